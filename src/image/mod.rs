@@ -1,0 +1,194 @@
+//! Planes of pixels, and the pair that everything starts from.
+
+use crate::error::{Error, Result};
+
+/// A rectangle of values, row by row from the top left.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plane<T> {
+    width: usize,
+    height: usize,
+    data: Vec<T>,
+}
+
+impl<T> Plane<T> {
+    /// A plane of `width` x `height` values, row by row from the top left.
+    ///
+    /// # Panics
+    /// When `data` does not hold exactly `width * height` values.
+    #[must_use]
+    pub fn new(width: usize, height: usize, data: Vec<T>) -> Self {
+        assert_eq!(data.len(), width * height, "a plane of {width} x {height}");
+        Self { width, height, data }
+    }
+
+    /// A plane whose value at (x, y) is `f(x, y)`.
+    pub fn from_fn(width: usize, height: usize, mut f: impl FnMut(usize, usize) -> T) -> Self {
+        let mut data = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                data.push(f(x, y));
+            }
+        }
+        Self { width, height, data }
+    }
+
+    /// Width in pixels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// (width, height) in pixels.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// All values, row by row.
+    #[must_use]
+    pub fn data(&self) -> &[T] {
+        &self.data
+    }
+
+    /// All values, row by row, to change.
+    pub fn data_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+
+    /// The values, row by row, without the plane around them.
+    #[must_use]
+    pub fn into_data(self) -> Vec<T> {
+        self.data
+    }
+
+    /// Row `y`.
+    #[must_use]
+    pub fn row(&self, y: usize) -> &[T] {
+        &self.data[y * self.width..(y + 1) * self.width]
+    }
+
+    /// A plane of the same size with `f` applied to each value.
+    pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Plane<U> {
+        Plane { width: self.width, height: self.height, data: self.data.iter().map(f).collect() }
+    }
+}
+
+impl<T: Clone> Plane<T> {
+    /// A plane that holds `value` everywhere.
+    #[must_use]
+    pub fn filled(width: usize, height: usize, value: T) -> Self {
+        Self { width, height, data: vec![value; width * height] }
+    }
+}
+
+impl<T> std::ops::Index<(usize, usize)> for Plane<T> {
+    type Output = T;
+
+    /// The value at (x, y).
+    fn index(&self, (x, y): (usize, usize)) -> &T {
+        &self.data[y * self.width + x]
+    }
+}
+
+impl<T> std::ops::IndexMut<(usize, usize)> for Plane<T> {
+    /// The value at (x, y), to change.
+    fn index_mut(&mut self, (x, y): (usize, usize)) -> &mut T {
+        &mut self.data[y * self.width + x]
+    }
+}
+
+/// One pixel as the matcher sees it: red, green, blue and grey, each in 1/256 of an 8-bit level (0 ..= 65280
+/// from 8-bit files, 0 ..= 65535 at most).
+pub type Pixel = [u16; 4];
+
+/// An image with the mask of what to ignore in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Colour and grey of each pixel.
+    pub pixels: Plane<Pixel>,
+    /// `true` where a pixel carries no information: its value is never looked at.
+    pub masked: Plane<bool>,
+}
+
+/// Grey of a colour by the weights of ITU-R BT.601, in integers: round(0.299 r + 0.587 g + 0.114 b).
+#[must_use]
+pub fn grey(r: u16, g: u16, b: u16) -> u16 {
+    ((299 * r as u32 + 587 * g as u32 + 114 * b as u32 + 500) / 1000) as u16
+}
+
+impl Image {
+    /// An image from 8-bit colours, nothing masked.
+    #[must_use]
+    pub fn from_rgb8(rgb: &Plane<[u8; 3]>) -> Self {
+        let pixels = rgb.map(|&[r, g, b]| {
+            let [r, g, b] = [r, g, b].map(|v| (v as u16) << 8);
+            [r, g, b, grey(r, g, b)]
+        });
+        let masked = Plane::filled(rgb.width(), rgb.height(), false);
+        Self { pixels, masked }
+    }
+
+    /// Width in pixels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.pixels.width()
+    }
+
+    /// Height in pixels.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.pixels.height()
+    }
+}
+
+/// A rectified pair. The left image is the reference: its pixel (x, y) with disparity d is seen at (x - d, y)
+/// in the right image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pair {
+    left: Image,
+    right: Image,
+}
+
+impl Pair {
+    /// A pair of images of one size.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] when the sizes differ or there is no pixel at all.
+    pub fn new(left: Image, right: Image) -> Result<Self> {
+        let (l, r) = (left.pixels.size(), right.pixels.size());
+        if l != r {
+            return Err(Error::Mismatch(format!(
+                "the left image is {} x {} and the right one {} x {}: a rectified pair has one size",
+                l.0, l.1, r.0, r.1
+            )));
+        }
+        if l.0 == 0 || l.1 == 0 {
+            return Err(Error::Mismatch("the images hold no pixel".into()));
+        }
+        Ok(Self { left, right })
+    }
+
+    /// The reference view.
+    #[must_use]
+    pub fn left(&self) -> &Image {
+        &self.left
+    }
+
+    /// The other view.
+    #[must_use]
+    pub fn right(&self) -> &Image {
+        &self.right
+    }
+
+    /// (width, height) of both views.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        self.left.pixels.size()
+    }
+}

@@ -1,0 +1,6 @@
+//! Stereo disparity by a multi-resolution factor graph.
+
+pub mod error;
+pub mod image;
+
+pub use error::{Error, Result};
