@@ -1,0 +1,412 @@
+//! The metrics themselves: pure functions of planes.
+//!
+//! The error of a pixel is |estimate - truth| in pixels, taken in `f64`. A pixel counts when its truth is known
+//! (finite) and it lies in the region asked for. An estimate that is infinite or NaN is *invalid*: it counts as bad
+//! at every threshold and is left out of everything that averages or ranks errors.
+
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
+use crate::error::{Error, Result};
+use crate::image::Plane;
+
+/// The thresholds of [`Metrics::bad`], in pixels of disparity.
+pub const THRESHOLDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+
+/// The mask's value for a pixel that both views see.
+const VISIBLE: u8 = 255;
+
+/// The errors of one map over one region.
+///
+/// In JSON the shares of bad pixels carry their thresholds: `bad0.5`, `bad1.0`, `bad2.0`, `bad4.0`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metrics {
+    /// Pixels of the region whose truth is known.
+    pub pixels: u64,
+    /// Share of `pixels` with a valid estimate, in percent, rounded to four decimals.
+    pub density: f64,
+    /// Mean absolute error of the valid pixels; `None` when there are none.
+    pub avg: Option<f64>,
+    /// Root of the mean squared error of the valid pixels; `None` when there are none.
+    pub rms: Option<f64>,
+    /// 10 log10(255^2 / MSE) in dB, the MSE that of `rms`; `None` when no pixel is valid, and for a perfect map,
+    /// for which it is infinite.
+    pub psnr: Option<f64>,
+    /// Share of `pixels` in percent whose error is above each of [`THRESHOLDS`], or whose estimate is invalid.
+    pub bad: [f64; 4],
+    /// Median of the absolute errors of the valid pixels; `None` when there are none.
+    ///
+    /// All quantiles interpolate linearly, as `numpy.quantile` does by default: of n errors in ascending order,
+    /// counted from 0, the quantile q is the value at position (n - 1) q, on the line between its two neighbours.
+    pub a50: Option<f64>,
+    /// The error that 90 % of the valid pixels stay below, interpolated as in `a50`.
+    pub a90: Option<f64>,
+    /// The error that 95 % of the valid pixels stay below, interpolated as in `a50`.
+    pub a95: Option<f64>,
+    /// The error that 99 % of the valid pixels stay below, interpolated as in `a50`.
+    pub a99: Option<f64>,
+}
+
+impl Serialize for Metrics {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Metrics", 13)?;
+        out.serialize_field("pixels", &self.pixels)?;
+        out.serialize_field("density", &self.density)?;
+        out.serialize_field("avg", &self.avg)?;
+        out.serialize_field("rms", &self.rms)?;
+        out.serialize_field("psnr", &self.psnr)?;
+        out.serialize_field("bad0.5", &self.bad[0])?;
+        out.serialize_field("bad1.0", &self.bad[1])?;
+        out.serialize_field("bad2.0", &self.bad[2])?;
+        out.serialize_field("bad4.0", &self.bad[3])?;
+        out.serialize_field("a50", &self.a50)?;
+        out.serialize_field("a90", &self.a90)?;
+        out.serialize_field("a95", &self.a95)?;
+        out.serialize_field("a99", &self.a99)?;
+        out.end()
+    }
+}
+
+/// The errors of one map.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Report {
+    /// Over every pixel whose truth is known.
+    pub all: Metrics,
+    /// Over those of them that both views see (mask 255); `None` without a mask, or when it leaves no pixel.
+    pub nonocc: Option<Metrics>,
+}
+
+/// Compares `estimate` with `truth` (not finite = unknown) over all known pixels and, where there is a `mask`
+/// (255 = both views see the pixel), over those that both views see.
+///
+/// # Errors
+/// [`Error::Mismatch`] when the sizes differ or no truth is known.
+pub fn evaluate(estimate: &Plane<f32>, truth: &Plane<f32>, mask: Option<&Plane<u8>>) -> Result<Report> {
+    if let Some(mask) = mask {
+        same_size("mask", mask.size(), truth.size())?;
+    }
+    let all = measure(estimate, truth, |_, _| true)?.ok_or_else(|| {
+        Error::Mismatch("the ground truth holds no known (finite) pixel: nothing to compare with".into())
+    })?;
+    let nonocc = match mask {
+        Some(mask) => measure(estimate, truth, |x, y| mask[(x, y)] == VISIBLE)?,
+        None => None,
+    };
+    Ok(Report { all, nonocc })
+}
+
+/// Compares `estimate` with `truth` over the pixels (x, y) whose truth is known (finite) and for which `region(x, y)`
+/// holds; `None` when there is no such pixel.
+///
+/// # Errors
+/// [`Error::Mismatch`] when the sizes differ.
+pub fn measure(
+    estimate: &Plane<f32>,
+    truth: &Plane<f32>,
+    region: impl Fn(usize, usize) -> bool,
+) -> Result<Option<Metrics>> {
+    same_size("disparity map", estimate.size(), truth.size())?;
+    let mut pixels = 0_u64;
+    let mut bad = [0_u64; 4];
+    let mut sum = Sum::default();
+    let mut squares = Sum::default();
+    let mut errors = Vec::new();
+    for y in 0..truth.height() {
+        for (x, (&d, &t)) in estimate.row(y).iter().zip(truth.row(y)).enumerate() {
+            if !t.is_finite() || !region(x, y) {
+                continue;
+            }
+            pixels += 1;
+            let error = (f64::from(d) - f64::from(t)).abs();
+            for (count, threshold) in bad.iter_mut().zip(THRESHOLDS) {
+                *count += u64::from(!d.is_finite() || error > threshold);
+            }
+            if d.is_finite() {
+                sum.add(error);
+                squares.add(error * error);
+                errors.push(error);
+            }
+        }
+    }
+    if pixels == 0 {
+        return Ok(None);
+    }
+    let percent = |count: u64| 100.0 * count as f64 / pixels as f64;
+    let valid = errors.len() as u64;
+    errors.sort_unstable_by(f64::total_cmp);
+    let mse = (valid > 0).then(|| squares.value() / valid as f64);
+    Ok(Some(Metrics {
+        pixels,
+        density: four_decimals(percent(valid)),
+        avg: (valid > 0).then(|| sum.value() / valid as f64),
+        rms: mse.map(f64::sqrt),
+        psnr: mse.filter(|&mse| mse > 0.0).map(|mse| 10.0 * (255.0 * 255.0 / mse).log10()),
+        bad: bad.map(percent),
+        a50: quantile(&errors, 0.50),
+        a90: quantile(&errors, 0.90),
+        a95: quantile(&errors, 0.95),
+        a99: quantile(&errors, 0.99),
+    }))
+}
+
+/// The average of each field over several pairs, every pair with the same weight; `None` of no reports.
+///
+/// A mean is over all the pairs or not at all: a field that one of them lacks (`nonocc` without a mask, the PSNR of
+/// a perfect map) is `None` in the mean, so that no figure silently stands for fewer pairs than its neighbour. The
+/// mean of `pixels` is rounded to the nearest integer, that of `density` is not rounded.
+pub fn mean<'a>(reports: impl IntoIterator<Item = &'a Report>) -> Option<Report> {
+    let reports: Vec<&Report> = reports.into_iter().collect();
+    let all = mean_metrics(&reports.iter().map(|r| &r.all).collect::<Vec<_>>())?;
+    let nonocc = reports.iter().map(|r| r.nonocc.as_ref()).collect::<Option<Vec<_>>>();
+    Some(Report { all, nonocc: nonocc.and_then(|m| mean_metrics(&m)) })
+}
+
+fn mean_metrics(metrics: &[&Metrics]) -> Option<Metrics> {
+    let every = |field: fn(&Metrics) -> Option<f64>| -> Option<f64> {
+        let mut sum = Sum::default();
+        for m in metrics {
+            sum.add(field(m)?);
+        }
+        (!metrics.is_empty()).then(|| sum.value() / metrics.len() as f64)
+    };
+    Some(Metrics {
+        pixels: every(|m| Some(m.pixels as f64))?.round() as u64,
+        density: every(|m| Some(m.density))?,
+        avg: every(|m| m.avg),
+        rms: every(|m| m.rms),
+        psnr: every(|m| m.psnr),
+        bad: [
+            every(|m| Some(m.bad[0]))?,
+            every(|m| Some(m.bad[1]))?,
+            every(|m| Some(m.bad[2]))?,
+            every(|m| Some(m.bad[3]))?,
+        ],
+        a50: every(|m| m.a50),
+        a90: every(|m| m.a90),
+        a95: every(|m| m.a95),
+        a99: every(|m| m.a99),
+    })
+}
+
+/// The planes of one comparison have one size.
+pub(super) fn same_size(what: &str, got: (usize, usize), truth: (usize, usize)) -> Result<()> {
+    if got == truth {
+        return Ok(());
+    }
+    Err(Error::Mismatch(format!(
+        "the {what} is {} x {} and the ground truth {} x {}: both must be of the reference view, at one resolution",
+        got.0, got.1, truth.0, truth.1
+    )))
+}
+
+/// `value` to four decimals, by way of its exact decimal expansion (ties to even).
+fn four_decimals(value: f64) -> f64 {
+    format!("{value:.4}").parse().unwrap_or(value)
+}
+
+/// The quantile `q` of ascending values, linearly interpolated; `None` of nothing.
+fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
+    let last = ascending.len().checked_sub(1)?;
+    let position = last as f64 * q;
+    let below = (position.floor() as usize).min(last);
+    let above = (below + 1).min(last);
+    let (a, b) = (ascending[below], ascending[above]);
+    Some(a + (b - a) * (position - below as f64))
+}
+
+/// A sum whose rounding errors are summed apart (Neumaier), so that it does not lose digits with length.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    total: f64,
+    lost: f64,
+}
+
+impl Sum {
+    fn add(&mut self, value: f64) {
+        let total = self.total + value;
+        self.lost += if self.total.abs() >= value.abs() {
+            (self.total - total) + value
+        } else {
+            (value - total) + self.total
+        };
+        self.total = total;
+    }
+
+    fn value(self) -> f64 {
+        self.total + self.lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INF: f32 = f32::INFINITY;
+
+    fn row(values: &[f32]) -> Plane<f32> {
+        Plane::new(values.len(), 1, values.to_vec())
+    }
+
+    fn close(got: f64, expected: f64) {
+        assert!((got - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{got} instead of {expected}");
+    }
+
+    fn close_some(got: Option<f64>, expected: f64) {
+        close(got.expect("a value"), expected);
+    }
+
+    fn close_all(got: [f64; 4], expected: [f64; 4]) {
+        for (got, expected) in got.into_iter().zip(expected) {
+            close(got, expected);
+        }
+    }
+
+    #[test]
+    fn a_case_computed_by_hand() {
+        // errors 0, 0.5, 1.5, 3, 5: at a threshold is not above it
+        let truth = row(&[10.0, 10.0, 10.0, 10.0, 10.0]);
+        let m = evaluate(&row(&[10.0, 10.5, 8.5, 13.0, 5.0]), &truth, None).unwrap().all;
+        assert_eq!(m.pixels, 5);
+        close(m.density, 100.0);
+        close_some(m.avg, 2.0);
+        let mse = (0.25 + 2.25 + 9.0 + 25.0) / 5.0;
+        close_some(m.rms, f64::sqrt(mse));
+        close_some(m.psnr, 20.0 * f64::log10(255.0) - 10.0 * f64::log10(mse));
+        close_all(m.bad, [60.0, 60.0, 40.0, 20.0]);
+        close_some(m.a50, 1.5);
+        close_some(m.a90, 3.0 + 0.6 * 2.0);
+        close_some(m.a95, 3.0 + 0.8 * 2.0);
+        close_some(m.a99, 3.0 + 0.96 * 2.0);
+    }
+
+    #[test]
+    fn invalid_pixels_are_bad_everywhere_and_averaged_nowhere() {
+        let truth = row(&[4.0, 4.0, 4.0, 4.0, 4.0, 4.0]);
+        let estimate = row(&[4.25, 3.75, INF, f32::NAN, f32::NEG_INFINITY, 7.0]);
+        let m = evaluate(&estimate, &truth, None).unwrap().all;
+        assert_eq!(m.pixels, 6);
+        close(m.density, 50.0);
+        close_some(m.avg, 3.5 / 3.0);
+        close_some(m.rms, f64::sqrt((0.0625 + 0.0625 + 9.0) / 3.0));
+        close_all(m.bad, [4.0, 4.0, 4.0, 3.0].map(|n| 100.0 * n / 6.0));
+        close_some(m.a50, 0.25);
+    }
+
+    #[test]
+    fn a_map_without_a_valid_pixel_has_shares_only() {
+        let m = evaluate(&row(&[INF, f32::NAN]), &row(&[1.0, 2.0]), None).unwrap().all;
+        assert_eq!((m.pixels, m.bad), (2, [100.0; 4]));
+        close(m.density, 0.0);
+        assert_eq!([m.avg, m.rms, m.psnr, m.a50, m.a90, m.a95, m.a99], [None; 7]);
+    }
+
+    #[test]
+    fn unknown_truth_does_not_count() {
+        let truth = row(&[INF, 3.0, f32::NAN, 3.0]);
+        let m = evaluate(&row(&[99.0, 3.0, INF, 5.0]), &truth, None).unwrap().all;
+        assert_eq!(m.pixels, 2);
+        close(m.density, 100.0);
+        close_some(m.avg, 1.0);
+        close_all(m.bad, [50.0, 50.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_perfect_map_has_no_psnr() {
+        let truth = row(&[1.0, 2.5, -3.0]);
+        let m = evaluate(&truth, &truth, None).unwrap().all;
+        assert_eq!((m.avg, m.rms, m.psnr, m.bad), (Some(0.0), Some(0.0), None, [0.0; 4]));
+        assert_eq!((m.a50, m.a99), (Some(0.0), Some(0.0)));
+    }
+
+    #[test]
+    fn the_mask_selects_what_both_views_see() {
+        let truth = Plane::new(2, 2, vec![1.0, 1.0, INF, 1.0]);
+        let estimate = Plane::new(2, 2, vec![1.0, 6.0, 9.0, 2.0]);
+        let mask = Plane::new(2, 2, vec![255, 128, 255, 255]);
+        let report = evaluate(&estimate, &truth, Some(&mask)).unwrap();
+        assert_eq!(report.all.pixels, 3);
+        close_some(report.all.avg, 2.0);
+        let nonocc = report.nonocc.unwrap();
+        assert_eq!(nonocc.pixels, 2);
+        close_some(nonocc.avg, 0.5);
+        close_all(nonocc.bad, [50.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn an_empty_region_has_no_metrics() {
+        let truth = row(&[1.0, INF]);
+        assert_eq!(measure(&truth, &truth, |_, _| false).unwrap(), None);
+        assert_eq!(measure(&truth, &truth, |x, _| x == 1).unwrap(), None);
+        let mask = Plane::new(2, 1, vec![128, 255]);
+        assert_eq!(evaluate(&truth, &truth, Some(&mask)).unwrap().nonocc, None);
+        let unknown = row(&[INF, INF]);
+        assert!(matches!(evaluate(&truth, &unknown, None), Err(Error::Mismatch(_))));
+    }
+
+    #[test]
+    fn sizes_must_agree() {
+        let (truth, wide) = (Plane::filled(3, 2, 0.0), Plane::filled(2, 3, 0.0));
+        let error = evaluate(&wide, &truth, None).unwrap_err().to_string();
+        assert!(error.contains("disparity map is 2 x 3") && error.contains("truth 3 x 2"), "{error}");
+        let error = evaluate(&truth, &truth, Some(&Plane::filled(3, 3, 255))).unwrap_err().to_string();
+        assert!(error.contains("mask is 3 x 3") && error.contains("truth 3 x 2"), "{error}");
+    }
+
+    #[test]
+    fn quantiles_interpolate() {
+        assert_eq!(quantile(&[], 0.5), None);
+        assert_eq!(quantile(&[7.0], 0.99), Some(7.0));
+        assert_eq!(quantile(&[1.0, 2.0], 0.5), Some(1.5));
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 1.0), Some(4.0));
+    }
+
+    #[test]
+    fn the_sum_keeps_what_plain_addition_loses() {
+        let mut sum = Sum::default();
+        for value in [1e16, 1.0, 1.0, -1e16] {
+            sum.add(value);
+        }
+        close(sum.value(), 2.0);
+    }
+
+    #[test]
+    fn means_are_over_all_pairs_or_none() {
+        let truth = row(&[4.0, 4.0]);
+        let mask = Plane::filled(2, 1, 255);
+        let one = evaluate(&row(&[5.0, 5.0]), &truth, Some(&mask)).unwrap();
+        let two = evaluate(&row(&[7.0, INF]), &truth, Some(&mask)).unwrap();
+        let perfect = evaluate(&truth, &truth, None).unwrap();
+
+        let m = mean([&one, &two]).unwrap();
+        assert_eq!(m.all.pixels, 2);
+        close(m.all.density, 75.0);
+        close_some(m.all.avg, 2.0);
+        close_some(m.all.rms, 2.0);
+        close_some(m.all.psnr, 20.0 * f64::log10(255.0) - 10.0 * f64::log10(9.0) / 2.0);
+        close_all(m.all.bad, [100.0, 50.0, 50.0, 25.0]);
+        close_some(m.all.a50, 2.0);
+        assert_eq!(m.nonocc.as_ref(), Some(&m.all));
+
+        let m = mean([&one, &perfect]).unwrap();
+        close_some(m.all.avg, 0.5);
+        assert_eq!((m.all.psnr, m.nonocc), (None, None));
+
+        assert_eq!(mean([]), None);
+    }
+
+    #[test]
+    fn json_names_carry_the_thresholds() {
+        let report = evaluate(&row(&[1.0, 2.0]), &row(&[1.0, 2.75]), None).unwrap();
+        let json = serde_json::to_string(&report).unwrap();
+        for part in [r#""all":{"pixels":2,"density":100.0,"avg":0.375,"rms":"#, r#""nonocc":null"#] {
+            assert!(json.contains(part), "{json}");
+        }
+        let shares = r#""bad0.5":50.0,"bad1.0":0.0,"bad2.0":0.0,"bad4.0":0.0,"a50":0.375,"a90":"#;
+        assert!(json.contains(shares), "{json}");
+    }
+
+    #[test]
+    fn density_has_four_decimals() {
+        let m = evaluate(&row(&[1.0, INF, INF]), &row(&[1.0; 3]), None).unwrap().all;
+        assert_eq!(m.density.to_string(), "33.3333");
+    }
+}
