@@ -1,0 +1,120 @@
+//! Matching cost of level 0: see [`crate::backend::Backend::cost`].
+
+use crate::image::{Image, Pair, Pixel};
+use crate::options::Cost;
+use crate::plan::{COST_MAX, Plan};
+use crate::tables;
+use rayon::prelude::*;
+
+const CENSUS_X: isize = 4;
+const CENSUS_Y: isize = 3;
+
+pub(super) fn run(plan: &Plan, pair: &Pair, out: &mut [u8]) {
+    match plan.method.cost {
+        Cost::AdCensus => ad_census(plan, pair, out),
+        Cost::Sad => sad(plan, pair, out),
+    }
+}
+
+fn difference(a: &Pixel, b: &Pixel) -> u32 {
+    (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum()
+}
+
+fn ad_census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
+    let level = &plan.levels[0];
+    let (left, right) = (pair.left(), pair.right());
+    let (ad, census) = (tables::ad_cost(), tables::census_cost());
+    let (left_census, right_census) = (census_bits(left), census_bits(right));
+    let width = level.width;
+    out.par_chunks_mut(width * level.stride).enumerate().for_each(|(y, row)| {
+        let (lp, rp) = (left.pixels.row(y), right.pixels.row(y));
+        let (lm, rm) = (left.masked.row(y), right.masked.row(y));
+        let (lc, rc) = (&left_census[y * width..][..width], &right_census[y * width..][..width]);
+        for (x, costs) in row.chunks_exact_mut(level.stride).enumerate() {
+            costs.fill(plan.outside_cost);
+            if lm[x] {
+                continue;
+            }
+            // x - d is inside for first <= label index < end.
+            let first = (x as i64 - (width as i64 - 1) - i64::from(level.min)).max(0);
+            let end = (x as i64 - i64::from(level.min) + 1).min(level.labels as i64);
+            for j in first..end {
+                let xr = (x as i64 - i64::from(level.min) - j) as usize;
+                if !rm[xr] {
+                    let colour = ad[(difference(&lp[x], &rp[xr]) >> 8) as usize];
+                    let bits = (lc[x] ^ rc[xr]).count_ones() as usize;
+                    costs[j as usize] = colour + census[bits];
+                }
+            }
+        }
+    });
+}
+
+/// The census of every pixel: a bit for each other place of the window in raster order.
+fn census_bits(image: &Image) -> Vec<u64> {
+    let (width, height) = image.pixels.size();
+    let clamp = |v: isize, size: usize| v.clamp(0, size as isize - 1) as usize;
+    // A masked pixel is below nobody.
+    let grey = |x: usize, y: usize| if image.masked[(x, y)] { u16::MAX } else { image.pixels[(x, y)][3] };
+    let mut out = vec![0; width * height];
+    out.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, bits) in row.iter_mut().enumerate() {
+            let centre = image.pixels[(x, y)][3];
+            for dy in -CENSUS_Y..=CENSUS_Y {
+                let ny = clamp(y as isize + dy, height);
+                for dx in -CENSUS_X..=CENSUS_X {
+                    if (dx, dy) != (0, 0) {
+                        let below = grey(clamp(x as isize + dx, width), ny) < centre;
+                        *bits = *bits << 1 | u64::from(below);
+                    }
+                }
+            }
+        }
+    });
+    out
+}
+
+fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
+    let level = &plan.levels[0];
+    let (width, height) = (level.width, level.height);
+    let radius = plan.method.sad_window as usize / 2;
+    let (left, right) = (pair.left(), pair.right());
+    out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
+        || vec![(0u64, 0u32); width + 1],
+        |sums, (y, row)| {
+            row.fill(plan.outside_cost);
+            let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);
+            for j in 0..level.labels {
+                let d = i64::from(level.min) + j as i64;
+                let inside = d.max(0)..(width as i64 + d.min(0));
+                if inside.is_empty() {
+                    continue;
+                }
+                let inside = inside.start as usize..inside.end as usize;
+                // Running sums along the row of (difference, valid pairs) over the window's rows.
+                let mut running = (0u64, 0);
+                sums[inside.start] = running;
+                for x in inside.clone() {
+                    let xr = (x as i64 - d) as usize;
+                    for ny in rows.clone() {
+                        if !left.masked[(x, ny)] && !right.masked[(xr, ny)] {
+                            running.0 += u64::from(difference(&left.pixels[(x, ny)], &right.pixels[(xr, ny)]));
+                            running.1 += 1;
+                        }
+                    }
+                    sums[x + 1] = running;
+                }
+                for x in inside.clone() {
+                    let xr = (x as i64 - d) as usize;
+                    if left.masked[(x, y)] || right.masked[(xr, y)] {
+                        continue;
+                    }
+                    let from = sums[x.saturating_sub(radius).max(inside.start)];
+                    let to = sums[(x + radius + 1).min(inside.end)];
+                    let (sum, count) = ((to.0 - from.0) as u32, to.1 - from.1);
+                    row[x * level.stride + j] = ((sum + 384 * count) / (768 * count)).min(COST_MAX.into()) as u8;
+                }
+            }
+        },
+    );
+}

@@ -1,0 +1,151 @@
+//! The seam: what every backend can do, one method a stage.
+//!
+//! A backend knows stages, not their order; [`crate::solver`] alone knows that. Everything from the matching cost
+//! on is integer arithmetic, so all backends give the same bits. The documentation of each method is the
+//! definition that the CPU stage, the shader and the naive twin in the tests follow independently.
+
+pub mod cpu;
+
+use crate::error::Result;
+use crate::graph::LevelGraph;
+use crate::image::{Pair, Plane};
+use crate::plan::Plan;
+
+/// Stands for "no label", in the right view where no left pixel projects.
+pub const NO_LABEL: u16 = u16::MAX;
+
+/// The belief of one pixel around its optimum, in units.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Peak {
+    /// Index of the label with the smallest belief, the lowest on ties.
+    pub label: u16,
+    /// Its belief.
+    pub best: u16,
+    /// The belief of the label below, [`u16::MAX`] if there is none.
+    pub lower: u16,
+    /// The belief of the label above, [`u16::MAX`] if there is none.
+    pub upper: u16,
+    /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
+    pub rival: u16,
+}
+
+/// What leaves a backend after the last iteration.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Estimate {
+    /// The optimum of each pixel of the reference view.
+    pub peaks: Plane<Peak>,
+    /// Label index of each pixel of the right view, read off the same beliefs; [`NO_LABEL`] where no left pixel
+    /// projects.
+    pub right: Plane<u16>,
+}
+
+/// A volume that tests and diagnostics may read and write, in the layout \[y\]\[x\]\[slot\]\[label\] (slot only
+/// for dependency messages), unpadded, one value an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Volume {
+    /// Matching cost: in cost units at level 0, in 1/256 cost units at coarser levels.
+    Cost(usize),
+    /// Evidence e.
+    Evidence(usize),
+    /// Messages of the dependency factors to their members.
+    Dependency(usize),
+    /// Messages of the resolution factors above to the pixels of this level.
+    Down(usize),
+    /// Messages of the resolution factors of this level to their own, coarse pixel.
+    Up(usize),
+    /// Beliefs b.
+    Belief(usize),
+}
+
+/// The stages of the method.
+pub trait Backend {
+    /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
+    fn describe(&self) -> String;
+
+    /// Takes the pair and the graphs of all levels of `plan`, allocates all buffers, and sets all messages to 0.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
+    fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
+
+    /// Matching cost of level 0, 0 ..= [`crate::plan::COST_MAX`].
+    ///
+    /// The cost of pixel (x, y) and disparity d compares left (x, y) with right (x - d, y). It is
+    /// [`Plan::outside_cost`] when x - d is outside the image or either pixel is masked. Otherwise:
+    /// - SAD: round(S / (768 n)), at most [`crate::plan::COST_MAX`], ties up, where n counts the places (i, j) of the
+    ///   window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked, and S sums
+    ///   |dr| + |dg| + |db| over them.
+    /// - AD-census: [`crate::tables::ad_cost`] at (|dr| + |dg| + |db|) >> 8 plus [`crate::tables::census_cost`] at the
+    ///   number of census bits that differ. The census of a pixel has a bit for each other place of a 9 x 7
+    ///   window, set where that place, clamped to the image, is unmasked and its grey is below the centre's.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when the device fails; so for all stages.
+    fn cost(&mut self) -> Result<()>;
+
+    /// Cost of `level` (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
+    /// 256 times).
+    ///
+    /// First d: for coarse label z, with low-pass the binomial mean (1 4 6 4 1) of the fine costs at 2 z - 2 ..= 2 z + 2,
+    /// labels clamped to the fine range; with the minimum, the smallest of the fine costs at those labels of
+    /// 2 z - 1 ..= 2 z + 1 that are in the range. Then x and y: the 5 x 5 binomial mean around (2 x, 2 y),
+    /// coordinates clamped to the image. Each of the two means is rounded once: (sum + half) >> bits, with sums of
+    /// weights 16 and 256.
+    fn pyramid(&mut self, level: usize) -> Result<()>;
+
+    /// Evidence of `level` from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
+    /// beliefs equal to the evidence.
+    fn evidence(&mut self, level: usize) -> Result<()>;
+
+    /// Messages of the dependency factors of `level`, from the beliefs and their own old messages.
+    ///
+    /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
+    /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, cut by
+    /// [`Plan::dependency`] with its bounds for the smallest s. A factor of one member sends 0. Slots without a
+    /// member keep 0.
+    fn dependency(&mut self, level: usize) -> Result<()>;
+
+    /// Messages of the resolution factors between `level` (1 or coarser) and the next finer one, in both directions,
+    /// from the beliefs and their own old messages.
+    ///
+    /// Each coarse pixel (x, y) has one factor with its children (2 x, 2 y) to (2 x + 1, 2 y + 1), as far as they are
+    /// inside. q is the belief less the factor's old message (less its minimum where the rule is absolute). Labels d
+    /// and z agree when |d - 2 z| is at most 1 (interpolating) or 0 (strict). U\[c\](z) is the smallest q\[c\](d) of
+    /// the d that agree with z, infinite if none does. To the parent: s(z) = the sum of U\[c\](z). To child c:
+    /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
+    /// infinite if none does. Each s is cut by [`Plan::resolution`] with its bounds for the smallest s. Infinite is
+    /// 2^20, and sums saturate there; where every s is infinite, the message is 0.
+    fn resolution(&mut self, level: usize) -> Result<()>;
+
+    /// Beliefs of `level`: evidence, plus every dependency message to the pixel, plus the resolution messages from
+    /// above and from below.
+    fn belief(&mut self, level: usize) -> Result<()>;
+
+    /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
+    /// call (of label indices; from 0 on the first call).
+    fn change(&mut self) -> Result<u64>;
+
+    /// The optimum of every pixel, and the map of the right view: at right pixel (x, y) the d with the smallest
+    /// belief of left pixel (x + d, y) among those inside, the lowest on ties.
+    fn estimate(&mut self) -> Result<Estimate>;
+
+    /// The values of `volume`.
+    fn read(&mut self, volume: Volume) -> Result<Vec<u32>>;
+
+    /// Replaces the values of `volume`.
+    fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()>;
+}
+
+/// Number of values in `volume` under `plan`, and labels in a row of them, without and with padding.
+#[must_use]
+pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
+    let (z, rows) = match volume {
+        Volume::Dependency(z) => (z, plan.slots()),
+        Volume::Cost(z) | Volume::Evidence(z) | Volume::Down(z) | Volume::Up(z) | Volume::Belief(z) => (z, 1),
+    };
+    let level = &plan.levels[z];
+    (level.pixels() * rows, level.labels, level.stride)
+}
+
+/// The cost in cost units of level 0 that [`Backend::cost`] never exceeds, in the 1/256 of coarser levels.
+pub const FINE_COST_SHIFT: u32 = crate::plan::COST_FRACTION_BITS;

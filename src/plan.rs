@@ -1,0 +1,369 @@
+//! What a match will do, worked out before it does anything: levels, integer parameters, bounds, memory.
+//!
+//! Pure: a plan depends on the image size, the disparity range and the [`Method`] alone, so it is the same on
+//! every machine, can be tested without a device, and is what `--dry-run` prints.
+//!
+//! # Units
+//! Messages, evidence and beliefs are costs, -log of the paper's probabilities, in [`UNITS_PER_NAT`] units a nat.
+//! All are non-negative integers; every message has minimum 0 over the labels.
+
+use crate::error::Result;
+use crate::options::{Cost, DisparityRange, Method, Potential, Pyramid, Resolution, Schedule};
+use crate::tables::AD_CENSUS_UNITS;
+
+/// Units of cost in one nat.
+pub const UNITS_PER_NAT: f64 = 4.0;
+/// Cap of a hard potential's messages, in units: the largest for which no belief exceeds 16 bits even where a
+/// pixel is a member of all 49 factors of its window, at two resolution messages and the largest evidence.
+pub const HARD_CAP: u16 = 1023;
+/// Largest matching cost at level 0, in cost units.
+pub const COST_MAX: u8 = 254;
+/// Fractional bits of the costs of level 1 and coarser.
+pub const COST_FRACTION_BITS: u32 = 8;
+/// Fractional bits of [`EvidenceScale::multiplier`].
+pub const EVIDENCE_BITS: u32 = 22;
+/// Side of the window that holds a dependency factor's members.
+pub const GRAPH_WINDOW: usize = 7;
+/// Labels are stored in blocks of this many; the last block is padded.
+pub const LABEL_BLOCK: usize = 16;
+
+const _: () = assert!(255 + (GRAPH_WINDOW * GRAPH_WINDOW + 2) as u32 * HARD_CAP as u32 <= u16::MAX as u32);
+
+/// Size of one level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LevelPlan {
+    /// Width in pixels, ceil(W / 2^z).
+    pub width: usize,
+    /// Height in pixels, ceil(H / 2^z).
+    pub height: usize,
+    /// Smallest label, floor(min / 2^z).
+    pub min: i32,
+    /// Number of labels, up to ceil(max / 2^z).
+    pub labels: usize,
+    /// Labels with padding: `labels` rounded up to whole blocks of [`LABEL_BLOCK`].
+    pub stride: usize,
+    /// From cost to evidence at this level.
+    pub evidence: EvidenceScale,
+}
+
+impl LevelPlan {
+    /// Number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Largest label.
+    #[must_use]
+    pub fn max(&self) -> i32 {
+        self.min + self.labels as i32 - 1
+    }
+}
+
+/// From cost to evidence: with c in 1/256 cost units,
+/// e(d) = (min(c(d) - min c, limit) * multiplier + 2^21) >> 22, at most `cap`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EvidenceScale {
+    /// Evidence units per 1/256 cost unit, with [`EVIDENCE_BITS`] fractional bits.
+    pub multiplier: u32,
+    /// The smallest difference of costs that gives the cap; differences beyond it count as this one.
+    pub limit: u32,
+    /// Largest evidence, in units.
+    pub cap: u32,
+}
+
+impl EvidenceScale {
+    fn new(gain: f64, cost_units: f64, method: &Method) -> Self {
+        let per_cost = gain * UNITS_PER_NAT / (method.temperature * cost_units * 256.0);
+        let multiplier =
+            (per_cost * f64::from(1u32 << EVIDENCE_BITS) + 0.5).floor().clamp(1.0, f64::from(1u32 << 30)) as u32;
+        let cap = (method.evidence_cap * UNITS_PER_NAT + 0.5).floor() as u32;
+        Self { multiplier, limit: (cap << EVIDENCE_BITS).div_ceil(multiplier), cap }
+    }
+
+    /// Evidence for a cost `difference` above the pixel's cheapest label, in 1/256 cost units.
+    #[must_use]
+    pub fn apply(self, difference: u32) -> u8 {
+        let product = difference.min(self.limit) * self.multiplier + (1 << (EVIDENCE_BITS - 1));
+        (product >> EVIDENCE_BITS).min(self.cap) as u8
+    }
+}
+
+/// Storage width of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MessageWidth {
+    /// Messages in 8 bits, sums over a factor in 16.
+    Narrow,
+    /// Messages in 16 bits, sums over a factor in 32.
+    Wide,
+}
+
+/// How a sum of messages s becomes a message m(d) = min(s(d), high) - low.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// What disagreement costs, in units.
+    pub tau: u16,
+    /// Where to cut.
+    pub rule: CutRule,
+}
+
+/// Where a message is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CutRule {
+    /// At tau above the smallest sum: high = min s + tau, low = min s.
+    Relative,
+    /// At tau, the members' messages having minimum 0: high = tau, low = min(min s, tau).
+    Absolute,
+}
+
+impl Cut {
+    /// (high, low) for the smallest sum `min`.
+    #[must_use]
+    pub fn bounds(self, min: u32) -> (u32, u32) {
+        let tau = u32::from(self.tau);
+        match self.rule {
+            CutRule::Relative => (min + tau, min),
+            CutRule::Absolute => (tau, min.min(tau)),
+        }
+    }
+}
+
+/// One step of the schedule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Phase {
+    /// The finest level that takes part; all coarser ones do too.
+    pub finest: usize,
+    /// Iterations, at most.
+    pub iterations: u32,
+}
+
+/// What a match will do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The method that it follows.
+    pub method: Method,
+    /// The disparities searched.
+    pub range: DisparityRange,
+    /// Every level, the finest first.
+    pub levels: Vec<LevelPlan>,
+    /// Neighbours of a dependency factor besides its centre.
+    pub neighbours: usize,
+    /// Cost of labels outside the right image, in cost units of level 0.
+    pub outside_cost: u8,
+    /// Cut of dependency messages.
+    pub dependency: Cut,
+    /// Cut of resolution messages.
+    pub resolution: Cut,
+    /// Storage width of both kinds of message.
+    pub message_width: MessageWidth,
+    /// The flooding, in order.
+    pub phases: Vec<Phase>,
+}
+
+impl Plan {
+    /// The plan for images of `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// [`crate::Error::Option`] when the method is out of its ranges.
+    pub fn new(width: usize, height: usize, range: DisparityRange, method: &Method) -> Result<Self> {
+        let method = method.clone().validated()?;
+        let cost_units = match method.cost {
+            Cost::Sad => 1.0,
+            Cost::AdCensus => AD_CENSUS_UNITS,
+        };
+        let mut levels = Vec::new();
+        let mut gain = 1.0;
+        let (mut size, mut min, mut max) = ((width, height), range.min, range.max);
+        for _ in 0..method.levels {
+            let labels = (max - min + 1) as usize;
+            levels.push(LevelPlan {
+                width: size.0,
+                height: size.1,
+                min,
+                labels,
+                stride: labels.next_multiple_of(LABEL_BLOCK),
+                evidence: EvidenceScale::new(gain, cost_units, &method),
+            });
+            if size.0.max(size.1) == 1 {
+                break;
+            }
+            size = (size.0.div_ceil(2), size.1.div_ceil(2));
+            (min, max) = (min.div_euclid(2), -((-max).div_euclid(2)));
+            gain *= method.evidence_gain;
+        }
+
+        let window = GRAPH_WINDOW * GRAPH_WINDOW;
+        // The tolerance keeps 48 (1 - 75 / 100) = 12 at 12 whatever the last bit of the product.
+        let neighbours =
+            (((window - 1) as f64 * (100.0 - method.percentile) / 100.0) - 1e-9).ceil().max(0.0) as usize;
+        let cut = |nats: f64| match method.potential {
+            Potential::Hard => Cut { tau: HARD_CAP, rule: CutRule::Relative },
+            Potential::Soft => Cut { tau: units(nats), rule: CutRule::Relative },
+            Potential::Exact => Cut { tau: units(nats), rule: CutRule::Absolute },
+        };
+        let (dependency, resolution) = (cut(method.dependency_cut), cut(method.resolution_cut));
+        let belief_bound =
+            levels[0].evidence.cap + window as u32 * u32::from(dependency.tau) + 2 * u32::from(resolution.tau);
+        // A pixel's padding labels count as labels with evidence 255.
+        let sum_bound = (neighbours + 1) as u32 * (belief_bound + 255);
+        let narrow = dependency.tau.max(resolution.tau) <= 255 && sum_bound <= u32::from(u16::MAX);
+
+        let last = levels.len() - 1;
+        let phases = match method.schedule {
+            Schedule::Together => vec![Phase { finest: 0, iterations: method.iterations }],
+            Schedule::CoarseFirst => (0..=last)
+                .rev()
+                .map(|finest| Phase {
+                    finest,
+                    iterations: if finest == 0 { method.final_iterations } else { method.iterations },
+                })
+                .collect(),
+        };
+        Ok(Self {
+            outside_cost: (method.outside_cost * cost_units + 0.5).floor() as u8,
+            range,
+            levels,
+            neighbours,
+            dependency,
+            resolution,
+            message_width: if narrow { MessageWidth::Narrow } else { MessageWidth::Wide },
+            phases,
+            method,
+        })
+    }
+
+    /// (width, height) of the finest level.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        (self.levels[0].width, self.levels[0].height)
+    }
+
+    /// Members of a dependency factor: the centre and its neighbours.
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.neighbours + 1
+    }
+
+    /// Bytes of one stored message value.
+    #[must_use]
+    pub fn message_bytes(&self) -> usize {
+        match self.message_width {
+            MessageWidth::Narrow => 1,
+            MessageWidth::Wide => 2,
+        }
+    }
+
+    /// Whether the pyramid takes the minimum over d instead of the low-pass.
+    #[must_use]
+    pub fn minimum_over_d(&self) -> bool {
+        self.method.pyramid == Pyramid::Minimum
+    }
+
+    /// Whether odd labels agree with both their coarse neighbours.
+    #[must_use]
+    pub fn interpolating(&self) -> bool {
+        self.method.resolution == Resolution::Interpolating
+    }
+
+    /// 2 z_min - d_min between `level` - 1 and `level`: 0, or -1 where the finer level's smallest label is odd.
+    /// Coarse label index j agrees best with the fine label index 2 j + offset.
+    #[must_use]
+    pub fn label_offset(&self, level: usize) -> i32 {
+        2 * self.levels[level].min - self.levels[level - 1].min
+    }
+
+    /// Bytes that the volumes and the graph of `level` take.
+    #[must_use]
+    pub fn level_bytes(&self, level: usize) -> u64 {
+        let l = &self.levels[level];
+        let cells = (l.pixels() * l.stride) as u64;
+        let cost = if level == 0 { 1 } else { 2 };
+        let up = if level == 0 { 0 } else { self.message_bytes() };
+        let down = if level + 1 == self.levels.len() { 0 } else { self.message_bytes() };
+        let volumes = cost + 1 + 2 + up + down + self.slots() * self.message_bytes();
+        // The member codes, and the transposed table with its row starts.
+        let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
+        cells * volumes as u64 + graph as u64
+    }
+
+    /// Bytes that all volumes and graphs take together.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (0..self.levels.len()).map(|z| self.level_bytes(z)).sum()
+    }
+}
+
+/// A cut in units, at least one.
+fn units(nats: f64) -> u16 {
+    ((nats * UNITS_PER_NAT + 0.5).floor() as u16).clamp(1, HARD_CAP)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(w: usize, h: usize, min: i32, max: i32) -> Plan {
+        Plan::new(w, h, DisparityRange::new(min, max).unwrap(), &Method::default()).unwrap()
+    }
+
+    #[test]
+    fn levels_cover_the_range_and_the_image() {
+        let p = plan(450, 375, -5, 59);
+        assert_eq!(p.levels.len(), 6);
+        for z in 1..p.levels.len() {
+            let (fine, coarse) = (p.levels[z - 1], p.levels[z]);
+            assert_eq!(coarse.width, fine.width.div_ceil(2));
+            assert_eq!(coarse.height, fine.height.div_ceil(2));
+            assert!(2 * coarse.min <= fine.min && 2 * coarse.max() >= fine.max());
+            assert!((-1..=0).contains(&p.label_offset(z)));
+            for d in fine.min..=fine.max() {
+                assert!((coarse.min..=coarse.max()).any(|label| (d - 2 * label).abs() <= 1));
+            }
+        }
+        assert_eq!((p.levels[3].min, p.levels[3].max()), (-1, 8));
+    }
+
+    #[test]
+    fn percentiles_count_neighbours() {
+        for (percentile, count) in [(97.0, 2), (92.0, 4), (84.0, 8), (75.0, 12), (100.0, 0), (0.0, 48)] {
+            let mut method = Method::default();
+            method.percentile = percentile;
+            let p = Plan::new(9, 9, DisparityRange::new(0, 3).unwrap(), &method).unwrap();
+            assert_eq!(p.neighbours, count, "{percentile} %");
+        }
+    }
+
+    #[test]
+    fn tiny_images_have_fewer_levels() {
+        assert_eq!(plan(1, 1, 0, 0).levels.len(), 1);
+        assert_eq!(plan(1, 3, 0, 7).levels.len(), 3);
+    }
+
+    #[test]
+    fn evidence_is_monotone_and_reaches_its_cap() {
+        for temperature in [0.001, 0.15, 0.8, 40.0] {
+            let mut method = Method::default();
+            method.temperature = temperature;
+            for gain in [1.0, 243.0] {
+                let scale = EvidenceScale::new(gain, AD_CENSUS_UNITS, &method);
+                let mut last = 0;
+                for difference in 0..=u16::MAX {
+                    let e = scale.apply(difference.into());
+                    assert!(e >= last && u32::from(e) <= scale.cap);
+                    let exact = f64::from(difference) * gain * 4.0 / (temperature * 127.0 * 256.0);
+                    let error = (f64::from(e) - exact.min(32.0)).abs();
+                    assert!(error <= 0.51 + 0.01 * exact.min(32.0), "{difference}: {e} against {exact}");
+                    last = e;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_paper_needs_wide_messages_and_the_default_narrow_ones() {
+        let range = DisparityRange::new(0, 59).unwrap();
+        let paper = Plan::new(450, 375, range, &Method::preset("paper").unwrap()).unwrap();
+        assert_eq!(paper.message_width, MessageWidth::Wide);
+        assert_eq!(plan(450, 375, 0, 59).message_width, MessageWidth::Narrow);
+    }
+}
