@@ -1,5 +1,7 @@
 //! Planes of pixels, and the pair that everything starts from.
 
+pub mod calib;
+
 use crate::error::{Error, Result};
 
 /// A rectangle of values, row by row from the top left.
