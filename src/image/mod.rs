@@ -1,6 +1,7 @@
 //! Planes of pixels, and the pair that everything starts from.
 
 pub mod calib;
+pub mod colour;
 
 use crate::error::{Error, Result};
 
