@@ -2,6 +2,9 @@
 
 pub mod calib;
 pub mod colour;
+pub mod pfm;
+pub mod read;
+pub mod write;
 
 use crate::error::{Error, Result};
 
