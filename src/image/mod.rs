@@ -1,5 +1,11 @@
 //! Planes of pixels, and the pair that everything starts from.
 
+pub mod calib;
+pub mod colour;
+pub mod pfm;
+pub mod read;
+pub mod write;
+
 use crate::error::{Error, Result};
 
 /// A rectangle of values, row by row from the top left.

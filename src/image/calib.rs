@@ -1,0 +1,200 @@
+//! `calib.txt`, the calibration file of the Middlebury benchmark.
+
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
+/// A calibration file is a dozen lines; no more than this is read of one.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// What `calib.txt` says about a pair. Every entry is optional, for the benchmarks leave out different ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Calibration {
+    /// Bound on the number of disparity levels: disparities are in `0 .. ndisp`, in pixels.
+    pub ndisp: Option<u32>,
+    /// Focal length of the left camera in pixels (the first entry of `cam0`).
+    pub focal_length: Option<f64>,
+    /// Horizontal offset of the principal points, `cx1 - cx0`, in pixels.
+    pub doffs: Option<f64>,
+    /// Distance of the cameras, in the unit of the file (Middlebury: millimetres).
+    pub baseline: Option<f64>,
+    /// Width of the images in pixels.
+    pub width: Option<u32>,
+    /// Height of the images in pixels.
+    pub height: Option<u32>,
+    /// Tight lower bound of the disparities, in pixels.
+    pub vmin: Option<f64>,
+    /// Tight upper bound of the disparities, in pixels.
+    pub vmax: Option<f64>,
+}
+
+impl Calibration {
+    /// Reads `calib.txt` from the folder of `image`; `None` when there is none.
+    ///
+    /// # Errors
+    /// As [`Calibration::read`].
+    pub fn beside(image: &Path) -> Result<Option<Self>> {
+        let path = image.with_file_name("calib.txt");
+        if path.exists() { Self::read(&path).map(Some) } else { Ok(None) }
+    }
+
+    /// Reads a calibration file.
+    ///
+    /// # Errors
+    /// [`Error::Read`] when the file cannot be read, or names the line and the key whose value makes no sense.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut bytes = Vec::new();
+        std::fs::File::open(path)
+            .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+            .map_err(|e| Error::read(path, e))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(Error::read(path, "larger than any calibration file; is it one?"));
+        }
+        // Only the keys known here matter, and they are ASCII.
+        Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::read(path, reason))
+    }
+
+    /// Parses `key=value` lines. Keys that are not known, and lines without `=` that begin with none, are
+    /// skipped; the error names line and key.
+    fn parse(text: &str) -> std::result::Result<Self, String> {
+        let mut calibration = Self::default();
+        for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+            let at = |key: &str, reason: String| format!("line {}: {key}: {reason}", i + 1);
+            let Some((key, value)) = line.split_once('=') else {
+                let word = line.split([' ', '\t', ':']).find(|w| !w.is_empty()).unwrap_or_default();
+                if KEYS.contains(&word) {
+                    return Err(at(word, "expected key=value".into()));
+                }
+                continue;
+            };
+            let (key, value) = (key.trim(), value.trim());
+            let put = match key {
+                "ndisp" => count(value).map(|v| calibration.ndisp = Some(v)),
+                "width" => count(value).map(|v| calibration.width = Some(v)),
+                "height" => count(value).map(|v| calibration.height = Some(v)),
+                "doffs" => number(value).map(|v| calibration.doffs = Some(v)),
+                "baseline" => number(value).map(|v| calibration.baseline = Some(v)),
+                "vmin" => number(value).map(|v| calibration.vmin = Some(v)),
+                "vmax" => number(value).map(|v| calibration.vmax = Some(v)),
+                "cam0" => focal_length(value).map(|v| calibration.focal_length = Some(v)),
+                "cam1" => focal_length(value).map(|_| ()),
+                _ => Ok(()),
+            };
+            put.map_err(|reason| at(key, reason))?;
+        }
+        Ok(calibration)
+    }
+}
+
+const KEYS: [&str; 9] = ["ndisp", "width", "height", "doffs", "baseline", "vmin", "vmax", "cam0", "cam1"];
+
+/// A finite number.
+fn number(text: &str) -> std::result::Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("{} is no number", quoted(text)))
+}
+
+/// A whole number from 1.
+fn count(text: &str) -> std::result::Result<u32, String> {
+    text.parse().ok().filter(|&v| v > 0).ok_or_else(|| format!("{} is no whole number from 1", quoted(text)))
+}
+
+/// The first entry of a camera matrix `[f 0 cx; 0 f cy; 0 0 1]`.
+fn focal_length(text: &str) -> std::result::Result<f64, String> {
+    let wrong = || format!("{} is no camera matrix like [f 0 cx; 0 f cy; 0 0 1]", quoted(text));
+    let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).ok_or_else(wrong)?;
+    let mut entries = Vec::new();
+    for row in inner.split(';') {
+        let row: Vec<f64> = row
+            .split([' ', '\t', ','])
+            .filter(|w| !w.is_empty())
+            .map(number)
+            .collect::<std::result::Result<_, _>>()?;
+        if row.len() != 3 {
+            return Err(wrong());
+        }
+        entries.extend(row);
+    }
+    match entries[..] {
+        [f, _, _, _, _, _, _, _, _] if f > 0.0 => Ok(f),
+        _ => Err(wrong()),
+    }
+}
+
+/// The text as a message may quote it: not longer than a glance.
+fn quoted(text: &str) -> String {
+    format!("{:?}", text.chars().take(60).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOTORCYCLE: &str = "cam0=[3979.911 0 1244.772; 0 3979.911 1019.507; 0 0 1]\n\
+        cam1=[3979.911 0 1369.115; 0 3979.911 1019.507; 0 0 1]\ndoffs=124.343\nbaseline=193.001\n\
+        width=2964\nheight=2000\nndisp=280\nisint=0\nvmin=31\nvmax=257\ndyavg=0.918\ndymax=1.516\n";
+
+    fn expected() -> Calibration {
+        Calibration {
+            ndisp: Some(280),
+            focal_length: Some(3979.911),
+            doffs: Some(124.343),
+            baseline: Some(193.001),
+            width: Some(2964),
+            height: Some(2000),
+            vmin: Some(31.0),
+            vmax: Some(257.0),
+        }
+    }
+
+    #[test]
+    fn reads_the_benchmarks_file() {
+        assert_eq!(Calibration::parse(MOTORCYCLE).unwrap(), expected());
+        // As edited elsewhere.
+        let edited = format!("\u{feff}{}", MOTORCYCLE.replace('\n', "\r\n\r\n").replace('=', " = "));
+        assert_eq!(Calibration::parse(&edited).unwrap(), expected());
+    }
+
+    #[test]
+    fn what_is_unknown_is_skipped() {
+        let text = "P0: 7.2e2 0 6e2\nsome words\nndisp=64\nrig=\u{fffd}\n\n";
+        assert_eq!(Calibration::parse(text).unwrap(), Calibration { ndisp: Some(64), ..Default::default() });
+        assert_eq!(Calibration::parse("").unwrap(), Calibration::default());
+    }
+
+    #[test]
+    fn errors_name_line_and_key() {
+        for (text, words) in [
+            ("width=3\nndisp=many", ["line 2", "ndisp"]),
+            ("ndisp=-3", ["line 1", "ndisp"]),
+            ("ndisp=0", ["line 1", "ndisp"]),
+            ("ndisp=99999999999", ["line 1", "ndisp"]),
+            ("ndisp 64", ["line 1", "ndisp"]),
+            ("\nheight=", ["line 2", "height"]),
+            ("vmin=NaN", ["line 1", "vmin"]),
+            ("doffs=inf", ["line 1", "doffs"]),
+            ("cam0=[1 0 2; 0 1 2]", ["line 1", "cam0"]),
+            ("cam0=[1 0 2; 0 1 2; 0 0 1", ["line 1", "cam0"]),
+            ("cam0=[1 0 2; 0 1 x; 0 0 1]", ["line 1", "cam0"]),
+            ("cam0=[1 0; 2 0 1 2; 0 0 1]", ["line 1", "cam0"]),
+            ("cam1=[-1 0 2; 0 1 2; 0 0 1]", ["line 1", "cam1"]),
+        ] {
+            let reason = Calibration::parse(text).unwrap_err();
+            assert!(words.iter().all(|w| reason.contains(w)), "{text:?}: {reason}");
+            assert!(!reason.contains('\n'), "{reason}");
+        }
+    }
+
+    #[test]
+    fn found_beside_the_image() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = folder.path().join("im0.png");
+        assert_eq!(Calibration::beside(&image).unwrap(), None);
+        std::fs::write(folder.path().join("calib.txt"), MOTORCYCLE).unwrap();
+        assert_eq!(Calibration::beside(&image).unwrap(), Some(expected()));
+        std::fs::write(folder.path().join("calib.txt"), "ndisp=x").unwrap();
+        let error = Calibration::beside(&image).unwrap_err().to_string();
+        assert!(error.contains("calib.txt") && error.contains("line 1"), "{error}");
+    }
+}

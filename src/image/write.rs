@@ -1,0 +1,413 @@
+//! Writing maps and pictures: whole or not at all.
+
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
+use tempfile::NamedTempFile;
+use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+
+use super::{Plane, pfm};
+use crate::error::{Error, Result};
+
+/// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
+const PNG_SCALE: f32 = 256.0;
+
+/// How a disparity map is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Pfm,
+    Png,
+    Tiff,
+}
+
+/// Writes a disparity map (in pixels; what is not finite is invalid) in the format that the extension names:
+///
+/// - `.pfm`: float, invalid is +infinity;
+/// - `.tif`, `.tiff`: float, invalid is NaN;
+/// - `.png`: 16 bits, disparity times 256, invalid is 0. Disparities from 0 to below 256 only; a valid one that
+///   would round to 0 becomes 1.
+///
+/// What exists and is no regular file (`/dev/null`, a pipe) is written to directly, as PFM when its name has
+/// no known extension.
+///
+/// # Errors
+/// [`Error::Write`] for an unknown extension, a disparity that PNG cannot hold, or a file that cannot be
+/// written.
+pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
+    let bytes = match format(path)? {
+        Format::Pfm => pfm::encode(&map.map(|&d| if d.is_finite() { d } else { f32::INFINITY })),
+        Format::Png => {
+            let levels = png_levels(map).map_err(|reason| Error::write(path, reason))?;
+            png(path, bytemuck::cast_slice(&levels), map.size(), ExtendedColorType::L16)?
+        }
+        Format::Tiff => tiff(path, &map.map(|&d| if d.is_finite() { d } else { f32::NAN }))?,
+    };
+    save(path, &bytes)
+}
+
+/// Says before any computing whether [`disparity`] will be able to write a map with disparities from
+/// `min_disparity` to `max_disparity` (pixels, both inclusive) to `path`. A file that is there stays untouched.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is unknown, the path is a folder or lies in none that can be written to,
+/// or the format cannot hold the range.
+pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32) -> Result<()> {
+    if format(path)? == Format::Png && (min_disparity < 0 || max_disparity > 255) {
+        let reason = format!(
+            "16-bit PNG holds disparities from 0 to 255 and the range is {min_disparity} to {max_disparity}; \
+             write .pfm or .tif"
+        );
+        return Err(Error::write(path, reason));
+    }
+    Target::of(path)?.check(path)
+}
+
+/// Says before any computing whether a PNG picture can be written to `path`.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is not `.png`, or the path is a folder or lies in none that can be
+/// written to.
+pub fn check_png_path(path: &Path) -> Result<()> {
+    png_extension(path)?;
+    Target::of(path)?.check(path)
+}
+
+/// Writes 8-bit grey levels as PNG.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
+pub fn grey8(path: &Path, plane: &Plane<u8>) -> Result<()> {
+    png_extension(path)?;
+    save(path, &png(path, plane.data(), plane.size(), ExtendedColorType::L8)?)
+}
+
+/// Writes 16-bit grey levels as PNG.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
+pub fn grey16(path: &Path, plane: &Plane<u16>) -> Result<()> {
+    png_extension(path)?;
+    save(path, &png(path, bytemuck::cast_slice(plane.data()), plane.size(), ExtendedColorType::L16)?)
+}
+
+/// Writes 8-bit colours (red, green, blue) as PNG.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
+pub fn rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<()> {
+    png_extension(path)?;
+    save(path, &png(path, plane.data().as_flattened(), plane.size(), ExtendedColorType::Rgb8)?)
+}
+
+fn png_extension(path: &Path) -> Result<()> {
+    if extension(path).as_deref() == Some("png") || is_special(path) {
+        return Ok(());
+    }
+    Err(Error::write(path, "pictures are written as PNG; give a name that ends in .png"))
+}
+
+fn format(path: &Path) -> Result<Format> {
+    match extension(path).as_deref() {
+        Some("pfm") => Ok(Format::Pfm),
+        Some("png") => Ok(Format::Png),
+        Some("tif" | "tiff") => Ok(Format::Tiff),
+        _ if is_special(path) => Ok(Format::Pfm),
+        _ => Err(Error::write(path, "disparity maps end in .pfm (float), .tif (float) or .png (16-bit)")),
+    }
+}
+
+/// The extension in lower case.
+fn extension(path: &Path) -> Option<String> {
+    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+}
+
+/// Whether there is something at `path` that is neither a file nor a folder.
+fn is_special(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
+}
+
+/// Disparities as KITTI stores them.
+fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
+    let level = |&d: &f32| {
+        let level = (d * PNG_SCALE).round();
+        if !d.is_finite() {
+            Ok(0)
+        } else if d < 0.0 || level > u16::MAX as f32 {
+            Err(format!(
+                "16-bit PNG holds disparities from 0 to below 256 and one is {d}; write .pfm or .tif"
+            ))
+        } else {
+            Ok((level as u16).max(1))
+        }
+    };
+    map.data().iter().map(level).collect()
+}
+
+/// A PNG file; samples of 16 bits are in the byte order of the machine.
+fn png(path: &Path, samples: &[u8], size: (usize, usize), kind: ExtendedColorType) -> Result<Vec<u8>> {
+    let (w, h) = png_or_tiff_size(path, size)?;
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes).write_image(samples, w, h, kind).map_err(|e| Error::write(path, e))?;
+    Ok(bytes)
+}
+
+fn tiff(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
+    let (w, h) = png_or_tiff_size(path, map.size())?;
+    let mut bytes = Cursor::new(Vec::new());
+    // Offsets in plain TIFF end at 4 GiB; few programs read BigTIFF, so only what needs it gets it.
+    let written = if map.data().len() < 1_000_000_000 {
+        TiffEncoder::new(&mut bytes).and_then(|mut e| e.write_image::<Gray32Float>(w, h, map.data()))
+    } else {
+        TiffEncoder::new_big(&mut bytes).and_then(|mut e| e.write_image::<Gray32Float>(w, h, map.data()))
+    };
+    written.map_err(|e| Error::write(path, e))?;
+    Ok(bytes.into_inner())
+}
+
+fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
+    match (u32::try_from(size.0), u32::try_from(size.1)) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
+        _ => {
+            Err(Error::write(path, format!("the format holds no picture of {} x {} pixels", size.0, size.1)))
+        }
+    }
+}
+
+/// Where bytes go.
+enum Target {
+    /// A regular file, there already or not: a temporary file in its folder takes its place by a rename.
+    File { file: PathBuf, folder: PathBuf },
+    /// Anything else that exists: a device or a pipe must not be replaced by a file.
+    Special,
+}
+
+impl Target {
+    fn of(path: &Path) -> Result<Self> {
+        let error = |reason: &str| Err(Error::write(path, reason));
+        let file = match fs::metadata(path) {
+            Ok(m) if m.is_dir() => return error("is a folder; give the name of a file"),
+            Ok(m) if !m.is_file() => return Ok(Self::Special),
+            Ok(m) if m.permissions().readonly() => {
+                return error("the file there is read-only; remove it first");
+            }
+            // A link stays a link: what it points to is replaced.
+            Ok(_) => fs::canonicalize(path).map_err(|e| Error::write(path, e))?,
+            Err(_) => path.to_owned(),
+        };
+        if file.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator) {
+            return error("names no file; give the name of one");
+        }
+        let folder = match file.parent() {
+            Some(p) if p != Path::new("") => p.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        if !folder.is_dir() {
+            return error(&format!("there is no folder {}; create it first", folder.display()));
+        }
+        Ok(Self::File { file, folder })
+    }
+
+    /// Tries to create a file where [`save`] would.
+    fn check(&self, path: &Path) -> Result<()> {
+        match self {
+            Self::File { folder, .. } => temporary(path, folder).map(drop),
+            Self::Special => Ok(()),
+        }
+    }
+}
+
+/// A file without a name that matters, gone when dropped.
+fn temporary(path: &Path, folder: &Path) -> Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".mrfgs-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // Temporary files are private by default; an output is as open as the umask lets it be.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder).map_err(|e| {
+        Error::write(path, format!("no file can be created in {}: {}", folder.display(), e.kind()))
+    })
+}
+
+/// Writes a file that appears whole or not at all.
+pub(super) fn save(path: &Path, bytes: &[u8]) -> Result<()> {
+    let error = |e: std::io::Error| Error::write(path, e);
+    match Target::of(path)? {
+        Target::Special => {
+            fs::OpenOptions::new().write(true).open(path).and_then(|mut f| f.write_all(bytes)).map_err(error)
+        }
+        Target::File { file, folder } => {
+            let mut temporary = temporary(path, &folder)?;
+            temporary.write_all(bytes).map_err(error)?;
+            // Else a crash of the machine could leave the name without the content.
+            temporary.as_file().sync_all().map_err(error)?;
+            temporary.persist(file).map(drop).map_err(|e| error(e.error))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::read::read_disparity;
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn maps_come_back_as_they_went() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = Plane::new(3, 2, vec![0.5, 255.0, f32::INFINITY, 17.25, 1.0 / 256.0, 3.0]);
+        for name in ["a.pfm", "a.PFM", "a.png", "a.tif", "a.Tiff"] {
+            let path = folder.path().join(name);
+            disparity(&path, &map).unwrap();
+            assert_eq!(read_disparity(&path).unwrap(), map, "{name}");
+        }
+        assert_eq!(names(folder.path()).len(), 5, "nothing temporary stays");
+    }
+
+    #[test]
+    fn the_float_formats_hold_what_png_cannot() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = Plane::new(2, 2, vec![-3.5, 256.0, 1e6, f32::INFINITY]);
+        for name in ["a.pfm", "a.tif"] {
+            let path = folder.path().join(name);
+            disparity(&path, &map).unwrap();
+            assert_eq!(read_disparity(&path).unwrap(), map, "{name}");
+        }
+        for bad in [-0.01, 255.999, 256.0, 1e30] {
+            let error =
+                disparity(&folder.path().join("a.png"), &Plane::filled(2, 1, bad)).unwrap_err().to_string();
+            assert!(error.contains(".pfm") && error.contains(".tif") && error.contains("a.png"), "{error}");
+        }
+        assert_eq!(names(folder.path()), ["a.pfm", "a.tif"]);
+    }
+
+    #[test]
+    fn invalid_pixels_carry_the_mark_of_each_format() {
+        let map = Plane::new(4, 1, vec![f32::INFINITY, f32::NAN, f32::NEG_INFINITY, 1.0]);
+        assert_eq!(png_levels(&map).unwrap(), [0, 0, 0, 256]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.pfm");
+        disparity(&path, &map).unwrap();
+        let infinity = f32::INFINITY;
+        assert_eq!(
+            pfm::read(&path).unwrap(),
+            pfm::Pfm::Grey(Plane::new(4, 1, vec![infinity, infinity, infinity, 1.0]))
+        );
+        let path = folder.path().join("a.tif");
+        disparity(&path, &map).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).unwrap();
+        let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
+            panic!("float")
+        };
+        assert_eq!(values.iter().map(|v| v.is_nan()).collect::<Vec<_>>(), [true, true, true, false]);
+    }
+
+    #[test]
+    fn zero_disparity_is_not_invalid_in_png() {
+        assert_eq!(png_levels(&Plane::new(4, 1, vec![0.0, -0.0, 0.001, 255.99])).unwrap(), [1, 1, 1, 65533]);
+    }
+
+    #[test]
+    fn pictures_come_back_as_they_went() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        grey8(&path, &Plane::new(2, 1, vec![3, 200])).unwrap();
+        assert_eq!(
+            image::open(&path).unwrap(),
+            image::DynamicImage::ImageLuma8(image::GrayImage::from_raw(2, 1, vec![3, 200]).unwrap())
+        );
+        grey16(&path, &Plane::new(1, 2, vec![3, 65535])).unwrap();
+        assert_eq!(image::open(&path).unwrap().into_luma16().into_raw(), [3, 65535]);
+        rgb8(&path, &Plane::new(1, 1, vec![[1, 2, 3]])).unwrap();
+        assert_eq!(image::open(&path).unwrap().into_rgb8().into_raw(), [1, 2, 3]);
+        assert!(grey8(&path, &Plane::new(0, 0, vec![])).is_err());
+        assert!(grey8(&folder.path().join("a.jpg"), &Plane::new(1, 1, vec![0])).is_err());
+    }
+
+    #[test]
+    fn the_early_check_finds_what_would_fail() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let check = |name: &str, min, max| check_disparity_path(&at(name), min, max);
+        check("a.pfm", -9, 999).unwrap();
+        check("a.tif", -9, 999).unwrap();
+        check("a.png", 0, 255).unwrap();
+        check_png_path(&at("a.PNG")).unwrap();
+        assert!(names(folder.path()).is_empty(), "the check leaves nothing");
+
+        fs::create_dir(at("b.pfm")).unwrap();
+        let refused = |result: Result<()>, words: &[&str]| {
+            let error = result.unwrap_err().to_string();
+            assert!(words.iter().all(|w| error.contains(w)), "{error}");
+            assert!(!error.contains('\n'), "{error}");
+        };
+        refused(check("a.png", -1, 10), &["a.png", ".pfm", ".tif", "-1"]);
+        refused(check("a.png", 0, 256), &["a.png", ".pfm", ".tif", "256"]);
+        refused(check("a.jpg", 0, 10), &[".pfm", ".tif", ".png"]);
+        refused(check("a", 0, 10), &[".pfm"]);
+        refused(check("b.pfm", 0, 10), &["b.pfm", "folder"]);
+        refused(check("none/a.pfm", 0, 10), &["none", "create it"]);
+        refused(check("a.pfm/", 0, 10), &["no file"]);
+        refused(check_png_path(&at("a.jpg")), &["a.jpg", ".png"]);
+        refused(check_png_path(&at("none/a.png")), &["create it"]);
+        refused(disparity(&at("none/a.pfm"), &Plane::filled(1, 1, 0.0)), &["create it"]);
+        refused(disparity(&at("b.pfm"), &Plane::filled(1, 1, 0.0)), &["folder"]);
+    }
+
+    #[test]
+    fn the_check_keeps_the_file_that_is_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.pfm");
+        fs::write(&path, "precious").unwrap();
+        check_disparity_path(&path, 0, 9).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"precious");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn outputs_are_as_open_as_other_files_and_links_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("plain"), "").unwrap();
+        disparity(&at("a.pfm"), &Plane::filled(1, 1, 0.0)).unwrap();
+        let mode = |name: &str| fs::metadata(at(name)).unwrap().permissions().mode();
+        assert_eq!(mode("a.pfm"), mode("plain"));
+
+        std::os::unix::fs::symlink(at("a.pfm"), at("link.pfm")).unwrap();
+        disparity(&at("link.pfm"), &Plane::filled(1, 1, 2.0)).unwrap();
+        assert!(fs::symlink_metadata(at("link.pfm")).unwrap().is_symlink());
+        assert_eq!(read_disparity(&at("a.pfm")).unwrap(), Plane::filled(1, 1, 2.0));
+
+        fs::set_permissions(at("plain"), fs::Permissions::from_mode(0o444)).unwrap();
+        fs::rename(at("plain"), at("plain.pfm")).unwrap();
+        let error = check_disparity_path(&at("plain.pfm"), 0, 9).unwrap_err().to_string();
+        assert!(error.contains("read-only"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn devices_are_written_to_and_stay() {
+        let null = Path::new("/dev/null");
+        check_disparity_path(null, -9, 999).unwrap();
+        check_png_path(null).unwrap();
+        disparity(null, &Plane::filled(1, 1, 0.0)).unwrap();
+        rgb8(null, &Plane::filled(1, 1, [0; 3])).unwrap();
+        assert!(is_special(null));
+        // The disk that is always full.
+        let error = disparity(Path::new("/dev/full"), &Plane::filled(1, 1, 0.0)).unwrap_err();
+        assert!(matches!(error, Error::Write { .. }), "{error}");
+    }
+}
