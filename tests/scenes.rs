@@ -1,0 +1,168 @@
+//! The rendered scenes: what `testdata/` holds is what the renderer makes, and the truth is true.
+
+#[path = "../testdata/scenes.rs"]
+mod scenes;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mrfgs::image::Plane;
+use scenes::Scene;
+
+static SCENES: LazyLock<Vec<Scene>> =
+    LazyLock::new(|| scenes::all().iter().map(scenes::Recipe::render).collect());
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
+}
+
+/// What a little-endian, one-channel PFM of these values holds.
+fn pfm(plane: &Plane<f32>) -> Vec<u8> {
+    let mut bytes = format!("Pf\n{} {}\n-1.0\n", plane.width(), plane.height()).into_bytes();
+    for y in (0..plane.height()).rev() {
+        bytes.extend(plane.row(y).iter().flat_map(|value| value.to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn the_files_are_a_fresh_rendering() {
+    assert_eq!(SCENES.len(), 6);
+    for scene in SCENES.iter() {
+        let (name, folder) = (scene.name, folder(scene.name));
+        let (width, height) = scene.left.size();
+        for (file, view) in [("im0.png", &scene.left), ("im1.png", &scene.right)] {
+            let image = image::open(folder.join(file)).unwrap();
+            assert_eq!(image.color(), image::ColorType::Rgb8, "{name}/{file}");
+            assert_eq!((image.width() as usize, image.height() as usize), (width, height), "{name}/{file}");
+            assert!(image.as_bytes() == view.data().as_flattened(), "{name}/{file}: render the scenes again");
+        }
+        let mask = image::open(folder.join("mask0nocc.png")).unwrap();
+        assert_eq!(mask.color(), image::ColorType::L8, "{name}");
+        assert!(mask.as_bytes() == scene.mask.data(), "{name}/mask0nocc.png: render the scenes again");
+        let truth = fs::read(folder.join("disp0GT.pfm")).unwrap();
+        assert!(truth == pfm(&scene.truth), "{name}/disp0GT.pfm: render the scenes again");
+        let calib = fs::read_to_string(folder.join("calib.txt")).unwrap();
+        assert_eq!(calib, format!("width={width}\nheight={height}\nndisp={}\n", scene.labels), "{name}");
+    }
+}
+
+/// Whether the truth is finite and inside the labels, and the mask has only its two values.
+fn assert_in_range(scene: &Scene) {
+    let last = (scene.labels - 1) as f32;
+    for truth in [&scene.truth, &scene.truth_right] {
+        assert!(truth.data().iter().all(|d| (0.0..=last).contains(d)), "{}: truth out of range", scene.name);
+    }
+    assert!(scene.mask.data().iter().all(|m| matches!(m, 255 | 128)), "{}", scene.name);
+}
+
+#[test]
+fn the_truth_is_inside_the_labels() {
+    for scene in SCENES.iter() {
+        assert_in_range(scene);
+        let hidden = share(scene.mask.data().iter().map(|&m| m == 128));
+        assert!((0.05..0.25).contains(&hidden), "{}: {hidden} hidden", scene.name);
+        let (low, high) =
+            scene.truth.data().iter().fold((f32::MAX, 0.0_f32), |(l, h), &d| (l.min(d), h.max(d)));
+        assert!(
+            high - low > 0.4 * scene.labels as f32,
+            "{}: {low} ..= {high} uses too few labels",
+            scene.name
+        );
+    }
+}
+
+#[test]
+fn any_size_will_do() {
+    for recipe in scenes::all() {
+        for (width, height, labels) in [(1, 1, 2), (61, 47, 9), (7, 90, 64), (90, 30, 60), (24, 18, 36)] {
+            let scene = scenes::render(recipe.name, width, height, labels);
+            assert_eq!(scene.left.size(), (width, height));
+            assert_in_range(&scene);
+        }
+        let flat = scenes::render(recipe.name, 31, 23, 1);
+        assert!(flat.truth.data().iter().all(|&d| d == 0.0) && flat.mask.data().iter().all(|&m| m == 255));
+    }
+}
+
+fn share(marks: impl Iterator<Item = bool>) -> f64 {
+    let (marked, all) = marks.fold((0, 0), |(marked, all), mark| (marked + usize::from(mark), all + 1));
+    f64::from(marked as u32) / f64::from(all)
+}
+
+/// Mean absolute colour difference in grey levels between what is visible at the left and the right view `d`
+/// further left, the left view first sent through `exposure`.
+fn difference(scene: &Scene, d: impl Fn(usize, usize) -> f32, exposure: impl Fn(f32) -> f32) -> f32 {
+    let (width, height) = scene.left.size();
+    let (mut sum, mut count) = (0.0, 0);
+    for y in 0..height {
+        for x in (0..width).filter(|&x| scene.mask[(x, y)] == 255) {
+            let at = (x as f32 - d(x, y)).clamp(0.0, (width - 1) as f32);
+            let (x0, part) = (at as usize, at.fract());
+            let [near, far] = [x0, (x0 + 1).min(width - 1)].map(|x| scene.right[(x, y)]);
+            for c in 0..3 {
+                let right = f32::from(near[c]) * (1.0 - part) + f32::from(far[c]) * part;
+                sum += f64::from((exposure(f32::from(scene.left[(x, y)][c])) - right).abs());
+            }
+            count += 3;
+        }
+    }
+    (sum / f64::from(count)) as f32
+}
+
+#[test]
+fn visible_points_look_alike_in_both_views() {
+    for scene in SCENES.iter() {
+        let exposure = |level: f32| if scene.name == "exposure" { 0.72 * level + 14.0 } else { level };
+        let (width, height) = scene.left.size();
+        let truth = difference(scene, |x, y| scene.truth[(x, y)], exposure);
+        // The controls: one and a half labels off, mirrored, and the other sign.
+        let off = [-1.5, 1.5].map(|by| difference(scene, |x, y| scene.truth[(x, y)] + by, exposure));
+        let mirrored = difference(scene, |x, y| scene.truth[(width - 1 - x, height - 1 - y)], exposure);
+        let negated = difference(scene, |x, y| -scene.truth[(x, y)], exposure);
+        println!("{}: {truth:.2}, off {off:.2?}, mirrored {mirrored:.2}, negated {negated:.2}", scene.name);
+        // Noise alone makes 1.4; the rest is linear interpolation, which is coarse at the edges of stripes and squares.
+        assert!(truth < 4.0, "{}: {truth}", scene.name);
+        assert!(off.iter().all(|&off| off > 1.5 * truth), "{}: {truth} and off {off:?}", scene.name);
+        assert!(mirrored > 3.0 * truth && negated > 3.0 * truth, "{}: {truth}, {mirrored}", scene.name);
+    }
+}
+
+#[test]
+fn only_the_scene_of_that_name_differs_in_exposure() {
+    for scene in SCENES.iter() {
+        let means = [&scene.left, &scene.right].map(|view| {
+            let bytes = view.data().as_flattened();
+            bytes.iter().map(|&b| f64::from(b)).sum::<f64>() / bytes.len() as f64
+        });
+        assert_eq!((means[0] - means[1]).abs() > 8.0, scene.name == "exposure", "{}: {means:?}", scene.name);
+    }
+}
+
+#[test]
+fn the_mask_follows_from_the_truth_of_both_views() {
+    for scene in SCENES.iter() {
+        // Seen from the right: at one of the two pixels next to x - d the right view has that disparity. This rule
+        // looks at pixel centres only, so that it errs along silhouettes where the mask does not.
+        let seen = |x: usize, y: usize| {
+            let d = scene.truth[(x, y)];
+            let at = x as f32 - d;
+            let near = |x: f32| (scene.truth_right[(x as usize, y)] - d).abs() < 0.5;
+            at >= 0.0 && (near(at.floor()) || near(at.ceil()))
+        };
+        let (width, height) = scene.mask.size();
+        let agree = |mask: &dyn Fn(usize, usize) -> u8| {
+            share((0..width * height).map(|i| {
+                let (x, y) = (i % width, i / width);
+                seen(x, y) == (mask(x, y) == 255)
+            }))
+        };
+        let right = agree(&|x, y| scene.mask[(x, y)]);
+        let mirrored = agree(&|x, y| scene.mask[(width - 1 - x, y)]);
+        let all_visible = agree(&|_, _| 255);
+        println!("{}: {right:.4}, mirrored {mirrored:.4}, all visible {all_visible:.4}", scene.name);
+        assert!(right > 0.98, "{}: the mask agrees with the truth at {right} of the pixels", scene.name);
+        assert!(mirrored < 0.95 && all_visible < 0.95, "{}: {mirrored}, {all_visible}", scene.name);
+    }
+}
