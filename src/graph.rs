@@ -48,9 +48,14 @@ impl LevelGraph {
     #[must_use]
     pub fn new(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
         let pixels = width * height;
-        assert_eq!(codes.len(), pixels * neighbours, "{neighbours} codes for each of {width} x {height} pixels");
+        assert_eq!(
+            codes.len(),
+            pixels * neighbours,
+            "{neighbours} codes for each of {width} x {height} pixels"
+        );
         let slots = neighbours + 1;
-        let mut graph = Self { width, height, neighbours, codes, starts: vec![0; pixels + 1], incoming: Vec::new() };
+        let mut graph =
+            Self { width, height, neighbours, codes, starts: vec![0; pixels + 1], incoming: Vec::new() };
         for factor in 0..pixels {
             for slot in 0..slots {
                 if let Some(pixel) = graph.member(factor, slot) {
@@ -195,7 +200,8 @@ fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
                     if image.masked[at] {
                         continue;
                     }
-                    let key = colour_distance(centre, &image.pixels[at]) + weight * (dx * dx + dy * dy) as u32;
+                    let key =
+                        colour_distance(centre, &image.pixels[at]) + weight * (dx * dx + dy * dy) as u32;
                     candidates.push((u64::from(key) << 8 | order as u64, code(dx, dy)));
                 }
                 if candidates.len() > neighbours {
@@ -220,7 +226,8 @@ pub fn downsample(image: &Image) -> Image {
     let (width, height) = image.pixels.size();
     let (w, h) = (width.div_ceil(2), height.div_ceil(2));
     let masked = Plane::from_fn(w, h, |x, y| {
-        (2 * y..height.min(2 * y + 2)).all(|fy| (2 * x..width.min(2 * x + 2)).all(|fx| image.masked[(fx, fy)]))
+        (2 * y..height.min(2 * y + 2))
+            .all(|fy| (2 * x..width.min(2 * x + 2)).all(|fx| image.masked[(fx, fy)]))
     });
     let rows: Vec<Vec<Pixel>> = (0..h)
         .into_par_iter()

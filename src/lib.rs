@@ -5,6 +5,7 @@ pub mod error;
 pub mod evaluation;
 pub mod graph;
 pub mod image;
+mod matcher;
 pub mod options;
 pub mod plan;
 pub mod refine;
@@ -12,3 +13,4 @@ pub mod solver;
 pub mod tables;
 
 pub use error::{Error, Result};
+pub use matcher::{Matched, match_pair};

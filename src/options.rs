@@ -147,7 +147,6 @@ pub enum Median {
     All,
 }
 
-
 macro_rules! method {
     ($( $field:ident: $type:ty, $unit:literal, $meaning:literal; )*) => {
         /// Every parameter that determines the bits of the result, given the pair and the range.
@@ -329,7 +328,10 @@ impl Method {
             };
             let unit = keys().into_iter().find(|k| k.0 == key).map_or("", |k| k.1);
             table.insert(key.clone(), value.clone());
-            table.clone().try_into::<Self>().map_err(|_| format!("`{key}` cannot be {value}; it takes {unit}"))?;
+            table
+                .clone()
+                .try_into::<Self>()
+                .map_err(|_| format!("`{key}` cannot be {value}; it takes {unit}"))?;
         }
         let method: Self = table.try_into().map_err(|e| one_line(&e))?;
         method.validated().map_err(|e| e.to_string())

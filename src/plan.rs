@@ -75,8 +75,9 @@ pub struct EvidenceScale {
 impl EvidenceScale {
     fn new(gain: f64, cost_units: f64, method: &Method) -> Self {
         let per_cost = gain * UNITS_PER_NAT / (method.temperature * cost_units * 256.0);
-        let multiplier =
-            (per_cost * f64::from(1u32 << EVIDENCE_BITS) + 0.5).floor().clamp(1.0, f64::from(1u32 << 30)) as u32;
+        let multiplier = (per_cost * f64::from(1u32 << EVIDENCE_BITS) + 0.5)
+            .floor()
+            .clamp(1.0, f64::from(1u32 << 30)) as u32;
         let cap = (method.evidence_cap * UNITS_PER_NAT + 0.5).floor() as u32;
         Self { multiplier, limit: (cap << EVIDENCE_BITS).div_ceil(multiplier), cap }
     }
@@ -202,8 +203,9 @@ impl Plan {
             Potential::Exact => Cut { tau: units(nats), rule: CutRule::Absolute },
         };
         let (dependency, resolution) = (cut(method.dependency_cut), cut(method.resolution_cut));
-        let belief_bound =
-            levels[0].evidence.cap + window as u32 * u32::from(dependency.tau) + 2 * u32::from(resolution.tau);
+        let belief_bound = levels[0].evidence.cap
+            + window as u32 * u32::from(dependency.tau)
+            + 2 * u32::from(resolution.tau);
         // A pixel's padding labels count as labels with evidence 255.
         let sum_bound = (neighbours + 1) as u32 * (belief_bound + 255);
         let narrow = dependency.tau.max(resolution.tau) <= 255 && sum_bound <= u32::from(u16::MAX);

@@ -52,7 +52,7 @@ fn pixels(fixed: &Plane<i32>, validity: &Plane<u8>, known: impl Fn(u8) -> bool) 
 }
 
 /// Told how far a match is; answers whether to go on.
-pub type Observer<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
+pub type Observer<'a> = &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send);
 
 /// How far a match is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +97,11 @@ pub fn solve(backend: &mut impl Backend, plan: &Plan, pair: &Pair, observer: Obs
 /// # Errors
 /// Whatever the backend reports.
 pub fn flood(backend: &mut impl Backend, plan: &Plan) -> Result<u32> {
-    propagate(backend, plan, &mut Work { observer: &mut |_| ControlFlow::Continue(()), done: 0.0, total: 1.0 })
+    propagate(
+        backend,
+        plan,
+        &mut Work { observer: &mut |_| ControlFlow::Continue(()), done: 0.0, total: 1.0 },
+    )
 }
 
 fn propagate(backend: &mut impl Backend, plan: &Plan, work: &mut Work) -> Result<u32> {
@@ -143,11 +147,8 @@ fn refine_estimate(estimate: &Estimate, plan: &Plan, pair: &Pair, iterations: u3
     let guide = pair.left();
     let raw = refine::sub_pixel(&estimate.peaks, min, method.sub_pixel);
     let (width, height) = plan.size();
-    let mut validity = if method.visibility {
-        refine::visibility(estimate, min)
-    } else {
-        Plane::filled(width, height, 0)
-    };
+    let mut validity =
+        if method.visibility { refine::visibility(estimate, min) } else { Plane::filled(width, height, 0) };
     for (flags, &masked) in validity.data_mut().iter_mut().zip(guide.masked.data()) {
         if masked {
             *flags = flag::MASKED;
@@ -171,7 +172,8 @@ fn refine_estimate(estimate: &Estimate, plan: &Plan, pair: &Pair, iterations: u3
             method.median_sigma_range,
         );
         let all = method.median == Median::All;
-        disparity = refine::weighted_median(&disparity, &validity, guide, &weights, |f| all || f & flag::FILLED != 0);
+        disparity =
+            refine::weighted_median(&disparity, &validity, guide, &weights, |f| all || f & flag::FILLED != 0);
     }
     Solution { disparity, raw, confidence, validity, iterations }
 }

@@ -5,6 +5,7 @@
 //! definition that the CPU stage, the shader and the naive twin in the tests follow independently.
 
 pub mod cpu;
+pub mod gpu;
 
 use crate::error::Result;
 use crate::graph::LevelGraph;
@@ -86,11 +87,10 @@ pub trait Backend {
     /// Cost of `level` (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
     /// 256 times).
     ///
-    /// First d: for coarse label z, with low-pass the binomial mean (1 4 6 4 1) of the fine costs at 2 z - 2 ..= 2 z + 2,
-    /// labels clamped to the fine range; with the minimum, the smallest of the fine costs at those labels of
-    /// 2 z - 1 ..= 2 z + 1 that are in the range. Then x and y: the 5 x 5 binomial mean around (2 x, 2 y),
-    /// coordinates clamped to the image. Each of the two means is rounded once: (sum + half) >> bits, with sums of
-    /// weights 16 and 256.
+    /// First x and y: for each fine label the 5 x 5 binomial mean (1 4 6 4 1, outer product) around (2 x, 2 y),
+    /// coordinates clamped to the image, rounded as (sum + 128) >> 8. Then d, from those means: for coarse label z, with
+    /// low-pass their binomial mean over the fine labels 2 z - 2 ..= 2 z + 2, labels clamped to the fine range, rounded as
+    /// (sum + 8) >> 4; with the minimum, the smallest at those labels of 2 z - 1 ..= 2 z + 1 that are in the range.
     fn pyramid(&mut self, level: usize) -> Result<()>;
 
     /// Evidence of `level` from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
@@ -146,6 +146,3 @@ pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
     let level = &plan.levels[z];
     (level.pixels() * rows, level.labels, level.stride)
 }
-
-/// The cost in cost units of level 0 that [`Backend::cost`] never exceeds, in the 1/256 of coarser levels.
-pub const FINE_COST_SHIFT: u32 = crate::plan::COST_FRACTION_BITS;

@@ -37,8 +37,9 @@ impl MedianWeights {
         while f64::from(1u32 << shift) * RANGE_ENTRIES as f64 <= 8.0 * twice_variance && shift < 26 {
             shift += 1;
         }
-        let range =
-            (0..RANGE_ENTRIES).map(|i| weight(i as f64 * f64::from(1u32 << shift) / twice_variance)).collect();
+        let range = (0..RANGE_ENTRIES)
+            .map(|i| weight(i as f64 * f64::from(1u32 << shift) / twice_variance))
+            .collect();
         Self { radius, space, range, shift }
     }
 
@@ -98,8 +99,11 @@ pub fn weighted_median(
                 // Bisection needs no sort: the smallest value whose cumulated weight reaches half.
                 while low < high {
                     let middle = low + (high - low) / 2;
-                    let below: u32 =
-                        values.iter().zip(weight.iter()).map(|(&v, &w)| if v <= middle { w } else { 0 }).sum();
+                    let below: u32 = values
+                        .iter()
+                        .zip(weight.iter())
+                        .map(|(&v, &w)| if v <= middle { w } else { 0 })
+                        .sum();
                     if 2 * below >= total {
                         high = middle;
                     } else {

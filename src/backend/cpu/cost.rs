@@ -98,7 +98,8 @@ fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
                     let xr = (x as i64 - d) as usize;
                     for ny in rows.clone() {
                         if !left.masked[(x, ny)] && !right.masked[(xr, ny)] {
-                            running.0 += u64::from(difference(&left.pixels[(x, ny)], &right.pixels[(xr, ny)]));
+                            running.0 +=
+                                u64::from(difference(&left.pixels[(x, ny)], &right.pixels[(xr, ny)]));
                             running.1 += 1;
                         }
                     }
@@ -112,7 +113,8 @@ fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
                     let from = sums[x.saturating_sub(radius).max(inside.start)];
                     let to = sums[(x + radius + 1).min(inside.end)];
                     let (sum, count) = ((to.0 - from.0) as u32, to.1 - from.1);
-                    row[x * level.stride + j] = ((sum + 384 * count) / (768 * count)).min(COST_MAX.into()) as u8;
+                    row[x * level.stride + j] =
+                        ((sum + 384 * count) / (768 * count)).min(COST_MAX.into()) as u8;
                 }
             }
         },

@@ -17,7 +17,13 @@ struct Scratch<S> {
     members: Vec<(usize, usize)>,
 }
 
-pub(super) fn run<M: Message>(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[u16], messages: &mut [M]) {
+pub(super) fn run<M: Message>(
+    plan: &Plan,
+    level: usize,
+    graph: &LevelGraph,
+    belief: &[u16],
+    messages: &mut [M],
+) {
     let l = &plan.levels[level];
     let (stride, slots) = (l.stride, graph.slots());
     let cut = plan.dependency;

@@ -23,7 +23,10 @@ pub(super) fn run(plan: &Plan, belief: &[u16]) -> Estimate {
                 let seen = x as i64 - i64::from(level.min);
                 for (j, &b) in belief.iter().enumerate() {
                     let xr = seen - j as i64;
-                    if xr >= 0 && xr < width as i64 && (right[xr as usize] == NO_LABEL || b < smallest[xr as usize]) {
+                    if xr >= 0
+                        && xr < width as i64
+                        && (right[xr as usize] == NO_LABEL || b < smallest[xr as usize])
+                    {
                         (right[xr as usize], smallest[xr as usize]) = (j as u16, b);
                     }
                 }

@@ -5,7 +5,15 @@ use std::ops::{Add, Sub};
 /// A stored message value.
 pub(super) trait Message: Copy + Default + Send + Sync + Into<u32> + Into<u16> {
     /// Holds any sum of a factor's messages; the plan proves that it does.
-    type Sum: Copy + Default + Ord + Send + Sync + From<u16> + Into<u32> + Add<Output = Self::Sum> + Sub<Output = Self::Sum>;
+    type Sum: Copy
+        + Default
+        + Ord
+        + Send
+        + Sync
+        + From<u16>
+        + Into<u32>
+        + Add<Output = Self::Sum>
+        + Sub<Output = Self::Sum>;
 
     /// A value that is known to fit.
     fn from_sum(sum: Self::Sum) -> Self;

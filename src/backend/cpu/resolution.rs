@@ -32,7 +32,10 @@ pub(super) fn run<M: Message>(
     let offset = plan.label_offset(level);
     let reach = i32::from(plan.interpolating());
     let cut = plan.resolution;
-    let rows = up.par_chunks_mut(cl.width * cl.stride).zip(down.par_chunks_mut(2 * fl.width * fl.stride)).enumerate();
+    let rows = up
+        .par_chunks_mut(cl.width * cl.stride)
+        .zip(down.par_chunks_mut(2 * fl.width * fl.stride))
+        .enumerate();
     rows.for_each_init(
         || Scratch {
             parent: vec![0; cl.labels],
@@ -46,7 +49,9 @@ pub(super) fn run<M: Message>(
                 let belief = &coarse_belief[(y * cl.width + x) * cl.stride..];
                 variable_message(belief, up, parent, cut);
                 total.copy_from_slice(parent);
-                let children = (0..4).map(|c| (2 * x + c % 2, c / 2)).filter(|&(fx, j)| fx < fl.width && 2 * y + j < fl.height);
+                let children = (0..4)
+                    .map(|c| (2 * x + c % 2, c / 2))
+                    .filter(|&(fx, j)| fx < fl.width && 2 * y + j < fl.height);
                 for ((fx, j), best) in children.clone().zip(best.chunks_exact_mut(cl.labels)) {
                     let belief = &fine_belief[((2 * y + j) * fl.width + fx) * fl.stride..];
                     variable_message(belief, &down[(j * fl.width + fx) * fl.stride..], child, cut);
@@ -54,7 +59,11 @@ pub(super) fn run<M: Message>(
                         let centre = 2 * z as i32 + offset;
                         let low = (centre - reach).max(0) as usize;
                         let high = (centre + reach + 1).clamp(0, fl.labels as i32) as usize;
-                        *best = if low < high { child[low..high].iter().copied().min().unwrap_or(INFINITE) } else { INFINITE };
+                        *best = if low < high {
+                            child[low..high].iter().copied().min().unwrap_or(INFINITE)
+                        } else {
+                            INFINITE
+                        };
                         *total += *best;
                     }
                 }
@@ -74,7 +83,11 @@ pub(super) fn run<M: Message>(
                             INFINITE
                         };
                     }
-                    write_message(&sum[..fl.labels], cut, &mut down[(j * fl.width + fx) * fl.stride..][..fl.stride]);
+                    write_message(
+                        &sum[..fl.labels],
+                        cut,
+                        &mut down[(j * fl.width + fx) * fl.stride..][..fl.stride],
+                    );
                 }
             }
         },

@@ -1,0 +1,18 @@
+// Sums the squared differences of each row, in 64 bits. One invocation a row.
+
+@group(0) @binding(1) var<storage, read> squares: array<u32>;
+// Lower and upper half.
+@group(0) @binding(2) var<storage, read_write> sums: array<vec2<u32>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.rows {
+        return;
+    }
+    var sum = vec2<u32>();
+    for (var x = 0u; x < params.level.width; x++) {
+        let low = sum.x + squares[id.x * params.level.width + x];
+        sum = vec2(low, sum.y + u32(low < sum.x));
+    }
+    sums[id.x] = sum;
+}

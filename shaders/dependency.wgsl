@@ -1,0 +1,124 @@
+// Messages of the dependency factors. One invocation a factor. It reads old beliefs and its own old messages and
+// writes its own messages only, so flooding is exact in place.
+
+// Codes of the neighbours, four a word.
+@group(0) @binding(1) var<storage, read> members: array<u32>;
+@group(0) @binding(2) var<storage, read> belief: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> messages: array<u32>;
+
+const NO_MEMBER: u32 = 0xffu;
+const ABSENT: u32 = 0xffffffffu;
+const WINDOW: u32 = 7u;
+const RADIUS: u32 = 3u;
+
+fn load_message(index: u32) -> vec4<u32> {
+    if NARROW {
+        return unpack_narrow(messages[index]);
+    }
+    return unpack_wide(vec2(messages[2u * index], messages[2u * index + 1u]));
+}
+
+fn store_message(index: u32, value: vec4<u32>) {
+    if NARROW {
+        messages[index] = pack_narrow(value);
+    } else {
+        let words = pack_wide(value);
+        messages[2u * index] = words.x;
+        messages[2u * index + 1u] = words.y;
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let quads = params.level.quads;
+    let y = params.first_row + id.y;
+    let top = halo_start(RADIUS);
+    // First quad of the factor's messages, and of each member's belief.
+    let own = id.y * (params.level.dependency_pitch / select(2u, 1u, NARROW)) + id.x * SLOTS * quads;
+    var bases: array<u32, SLOTS>;
+    bases[0] = (y - top) * params.level.pitch + id.x * quads;
+    var present = 1u;
+    let codes = id.y * params.level.member_pitch + id.x * ((SLOTS + 2u) / 4u);
+    for (var slot = 1u; slot < SLOTS; slot++) {
+        let code = (members[codes + (slot - 1u) / 4u] >> (8u * ((slot - 1u) % 4u))) & 0xffu;
+        bases[slot] = ABSENT;
+        if code != NO_MEMBER {
+            let px = id.x + code % WINDOW - RADIUS;
+            let py = y + code / WINDOW - RADIUS;
+            bases[slot] = (py - top) * params.level.pitch + px * quads;
+            present += 1u;
+        }
+    }
+    if present < 2u {
+        return;
+    }
+
+    // Where the cut is absolute, each member's message to the factor is less its minimum.
+    var floors: array<u32, SLOTS>;
+    if ABSOLUTE {
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            floors[slot] = 0u;
+            if bases[slot] != ABSENT {
+                var least = vec4(0xffffu);
+                for (var quad = 0u; quad < quads; quad++) {
+                    let b = unpack_wide(belief[bases[slot] + quad]);
+                    least = min(least, b - load_message(own + slot * quads + quad));
+                }
+                floors[slot] = smallest(least);
+            }
+        }
+    }
+
+    // The smallest sum over the other members, for each member.
+    var least: array<vec4<u32>, SLOTS>;
+    for (var slot = 0u; slot < SLOTS; slot++) {
+        least[slot] = vec4(ABSENT);
+    }
+    var q: array<vec4<u32>, SLOTS>;
+    for (var quad = 0u; quad < quads; quad++) {
+        var total = vec4<u32>();
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            if bases[slot] != ABSENT {
+                q[slot] = unpack_wide(belief[bases[slot] + quad]) - load_message(own + slot * quads + quad);
+                if ABSOLUTE {
+                    q[slot] -= vec4(floors[slot]);
+                }
+                total += q[slot];
+            }
+        }
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            if bases[slot] != ABSENT {
+                least[slot] = min(least[slot], total - q[slot]);
+            }
+        }
+    }
+
+    var high: array<u32, SLOTS>;
+    var low: array<u32, SLOTS>;
+    for (var slot = 0u; slot < SLOTS; slot++) {
+        let m = smallest(least[slot]);
+        high[slot] = select(m + params.tau, params.tau, ABSOLUTE);
+        low[slot] = select(m, min(m, params.tau), ABSOLUTE);
+    }
+
+    for (var quad = 0u; quad < quads; quad++) {
+        var total = vec4<u32>();
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            if bases[slot] != ABSENT {
+                q[slot] = unpack_wide(belief[bases[slot] + quad]) - load_message(own + slot * quads + quad);
+                if ABSOLUTE {
+                    q[slot] -= vec4(floors[slot]);
+                }
+                total += q[slot];
+            }
+        }
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            if bases[slot] != ABSENT {
+                store_message(own + slot * quads + quad, min(total - q[slot], vec4(high[slot])) - vec4(low[slot]));
+            }
+        }
+    }
+}

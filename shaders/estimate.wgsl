@@ -1,0 +1,46 @@
+// The optimum of every pixel with the beliefs around it. One invocation a pixel.
+
+@group(0) @binding(1) var<storage, read> belief: array<vec2<u32>>;
+// label | best << 16, lower | upper << 16, rival, 0.
+@group(0) @binding(2) var<storage, read_write> peaks: array<vec4<u32>>;
+
+const NONE: u32 = 0xffffu;
+const LANES: vec4<u32> = vec4(0u, 1u, 2u, 3u);
+
+fn load(first: u32, quad: u32) -> vec4<u32> {
+    let labels = vec4(4u * quad) + LANES;
+    return select(vec4(NONE), unpack_wide(belief[first + quad]), labels < vec4(params.level.labels));
+}
+
+fn at(first: u32, label: i32) -> u32 {
+    if label < 0 || label >= i32(params.level.labels) {
+        return NONE;
+    }
+    let words = belief[first + u32(label) / 4u];
+    return unpack_wide(words)[u32(label) % 4u];
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let first = id.y * params.level.pitch + id.x * params.level.quads;
+    // Belief and label in one key: the smallest key is the smallest belief at its lowest label.
+    var least = vec4(0xffffffffu);
+    for (var quad = 0u; quad < params.level.quads; quad++) {
+        least = min(least, (load(first, quad) << vec4(16u)) | (vec4(4u * quad) + LANES));
+    }
+    let key = smallest(least);
+    let label = i32(key & 0xffffu);
+    var rival = vec4(NONE);
+    for (var quad = 0u; quad < params.level.quads; quad++) {
+        let away = abs(vec4<i32>(vec4(4u * quad) + LANES) - vec4(label)) > vec4(1);
+        rival = min(rival, select(vec4(NONE), load(first, quad), away));
+    }
+    peaks[id.y * params.level.width + id.x] = vec4(
+        u32(label) | (key & 0xffff0000u),
+        at(first, label - 1) | (at(first, label + 1) << 16u),
+        smallest(rival),
+        0u);
+}

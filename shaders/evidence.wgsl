@@ -1,0 +1,46 @@
+// Evidence from cost, and beliefs that start from it. One invocation a pixel.
+
+// 8-bit at level 0, 16-bit at coarser ones.
+@group(0) @binding(1) var<storage, read> cost: array<u32>;
+@group(0) @binding(2) var<storage, read_write> evidence: array<u32>;
+@group(0) @binding(3) var<storage, read_write> belief: array<vec2<u32>>;
+
+const PADDING: u32 = 255u;
+
+// Costs of a quad in 1/256 cost units; padding is above every cost.
+fn load_cost(row: u32, index: u32, quad: u32) -> vec4<u32> {
+    var c: vec4<u32>;
+    if FINE_NARROW {
+        c = unpack_narrow(cost[row + index]) << vec4(8u);
+    } else {
+        c = unpack_wide(vec2(cost[row + 2u * index], cost[row + 2u * index + 1u]));
+    }
+    return select(vec4(1u << 16u), c, is_label(quad));
+}
+
+fn is_label(quad: u32) -> vec4<bool> {
+    return (vec4(4u * quad) + vec4(0u, 1u, 2u, 3u)) < vec4(params.level.labels);
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let quads = params.level.quads;
+    let pitch = params.level.pitch;
+    let row = id.y * select(2u * pitch, pitch, FINE_NARROW);
+    let first = id.x * quads;
+    var least = vec4(1u << 16u);
+    for (var quad = 0u; quad < quads; quad++) {
+        least = min(least, load_cost(row, first + quad, quad));
+    }
+    let base = vec4(smallest(least));
+    for (var quad = 0u; quad < quads; quad++) {
+        let difference = min(load_cost(row, first + quad, quad) - base, vec4(params.evidence_limit));
+        let scaled = (difference * params.evidence_multiplier + vec4(1u << 21u)) >> vec4(22u);
+        let e = select(vec4(PADDING), min(scaled, vec4(params.evidence_cap)), is_label(quad));
+        evidence[id.y * pitch + first + quad] = pack_narrow(e);
+        belief[id.y * pitch + first + quad] = pack_wide(e);
+    }
+}

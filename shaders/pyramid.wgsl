@@ -1,0 +1,60 @@
+// Cost of a level from the next finer one: low-pass in x and y, then low-pass or minimum in d. One invocation a
+// coarse pixel and pair of coarse labels, which share the fine labels between them.
+
+// 8-bit at level 0, 16-bit at coarser ones.
+@group(0) @binding(1) var<storage, read> fine_cost: array<u32>;
+@group(0) @binding(2) var<storage, read_write> cost: array<u32>;
+
+// The binomial mean over x and y around twice (x, y) of the fine cost of the label with this index, clamped.
+fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
+    let label = u32(clamp(index, 0, i32(params.fine.labels) - 1));
+    let top = max(2 * params.first_row, 2u) - 2u;
+    let words = select(2u, 1u, FINE_NARROW);
+    let pitch = params.fine.pitch * words;
+    var sum = 128u;
+    for (var j = 0; j < 5; j++) {
+        let v = u32(clamp(2 * y + j - 2, 0, i32(params.fine.height) - 1)) - top;
+        for (var i = 0; i < 5; i++) {
+            let u = u32(clamp(2 * x + i - 2, 0, i32(params.fine.width) - 1));
+            let start = v * pitch + u * params.fine.quads * words;
+            var c: u32;
+            if FINE_NARROW {
+                c = ((fine_cost[start + label / 4u] >> (8u * (label % 4u))) & 0xffu) << 8u;
+            } else {
+                c = (fine_cost[start + label / 2u] >> (16u * (label % 2u))) & 0xffffu;
+            }
+            sum += WEIGHTS[i] * WEIGHTS[j] * c;
+        }
+    }
+    return sum >> 8u;
+}
+
+var<private> WEIGHTS: array<u32, 5> = array(1u, 4u, 6u, 4u, 1u);
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let pairs = 2u * params.level.quads;
+    let x = id.x / pairs;
+    let pair = id.x - x * pairs;
+    if x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let y = params.first_row + id.y;
+    // Smoothed costs at the fine labels from two below the first coarse label to two above the second.
+    let base = i32(4u * pair) + params.label_offset - 2;
+    var s: array<u32, 7>;
+    for (var i = 0; i < 7; i++) {
+        if LOW_PASS || (i >= 1 && i <= 5) {
+            s[i] = smooth_cost(i32(x), i32(y), base + i);
+        }
+    }
+    var costs: vec2<u32>;
+    if LOW_PASS {
+        costs.x = (s[0] + 4u * s[1] + 6u * s[2] + 4u * s[3] + s[4] + 8u) >> 4u;
+        costs.y = (s[2] + 4u * s[3] + 6u * s[4] + 4u * s[5] + s[6] + 8u) >> 4u;
+    } else {
+        costs.x = min(min(s[1], s[2]), s[3]);
+        costs.y = min(min(s[3], s[4]), s[5]);
+    }
+    cost[2u * id.y * params.level.pitch + id.x] = costs.x | (costs.y << 16u);
+}

@@ -1,0 +1,26 @@
+// The map of the right view, read off the same beliefs. One invocation a right pixel.
+
+@group(0) @binding(1) var<storage, read> belief: array<u32>;
+@group(0) @binding(2) var<storage, read_write> labels: array<u32>;
+
+const NO_LABEL: u32 = 0xffffu;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let row = 2u * id.y * params.level.pitch;
+    // Label j is seen from left pixel x + low + j.
+    let shift = i32(id.x) + params.level.low;
+    let start = max(-shift, 0);
+    let end = min(i32(params.level.width) - shift, i32(params.level.labels));
+    var least = 0xffffffffu;
+    for (var j = start; j < end; j++) {
+        let label = u32(j);
+        let word = belief[row + 2u * u32(shift + j) * params.level.quads + label / 2u];
+        let b = (word >> (16u * (label % 2u))) & 0xffffu;
+        least = min(least, (b << 16u) | label);
+    }
+    labels[id.y * params.level.width + id.x] = select(least & 0xffffu, NO_LABEL, start >= end);
+}

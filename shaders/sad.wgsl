@@ -1,0 +1,71 @@
+// Matching cost of level 0 by the mean colour difference over a window. One invocation for RUN pixels of a row and a
+// quad of labels: a column of the window serves all of them.
+
+@group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read> right: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read_write> cost: array<u32>;
+
+const RUN: i32 = 8;
+const COST_MAX: u32 = 254u;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let width = i32(params.level.width);
+    let run = id.x / params.level.quads;
+    let quad = id.x - run * params.level.quads;
+    let x0 = i32(run) * RUN;
+    if x0 >= width || id.y >= params.rows {
+        return;
+    }
+    let radius = params.sad_radius;
+    let top = i32(halo_start(u32(radius)));
+    let y = i32(params.first_row + id.y);
+    let y_first = max(y - radius, 0);
+    let y_last = min(y + radius, i32(params.level.height) - 1);
+    let shifts = vec4(params.level.low + i32(4u * quad)) + vec4(0, 1, 2, 3);
+    var sums: array<vec4<u32>, RUN>;
+    var counts: array<vec4<u32>, RUN>;
+    for (var x = max(x0 - radius, 0); x <= min(x0 + RUN - 1 + radius, width - 1); x++) {
+        var sum = vec4<u32>();
+        var count = vec4<u32>();
+        for (var v = y_first; v <= y_last; v++) {
+            let row = (v - top) * width;
+            let pixel = left[row + x];
+            for (var i = 0; i < 4; i++) {
+                let xr = x - shifts[i];
+                if xr >= 0 && xr < width {
+                    let other = right[row + xr];
+                    if (pixel.z | other.z) == 0u {
+                        sum[i] += colour_difference(pixel, other);
+                        count[i] += 1u;
+                    }
+                }
+            }
+        }
+        for (var i = 0; i < RUN; i++) {
+            if abs(x - (x0 + i)) <= radius {
+                sums[i] += sum;
+                counts[i] += count;
+            }
+        }
+    }
+    for (var i = 0; i < RUN; i++) {
+        let x = x0 + i;
+        if x < width {
+            let pixel = left[(y - top) * width + x];
+            var costs = vec4<u32>();
+            for (var j = 0; j < 4; j++) {
+                let xr = x - shifts[j];
+                var c = params.outside_cost;
+                if xr >= 0 && xr < width {
+                    if (pixel.z | right[(y - top) * width + xr].z) == 0u {
+                        let n = counts[i][j];
+                        c = min((sums[i][j] + 384u * n) / (768u * n), COST_MAX);
+                    }
+                }
+                costs[j] = c;
+            }
+            cost[id.y * params.level.pitch + u32(x) * params.level.quads + quad] = pack_narrow(costs);
+        }
+    }
+}

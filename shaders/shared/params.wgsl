@@ -1,0 +1,67 @@
+// What every stage is told, one block for each dispatch: the level it works on, for stages between two levels
+// also the next finer one, and the band of rows. Rows of every volume start at a multiple of 256 bytes, so that
+// any range of rows can be bound; pitches are in 32-bit words.
+
+struct Level {
+    width: u32,
+    height: u32,
+    // Smallest label.
+    low: i32,
+    labels: u32,
+    // Labels with padding, in quads of four.
+    quads: u32,
+    // Words in a row of a volume of 8-bit values, one a label; 16-bit ones take twice as many.
+    pitch: u32,
+    // Words in a row of dependency messages.
+    dependency_pitch: u32,
+    // Words in a row of member codes.
+    member_pitch: u32,
+}
+
+struct Params {
+    level: Level,
+    fine: Level,
+    // The band: the stage works on rows first_row .. first_row + rows of the level.
+    first_row: u32,
+    rows: u32,
+    // First word of the bound range of the transposed table.
+    incoming_base: u32,
+    outside_cost: u32,
+    sad_radius: i32,
+    // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
+    label_offset: i32,
+    evidence_multiplier: u32,
+    evidence_limit: u32,
+    evidence_cap: u32,
+    // Cut of the messages that the stage writes.
+    tau: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+
+// Rows that a stage reads above its band start here.
+fn halo_start(halo: u32) -> u32 {
+    return max(params.first_row, halo) - halo;
+}
+
+// Two 16-bit values a word, the lower first.
+fn unpack_wide(words: vec2<u32>) -> vec4<u32> {
+    return vec4(words.x & 0xffffu, words.x >> 16u, words.y & 0xffffu, words.y >> 16u);
+}
+
+fn pack_wide(values: vec4<u32>) -> vec2<u32> {
+    return vec2(values.x | (values.y << 16u), values.z | (values.w << 16u));
+}
+
+// Four 8-bit values a word, the lowest first.
+fn unpack_narrow(word: u32) -> vec4<u32> {
+    return (vec4(word) >> vec4(0u, 8u, 16u, 24u)) & vec4(0xffu);
+}
+
+fn pack_narrow(values: vec4<u32>) -> u32 {
+    return values.x | (values.y << 8u) | (values.z << 16u) | (values.w << 24u);
+}
+
+fn smallest(values: vec4<u32>) -> u32 {
+    return min(min(values.x, values.y), min(values.z, values.w));
+}
