@@ -18,7 +18,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if x >= width || id.y >= params.rows {
         return;
     }
-    let row = id.y * width;
+    let row = id.y * params.level.pixel_pitch;
     let pixel = left[row + x];
     let bits = left_census[row + x];
     var costs = vec4<u32>();

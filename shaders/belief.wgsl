@@ -43,9 +43,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let y = params.first_row + id.y;
     let top = halo_start(RADIUS);
-    let start = id.y * (params.level.width + 1u) + x;
-    let end = starts[start + 1u] - params.incoming_base;
-    for (var e = starts[start] - params.incoming_base; e < end; e++) {
+    let start = id.y * params.level.starts_pitch + x;
+    // The bound entries are those of the bound rows.
+    let end = starts[start + 1u] - starts[0];
+    for (var e = starts[start] - starts[0]; e < end; e++) {
         let entry = incoming[e];
         let fx = x + (entry & 7u) - RADIUS;
         let fy = y + ((entry >> 3u) & 7u) - RADIUS - top;

@@ -16,10 +16,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let x = i32(id.x);
     let y = i32(params.first_row + id.y);
     let top = halo_start(u32(RADIUS_Y));
-    let centre = image[(u32(y) - top) * width + id.x].y >> 16u;
+    let pitch = params.level.pixel_pitch;
+    let centre = image[(u32(y) - top) * pitch + id.x].y >> 16u;
     var bits = vec2<u32>();
     for (var dy = -RADIUS_Y; dy <= RADIUS_Y; dy++) {
-        let row = (u32(clamp(y + dy, 0, i32(params.level.height) - 1)) - top) * width;
+        let row = (u32(clamp(y + dy, 0, i32(params.level.height) - 1)) - top) * pitch;
         for (var dx = -RADIUS_X; dx <= RADIUS_X; dx++) {
             if dx != 0 || dy != 0 {
                 let pixel = image[row + u32(clamp(x + dx, 0, i32(width) - 1))];
@@ -28,5 +29,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
     }
-    census[id.y * width + id.x] = bits;
+    census[id.y * pitch + id.x] = bits;
 }

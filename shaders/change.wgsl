@@ -19,7 +19,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         least = min(least, select(vec4(0xffffffffu), key, label < vec4(params.level.labels)));
     }
     let label = smallest(least) & 0xffffu;
-    let pixel = id.y * params.level.width + id.x;
+    let pixel = id.y * params.level.pixel_pitch + id.x;
     let difference = abs(i32(label) - i32(labels[pixel]));
     labels[pixel] = label;
     squares[pixel] = u32(difference * difference);

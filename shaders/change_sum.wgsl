@@ -11,8 +11,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var sum = vec2<u32>();
     for (var x = 0u; x < params.level.width; x++) {
-        let low = sum.x + squares[id.x * params.level.width + x];
+        let low = sum.x + squares[id.x * params.level.pixel_pitch + x];
         sum = vec2(low, sum.y + u32(low < sum.x));
     }
-    sums[id.x] = sum;
+    sums[params.first_row + id.x] = sum;
 }

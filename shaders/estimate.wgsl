@@ -38,7 +38,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let away = abs(vec4<i32>(vec4(4u * quad) + LANES) - vec4(label)) > vec4(1);
         rival = min(rival, select(vec4(NONE), load(first, quad), away));
     }
-    peaks[id.y * params.level.width + id.x] = vec4(
+    peaks[id.y * params.level.pixel_pitch + id.x] = vec4(
         u32(label) | (key & 0xffff0000u),
         at(first, label - 1) | (at(first, label + 1) << 16u),
         smallest(rival),

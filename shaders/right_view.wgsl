@@ -22,5 +22,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let b = (word >> (16u * (label % 2u))) & 0xffffu;
         least = min(least, (b << 16u) | label);
     }
-    labels[id.y * params.level.width + id.x] = select(least & 0xffffu, NO_LABEL, start >= end);
+    labels[id.y * params.level.pixel_pitch + id.x] = select(least & 0xffffu, NO_LABEL, start >= end);
 }

@@ -17,6 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if x0 >= width || id.y >= params.rows {
         return;
     }
+    let pitch = i32(params.level.pixel_pitch);
     let radius = params.sad_radius;
     let top = i32(halo_start(u32(radius)));
     let y = i32(params.first_row + id.y);
@@ -29,7 +30,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         var sum = vec4<u32>();
         var count = vec4<u32>();
         for (var v = y_first; v <= y_last; v++) {
-            let row = (v - top) * width;
+            let row = (v - top) * pitch;
             let pixel = left[row + x];
             for (var i = 0; i < 4; i++) {
                 let xr = x - shifts[i];
@@ -52,13 +53,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0; i < RUN; i++) {
         let x = x0 + i;
         if x < width {
-            let pixel = left[(y - top) * width + x];
+            let pixel = left[(y - top) * pitch + x];
             var costs = vec4<u32>();
             for (var j = 0; j < 4; j++) {
                 let xr = x - shifts[j];
                 var c = params.outside_cost;
                 if xr >= 0 && xr < width {
-                    if (pixel.z | right[(y - top) * width + xr].z) == 0u {
+                    if (pixel.z | right[(y - top) * pitch + xr].z) == 0u {
                         let n = counts[i][j];
                         c = min((sums[i][j] + 384u * n) / (768u * n), COST_MAX);
                     }

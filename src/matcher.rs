@@ -2,9 +2,10 @@
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
+use crate::backend::gpu::{self, Gpu};
 use crate::error::{Error, Result};
 use crate::image::Pair;
-use crate::options::{DisparityRange, Execution, Method};
+use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::{self, Observer, Solution};
 
@@ -41,9 +42,39 @@ pub fn match_pair(
         pool = pool.num_threads(threads);
     }
     let pool = pool.build().map_err(|e| Error::option("--threads", e.to_string()))?;
-    let (solution, ran_on) = pool.install(|| {
-        let mut cpu = Cpu::default();
-        solver::solve(&mut cpu, &plan, pair, observer).map(|solution| (solution, cpu.describe()))
-    })?;
-    Ok(Matched { solution, plan, ran_on, note: None })
+    pool.install(|| match execution.backend {
+        Choice::Cpu if execution.device.is_some() => Err(Error::option(
+            "--device",
+            "names a device, and --backend cpu uses none: leave one of them out",
+        )),
+        Choice::Cpu => run(&mut Cpu::default(), plan, pair, observer, None),
+        Choice::Gpu => run(&mut Gpu::new(execution.device.as_deref())?, plan, pair, observer, None),
+        // Who names a device means it.
+        Choice::Auto if execution.device.is_some() => {
+            run(&mut Gpu::new(execution.device.as_deref())?, plan, pair, observer, None)
+        }
+        Choice::Auto if !gpu::has_automatic() => run(&mut Cpu::default(), plan, pair, observer, None),
+        Choice::Auto => {
+            let tried =
+                Gpu::new(None).and_then(|mut gpu| run(&mut gpu, plan.clone(), pair, &mut *observer, None));
+            match tried {
+                // The bits are the same on the CPU path, so a device that fails costs time and nothing else.
+                Err(e @ (Error::Device(_) | Error::Memory(_))) => {
+                    run(&mut Cpu::default(), plan, pair, observer, Some(e.to_string()))
+                }
+                other => other,
+            }
+        }
+    })
+}
+
+fn run(
+    backend: &mut impl Backend,
+    plan: Plan,
+    pair: &Pair,
+    observer: Observer,
+    note: Option<String>,
+) -> Result<Matched> {
+    let solution = solver::solve(backend, &plan, pair, observer)?;
+    Ok(Matched { solution, plan, ran_on: backend.describe(), note })
 }

@@ -16,16 +16,18 @@ struct Level {
     dependency_pitch: u32,
     // Words in a row of member codes.
     member_pitch: u32,
+    // Elements in a row of what has one element a pixel.
+    pixel_pitch: u32,
+    // Words in a row of the starts of the transposed table.
+    starts_pitch: u32,
 }
 
 struct Params {
-    level: Level,
-    fine: Level,
+    @align(16) level: Level,
+    @align(16) fine: Level,
     // The band: the stage works on rows first_row .. first_row + rows of the level.
-    first_row: u32,
+    @align(16) first_row: u32,
     rows: u32,
-    // First word of the bound range of the transposed table.
-    incoming_base: u32,
     outside_cost: u32,
     sad_radius: i32,
     // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.

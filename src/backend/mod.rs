@@ -58,6 +58,21 @@ pub enum Volume {
     Belief(usize),
 }
 
+impl Volume {
+    /// The level it belongs to.
+    #[must_use]
+    pub fn level(self) -> usize {
+        match self {
+            Self::Cost(z)
+            | Self::Evidence(z)
+            | Self::Dependency(z)
+            | Self::Down(z)
+            | Self::Up(z)
+            | Self::Belief(z) => z,
+        }
+    }
+}
+
 /// The stages of the method.
 pub trait Backend {
     /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
@@ -139,10 +154,7 @@ pub trait Backend {
 /// Number of values in `volume` under `plan`, and labels in a row of them, without and with padding.
 #[must_use]
 pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
-    let (z, rows) = match volume {
-        Volume::Dependency(z) => (z, plan.slots()),
-        Volume::Cost(z) | Volume::Evidence(z) | Volume::Down(z) | Volume::Up(z) | Volume::Belief(z) => (z, 1),
-    };
-    let level = &plan.levels[z];
+    let rows = if matches!(volume, Volume::Dependency(_)) { plan.slots() } else { 1 };
+    let level = &plan.levels[volume.level()];
     (level.pixels() * rows, level.labels, level.stride)
 }

@@ -1,0 +1,223 @@
+//! The shaders, put together from their files, and what they are told.
+
+use crate::plan::{CutRule, LABEL_BLOCK, LevelPlan, MessageWidth, Plan};
+use bytemuck::{Pod, Zeroable};
+
+const PARAMS: &str = include_str!("../../../shaders/shared/params.wgsl");
+const IMAGE: &str = include_str!("../../../shaders/shared/image.wgsl");
+
+/// A stage's shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "named after the shader files")]
+pub enum Kernel {
+    Census,
+    AdCensus,
+    Sad,
+    Pyramid,
+    Evidence,
+    Dependency,
+    Resolution,
+    Belief,
+    Estimate,
+    RightView,
+    Change,
+    ChangeSum,
+}
+
+impl Kernel {
+    /// Every shader there is.
+    pub const ALL: [Self; 12] = [
+        Self::Census,
+        Self::AdCensus,
+        Self::Sad,
+        Self::Pyramid,
+        Self::Evidence,
+        Self::Dependency,
+        Self::Resolution,
+        Self::Belief,
+        Self::Estimate,
+        Self::RightView,
+        Self::Change,
+        Self::ChangeSum,
+    ];
+
+    /// Name of its file in `shaders/`, without the extension.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Census => "census",
+            Self::AdCensus => "ad_census",
+            Self::Sad => "sad",
+            Self::Pyramid => "pyramid",
+            Self::Evidence => "evidence",
+            Self::Dependency => "dependency",
+            Self::Resolution => "resolution",
+            Self::Belief => "belief",
+            Self::Estimate => "estimate",
+            Self::RightView => "right_view",
+            Self::Change => "change",
+            Self::ChangeSum => "change_sum",
+        }
+    }
+
+    fn body(self) -> &'static str {
+        match self {
+            Self::Census => include_str!("../../../shaders/census.wgsl"),
+            Self::AdCensus => include_str!("../../../shaders/ad_census.wgsl"),
+            Self::Sad => include_str!("../../../shaders/sad.wgsl"),
+            Self::Pyramid => include_str!("../../../shaders/pyramid.wgsl"),
+            Self::Evidence => include_str!("../../../shaders/evidence.wgsl"),
+            Self::Dependency => include_str!("../../../shaders/dependency.wgsl"),
+            Self::Resolution => include_str!("../../../shaders/resolution.wgsl"),
+            Self::Belief => include_str!("../../../shaders/belief.wgsl"),
+            Self::Estimate => include_str!("../../../shaders/estimate.wgsl"),
+            Self::RightView => include_str!("../../../shaders/right_view.wgsl"),
+            Self::Change => include_str!("../../../shaders/change.wgsl"),
+            Self::ChangeSum => include_str!("../../../shaders/change_sum.wgsl"),
+        }
+    }
+
+    /// The shader for a variant, as the device gets it.
+    #[must_use]
+    pub fn source(self, variant: Variant) -> String {
+        let Variant { narrow, fine_narrow, slots, absolute, interpolating, low_pass, has_down, has_up } =
+            variant;
+        format!(
+            "const NARROW = {narrow};\nconst FINE_NARROW = {fine_narrow};\nconst SLOTS = {slots}u;\n\
+             const ABSOLUTE = {absolute};\nconst INTERPOLATING = {interpolating};\nconst LOW_PASS = {low_pass};\n\
+             const HAS_DOWN = {has_down};\nconst HAS_UP = {has_up};\n{PARAMS}\n{IMAGE}\n{}",
+            self.body()
+        )
+    }
+
+    /// How often all loops of one invocation run at most, together. Mesa 22 stops a shader silently after about
+    /// 65,000.
+    #[must_use]
+    pub fn loop_iterations(self, plan: &Plan, level: usize) -> usize {
+        let l = &plan.levels[level];
+        let (quads, slots) = (l.stride / 4, plan.slots());
+        let fine_labels = plan.levels[level.saturating_sub(1)].stride;
+        match self {
+            Self::Census => 7 * 10,
+            Self::AdCensus => 4,
+            Self::Sad => {
+                let window = plan.method.sad_window as usize;
+                (window + 7) * (1 + 5 * window + 8) + 8 * 5
+            }
+            Self::Pyramid => 7 * 31,
+            Self::Evidence | Self::Estimate => 2 * quads,
+            Self::Dependency => slots * (quads + 5) + 2 * quads * (2 * slots + 1),
+            Self::Resolution => fine_labels + 3 * l.stride + fine_labels / 2,
+            // A pixel is a member of at most the 49 factors of its window.
+            Self::Belief => 2 * 4 + 49 * 5,
+            Self::RightView => l.labels,
+            Self::Change => quads,
+            Self::ChangeSum => l.width,
+        }
+    }
+}
+
+/// What a shader is specialised by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a constant of the shaders")]
+pub struct Variant {
+    /// Messages are stored in 8 bits instead of 16.
+    pub narrow: bool,
+    /// Costs read are stored in 8 bits instead of 16.
+    pub fine_narrow: bool,
+    /// Members of a dependency factor.
+    pub slots: usize,
+    /// The cut is [`CutRule::Absolute`].
+    pub absolute: bool,
+    /// Odd labels agree with both their coarse neighbours.
+    pub interpolating: bool,
+    /// The pyramid's low-pass in d instead of the minimum.
+    pub low_pass: bool,
+    /// There is a coarser level.
+    pub has_down: bool,
+    /// There is a finer level.
+    pub has_up: bool,
+}
+
+impl Variant {
+    /// What `kernel` is for `plan` at `level`, without what it does not look at, so that equal shaders compile once.
+    #[must_use]
+    pub fn new(kernel: Kernel, plan: &Plan, level: usize) -> Self {
+        let looks = |kernels: &[Kernel]| kernels.contains(&kernel);
+        let messages = looks(&[Kernel::Dependency, Kernel::Resolution, Kernel::Belief]);
+        let potentials = looks(&[Kernel::Dependency, Kernel::Resolution]);
+        Self {
+            narrow: messages && plan.message_width == MessageWidth::Narrow,
+            fine_narrow: kernel == Kernel::Evidence && level == 0 || kernel == Kernel::Pyramid && level == 1,
+            slots: if looks(&[Kernel::Dependency, Kernel::Belief]) { plan.slots() } else { 1 },
+            absolute: potentials && plan.dependency.rule == CutRule::Absolute,
+            interpolating: kernel == Kernel::Resolution && plan.interpolating(),
+            low_pass: kernel == Kernel::Pyramid && !plan.minimum_over_d(),
+            has_down: kernel == Kernel::Belief && level + 1 < plan.levels.len(),
+            has_up: kernel == Kernel::Belief && level > 0,
+        }
+    }
+}
+
+/// Rows of every buffer start at a multiple of this many 32-bit words: the alignment of bindings everywhere.
+pub(super) const ALIGN_WORDS: usize = 64;
+
+/// `Level` of `shaders/shared/params.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[allow(missing_docs, reason = "explained in the shader")]
+pub struct LevelParams {
+    pub width: u32,
+    pub height: u32,
+    pub low: i32,
+    pub labels: u32,
+    pub quads: u32,
+    pub pitch: u32,
+    pub dependency_pitch: u32,
+    pub member_pitch: u32,
+    pub pixel_pitch: u32,
+    pub starts_pitch: u32,
+}
+
+impl LevelParams {
+    /// Parameters of `level`.
+    #[must_use]
+    pub fn new(plan: &Plan, level: &LevelPlan) -> Self {
+        const { assert!(LABEL_BLOCK.is_multiple_of(16)) };
+        let quads = level.stride / 4;
+        let pitch = |words: usize| words.next_multiple_of(ALIGN_WORDS) as u32;
+        Self {
+            width: level.width as u32,
+            height: level.height as u32,
+            low: level.min,
+            labels: level.labels as u32,
+            quads: quads as u32,
+            pitch: pitch(level.width * quads),
+            dependency_pitch: pitch(level.width * plan.slots() * quads * plan.message_bytes()),
+            member_pitch: pitch(level.width * plan.neighbours.div_ceil(4)),
+            pixel_pitch: pitch(level.width),
+            starts_pitch: pitch(level.width + 1),
+        }
+    }
+}
+
+/// `Params` of `shaders/shared/params.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[allow(missing_docs, reason = "explained in the shader")]
+pub struct Params {
+    pub level: LevelParams,
+    pub padding_0: [u32; 2],
+    pub fine: LevelParams,
+    pub padding_1: [u32; 2],
+    pub first_row: u32,
+    pub rows: u32,
+    pub outside_cost: u32,
+    pub sad_radius: i32,
+    pub label_offset: i32,
+    pub evidence_multiplier: u32,
+    pub evidence_limit: u32,
+    pub evidence_cap: u32,
+    pub tau: u32,
+    pub padding_2: [u32; 3],
+}
