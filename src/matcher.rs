@@ -69,7 +69,7 @@ pub fn match_pair(
 }
 
 fn run(
-    backend: &mut impl Backend,
+    backend: &mut dyn Backend,
     plan: Plan,
     pair: &Pair,
     observer: Observer,
