@@ -39,10 +39,14 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
             let plan = Plan::new(width, height, range, &method).expect("a plan");
             let coarsest = plan.levels.len() - 1;
             let mut group = criterion.benchmark_group(format!("{case}/{preset}"));
-            group.sample_size(10).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(500));
+            group
+                .sample_size(10)
+                .measurement_time(Duration::from_secs(2))
+                .warm_up_time(Duration::from_millis(500));
 
             // Whatever a stage needs is there, and the device is warm.
-            let solution = solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
+            let solution =
+                solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
             group.bench_function(format!("cost/{name}"), |b| {
                 b.iter(|| {
                     backend.cost().expect("cost");
@@ -77,14 +81,22 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                 b.iter(|| black_box(backend.estimate().expect("an estimate")));
             });
             group.bench_function(format!("match/{name}"), |b| {
-                b.iter(|| solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match"));
+                b.iter(|| {
+                    solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match")
+                });
             });
             if name == "cpu" {
                 group.bench_function("graph", |b| b.iter(|| graph::build(pair.left(), &plan)));
                 let weights = refine::MedianWeights::new(15, 5.0, 0.1);
                 group.bench_function("median", |b| {
                     b.iter(|| {
-                        refine::weighted_median(&solution.raw, &solution.validity, pair.left(), &weights, |_| true)
+                        refine::weighted_median(
+                            &solution.raw,
+                            &solution.validity,
+                            pair.left(),
+                            &weights,
+                            |_| true,
+                        )
                     });
                 });
             }

@@ -1,8 +1,8 @@
-// The optimum of every pixel with the beliefs around it. One invocation a pixel.
+// The optimum of every pixel and its best rival. One invocation a pixel.
 
 @group(0) @binding(1) var<storage, read> belief: array<vec2<u32>>;
-// label | best << 16, lower | upper << 16, rival, 0.
-@group(0) @binding(2) var<storage, read_write> peaks: array<vec4<u32>>;
+// label | best << 16, rival.
+@group(0) @binding(2) var<storage, read_write> peaks: array<vec2<u32>>;
 
 const NONE: u32 = 0xffffu;
 const LANES: vec4<u32> = vec4(0u, 1u, 2u, 3u);
@@ -10,14 +10,6 @@ const LANES: vec4<u32> = vec4(0u, 1u, 2u, 3u);
 fn load(first: u32, quad: u32) -> vec4<u32> {
     let labels = vec4(4u * quad) + LANES;
     return select(vec4(NONE), unpack_wide(belief[first + quad]), labels < vec4(params.level.labels));
-}
-
-fn at(first: u32, label: i32) -> u32 {
-    if label < 0 || label >= i32(params.level.labels) {
-        return NONE;
-    }
-    let words = belief[first + u32(label) / 4u];
-    return unpack_wide(words)[u32(label) % 4u];
 }
 
 @compute @workgroup_size(64)
@@ -38,9 +30,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let away = abs(vec4<i32>(vec4(4u * quad) + LANES) - vec4(label)) > vec4(1);
         rival = min(rival, select(vec4(NONE), load(first, quad), away));
     }
-    peaks[id.y * params.level.pixel_pitch + id.x] = vec4(
-        u32(label) | (key & 0xffff0000u),
-        at(first, label - 1) | (at(first, label + 1) << 16u),
-        smallest(rival),
-        0u);
+    peaks[id.y * params.level.pixel_pitch + id.x] = vec2(u32(label) | (key & 0xffff0000u), smallest(rival));
 }

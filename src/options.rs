@@ -113,18 +113,6 @@ pub enum Schedule {
     CoarseFirst,
 }
 
-/// How the disparity between two labels is read off the belief.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SubPixel {
-    /// Not at all: whole labels.
-    None,
-    /// The vertex of the parabola through the optimum and its two neighbours.
-    Parabola,
-    /// The tip of the symmetric V through the same three points: the steeper side sets the slope of both.
-    Equiangular,
-}
-
 /// What becomes of the pixels that are invalid after visibility and region filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -196,7 +184,7 @@ method! {
     visibility: bool, "true | false", "Compare with the map of the right view, read off the same beliefs, and call \
          what disagrees by more than one pixel occluded (the paper does without).";
     region_size: u32, "pixels", "Regions smaller than this become invalid; 0 keeps all (open).";
-    sub_pixel: SubPixel, "none | parabola | equiangular", "How the disparity between labels is read off the belief \
+    sub_pixel: bool, "true | false", "Place the disparity between the labels, by the matching cost around the optimum \
          (open).";
     fill: Fill, "none | row", "What becomes of invalid pixels.";
     median: Median, "off | filled | all", "Which pixels the weighted median touches (section 3.5).";
@@ -242,7 +230,7 @@ impl Default for Method {
             tolerance: 0.0,
             visibility: true,
             region_size: 200,
-            sub_pixel: SubPixel::Equiangular,
+            sub_pixel: true,
             fill: Fill::Row,
             median: Median::All,
             median_window: 15,
@@ -277,7 +265,7 @@ impl Method {
                 tolerance: 0.1,
                 visibility: false,
                 region_size: 0,
-                sub_pixel: SubPixel::None,
+                sub_pixel: false,
                 ..Self::default()
             }),
             _ => {

@@ -4,7 +4,7 @@ use crate::backend::{Backend, Estimate};
 use crate::error::{Error, Result};
 use crate::graph;
 use crate::image::{Pair, Plane};
-use crate::options::{Fill, Median, SubPixel};
+use crate::options::{Fill, Median};
 use crate::plan::Plan;
 use crate::refine::{self, FRACTION, MedianWeights, flag};
 use std::ops::ControlFlow;
@@ -145,8 +145,13 @@ fn refine_estimate(estimate: &Estimate, plan: &Plan, pair: &Pair, iterations: u3
     let method = &plan.method;
     let min = plan.range.min;
     let guide = pair.left();
-    let raw = refine::sub_pixel(&estimate.peaks, min, method.sub_pixel);
     let (width, height) = plan.size();
+    let labels = estimate.peaks.map(|peak| (min + i32::from(peak.label)) * FRACTION);
+    let raw = if method.sub_pixel {
+        Plane::from_fn(width, height, |x, y| labels[(x, y)] + i32::from(estimate.offsets[(x, y)]))
+    } else {
+        labels.clone()
+    };
     let mut validity =
         if method.visibility { refine::visibility(estimate, min) } else { Plane::filled(width, height, 0) };
     for (flags, &masked) in validity.data_mut().iter_mut().zip(guide.masked.data()) {
@@ -154,11 +159,6 @@ fn refine_estimate(estimate: &Estimate, plan: &Plan, pair: &Pair, iterations: u3
             *flags = flag::MASKED;
         }
     }
-    let labels = if method.sub_pixel == SubPixel::None {
-        raw.clone()
-    } else {
-        refine::sub_pixel(&estimate.peaks, min, SubPixel::None)
-    };
     refine::region_filter(&labels, &mut validity, method.region_size as usize);
     let confidence = refine::confidence(&estimate.peaks, &mut validity, method.confidence_floor);
     let mut disparity = raw.clone();

@@ -70,7 +70,13 @@ fn for_every_shader(check: impl Fn(Kernel, &Module, &ModuleInfo) -> Result<(), S
             result.err().map(|e| format!("{name}: {e}"))
         })
         .collect();
-    assert!(failures.is_empty(), "{} of {} shaders fail:\n{}", failures.len(), sources.len(), failures.join("\n"));
+    assert!(
+        failures.is_empty(),
+        "{} of {} shaders fail:\n{}",
+        failures.len(),
+        sources.len(),
+        failures.join("\n")
+    );
 }
 
 #[test]
@@ -94,7 +100,10 @@ fn validation_can_fail() {
     assert!(validated(&source).is_ok());
     assert!(validated(&source.replace("pack_wide(sums[i])", "sums[i]")).is_err());
     // 64-bit integers are a capability that was not asked for.
-    assert!(validated(&source.replace("let blocks = quads / QUADS;", "let blocks = u32(u64(quads)) / QUADS;")).is_err());
+    assert!(
+        validated(&source.replace("let blocks = quads / QUADS;", "let blocks = u32(u64(quads)) / QUADS;"))
+            .is_err()
+    );
 }
 
 #[test]
@@ -107,13 +116,16 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
     let params = fields!(Params: level, fine, first_row, rows, outside_cost, sad_radius, label_offset,
         evidence_multiplier, evidence_limit, evidence_cap, tau);
     for_every_shader(|_, module, _| {
-        let expected = [("Level", &level, size_of::<LevelParams>()), ("Params", &params, size_of::<Params>())];
+        let expected =
+            [("Level", &level, size_of::<LevelParams>()), ("Params", &params, size_of::<Params>())];
         for (name, fields, bytes) in expected {
             let (members, span) = module
                 .types
                 .iter()
                 .find_map(|(_, t)| match &t.inner {
-                    TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => Some((members, *span)),
+                    TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
+                        Some((members, *span))
+                    }
                     _ => None,
                 })
                 .ok_or(format!("no struct {name}"))?;
@@ -174,8 +186,9 @@ fn every_shader_translates_to_spirv_msl_and_hlsl() {
     for_every_shader(|_, module, info| {
         let entry = (ShaderStage::Compute, "main".to_owned());
         let spirv = naga::back::spv::PipelineOptions { shader_stage: entry.0, entry_point: entry.1.clone() };
-        let words = naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), Some(&spirv))
-            .map_err(|e| format!("SPIR-V: {e}"))?;
+        let words =
+            naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), Some(&spirv))
+                .map_err(|e| format!("SPIR-V: {e}"))?;
         let msl_options = naga::back::msl::Options { lang_version: (2, 4), ..Default::default() };
         let msl = naga::back::msl::PipelineOptions { entry_point: Some(entry.clone()), ..Default::default() };
         let (metal, _) = naga::back::msl::write_string(module, info, &msl_options, &msl)

@@ -22,10 +22,6 @@ pub struct Peak {
     pub label: u16,
     /// Its belief.
     pub best: u16,
-    /// The belief of the label below, [`u16::MAX`] if there is none.
-    pub lower: u16,
-    /// The belief of the label above, [`u16::MAX`] if there is none.
-    pub upper: u16,
     /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
     pub rival: u16,
 }
@@ -35,6 +31,8 @@ pub struct Peak {
 pub struct Estimate {
     /// The optimum of each pixel of the reference view.
     pub peaks: Plane<Peak>,
+    /// How far the disparity of each pixel is above its label, in 1/256 px, -128 ..= 128.
+    pub offsets: Plane<i16>,
     /// Label index of each pixel of the right view, read off the same beliefs; [`NO_LABEL`] where no left pixel
     /// projects.
     pub right: Plane<u16>,
@@ -140,8 +138,16 @@ pub trait Backend {
     /// call (of label indices; from 0 on the first call).
     fn change(&mut self) -> Result<u64>;
 
-    /// The optimum of every pixel, and the map of the right view: at right pixel (x, y) the d with the smallest
-    /// belief of left pixel (x + d, y) among those inside, the lowest on ties.
+    /// The optimum of every pixel, its offset between labels, and the map of the right view.
+    ///
+    /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
+    /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 3 x 3
+    /// neighbourhood, as far as it is inside, whose own label is at most one away. With s = max(a, c) - b it is
+    /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0 or at an end of the range. (The cost and
+    /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
+    ///
+    /// The right view has at (x, y) the d with the smallest belief of left pixel (x + d, y) among those inside, the lowest
+    /// on ties.
     fn estimate(&mut self) -> Result<Estimate>;
 
     /// The values of `volume`.

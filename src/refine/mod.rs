@@ -1,19 +1,20 @@
-//! What follows the beliefs, a stage a file: sub-pixel, visibility, region filter, fill, weighted median,
+//! What follows the estimate, a stage a file: visibility, region filter, fill, weighted median,
 //! confidence. All in integers, disparities in 1/256 px.
 
 mod confidence;
 mod fill;
 mod median;
 mod region;
-mod sub_pixel;
 mod visibility;
 
 pub use confidence::confidence;
 pub use fill::fill;
 pub use median::{MedianWeights, weighted_median};
 pub use region::region_filter;
-pub use sub_pixel::{FRACTION, sub_pixel};
 pub use visibility::visibility;
+
+/// Fixed-point units of disparity in one pixel.
+pub const FRACTION: i32 = 256;
 
 /// Why a pixel is what it is: bits of the validity map. A pixel of 0 is measured and trusted.
 pub mod flag {

@@ -3,9 +3,10 @@
 use crate::backend::{Estimate, NO_LABEL, Peak};
 use crate::image::Plane;
 use crate::plan::Plan;
+use crate::refine::FRACTION;
 use rayon::prelude::*;
 
-pub(super) fn run(plan: &Plan, belief: &[u16]) -> Estimate {
+pub(super) fn run(plan: &Plan, cost: &[u8], belief: &[u16]) -> Estimate {
     let level = &plan.levels[0];
     let (width, labels, stride) = (level.width, level.labels, level.stride);
     let mut peaks = vec![Peak::default(); level.pixels()];
@@ -34,21 +35,49 @@ pub(super) fn run(plan: &Plan, belief: &[u16]) -> Estimate {
         },
     );
     let (width, height) = plan.size();
-    Estimate { peaks: Plane::new(width, height, peaks), right: Plane::new(width, height, right) }
+    let peaks = Plane::new(width, height, peaks);
+    let offsets = offsets(plan, cost, &peaks);
+    Estimate { peaks, offsets, right: Plane::new(width, height, right) }
+}
+
+fn offsets(plan: &Plan, cost: &[u8], peaks: &Plane<Peak>) -> Plane<i16> {
+    let level = &plan.levels[0];
+    let (width, height) = plan.size();
+    let mut offsets = vec![0; level.pixels()];
+    offsets.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, offset) in row.iter_mut().enumerate() {
+            let label = peaks[(x, y)].label;
+            let first = usize::from(label).wrapping_sub(1);
+            if label == 0 || first + 2 >= level.labels {
+                continue;
+            }
+            let mut sums = [0i32; 3];
+            for ny in y.saturating_sub(1)..(y + 2).min(height) {
+                for nx in x.saturating_sub(1)..(x + 2).min(width) {
+                    if peaks[(nx, ny)].label.abs_diff(label) <= 1 {
+                        let costs = &cost[(ny * width + nx) * level.stride + first..][..3];
+                        for (sum, &c) in sums.iter_mut().zip(costs) {
+                            *sum += i32::from(c);
+                        }
+                    }
+                }
+            }
+            let [below, at, above] = sums;
+            let slope = below.max(above) - at;
+            if slope > 0 {
+                let exact = (FRACTION * (below - above) + slope).div_euclid(2 * slope);
+                *offset = exact.clamp(-FRACTION / 2, FRACTION / 2) as i16;
+            }
+        }
+    });
+    Plane::new(width, height, offsets)
 }
 
 fn peak_of(belief: &[u16]) -> Peak {
     let (label, best) = optimum(belief);
-    let at = |j: Option<usize>| j.and_then(|j| belief.get(j)).copied().unwrap_or(u16::MAX);
     let below = &belief[..label.saturating_sub(1)];
     let above = belief.get(label + 2..).unwrap_or_default();
-    Peak {
-        label: label as u16,
-        best,
-        lower: at(label.checked_sub(1)),
-        upper: at(Some(label + 1)),
-        rival: below.iter().chain(above).copied().min().unwrap_or(u16::MAX),
-    }
+    Peak { label: label as u16, best, rival: below.iter().chain(above).copied().min().unwrap_or(u16::MAX) }
 }
 
 /// Index and value of the smallest belief, the lowest index on ties.

@@ -214,7 +214,7 @@ impl Backend for Cpu {
     }
 
     fn estimate(&mut self) -> Result<Estimate> {
-        Ok(on_volumes!(self, v => estimate::run(&v.plan, &v.levels[0].belief)))
+        Ok(on_volumes!(self, v => estimate::run(&v.plan, &v.fine_cost, &v.levels[0].belief)))
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {

@@ -19,6 +19,7 @@ pub enum Kernel {
     Resolution,
     Belief,
     Estimate,
+    SubPixel,
     RightView,
     Change,
     ChangeSum,
@@ -26,7 +27,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every shader there is.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Census,
         Self::AdCensus,
         Self::Sad,
@@ -36,6 +37,7 @@ impl Kernel {
         Self::Resolution,
         Self::Belief,
         Self::Estimate,
+        Self::SubPixel,
         Self::RightView,
         Self::Change,
         Self::ChangeSum,
@@ -54,6 +56,7 @@ impl Kernel {
             Self::Resolution => "resolution",
             Self::Belief => "belief",
             Self::Estimate => "estimate",
+            Self::SubPixel => "sub_pixel",
             Self::RightView => "right_view",
             Self::Change => "change",
             Self::ChangeSum => "change_sum",
@@ -71,6 +74,7 @@ impl Kernel {
             Self::Resolution => include_str!("../../../shaders/resolution.wgsl"),
             Self::Belief => include_str!("../../../shaders/belief.wgsl"),
             Self::Estimate => include_str!("../../../shaders/estimate.wgsl"),
+            Self::SubPixel => include_str!("../../../shaders/sub_pixel.wgsl"),
             Self::RightView => include_str!("../../../shaders/right_view.wgsl"),
             Self::Change => include_str!("../../../shaders/change.wgsl"),
             Self::ChangeSum => include_str!("../../../shaders/change_sum.wgsl"),
@@ -110,6 +114,7 @@ impl Kernel {
             Self::Resolution => fine_labels + 3 * l.stride + fine_labels / 2,
             // A pixel is a member of at most the 49 factors of its window.
             Self::Belief => 2 * 4 + 49 * 5,
+            Self::SubPixel => 3 + 9 * 4,
             Self::RightView => l.labels,
             Self::Change => quads,
             Self::ChangeSum => l.width,

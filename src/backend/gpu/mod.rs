@@ -49,6 +49,7 @@ struct Buffers {
     /// Sums of the squared changes of each row, lower and upper half.
     change_sums: wgpu::Buffer,
     peaks: wgpu::Buffer,
+    offsets: wgpu::Buffer,
     right_labels: wgpu::Buffer,
 }
 
@@ -444,7 +445,7 @@ impl Gpu {
                 ]
             })?);
             if z == 0 {
-                stages.estimate = self.estimate_stages(plan, &base, &b.belief, state)?;
+                stages.estimate = self.estimate_stages(plan, &base, b, state)?;
                 stages.change = self.change_stages(plan, &base, &b.belief, state)?;
             }
         }
@@ -506,21 +507,26 @@ impl Gpu {
         &mut self,
         plan: &Plan,
         base: &Params,
-        belief: &wgpu::Buffer,
+        level: &LevelBuffers,
         state: &Buffers,
     ) -> Result<Vec<Dispatch>> {
         let l = base.level;
-        let mut dispatches = self.stage(Kernel::Estimate, plan, 0, base, Some(l.width), |rows| {
-            vec![
-                Binding::rows(belief, 2 * l.pitch, rows),
-                Binding::rows(&state.peaks, 4 * l.pixel_pitch, rows),
-            ]
+        let belief_rows = |rows: &Range<u32>| Binding::rows(&level.belief, 2 * l.pitch, rows);
+        let peak_rows = |rows: &Range<u32>| Binding::rows(&state.peaks, 2 * l.pixel_pitch, rows);
+        let threads = Some(l.width);
+        let mut dispatches = self.stage(Kernel::Estimate, plan, 0, base, threads, |rows| {
+            vec![belief_rows(rows), peak_rows(rows)]
         })?;
-        dispatches.extend(self.stage(Kernel::RightView, plan, 0, base, Some(l.width), |rows| {
+        dispatches.extend(self.stage(Kernel::SubPixel, plan, 0, base, threads, |rows| {
+            let seen = with_halo(rows, 1, l.height);
             vec![
-                Binding::rows(belief, 2 * l.pitch, rows),
-                Binding::rows(&state.right_labels, l.pixel_pitch, rows),
+                Binding::rows(&level.cost, l.pitch, &seen),
+                peak_rows(&seen),
+                Binding::rows(&state.offsets, l.pixel_pitch, rows),
             ]
+        })?);
+        dispatches.extend(self.stage(Kernel::RightView, plan, 0, base, threads, |rows| {
+            vec![belief_rows(rows), Binding::rows(&state.right_labels, l.pixel_pitch, rows)]
         })?);
         Ok(dispatches)
     }
@@ -596,7 +602,8 @@ impl Backend for Gpu {
         let pixels = u64::from(fine.pixel_pitch) * u64::from(fine.height);
         let buffers = Buffers {
             change_sums: self.buffer("change", 2 * u64::from(fine.height))?,
-            peaks: self.buffer("peaks", 4 * pixels)?,
+            peaks: self.buffer("peaks", 2 * pixels)?,
+            offsets: self.buffer("offsets", pixels)?,
             right_labels: self.buffer("right labels", pixels)?,
             levels,
         };
@@ -640,19 +647,21 @@ impl Backend for Gpu {
 
     fn estimate(&mut self) -> Result<Estimate> {
         self.run(|s| &s.estimate)?;
-        let (peaks, right) = (self.state().buffers.peaks.clone(), self.state().buffers.right_labels.clone());
-        let (peaks, right) = (self.download(&peaks)?, self.download(&right)?);
+        let Buffers { peaks, offsets, right_labels, .. } = &self.state().buffers;
+        let (peaks, offsets, right) = (peaks.clone(), offsets.clone(), right_labels.clone());
+        let (peaks, offsets, right) =
+            (self.download(&peaks)?, self.download(&offsets)?, self.download(&right)?);
         let state = self.state();
         let (width, height) = state.plan.size();
         let pitch = state.buffers.levels[0].params.pixel_pitch as usize;
-        let halves = |word: u32| (word as u16, (word >> 16) as u16);
-        let peaks = Plane::from_fn(width, height, |x, y| {
-            let words = &peaks[4 * (y * pitch + x)..][..3];
-            let ((label, best), (lower, upper), rival) =
-                (halves(words[0]), halves(words[1]), words[2] as u16);
-            Peak { label, best, lower, upper, rival }
-        });
-        Ok(Estimate { peaks, right: Plane::from_fn(width, height, |x, y| right[y * pitch + x] as u16) })
+        Ok(Estimate {
+            peaks: Plane::from_fn(width, height, |x, y| {
+                let [first, second] = [0, 1].map(|i| peaks[2 * (y * pitch + x) + i]);
+                Peak { label: first as u16, best: (first >> 16) as u16, rival: second as u16 }
+            }),
+            offsets: Plane::from_fn(width, height, |x, y| offsets[y * pitch + x] as i16),
+            right: Plane::from_fn(width, height, |x, y| right[y * pitch + x] as u16),
+        })
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {

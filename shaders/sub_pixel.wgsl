@@ -1,0 +1,42 @@
+// How far the disparity of every pixel is above its label, by the matching cost around it. One invocation a pixel.
+
+@group(0) @binding(1) var<storage, read> cost: array<u32>;
+// label | best << 16, rival.
+@group(0) @binding(2) var<storage, read> peaks: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> offsets: array<i32>;
+
+const FRACTION: i32 = 256;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let pitch = params.level.pixel_pitch;
+    let top = i32(halo_start(1u));
+    let x = i32(id.x);
+    let y = i32(params.first_row + id.y);
+    let label = i32(peaks[u32(y - top) * pitch + id.x].x & 0xffffu);
+    var offset = 0;
+    if label > 0 && label + 1 < i32(params.level.labels) {
+        var sums = vec3<i32>();
+        for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
+            for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {
+                if abs(i32(peaks[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 1 {
+                    let start = u32(v - top) * params.level.pitch + u32(u) * params.level.quads;
+                    for (var i = 0; i < 3; i++) {
+                        let at = u32(label - 1 + i);
+                        sums[i] += i32((cost[start + at / 4u] >> (8u * (at % 4u))) & 0xffu);
+                    }
+                }
+            }
+        }
+        let slope = max(sums.x, sums.z) - sums.y;
+        if slope > 0 {
+            // Raised by half a pixel, the dividend is not negative and the quotient rounds towards minus infinity.
+            let difference = clamp(sums.x - sums.z, -slope, slope);
+            offset = (FRACTION * (difference + slope) + slope) / (2 * slope) - FRACTION / 2;
+        }
+    }
+    offsets[id.y * pitch + id.x] = offset;
+}
