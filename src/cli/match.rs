@@ -147,7 +147,12 @@ fn check_outputs(args: &Args, range: DisparityRange) -> Result<()> {
     for (_, path) in pictures {
         path.map_or(Ok(()), |p| write::check_png_path(p))?;
     }
-    let inputs = [("LEFT", Some(&args.left)), ("RIGHT", Some(&args.right)), ("the mask", args.mask.as_ref())];
+    let inputs = [
+        ("LEFT", Some(&args.left)),
+        ("RIGHT", Some(&args.right)),
+        ("the mask", args.mask.as_ref()),
+        ("the config file", args.method.config.as_ref()),
+    ];
     outputs::distinct(
         &inputs.into_iter().filter_map(given).collect::<Vec<_>>(),
         &maps.into_iter().chain(pictures).filter_map(given).collect::<Vec<_>>(),
