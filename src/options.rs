@@ -8,6 +8,7 @@
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::io::Read;
 use std::path::Path;
 
 /// The disparities to search, in pixels, both ends included.
@@ -21,6 +22,8 @@ pub struct DisparityRange {
 
 /// Most labels of a range: what 16-bit label indices and every device's limits allow.
 pub const MAX_LABELS: usize = 16_384;
+/// A config file is a few dozen lines; no more than this is read of one.
+const MAX_CONFIG_BYTES: u64 = 1 << 20;
 /// Largest absolute disparity: the fixed-point maps hold 1/256 px in 32 bits with room for differences.
 pub const MAX_DISPARITY: i32 = 1 << 20;
 
@@ -37,16 +40,18 @@ impl DisparityRange {
             ));
         }
         if min < -MAX_DISPARITY || max > MAX_DISPARITY {
+            let (name, value) =
+                if max > MAX_DISPARITY { ("--max-disparity", max) } else { ("--min-disparity", min) };
             return Err(Error::option(
-                "--max-disparity",
-                format!("disparities beyond {MAX_DISPARITY} px are not supported"),
+                name,
+                format!("{value} is out of reach: disparities are within {MAX_DISPARITY} px of 0"),
             ));
         }
         let labels = i64::from(max) - i64::from(min) + 1;
         if labels > MAX_LABELS as i64 {
             return Err(Error::option(
                 "--max-disparity",
-                format!("{min} ..= {max} is {labels} labels; at most {MAX_LABELS} are supported"),
+                format!("{min} to {max} are {labels} labels and at most {MAX_LABELS} fit: narrow the range"),
             ));
         }
         Ok(Self { min, max })
@@ -283,47 +288,86 @@ impl Method {
     /// # Errors
     /// [`Error::Option`] naming the key when there is no such key or the value does not fit it.
     pub fn set(&mut self, key: &str, value: &str) -> Result<()> {
+        self.set_all([(key, value)])
+    }
+
+    /// Sets each key to its value, the last one where a key comes twice. What depends on two keys is checked once
+    /// all are set, so that their order does not matter.
+    ///
+    /// # Errors
+    /// As [`Method::set`].
+    pub fn set_all<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<()> {
         // Bare words (`cost=sad`) are strings, everything else is TOML already.
-        let text = [format!("{key} = {value}"), format!("{key} = \"{value}\"")];
-        let table = text.iter().find_map(|t| t.parse::<toml::Table>().ok()).ok_or_else(|| {
-            Error::option(format!("--set {key}"), format!("cannot understand the value `{value}`"))
-        })?;
-        *self = self.merged(table).map_err(|e| Error::option(format!("--set {key}"), e))?;
+        let value = |text: &str| match format!("value = {text}").parse::<toml::Table>() {
+            Ok(mut table) if table.len() == 1 => table.remove("value"),
+            _ => None,
+        };
+        let changes = pairs
+            .into_iter()
+            .map(|(key, text)| (key.to_owned(), value(text).unwrap_or_else(|| text.into())))
+            .collect();
+        *self =
+            self.merged(changes).map_err(|(key, reason)| Error::option(format!("--set {key}"), reason))?;
         Ok(())
     }
 
     /// Sets every key that the TOML file `path` holds.
     ///
     /// # Errors
-    /// [`Error::Read`] when the file cannot be read, is no TOML, or holds a key or a value that does not fit.
+    /// [`Error::Read`] when the file cannot be read, is no TOML, or holds a key or a value that does not fit; it names
+    /// the line.
     pub fn load(&mut self, path: &Path) -> Result<()> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-        let table = text.parse::<toml::Table>().map_err(|e| Error::read(path, one_line(&e)))?;
-        *self = self.merged(table).map_err(|e| Error::read(path, e))?;
+        let mut text = String::new();
+        std::fs::File::open(path)
+            .and_then(|file| file.take(MAX_CONFIG_BYTES + 1).read_to_string(&mut text))
+            .map_err(|e| match e.kind() {
+                std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
+                std::io::ErrorKind::InvalidData => Error::read(path, "is no text; give a TOML file"),
+                _ => Error::read(path, e),
+            })?;
+        if text.len() as u64 > MAX_CONFIG_BYTES {
+            return Err(Error::read(path, "larger than any config file; is it one?"));
+        }
+        let line = |at: usize| text[..at].matches('\n').count() + 1;
+        let table = text.parse::<toml::Table>().map_err(|e| {
+            let place = e.span().map(|s| format!("line {}: ", line(s.start.min(text.len()))));
+            Error::read(path, format!("{}{}", place.unwrap_or_default(), one_line(e.message())))
+        })?;
+        *self = self.merged(table).map_err(|(key, reason)| {
+            let place = text.lines().position(|l| {
+                l.trim_start()
+                    .strip_prefix(&key)
+                    .is_some_and(|rest| rest.trim_start().starts_with(['=', '.']))
+            });
+            let place = place.map(|n| format!("line {}: ", n + 1));
+            Error::read(path, format!("{}{key}: {reason}", place.unwrap_or_default()))
+        })?;
         Ok(())
     }
 
-    /// This method with the keys of `changes` replaced.
-    fn merged(&self, changes: toml::Table) -> std::result::Result<Self, String> {
+    /// This method with the keys of `changes` replaced; else the key that does not fit, and why.
+    fn merged(&self, changes: toml::Table) -> std::result::Result<Self, (String, String)> {
         let mut table = self.table();
+        let mut method = self.clone();
         for (key, value) in changes {
             let Some(old) = table.get(&key) else {
-                return Err(format!("there is no key `{key}`; `mrfgs presets` lists them"));
+                return Err((key, "there is no such key; `mrfgs presets` lists them".into()));
             };
             // A whole number is a fine value for a real parameter.
             let value = match (old, value) {
                 (toml::Value::Float(_), toml::Value::Integer(i)) => toml::Value::Float(i as f64),
                 (_, value) => value,
             };
-            let unit = keys().into_iter().find(|k| k.0 == key).map_or("", |k| k.1);
             table.insert(key.clone(), value.clone());
-            table
-                .clone()
-                .try_into::<Self>()
-                .map_err(|_| format!("`{key}` cannot be {value}; it takes {unit}"))?;
+            method = table.clone().try_into().map_err(|_| {
+                let unit = keys().into_iter().find(|k| k.0 == key).map_or("", |k| k.1);
+                (key, format!("expected {unit}, not {}", one_line(&value.to_string())))
+            })?;
         }
-        let method: Self = table.try_into().map_err(|e| one_line(&e))?;
-        method.validated().map_err(|e| e.to_string())
+        method.validated().map_err(|e| match e {
+            Error::Option { name, reason } => (name, reason),
+            other => (String::new(), other.to_string()),
+        })
     }
 
     /// All keys with their values.
@@ -354,7 +398,14 @@ impl Method {
             }
         };
         let odd = |name: &str, value: u32| {
-            if value % 2 == 1 { Ok(()) } else { Err(Error::option(name, format!("{value} is not odd"))) }
+            if value % 2 == 1 {
+                Ok(())
+            } else {
+                Err(Error::option(
+                    name,
+                    format!("{value} is not odd; take {} or {}", value.saturating_sub(1), value + 1),
+                ))
+            }
         };
         within("sad-window", 1.0, 31.0)?;
         odd("sad-window", self.sad_window)?;
@@ -380,9 +431,9 @@ impl Method {
     }
 }
 
-/// The first line of a message, for errors that must be one line.
-fn one_line(e: &impl ToString) -> String {
-    e.to_string().lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
+/// A text in one line, as errors must be.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Which backend runs the stages.
@@ -406,4 +457,105 @@ pub struct Execution {
     pub device: Option<String>,
     /// Threads of the CPU path; `None` takes one a core.
     pub threads: Option<usize>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_as_in_toml_or_bare() {
+        let mut method = Method::default();
+        method.set("cost", "sad").unwrap();
+        method.set("cost", "\"sad\"").unwrap();
+        method.set("temperature", "2").unwrap();
+        method.set("visibility", "false").unwrap();
+        method.set_all([("levels", "3"), ("levels", "4")]).unwrap();
+        let expected =
+            Method { cost: Cost::Sad, temperature: 2.0, visibility: false, levels: 4, ..Method::default() };
+        assert_eq!(method, expected);
+    }
+
+    #[test]
+    fn what_depends_on_two_keys_is_checked_at_the_end() {
+        for order in [[0, 1], [1, 0]] {
+            let pairs = [("cost", "ad-census"), ("outside-cost", "0.5")];
+            let mut method = Method::preset("paper").unwrap();
+            method.set_all(order.map(|i| pairs[i])).unwrap();
+            assert_eq!((method.cost, method.outside_cost), (Cost::AdCensus, 0.5));
+        }
+        let error = Method::preset("paper").unwrap().set("cost", "ad-census").unwrap_err().to_string();
+        assert_eq!(error, "--set outside-cost: 20 is outside 0 to 2");
+    }
+
+    #[test]
+    fn errors_name_the_key_and_what_it_takes() {
+        for (key, value, words) in [
+            ("colour", "red", "--set colour: there is no such key; `mrfgs presets` lists them"),
+            ("cost", "ncc", "--set cost: expected sad | ad-census, not \"ncc\""),
+            ("levels", "2.5", "--set levels: expected levels, 1 to 16, not 2.5"),
+            ("levels", "-1", "--set levels: expected levels, 1 to 16, not -1"),
+            ("levels", "", "--set levels: expected levels, 1 to 16, not \"\""),
+            ("levels", "17", "--set levels: 17 is outside 1 to 16"),
+            ("levels", "3\ncost = \"sad\"", "--set levels: expected"),
+            ("temperature", "nan", "--set temperature: NaN is outside 0.001 to 1000000"),
+            ("median-window", "4", "--set median-window: 4 is not odd; take 3 or 5"),
+        ] {
+            let mut method = Method::default();
+            let error = method.set(key, value).unwrap_err().to_string();
+            assert!(error.starts_with(words) && !error.contains('\n'), "{error}");
+            assert_eq!(method, Method::default(), "{key}={value} changes nothing");
+        }
+    }
+
+    #[test]
+    fn errors_in_a_file_name_the_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("method.toml");
+        for (text, words) in [
+            ("levels = 3\ncost sad\n", "method.toml: line 2: "),
+            ("levels = 3\nlevels = 3\n", "method.toml: line 2: duplicate key"),
+            ("# levels\n\nlevels = 99", "method.toml: line 3: levels: 99 is outside 1 to 16"),
+            ("[levels]\nx = 1", "method.toml: levels: expected levels, 1 to 16, not"),
+            ("cost = \"sad", "method.toml: line 1: "),
+            ("\nsad_window = 3", "method.toml: line 2: sad_window: there is no such key"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = Method::default().load(&path).unwrap_err().to_string();
+            assert!(error.contains(words) && !error.contains('\n'), "{error}");
+        }
+        let error = Method::default().load(&folder.path().join("none.toml")).unwrap_err().to_string();
+        assert!(error.contains("none.toml: there is no such file"), "{error}");
+    }
+
+    #[test]
+    fn every_preset_survives_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("method.toml");
+        for (name, _) in PRESETS {
+            let preset = Method::preset(name).unwrap().validated().unwrap();
+            std::fs::write(&path, preset.table().to_string()).unwrap();
+            for (other, _) in PRESETS {
+                let mut method = Method::preset(other).unwrap();
+                method.load(&path).unwrap();
+                assert_eq!(method, preset);
+            }
+        }
+        assert!(Method::preset("none").unwrap_err().to_string().contains("default, paper"));
+    }
+
+    #[test]
+    fn ranges_name_the_flag_to_change() {
+        assert_eq!(DisparityRange::new(-3, -3).unwrap().labels(), 1);
+        for (min, max, words) in [
+            (5, 4, ["--max-disparity", "below the minimum"]),
+            (0, 2_000_000, ["--max-disparity", "out of reach"]),
+            (-2_000_000, 0, ["--min-disparity", "out of reach"]),
+            (i32::MIN, i32::MAX, ["disparity", "out of reach"]),
+            (0, 16_384, ["--max-disparity", "narrow the range"]),
+        ] {
+            let error = DisparityRange::new(min, max).unwrap_err().to_string();
+            assert!(words.iter().all(|w| error.contains(w)), "{error}");
+        }
+    }
 }

@@ -107,6 +107,30 @@ pub fn mask(path: &Path) -> Result<Plane<bool>> {
     Ok(plane)
 }
 
+/// Reads 8-bit levels, such as those of Middlebury's visibility masks, from any integer image that [`pair`] reads:
+/// of 16 bits the upper 8, of colours the grey.
+///
+/// # Errors
+/// [`Error::Read`] as [`pair`], and for float values.
+pub fn grey8(path: &Path) -> Result<Plane<u8>> {
+    let raster = raster(path)?;
+    let level = |c: &[u16]| match c {
+        [r, g, b] => (grey(*r, *g, *b) >> 8) as u8,
+        [v, ..] => (v >> 8) as u8,
+        [] => 0,
+    };
+    match &raster.samples {
+        Samples::Byte(v) => {
+            let wide: Vec<u16> = v.iter().map(|&v| u16::from(v) << 8).collect();
+            Ok(raster.plane(&wide, level))
+        }
+        Samples::Word(v) => Ok(raster.plane(v, level)),
+        Samples::Float(_) | Samples::Double(_) => {
+            Err(Error::read(path, "holds float values; give an 8-bit PNG"))
+        }
+    }
+}
+
 /// Reads a disparity map in pixels; what is invalid becomes +infinity. PFM and float TIFF hold disparities as
 /// they are (not finite: invalid), 16-bit PNG holds them times 256 (0: invalid).
 ///
@@ -755,6 +779,18 @@ mod tests {
         );
         let plane = mask(&path).unwrap();
         assert_eq!((0..N).filter(|&i| plane.data()[i]).collect::<Vec<_>>(), [2, 3]);
+    }
+
+    #[test]
+    fn levels_are_the_upper_eight_bits() {
+        let f = Folder::new();
+        assert_eq!(grey8(&f.grey8("a.png", RAMP)).unwrap().data(), RAMP);
+        let words = f.grey16("b.png", RAMP.map(|v| u16::from(v) * 257));
+        assert_eq!(grey8(&words).unwrap().data(), RAMP);
+        let colours = RAMP.iter().flat_map(|&v| [v; 3]).collect();
+        RgbImage::from_raw(W, H, colours).unwrap().save(f.at("c.png")).unwrap();
+        assert_eq!(grey8(&f.at("c.png")).unwrap().data(), RAMP);
+        refused(grey8(&f.tiff::<colortype::Gray32Float>("d.tif", &[0.0; N])), &["d.tif", "float"]);
     }
 
     #[test]

@@ -75,6 +75,14 @@ pub fn check_png_path(path: &Path) -> Result<()> {
     Target::of(path)?.check(path)
 }
 
+/// Says before any computing whether a file can be written to `path`, whatever its name ends in.
+///
+/// # Errors
+/// [`Error::Write`] when the path is a folder or lies in none that can be written to.
+pub fn check_path(path: &Path) -> Result<()> {
+    Target::of(path)?.check(path)
+}
+
 /// Writes 8-bit grey levels as PNG.
 ///
 /// # Errors
@@ -234,8 +242,11 @@ fn temporary(path: &Path, folder: &Path) -> Result<NamedTempFile> {
     })
 }
 
-/// Writes a file that appears whole or not at all.
-pub(super) fn save(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Writes a file that appears whole or not at all. What exists and is no regular file is written to directly.
+///
+/// # Errors
+/// [`Error::Write`] when the file cannot be written.
+pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
     let error = |e: std::io::Error| Error::write(path, e);
     match Target::of(path)? {
         Target::Special => {
@@ -345,6 +356,7 @@ mod tests {
         check("a.tif", -9, 999).unwrap();
         check("a.png", 0, 255).unwrap();
         check_png_path(&at("a.PNG")).unwrap();
+        check_path(&at("a.json")).unwrap();
         assert!(names(folder.path()).is_empty(), "the check leaves nothing");
 
         fs::create_dir(at("b.pfm")).unwrap();
@@ -362,6 +374,8 @@ mod tests {
         refused(check("a.pfm/", 0, 10), &["no file"]);
         refused(check_png_path(&at("a.jpg")), &["a.jpg", ".png"]);
         refused(check_png_path(&at("none/a.png")), &["create it"]);
+        refused(check_path(&at("none/a.json")), &["create it"]);
+        refused(check_path(&at("b.pfm")), &["b.pfm", "folder"]);
         refused(disparity(&at("none/a.pfm"), &Plane::filled(1, 1, 0.0)), &["create it"]);
         refused(disparity(&at("b.pfm"), &Plane::filled(1, 1, 0.0)), &["folder"]);
     }

@@ -1,0 +1,227 @@
+//! `mrfgs match`.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use mrfgs::image::{Pair, calib::Calibration, colour, read, write};
+use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
+use mrfgs::plan::{MessageWidth, Plan};
+use mrfgs::solver::Solution;
+use mrfgs::{Error, Result};
+
+use super::outputs::{self, Written};
+use super::{ExecutionArgs, MethodArgs, bytes, plural};
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs match left.png right.png disparity.pfm --max-disparity 63
+  mrfgs match im0.png im1.png disparity.tif                     (with calib.txt beside im0.png)
+  mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25 --mask clouds.png
+  mrfgs match l.png r.png d.png --max-disparity 90 --no-fill --confidence c.png --preview p.png
+  mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run   (levels and memory, without running)";
+
+/// Match a rectified pair and write its disparity map
+///
+/// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF or PFM, told apart by their
+/// content; pixels that are transparent or not finite are ignored.
+///
+/// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels,
+/// .tif or .tiff as float with NaN, .png as 16 bits with disparity times 256 and 0 for invalid ones (ranges within 0 to
+/// 255 only).
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Args {
+    /// Left image, the reference view
+    left: PathBuf,
+    /// Right image, of the same size and rectified, so that matches are on the same row
+    right: PathBuf,
+    /// Disparity map to write: .pfm, .tif, .tiff or .png
+    output: PathBuf,
+
+    /// Largest disparity to search, in pixels, itself included [default: ndisp - 1 of a calib.txt beside LEFT]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
+    max_disparity: Option<i32>,
+    /// Smallest disparity to search, in pixels; may be negative
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = pixels)]
+    min_disparity: i32,
+    /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+    /// Checks everything and prints the plan (levels, schedule, memory), but runs and writes nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Prints nothing but failures
+    #[arg(long)]
+    quiet: bool,
+
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Leaves invalid pixels invalid, the same as `--set fill=none`
+    #[arg(long, help_heading = "Method")]
+    no_fill: bool,
+
+    #[command(flatten)]
+    execution: ExecutionArgs,
+
+    /// Writes the map before post-processing too, as OUTPUT by extension
+    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
+    raw: Option<PathBuf>,
+    /// Writes the confidence too: 8-bit PNG, 0 to 255, how far the best rival is behind in 1/8 nat
+    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
+    confidence: Option<PathBuf>,
+    /// Writes why each pixel is what it is: 8-bit PNG, the sum of 1 match outside the right image, 2 occluded, 4 in a
+    /// small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted
+    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
+    validity: Option<PathBuf>,
+    /// Writes the map in colours too, far cold and near warm, with a scale: PNG
+    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
+    preview: Option<PathBuf>,
+}
+
+fn pixels(text: &str) -> std::result::Result<i32, String> {
+    text.parse().map_err(|_| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    let mut method = args.method.method()?;
+    if args.no_fill {
+        method.fill = Fill::None;
+    }
+    let execution = args.execution.execution()?;
+    let pair = read::pair(&args.left, &args.right, args.mask.as_deref())?;
+    let range = range(args, &pair)?;
+    check_outputs(args, range)?;
+    if args.dry_run {
+        return super::print(&describe(&Plan::new(pair.size().0, pair.size().1, range, &method)?));
+    }
+    let (matched, _) = super::match_and_tell(&pair, range, &method, &execution, None, args.quiet)?;
+    write_outputs(args, range, &matched.solution)
+}
+
+/// The range to search.
+fn range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
+    let min = args.min_disparity;
+    let range = match args.max_disparity {
+        Some(max) => DisparityRange::new(min, max)?,
+        None => beside(&args.left, min)?.ok_or_else(|| {
+            let reason = format!(
+                "give the largest disparity to search, in pixels: there is no calib.txt with ndisp beside {}",
+                args.left.display()
+            );
+            Error::option("--max-disparity", reason)
+        })?,
+    };
+    let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
+    if i64::from(range.min) >= width || i64::from(range.max) <= -width {
+        let reason = format!(
+            "no disparity from {} to {} is inside images {width} pixels wide; give those of the pair",
+            range.min, range.max
+        );
+        return Err(Error::option("--max-disparity", reason));
+    }
+    Ok(range)
+}
+
+/// The range that a calib.txt beside the left image gives.
+fn beside(left: &Path, min: i32) -> Result<Option<DisparityRange>> {
+    match Calibration::beside(left)? {
+        Some(calibration) => super::calibrated_range(&left.with_file_name("calib.txt"), &calibration, min),
+        None => Ok(None),
+    }
+}
+
+/// Finds out before any computing whether all outputs can be written.
+fn check_outputs(args: &Args, range: DisparityRange) -> Result<()> {
+    fn given<'a>((name, path): (&'static str, Option<&'a PathBuf>)) -> Option<(&'static str, &'a Path)> {
+        Some((name, path?))
+    }
+    let maps = [("OUTPUT", Some(&args.output)), ("--raw", args.raw.as_ref())];
+    let pictures = [
+        ("--confidence", args.confidence.as_ref()),
+        ("--validity", args.validity.as_ref()),
+        ("--preview", args.preview.as_ref()),
+    ];
+    for (_, path) in maps {
+        path.map_or(Ok(()), |p| write::check_disparity_path(p, range.min, range.max))?;
+    }
+    for (_, path) in pictures {
+        path.map_or(Ok(()), |p| write::check_png_path(p))?;
+    }
+    let inputs = [
+        ("LEFT", Some(&args.left)),
+        ("RIGHT", Some(&args.right)),
+        ("the mask", args.mask.as_ref()),
+        ("the config file", args.method.config.as_ref()),
+    ];
+    outputs::distinct(
+        &inputs.into_iter().filter_map(given).collect::<Vec<_>>(),
+        &maps.into_iter().chain(pictures).filter_map(given).collect::<Vec<_>>(),
+    )
+}
+
+/// Writes all outputs or leaves none of them.
+fn write_outputs(args: &Args, range: DisparityRange, solution: &Solution) -> Result<()> {
+    let map = solution.final_map();
+    let mut written = Written::default();
+    written.note(&args.output, write::disparity(&args.output, &map))?;
+    if let Some(path) = &args.raw {
+        written.note(path, write::disparity(path, &solution.raw_map()))?;
+    }
+    if let Some(path) = &args.confidence {
+        written.note(path, write::grey8(path, &solution.confidence))?;
+    }
+    if let Some(path) = &args.validity {
+        written.note(path, write::grey8(path, &solution.validity))?;
+    }
+    if let Some(path) = &args.preview {
+        let picture = colour::preview(&map, range.min as f32, range.max as f32);
+        written.note(path, write::rgb8(path, &picture))?;
+    }
+    written.keep();
+    Ok(())
+}
+
+/// The plan for people.
+fn describe(plan: &Plan) -> String {
+    let mut out = String::new();
+    let ((width, height), range) = (plan.size(), plan.range);
+    let _ = writeln!(
+        out,
+        "{width} x {height} pixels, disparities {} to {} ({} label{})\n",
+        range.min,
+        range.max,
+        range.labels(),
+        plural(range.labels())
+    );
+    let _ = writeln!(out, "level      width x height    labels                  memory");
+    for (z, level) in plan.levels.iter().enumerate() {
+        let size = format!("{} x {}", level.width, level.height);
+        let labels = format!("{} to {} ({})", level.min, level.max(), level.labels);
+        let _ = writeln!(out, "{z:>5}  {size:>18}    {labels:20} {:>9}", bytes(plan.level_bytes(z)));
+    }
+    let _ = writeln!(out, "  all{:>52}\n", bytes(plan.bytes()));
+    let width = match plan.message_width {
+        MessageWidth::Narrow => 8,
+        MessageWidth::Wide => 16,
+    };
+    let _ = writeln!(out, "messages   {width} bits, factors of {} pixels and their centre", plan.neighbours);
+    let last = plan.levels.len() - 1;
+    for (i, phase) in plan.phases.iter().enumerate() {
+        let levels = if phase.finest == last {
+            format!("level {last}")
+        } else {
+            format!("levels {} to {last}", phase.finest)
+        };
+        let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
+        let _ = writeln!(out, "{head:10} {n:>4} iteration{} of {levels}", plural(n as usize));
+    }
+    if plan.method.tolerance > 0.0 {
+        let sooner = match plan.method.schedule {
+            Schedule::Together => "or fewer",
+            Schedule::CoarseFirst => "or fewer of the last",
+        };
+        let tolerance = plan.method.tolerance;
+        let _ = writeln!(out, "{:10} {sooner}, once the map changes by at most {tolerance} px (RMS)", "");
+    }
+    out
+}

@@ -1,0 +1,318 @@
+//! The command line: one file a subcommand, and here what they share. Nothing else in the crate prints.
+
+mod devices;
+mod evaluate;
+mod r#match;
+mod outputs;
+mod presets;
+mod progress;
+
+use std::fmt;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
+use mrfgs::image::Pair;
+use mrfgs::image::calib::Calibration;
+use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::{Error, Matched, Result, match_pair};
+use progress::Bar;
+
+const ABOUT: &str = "\
+Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
+
+Takes a rectified pair and writes how far each pixel of the left image has moved to the left in the right one: \
+left (x, y) with disparity d is seen at right (x - d, y).";
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs match left.png right.png disparity.pfm --max-disparity 63
+  mrfgs match im0.png im1.png disparity.png      (range from the calib.txt beside im0.png)
+  mrfgs evaluate Teddy Cones --json figures.json
+  mrfgs presets paper > paper.toml
+
+Exit status: 0 when all went well, 2 when the command line makes no sense, 1 for any other failure. A failure is one \
+line on standard error and leaves no output behind.";
+
+#[derive(Parser)]
+#[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Match(r#match::Args),
+    Evaluate(evaluate::Args),
+    /// List the devices of this machine, their limits, and which one `auto` takes
+    Devices,
+    Presets(presets::Args),
+}
+
+/// Why the program ends early.
+pub(crate) enum Failure {
+    /// The command line makes no sense.
+    Usage(String),
+    /// Anything else.
+    Error(Error),
+}
+
+impl Failure {
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Usage(_) => ExitCode::from(2),
+            Self::Error(_) => ExitCode::FAILURE,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    /// One line, whatever names of files hold.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let text = match self {
+            Self::Usage(text) => text.clone(),
+            Self::Error(error) => error.to_string(),
+        };
+        f.write_str(&text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" "))
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Error(error)
+    }
+}
+
+/// Does what the command line says.
+pub(crate) fn run() -> std::result::Result<(), Failure> {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(answer) if answer.use_stderr() => return Err(Failure::Usage(one_line(&answer))),
+        Err(help) => return Ok(printed(help.print())?),
+    };
+    match cli.command {
+        Command::Match(args) => r#match::run(&args)?,
+        Command::Evaluate(args) => evaluate::run(&args)?,
+        Command::Devices => devices::run()?,
+        Command::Presets(args) => presets::run(&args)?,
+    }
+    Ok(())
+}
+
+/// The parser's complaint without its headings and the usage.
+fn one_line(error: &clap::Error) -> String {
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return "give a subcommand: match, evaluate, devices or presets; `mrfgs --help` explains".into();
+    }
+    let text = error.render().to_string();
+    let lines: Vec<&str> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
+        .filter(|l| !l.is_empty())
+        .collect();
+    let text = lines.join(" ").replace(" tip: ", "; ");
+    let subcommand = std::env::args_os()
+        .nth(1)
+        .and_then(|name| name.into_string().ok())
+        .filter(|name| Cli::command().find_subcommand(name).is_some())
+        .map_or(String::new(), |name| format!(" {name}"));
+    format!("{}; `mrfgs{subcommand} --help` explains", text.strip_prefix("error: ").unwrap_or(&text))
+}
+
+/// Writes to standard output.
+fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    printed(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// What became of a text for standard output. That a reader like `head` has seen enough is no error.
+fn printed(result: std::io::Result<()>) -> Result<()> {
+    match result {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::write("standard output", e)),
+        _ => Ok(()),
+    }
+}
+
+/// Says something on standard error.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stderr(), "mrfgs: {text}");
+}
+
+/// The parameters that determine the result.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Method")]
+struct MethodArgs {
+    /// Preset to start from; `mrfgs presets` lists them, with every key
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    preset: String,
+    /// TOML file of keys that replace the preset's, such as `mrfgs presets NAME` prints
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Sets one key, after preset and config file: `--set levels=4 --set cost=sad`
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
+    set: Vec<(String, String)>,
+}
+
+fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().into(), value.trim().into())),
+        _ => Err("give a key and its value, like levels=4".into()),
+    }
+}
+
+impl MethodArgs {
+    /// The method: the preset, then the config file, then each `--set`.
+    fn method(&self) -> Result<Method> {
+        let mut method = Method::preset(&self.preset)?;
+        if let Some(path) = &self.config {
+            method.load(path)?;
+        }
+        method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
+        method.validated()
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Backend {
+    /// A GPU where there is one, else the CPU path
+    #[default]
+    Auto,
+    /// A GPU, or any Vulkan or Metal driver; an error where there is none
+    Gpu,
+    /// The CPU path
+    Cpu,
+}
+
+/// Where the work runs. No choice changes a bit of the result.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Where it runs (changes no bit of the result)")]
+struct ExecutionArgs {
+    /// What runs the stages
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    backend: Backend,
+    /// A device by its index in `mrfgs devices` or a part of its name [default: the fastest kind there is]
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// Threads of the CPU path, 1 to 1024 [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl ExecutionArgs {
+    fn execution(&self) -> Result<Execution> {
+        if self.backend == Backend::Cpu && self.device.is_some() {
+            let reason = "`--backend cpu` runs on no device; leave one of the two away";
+            return Err(Error::option("--device", reason));
+        }
+        Ok(Execution {
+            backend: match self.backend {
+                Backend::Auto => Choice::Auto,
+                Backend::Gpu => Choice::Gpu,
+                Backend::Cpu => Choice::Cpu,
+            },
+            device: self.device.clone(),
+            threads: self.threads.map(usize::from),
+        })
+    }
+}
+
+/// The range that `path`, a calib.txt, has read as `calibration`, gives from `min` on; `None` where it gives none.
+fn calibrated_range(path: &Path, calibration: &Calibration, min: i32) -> Result<Option<DisparityRange>> {
+    let Some(ndisp) = calibration.ndisp else { return Ok(None) };
+    let max = i32::try_from(ndisp).unwrap_or(i32::MAX) - 1;
+    match DisparityRange::new(min, max) {
+        Err(Error::Option { reason, .. }) => Err(Error::read(path, format!("ndisp={ndisp}: {reason}"))),
+        range => range.map(Some),
+    }
+}
+
+/// Matches a pair with a progress bar, and says on standard error what ran where and how long. `name` tells pairs
+/// apart where there are several.
+fn match_and_tell(
+    pair: &Pair,
+    range: DisparityRange,
+    method: &Method,
+    execution: &Execution,
+    name: Option<&str>,
+    quiet: bool,
+) -> Result<(Matched, Duration)> {
+    let start = Instant::now();
+    let mut bar = Bar::new(name, quiet);
+    let matched = match_pair(pair, range, method, execution, &mut |progress| bar.update(progress));
+    bar.finish();
+    let (matched, time) = (matched?, start.elapsed());
+    if !quiet {
+        if let Some(note) = &matched.note {
+            say(note);
+        }
+        let (width, height) = matched.plan.size();
+        let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
+        let (labels, iterations) = (range.labels(), matched.solution.iterations);
+        say(&format!(
+            "{name}{width} x {height}, {labels} label{}, {iterations} iteration{} in {:.2} s on {}",
+            plural(labels),
+            plural(iterations as usize),
+            time.as_secs_f64(),
+            matched.ran_on
+        ));
+    }
+    Ok((matched, time))
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+/// A number of bytes for people.
+fn bytes(count: u64) -> String {
+    const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
+    if count < 1024 {
+        return format!("{count} B");
+    }
+    let mut value = count as f64 / 1024.0;
+    let mut unit = 0;
+    while value >= 1023.5 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    format!("{value:.*} {}", usize::from(value < 9.95), UNITS[unit])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parser_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn no_subcommand_has_more_than_twenty_flags() {
+        for command in Cli::command().get_subcommands() {
+            let flags = command.get_arguments().filter(|a| a.get_long().is_some()).count();
+            assert!(flags <= 20, "{}: {flags}", command.get_name());
+        }
+    }
+
+    #[test]
+    fn bytes_have_two_digits_that_matter() {
+        for (count, text) in [
+            (0, "0 B"),
+            (1023, "1023 B"),
+            (1024, "1.0 KiB"),
+            (10 * 1024, "10 KiB"),
+            (1_048_000, "1023 KiB"),
+            (1_048_570, "1.0 MiB"),
+            (5 << 30, "5.0 GiB"),
+            (u64::MAX, "16384 PiB"),
+        ] {
+            assert_eq!(bytes(count), text);
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! The bar that shows how far a match is.
+
+use std::io::IsTerminal;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use mrfgs::solver::Progress;
+
+/// What is over sooner than this needs no bar.
+const PATIENCE: Duration = Duration::from_secs(1);
+const STEPS: u64 = 1000;
+
+/// A bar on a terminal, from [`PATIENCE`] on.
+pub(super) struct Bar {
+    start: Instant,
+    wanted: bool,
+    name: String,
+    drawn: Option<ProgressBar>,
+}
+
+impl Bar {
+    pub(super) fn new(name: Option<&str>, quiet: bool) -> Self {
+        let wanted = !quiet && std::io::stderr().is_terminal();
+        Self { start: Instant::now(), wanted, name: name.unwrap_or("mrfgs").into(), drawn: None }
+    }
+
+    pub(super) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
+        if self.wanted && self.start.elapsed() > PATIENCE {
+            let bar = self.drawn.get_or_insert_with(|| {
+                let style = ProgressStyle::with_template("{prefix} [{bar:40}] {percent:>3} % {msg}");
+                ProgressBar::new(STEPS)
+                    .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+                    .with_prefix(self.name.clone())
+            });
+            bar.set_message(progress.stage);
+            bar.set_position((progress.done * STEPS as f64) as u64);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Takes the bar away.
+    pub(super) fn finish(self) {
+        if let Some(bar) = self.drawn {
+            bar.finish_and_clear();
+        }
+    }
+}

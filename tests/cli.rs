@@ -1,0 +1,666 @@
+//! The command line, through the built program: what it writes, and how it fails.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use mrfgs::image::read;
+use mrfgs::options::{self, Method};
+use mrfgs::refine::flag;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// What a run of the program leaves.
+#[derive(Debug)]
+struct Run {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+/// Runs the program in `folder`.
+fn run(folder: &Path, args: &[&str]) -> Run {
+    run_with(folder, args, &[])
+}
+
+fn run_with(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Run {
+    let output = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .current_dir(folder)
+        .args(args)
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+impl Run {
+    fn succeeded(self) -> Self {
+        assert_eq!(self.code, Some(0), "{self:?}");
+        self
+    }
+
+    /// Exactly one line on standard error, with all these words, and nothing on standard output.
+    fn failed(&self, code: i32, words: &[&str], what: &str) {
+        assert_eq!(self.code, Some(code), "{what}: {self:?}");
+        assert_eq!(self.stdout, "", "{what}");
+        assert!(self.stderr.starts_with("mrfgs: ") && self.stderr.ends_with('\n'), "{what}: {self:?}");
+        assert_eq!(self.stderr.lines().count(), 1, "{what}: {}", self.stderr);
+        assert!(!self.stderr.contains("panicked"), "{what}: {}", self.stderr);
+        for word in words {
+            assert!(self.stderr.contains(word), "{what}: no `{word}` in: {}", self.stderr);
+        }
+    }
+
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap()
+    }
+}
+
+/// Everything in a folder and below it: the content of files, `None` for folders.
+fn listing(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            all.extend(listing(&path));
+            all.insert(path, None);
+        } else {
+            let content = fs::read(&path).unwrap();
+            all.insert(path, Some(content));
+        }
+    }
+    all
+}
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
+}
+
+/// The path of a file of a scene, as an argument.
+fn scene_file(name: &str, file: &str) -> String {
+    scene(name).join(file).to_str().unwrap().to_owned()
+}
+
+/// A folder with a pair of 60 x 40 pixels without calib.txt, and with much that is wrong.
+fn workshop() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
+        let image = image::open(scene("slanted").join(from)).unwrap();
+        image.crop_imm(100, 80, 60, 40).save(at(to)).unwrap();
+    }
+    let left = fs::read(at("left.png")).unwrap();
+    image::open(at("left.png")).unwrap().crop_imm(0, 0, 30, 40).save(at("narrow.png")).unwrap();
+    fs::write(at("cut.png"), &left[..left.len() / 2]).unwrap();
+    fs::write(at("empty.png"), "").unwrap();
+    fs::write(at("text.png"), "a picture is worth a thousand words").unwrap();
+    fs::create_dir(at("folder")).unwrap();
+    fs::create_dir(at("taken.pfm")).unwrap();
+    fs::create_dir(at("taken.png")).unwrap();
+    fs::write(at("syntax.toml"), "levels = 3\ncost sad\n").unwrap();
+    fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
+    fs::write(at("value.toml"), "levels = 3\n\ntemperature = -1\n").unwrap();
+    for (name, calib) in [("damaged", "ndisp=many\n"), ("silent", "width=60\n"), ("huge", "ndisp=100000\n")] {
+        fs::create_dir(at(name)).unwrap();
+        fs::copy(at("left.png"), at(name).join("left.png")).unwrap();
+        fs::write(at(name).join("calib.txt"), calib).unwrap();
+    }
+    // Folders to evaluate, each with one thing wrong.
+    for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"] {
+        let to = at(&format!("without-{file}"));
+        fs::create_dir(&to).unwrap();
+        for other in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"].into_iter().filter(|f| *f != file) {
+            fs::copy(scene("slanted").join(other), to.join(other)).unwrap();
+        }
+    }
+    fs::create_dir(at("misfit")).unwrap();
+    for (from, to) in [("left.png", "im0.png"), ("right.png", "im1.png")] {
+        fs::copy(at(from), at("misfit").join(to)).unwrap();
+    }
+    for file in ["disp0GT.pfm", "calib.txt"] {
+        fs::copy(scene("slanted").join(file), at("misfit").join(file)).unwrap();
+    }
+    fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
+    folder
+}
+
+#[test]
+fn match_writes_every_output_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("slanted", file));
+    let mask = image::GrayImage::from_fn(240, 180, |x, y| image::Luma([u8::from(x > 200 && y < 9) * 9]));
+    mask.save(at("mask.png")).unwrap();
+
+    let common = ["--mask", "mask.png", "--threads", "2", "--backend", "cpu"];
+    let first = ["match", &left, &right, "a.pfm", "--raw", "raw.tif", "--confidence", "confidence.png"];
+    let first = [&first[..], &["--validity", "validity.png", "--preview", "preview.png"], &common].concat();
+    let told = run(folder.path(), &first).succeeded();
+    assert_eq!(told.stdout, "");
+    assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
+    for words in ["mrfgs: 240 x 180, 32 labels, 28 iterations in ", " s on the CPU path, 2 threads\n"] {
+        assert!(told.stderr.contains(words), "{}", told.stderr);
+    }
+
+    let map = read::read_disparity(&at("a.pfm")).unwrap();
+    let raw = read::read_disparity(&at("raw.tif")).unwrap();
+    let validity = read::grey8(&at("validity.png")).unwrap();
+    let confidence = read::grey8(&at("confidence.png")).unwrap();
+    assert_eq!([map.size(), raw.size(), validity.size(), confidence.size()], [(240, 180); 4]);
+    let preview = image::open(at("preview.png")).unwrap();
+    assert_eq!((preview.width(), preview.color()), (240, image::ColorType::Rgb8));
+    assert!(preview.height() > 180, "the scale is below the map");
+    let (mut measured, mut filled) = (0, 0);
+    for y in 0..180 {
+        for x in 0..240 {
+            let masked = x > 200 && y < 9;
+            let flags = validity[(x, y)];
+            assert_eq!(masked, flags & flag::MASKED != 0, "{x}, {y}");
+            assert_eq!(masked, !map[(x, y)].is_finite(), "all is filled but what is masked");
+            assert_eq!(masked, !raw[(x, y)].is_finite());
+            assert!(masked || (0.0..=31.0).contains(&map[(x, y)]), "{}", map[(x, y)]);
+            assert_eq!(flags & !(flag::INVALID | flag::LOW_CONFIDENCE | flag::FILLED), 0);
+            assert!(flags & flag::INVALID == 0 || confidence[(x, y)] == 0);
+            measured += usize::from(flags == 0);
+            filled += usize::from(flags & flag::FILLED != 0);
+        }
+    }
+    assert!(measured > 20_000 && filled > 500, "{measured} measured, {filled} filled");
+    assert!(confidence.data().iter().any(|&c| c > 100));
+    assert!(map != raw, "post-processing does something");
+
+    // The same map in the other formats; the number of threads changes nothing.
+    for (output, raw, step) in [("b.png", "raw.png", 256.0), ("c.tiff", "raw.PFM", f32::INFINITY)] {
+        let args = ["match", &left, &right, output, "--raw", raw, "--mask", "mask.png", "--threads", "1"];
+        let quiet = run(folder.path(), &[&args[..], &["--quiet", "--max-disparity", "31"]].concat());
+        let quiet = quiet.succeeded();
+        assert_eq!((quiet.stdout, quiet.stderr), (String::new(), String::new()));
+        for (name, expected) in [(output, &map), (raw, &read::read_disparity(&at("raw.tif")).unwrap())] {
+            let same = read::read_disparity(&at(name)).unwrap();
+            for (a, b) in same.data().iter().zip(expected.data()) {
+                // In 16-bit PNG a disparity of 0 is 1/256.
+                assert!(
+                    a.total_cmp(b).is_eq() || (a * step - 1.0).abs() < 1e-6 && *b == 0.0,
+                    "{name}: {a} and {b}"
+                );
+            }
+        }
+    }
+    let tiff = fs::read(at("c.tiff")).unwrap();
+    let mut decoder = tiff::decoder::Decoder::new(std::io::Cursor::new(tiff)).unwrap();
+    let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else { panic!("float") };
+    assert!(values[239].is_nan() && values[0].is_finite(), "invalid is NaN in TIFF");
+    let pfm = fs::read(at("a.pfm")).unwrap();
+    assert!(
+        pfm.ends_with(&f32::INFINITY.to_le_bytes()),
+        "invalid is +inf in PFM, whose last row is the top one"
+    );
+    let png = image::open(at("b.png")).unwrap().into_luma16();
+    assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
+
+    // Without the fill, what is invalid stays so.
+    let args = ["match", &left, &right, "d.pfm", "--no-fill", "--set", "fill=row", "--mask", "mask.png"];
+    run(folder.path(), &[&args[..], &["--validity", "v.png"]].concat()).succeeded();
+    let map = read::read_disparity(&at("d.pfm")).unwrap();
+    let validity = read::grey8(&at("v.png")).unwrap();
+    assert!(map.data().iter().zip(validity.data()).all(|(d, f)| d.is_finite() == (f & flag::INVALID == 0)));
+    assert!(map.data().iter().filter(|d| !d.is_finite()).count() > 1000);
+
+    let names: Vec<_> = listing(folder.path()).into_keys().collect();
+    assert_eq!(names.len(), 12, "nothing else is left: {names:?}");
+}
+
+#[test]
+fn ranges_may_be_negative() {
+    let folder = workshop();
+    // With the views swapped, every disparity has the other sign.
+    let args =
+        ["match", "right.png", "left.png", "out.tif", "--min-disparity", "-31", "--max-disparity", "-1"];
+    run(folder.path(), &args).succeeded();
+    let map = read::read_disparity(&folder.path().join("out.tif")).unwrap();
+    assert_eq!(map.size(), (60, 40));
+    assert!(map.data().iter().all(|d| (-31.0..=-1.0).contains(d)));
+}
+
+#[test]
+fn files_in_the_way_are_replaced_and_devices_are_not() {
+    let folder = workshop();
+    fs::write(folder.path().join("out.pfm"), "old").unwrap();
+    let mut args = vec!["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
+    if cfg!(unix) {
+        args.extend(["--raw", "/dev/null", "--preview", "/dev/null"]);
+    }
+    run(folder.path(), &args).succeeded();
+    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (60, 40));
+}
+
+#[test]
+fn a_dry_run_prints_the_plan_and_leaves_nothing() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "20", "--dry-run"];
+    let plan = run(folder.path(), &[&args[..], &["--quiet", "--raw", "raw.pfm"]].concat()).succeeded();
+    assert_eq!(plan.stderr, "");
+    for words in [
+        "60 x 40 pixels, disparities 0 to 20 (21 labels)",
+        "0             60 x 40    0 to 20 (21)",
+        "5               2 x 2    0 to 1 (2)",
+        "messages   8 bits",
+        "3 iterations of levels 0 to 5",
+        "KiB",
+        "  all",
+    ] {
+        assert!(plan.stdout.contains(words), "no `{words}` in:\n{}", plan.stdout);
+    }
+    let paper = run(folder.path(), &[&args[..], &["--preset", "paper"]].concat()).succeeded();
+    for words in
+        ["16 bits", "30 iterations of levels 0 to 5", "or fewer, once the map changes by at most 0.1 px"]
+    {
+        assert!(paper.stdout.contains(words), "no `{words}` in:\n{}", paper.stdout);
+    }
+    // It finds what a real run would.
+    let args = ["match", "left.png", "right.png", "none/out.pfm", "--max-disparity", "20", "--dry-run"];
+    run(folder.path(), &args).failed(1, &["none", "create it"], "--dry-run");
+    assert!(listing(folder.path()) == before);
+}
+
+/// Arguments, separated by spaces; exit status; what the message must say: the thing and the remedy.
+type Failure = (&'static str, i32, &'static [&'static str]);
+
+/// `M` stands for a `match` that would succeed, up to its output.
+const FAILURES: &[Failure] = &[
+    // The command line itself.
+    ("", 2, &["subcommand", "match, evaluate", "--help"]),
+    ("frobnicate", 2, &["frobnicate", "--help"]),
+    ("match left.png", 2, &["<RIGHT> <OUTPUT>", "mrfgs match --help"]),
+    ("M out.pfm --frobnicate", 2, &["--frobnicate", "--help"]),
+    ("M out.pfm --mask", 2, &["--mask", "value"]),
+    ("M out.pfm surplus.pfm", 2, &["surplus.pfm", "--help"]),
+    // Inputs.
+    ("match none.png right.png out.pfm", 1, &["none.png", "no such file", "check the name"]),
+    ("match left.png none.png out.pfm --max-disparity 9", 1, &["none.png", "no such file", "check the name"]),
+    ("match folder right.png out.pfm --max-disparity 9", 1, &["folder: is a folder", "give the image file"]),
+    ("match left.png folder out.pfm --max-disparity 9", 1, &["folder: is a folder", "give the image file"]),
+    (
+        "match left.png narrow.png out.pfm --max-disparity 9",
+        1,
+        &["left.png is 60 x 40", "narrow.png is 30 x 40"],
+    ),
+    ("match cut.png right.png out.pfm --max-disparity 9", 1, &["cut.png", "truncated", "get the file again"]),
+    ("match left.png empty.png out.pfm --max-disparity 9", 1, &["empty.png", "empty", "get it again"]),
+    ("match text.png right.png out.pfm --max-disparity 9", 1, &["text.png", "not an image", "give PNG"]),
+    ("M out.pfm --mask narrow.png", 1, &["narrow.png is 30 x 40", "a mask has the size of the left image"]),
+    ("M out.pfm --mask none.png", 1, &["none.png", "check the name"]),
+    ("M out.pfm --mask text.png", 1, &["text.png", "give PNG"]),
+    // Outputs.
+    ("M out.jpg", 1, &["out.jpg", ".pfm (float), .tif (float) or .png"]),
+    ("M out", 1, &["out:", ".pfm"]),
+    ("M none/out.pfm", 1, &["none/out.pfm", "there is no folder none", "create it"]),
+    ("M left.png/out.pfm", 1, &["left.png/out.pfm", "there is no folder", "create it"]),
+    ("M taken.pfm", 1, &["taken.pfm", "is a folder", "name of a file"]),
+    ("M out.pfm --raw taken.pfm", 1, &["taken.pfm", "is a folder"]),
+    ("M out.pfm --raw raw.bmp", 1, &["raw.bmp", ".pfm"]),
+    ("M out.pfm --raw none/raw.pfm", 1, &["none/raw.pfm", "create it"]),
+    ("M out.pfm --confidence c.pfm", 1, &["c.pfm", "ends in .png"]),
+    ("M out.pfm --validity v.tif", 1, &["v.tif", "ends in .png"]),
+    ("M out.pfm --validity taken.png", 1, &["taken.png", "is a folder"]),
+    ("M out.pfm --preview p.jpg", 1, &["p.jpg", "ends in .png"]),
+    ("M out.pfm --preview none/p.png", 1, &["none/p.png", "create it"]),
+    ("M out.png --min-disparity -1", 1, &["out.png", "-1 to 9", ".pfm or .tif"]),
+    ("M out.pfm --raw raw.png --min-disparity -1", 1, &["raw.png", "-1 to 9", ".pfm or .tif"]),
+    ("match left.png right.png out.png --max-disparity 256", 1, &["out.png", "0 to 256", ".pfm or .tif"]),
+    ("M out.pfm --raw out.pfm", 1, &["--raw", "out.pfm is OUTPUT already", "another name"]),
+    ("M out.pfm --raw ./folder/../out.pfm", 1, &["--raw", "OUTPUT", "another name"]),
+    ("M a.png --preview a.png", 1, &["--preview", "a.png is OUTPUT already", "another name"]),
+    (
+        "M out.pfm --confidence c.png --validity c.png",
+        1,
+        &["--validity", "c.png is --confidence", "another name"],
+    ),
+    ("M left.png", 1, &["OUTPUT", "left.png is LEFT already", "another name"]),
+    ("M out.pfm --preview folder/../right.png", 1, &["--preview", "is RIGHT already", "another name"]),
+    ("M narrow.png --mask left.png --preview left.png", 1, &["--preview", "LEFT", "another name"]),
+    // The range.
+    ("match left.png right.png out.pfm", 1, &["--max-disparity", "no calib.txt with ndisp beside left.png"]),
+    ("match silent/left.png right.png out.pfm", 1, &["--max-disparity", "no calib.txt with ndisp"]),
+    ("match damaged/left.png right.png out.pfm", 1, &["calib.txt", "line 1", "ndisp"]),
+    ("match huge/left.png right.png out.pfm", 1, &["calib.txt", "ndisp=100000", "at most 16384"]),
+    ("M out.pfm --max-disparity 9", 2, &["--max-disparity", "multiple times"]),
+    (
+        "match left.png right.png out.pfm --max-disparity many",
+        2,
+        &["many", "--max-disparity", "whole number"],
+    ),
+    ("match left.png right.png out.pfm --max-disparity 3.5", 2, &["3.5", "--max-disparity", "whole number"]),
+    ("match left.png right.png out.pfm --max-disparity 99999999999", 2, &["--max-disparity", "1048576"]),
+    ("match left.png right.png out.pfm --max-disparity 2000000", 1, &["--max-disparity", "out of reach"]),
+    ("match left.png right.png out.pfm --max-disparity 50000", 1, &["--max-disparity", "narrow the range"]),
+    ("match left.png right.png out.pfm --max-disparity -1", 1, &["--max-disparity", "-1", "--min-disparity"]),
+    ("M out.pfm --min-disparity 10", 1, &["--max-disparity", "below the minimum disparity 10", "raise it"]),
+    ("M out.pfm --min-disparity -2000000", 1, &["--min-disparity", "out of reach"]),
+    ("M out.pfm --min-disparity few", 2, &["few", "--min-disparity", "whole number"]),
+    (
+        "match left.png right.png out.pfm --min-disparity 60 --max-disparity 70",
+        1,
+        &["--max-disparity", "60 to 70", "60 pixels wide"],
+    ),
+    // The method.
+    ("M out.pfm --preset best", 1, &["--preset", "`best`", "default, paper"]),
+    ("M out.pfm --set colour=red", 1, &["--set colour", "no such key", "mrfgs presets"]),
+    ("M out.pfm --set levels", 2, &["--set", "levels=4"]),
+    ("M out.pfm --set =4", 2, &["--set", "levels=4"]),
+    ("M out.pfm --set levels=many", 1, &["--set levels", "1 to 16", "\"many\""]),
+    ("M out.pfm --set levels=17", 1, &["--set levels", "17 is outside 1 to 16"]),
+    ("M out.pfm --set cost=ncc", 1, &["--set cost", "sad | ad-census", "ncc"]),
+    ("M out.pfm --set temperature=nan", 1, &["--set temperature", "outside"]),
+    ("M out.pfm --set sad-window=4", 1, &["--set sad-window", "odd", "3 or 5"]),
+    ("M out.pfm --config none.toml", 1, &["none.toml", "no such file", "check the name"]),
+    ("M out.pfm --config folder", 1, &["folder"]),
+    ("M out.pfm --config syntax.toml", 1, &["syntax.toml", "line 2"]),
+    ("M out.pfm --config key.toml", 1, &["key.toml", "line 2", "level", "mrfgs presets"]),
+    ("M out.pfm --config value.toml", 1, &["value.toml", "line 3", "temperature", "-1 is outside"]),
+    ("M out.pfm --config left.png", 1, &["left.png", "TOML"]),
+    // Where it runs.
+    ("M out.pfm --threads 0", 2, &["--threads", "1..=1024"]),
+    ("M out.pfm --threads -1", 2, &["-1"]),
+    ("M out.pfm --threads 1000000", 2, &["--threads", "1..=1024"]),
+    ("M out.pfm --threads two", 2, &["--threads", "two"]),
+    ("M out.pfm --backend tpu", 2, &["--backend", "auto, gpu, cpu"]),
+    ("M out.pfm --backend cpu --device 0", 1, &["--device", "--backend cpu"]),
+    // Evaluation.
+    ("evaluate", 2, &["DIR", "mrfgs evaluate --help"]),
+    ("evaluate none", 1, &["none/im0.png", "disp0GT.pfm, calib.txt"]),
+    ("evaluate left.png", 1, &["left.png/im0.png", "a folder to evaluate holds"]),
+    ("evaluate without-im0.png", 1, &["without-im0.png/im0.png", "a folder to evaluate holds"]),
+    ("evaluate without-im1.png", 1, &["without-im1.png/im1.png", "a folder to evaluate holds"]),
+    ("evaluate without-disp0GT.pfm", 1, &["without-disp0GT.pfm/disp0GT.pfm", "a folder to evaluate holds"]),
+    ("evaluate without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to evaluate holds"]),
+    ("evaluate misfit without-calib.txt", 1, &["without-calib.txt/calib.txt"]),
+    ("evaluate misfit", 1, &["disp0GT.pfm is 240 x 180", "im0.png is 60 x 40"]),
+    ("evaluate misfit --preset best", 1, &["--preset", "default, paper"]),
+    ("evaluate misfit --json none/a.json", 1, &["none/a.json", "create it"]),
+    ("evaluate misfit --json folder", 1, &["folder", "is a folder"]),
+    ("evaluate misfit --json misfit/calib.txt", 1, &["--json", "misfit/calib.txt", "another name"]),
+    ("evaluate --disparity unknown.pfm", 2, &["--truth"]),
+    ("evaluate --truth unknown.pfm", 2, &["--disparity"]),
+    ("evaluate misfit --disparity unknown.pfm --truth unknown.pfm", 2, &["DIR", "--disparity"]),
+    ("evaluate --levels 3 --disparity unknown.pfm --truth unknown.pfm", 2, &["--levels"]),
+    ("evaluate --preset paper --disparity unknown.pfm --truth unknown.pfm", 2, &["--preset", "--disparity"]),
+    ("evaluate --disparity none.pfm --truth unknown.pfm", 1, &["none.pfm", "check the name"]),
+    ("evaluate --disparity left.png --truth unknown.pfm", 1, &["left.png", "channel", "16-bit .png"]),
+    ("evaluate --disparity unknown.pfm --truth unknown.pfm", 1, &["unknown.pfm", "no known disparity"]),
+    (
+        "evaluate --disparity unknown.pfm --truth misfit/disp0GT.pfm",
+        1,
+        &["240 x 180", "unknown.pfm is 1 x 1"],
+    ),
+    (
+        "evaluate --disparity misfit/disp0GT.pfm --truth misfit/disp0GT.pfm --mask left.png",
+        1,
+        &["left.png is 60 x 40", "240 x 180"],
+    ),
+    ("presets best", 1, &["`best`", "default, paper"]),
+];
+
+#[test]
+fn every_failure_is_one_line_and_leaves_nothing() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    for (line, code, words) in FAILURES {
+        let words_of_line = line.replacen("M ", "match left.png right.png --max-disparity 9 ", 1);
+        let args: Vec<&str> = words_of_line.split_whitespace().collect();
+        run(folder.path(), &args).failed(*code, words, line);
+        assert!(listing(folder.path()) == before, "{line}: the folder has changed");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_without_permission_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = workshop();
+    let locked = folder.path().join("locked");
+    fs::create_dir(&locked).unwrap();
+    fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(locked.join("probe"), "").is_ok() {
+        // Not by `eprintln`, which the test harness keeps to itself.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED a_folder_without_permission_is_named: this user may write to a folder without write permission (root)"
+        );
+        return;
+    }
+    for output in [["locked/out.pfm", "raw.pfm"], ["out.pfm", "locked/raw.pfm"]] {
+        let args = ["match", "left.png", "right.png", output[0], "--raw", output[1], "--max-disparity", "9"];
+        run(folder.path(), &args).failed(1, &["locked", "no file can be created", "permission"], "locked");
+        assert!(!folder.path().join("out.pfm").exists());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_was_written_before_a_failure_is_removed() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    // The disk that is always full lets itself be opened.
+    for full in ["--raw", "--validity", "--preview"] {
+        let args = ["match", "left.png", "right.png", "out.pfm", "--confidence", "c.png", full, "/dev/full"];
+        let args = [&args[..], &["--max-disparity", "9", "--quiet"]].concat();
+        run(folder.path(), &args).failed(1, &["/dev/full", "No space left"], full);
+        assert!(listing(folder.path()) == before, "{full}");
+    }
+    assert!(Path::new("/dev/full").exists());
+}
+
+/// A machine without any Vulkan driver; Metal is always there.
+const NO_DRIVER: &[(&str, &str)] =
+    &[("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent"), ("VK_ADD_DRIVER_FILES", "")];
+
+#[cfg(not(target_os = "macos"))]
+#[test]
+fn without_a_driver_auto_takes_the_cpu_path() {
+    let folder = workshop();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "auto"];
+    let told = run_with(folder.path(), &args, NO_DRIVER).succeeded();
+    assert!(told.stderr.contains(" on the CPU path, "), "{}", told.stderr);
+    let told = run_with(folder.path(), &["devices"], NO_DRIVER).succeeded();
+    assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` takes the CPU path\n");
+}
+
+#[cfg(not(target_os = "macos"))]
+#[test]
+#[ignore = "match_pair does not look at Execution::backend and Execution::device yet"]
+fn without_a_driver_gpu_says_what_to_do() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "gpu"];
+    let told = run_with(folder.path(), &args, NO_DRIVER);
+    told.failed(1, &["driver", "install", "--backend cpu"], "--backend gpu without a driver");
+    let told = run_with(folder.path(), &[&args[..], &["--device", "0"]].concat(), NO_DRIVER);
+    told.failed(1, &["driver", "install", "--backend cpu"], "--device 0 without a driver");
+    assert!(listing(folder.path()) == before);
+}
+
+#[test]
+#[ignore = "match_pair does not look at Execution::backend and Execution::device yet"]
+fn an_unknown_device_is_named() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    for device in ["no-such-device", "999"] {
+        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", device];
+        run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
+    }
+    assert!(listing(folder.path()) == before);
+}
+
+#[test]
+fn devices_say_what_auto_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = run(folder.path(), &["devices"]).succeeded();
+    let last = told.stdout.lines().last().unwrap();
+    assert!(last.contains("`auto` takes "), "{}", told.stdout);
+}
+
+/// Every number of a report, by its place in the JSON.
+fn figures(value: &Value, place: &str, all: &mut BTreeMap<String, f64>) {
+    match value {
+        Value::Object(entries) => {
+            for (key, value) in entries {
+                figures(value, &format!("{place}/{key}"), all);
+            }
+        }
+        Value::Number(n) => {
+            all.insert(place.into(), n.as_f64().unwrap());
+        }
+        other => panic!("{place} is {other}"),
+    }
+}
+
+#[test]
+fn evaluate_gives_figures_and_the_same_for_a_written_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let dirs = ["slanted", "exposure"].map(|name| scene(name).to_str().unwrap().to_owned());
+    let told = run(folder.path(), &["evaluate", &dirs[0], &dirs[1], "--json", "out.json"]).succeeded();
+    let lines: Vec<&str> = told.stdout.lines().collect();
+    assert_eq!(lines.len(), 3 + 4 + 3, "{}", told.stdout);
+    for (line, start) in
+        [(3, "slanted      raw   |"), (5, "exposure     raw   |"), (8, "mean         raw   |")]
+    {
+        assert!(lines[line].starts_with(start), "{}", told.stdout);
+        assert!(lines[line + 1].starts_with("             final |"), "{}", told.stdout);
+    }
+
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("out.json")).unwrap()).unwrap();
+    assert_eq!(json["method"], serde_json::to_value(Method::default()).unwrap());
+    assert!(json["ran_on"].is_string());
+    assert_eq!(json["pairs"].as_array().unwrap().len(), 2);
+    assert_eq!(json["pairs"][1]["name"], "exposure");
+    assert!(json["pairs"][0]["seconds"].as_f64().unwrap() > 0.0);
+    let mut all = BTreeMap::new();
+    for map in ["raw", "final"] {
+        figures(&json["pairs"][0][map], map, &mut all);
+        figures(&json["mean"][map], "mean", &mut all);
+    }
+    assert!(all.values().all(|v| v.is_finite() && *v >= 0.0), "{all:?}");
+    assert!(all["final/all/avg"] < 1.0 && all["final/all/bad2.0"] < 10.0, "{all:?}");
+    assert_eq!((all["final/all/pixels"], all["final/all/density"]), (240.0 * 180.0, 100.0));
+
+    let at = |file: &str| scene_file("slanted", file);
+    let (left, right, truth, mask) = (at("im0.png"), at("im1.png"), at("disp0GT.pfm"), at("mask0nocc.png"));
+    run(folder.path(), &["match", &left, &right, "map.pfm", "--raw", "raw.pfm", "--quiet"]).succeeded();
+    for (map, file) in [("final", "map.pfm"), ("raw", "raw.pfm")] {
+        let args = ["evaluate", "--disparity", file, "--truth", &truth, "--mask", &mask, "--json", "-"];
+        let told = run(folder.path(), &args).succeeded();
+        assert_eq!(told.stderr, "");
+        let json = told.json();
+        assert!(json["method"].is_null() && json["pairs"][0]["raw"].is_null());
+        let mut same = BTreeMap::new();
+        figures(&json["pairs"][0]["final"], map, &mut same);
+        for (place, value) in same {
+            let expected = all[&place];
+            assert!((value - expected).abs() <= 1e-6 * expected.abs(), "{place}: {value} and {expected}");
+        }
+    }
+    // Without the mask there is a table all the same.
+    let args = ["evaluate", "--disparity", "map.pfm", "--truth", &truth];
+    let told = run(folder.path(), &args).succeeded();
+    assert!(told.stdout.contains("map          final |"), "{}", told.stdout);
+}
+
+#[test]
+fn the_later_word_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("my.toml"),
+        "levels = 3\niterations = 2\ncost = \"ad-census\"\noutside-cost = 1\n",
+    )
+    .unwrap();
+    let dir = scene("wall").to_str().unwrap().to_owned();
+    let args = ["evaluate", &dir, "--json", "-", "--set", "levels=2", "--set", "levels=1"];
+    let told = run(folder.path(), &[&args[..], &["--preset", "paper", "--config", "my.toml"]].concat());
+    let method = &told.succeeded().json()["method"];
+    assert_eq!(method["levels"], 1, "--set after --config, the last --set last");
+    assert_eq!(method["iterations"], 2, "--config after --preset");
+    assert_eq!((&method["cost"], &method["outside-cost"]), (&"ad-census".into(), &1.0.into()));
+    assert_eq!(method["potential"], "hard", "--preset before all");
+}
+
+#[test]
+fn presets_can_be_pasted_into_a_config_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, _) in options::PRESETS {
+        let told = run(folder.path(), &["presets", name]).succeeded();
+        let path = folder.path().join("pasted.toml");
+        fs::write(&path, &told.stdout).unwrap();
+        for (other, _) in options::PRESETS {
+            let mut method = Method::preset(other).unwrap();
+            method.load(&path).unwrap();
+            assert_eq!(method, Method::preset(name).unwrap(), "{name} over {other}");
+        }
+    }
+    let listing = run(folder.path(), &["presets"]).succeeded().stdout;
+    for (key, unit, _) in options::keys() {
+        let line = listing.lines().find(|l| l.split(' ').next() == Some(&key)).unwrap();
+        assert!(line.contains(unit), "{line}");
+        for (name, _) in options::PRESETS {
+            let value = Method::preset(name).unwrap().table()[&key].to_string().replace('"', "");
+            assert!(line.split_whitespace().any(|word| word == value), "{value} in {line}");
+        }
+    }
+    assert!(listing.lines().all(|l| l.chars().count() <= 110), "lines fit a terminal");
+}
+
+#[test]
+fn help_teaches() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = |args: &[&str]| {
+        let told = run(folder.path(), args).succeeded();
+        assert_eq!(told.stderr, "");
+        // As it is wrapped depends on the terminal.
+        told.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let text = help(&["match", "--help"]);
+    for (bit, what) in [
+        (flag::OUTSIDE, "match outside the right image"),
+        (flag::OCCLUDED, "occluded"),
+        (flag::SMALL_REGION, "in a small region"),
+        (flag::LOW_CONFIDENCE, "low confidence"),
+        (flag::FILLED, "filled"),
+        (flag::MASKED, "masked"),
+    ] {
+        assert!(text.contains(&format!("{bit} {what}")), "{bit} {what}");
+    }
+    for words in ["Examples:", "[default: 0]", "ndisp - 1", "in pixels"] {
+        assert!(text.contains(words), "{words}");
+    }
+    assert!(help(&["--help"]).contains("Exit status: 0"));
+    assert!(help(&["evaluate", "--help"]).contains("mask0nocc.png"));
+    assert!(help(&["presets", "--help"]).contains("Examples:"));
+    assert_eq!(help(&["--version"]), format!("mrfgs {}", env!("CARGO_PKG_VERSION")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_reader_that_leaves_early_is_no_failure() {
+    use std::process::Stdio;
+    let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .arg("presets")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{output:?}");
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_mrfgs")).arg("presets").stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("standard output") && text.lines().count() == 1, "{text}");
+}
