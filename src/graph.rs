@@ -1,7 +1,7 @@
 //! Who depends on whom: the dependency factors S of one level (sections 3.1 and 4.1).
 //!
 //! There is one factor a pixel. Its members are the pixel and those neighbours in a 7 x 7 window whose bilateral
-//! coefficient exp(-(dx^2 + dy^2) / 2 sigma_d^2 - |colour difference|^2 / 2 sigma_r^2) reaches the percentile.
+//! coefficient `exp(-(dx^2 + dy^2) / 2 sigma_d^2 - |colour difference|^2 / 2 sigma_r^2)` reaches the percentile.
 //! Only the order of the coefficients matters, so their exponents are compared, in integers, ties by distance and
 //! then in raster order: every machine picks the same graph. The centre's own coefficient is always the
 //! largest; the percentile is taken over the 48 others (open in the paper).
@@ -98,6 +98,9 @@ impl LevelGraph {
     }
 
     /// The pixel in `slot` of `factor`, both pixels as raster indices; `None` where no pixel fills it.
+    ///
+    /// # Panics
+    /// When the member is outside the image, which [`LevelGraph::new`] has ruled out.
     #[must_use]
     pub fn member(&self, factor: usize, slot: usize) -> Option<usize> {
         if slot == 0 {

@@ -257,7 +257,7 @@ impl Method {
             "paper" => Ok(Self {
                 cost: Cost::Sad,
                 outside_cost: 20.0,
-                temperature: 4.0,
+                temperature: 0.5,
                 evidence_cap: 63.75,
                 evidence_gain: 1.0,
                 pyramid: Pyramid::LowPass,

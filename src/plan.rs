@@ -208,7 +208,7 @@ impl Plan {
             + 2 * u32::from(resolution.tau);
         // A pixel's padding labels count as labels with evidence 255.
         let sum_bound = (neighbours + 1) as u32 * (belief_bound + 255);
-        let narrow = dependency.tau.max(resolution.tau) <= 255 && sum_bound <= u32::from(u16::MAX);
+        let narrow = dependency.tau.max(resolution.tau) <= 255 && u16::try_from(sum_bound).is_ok();
 
         let last = levels.len() - 1;
         let phases = match method.schedule {
@@ -267,7 +267,7 @@ impl Plan {
         self.method.resolution == Resolution::Interpolating
     }
 
-    /// 2 z_min - d_min between `level` - 1 and `level`: 0, or -1 where the finer level's smallest label is odd.
+    /// `2 z_min - d_min` between `level` - 1 and `level`: 0, or -1 where the finer level's smallest label is odd.
     /// Coarse label index j agrees best with the fine label index 2 j + offset.
     #[must_use]
     pub fn label_offset(&self, level: usize) -> i32 {
@@ -328,8 +328,7 @@ mod tests {
     #[test]
     fn percentiles_count_neighbours() {
         for (percentile, count) in [(97.0, 2), (92.0, 4), (84.0, 8), (75.0, 12), (100.0, 0), (0.0, 48)] {
-            let mut method = Method::default();
-            method.percentile = percentile;
+            let method = Method { percentile, ..Method::default() };
             let p = Plan::new(9, 9, DisparityRange::new(0, 3).unwrap(), &method).unwrap();
             assert_eq!(p.neighbours, count, "{percentile} %");
         }
@@ -344,8 +343,7 @@ mod tests {
     #[test]
     fn evidence_is_monotone_and_reaches_its_cap() {
         for temperature in [0.001, 0.15, 0.8, 40.0] {
-            let mut method = Method::default();
-            method.temperature = temperature;
+            let method = Method { temperature, ..Method::default() };
             for gain in [1.0, 243.0] {
                 let scale = EvidenceScale::new(gain, AD_CENSUS_UNITS, &method);
                 let mut last = 0;

@@ -1,7 +1,7 @@
 //! Tables of exponentials in integers: the only transcendental function of the method, the same on every
 //! machine because it is evaluated with IEEE additions, multiplications and divisions alone.
 
-/// exp(-x) for x >= 0, by a Taylor series of exp(x / 2^k) and k squarings; accurate to about 1e-14.
+/// exp(-x) for x >= 0, by a Taylor series of exp(x / 2^k) and k squarings; to a relative 1e-11.
 #[must_use]
 pub fn exp_neg(x: f64) -> f64 {
     if x > 700.0 {
@@ -56,7 +56,7 @@ mod tests {
         for i in 0..7000 {
             let x = f64::from(i) / 10.0;
             let (ours, libm) = (exp_neg(x), (-x).exp());
-            assert!((ours - libm).abs() <= 1e-12 * libm, "exp(-{x}): {ours} against {libm}");
+            assert!((ours - libm).abs() <= 1e-11 * libm, "exp(-{x}): {ours} against {libm}");
         }
         assert!(exp_neg(1e6) < f64::MIN_POSITIVE);
     }

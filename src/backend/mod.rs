@@ -71,7 +71,8 @@ impl Volume {
     }
 }
 
-/// The stages of the method.
+/// The stages of the method. Each fails with [`crate::Error::Device`] when its device does, and otherwise never.
+#[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Backend {
     /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
     fn describe(&self) -> String;
@@ -92,9 +93,6 @@ pub trait Backend {
     /// - AD-census: [`crate::tables::ad_cost`] at (|dr| + |dg| + |db|) >> 8 plus [`crate::tables::census_cost`] at the
     ///   number of census bits that differ. The census of a pixel has a bit for each other place of a 9 x 7
     ///   window, set where that place, clamped to the image, is unmasked and its grey is below the centre's.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] when the device fails; so for all stages.
     fn cost(&mut self) -> Result<()>;
 
     /// Cost of `level` (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count

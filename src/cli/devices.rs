@@ -6,7 +6,7 @@ use mrfgs::Result;
 use mrfgs::backend::gpu;
 
 pub(super) fn run() -> Result<()> {
-    let devices = gpu::devices()?;
+    let devices = gpu::devices();
     let mut out = String::new();
     for device in &devices {
         let _ = writeln!(

@@ -16,7 +16,7 @@ pub(super) fn run(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     }
 }
 
-fn difference(a: &Pixel, b: &Pixel) -> u32 {
+fn difference(a: Pixel, b: Pixel) -> u32 {
     (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum()
 }
 
@@ -41,7 +41,7 @@ fn ad_census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
             for j in first..end {
                 let xr = (x as i64 - i64::from(level.min) - j) as usize;
                 if !rm[xr] {
-                    let colour = ad[(difference(&lp[x], &rp[xr]) >> 8) as usize];
+                    let colour = ad[(difference(lp[x], rp[xr]) >> 8) as usize];
                     let bits = (lc[x] ^ rc[xr]).count_ones() as usize;
                     costs[j as usize] = colour + census[bits];
                 }
@@ -98,8 +98,7 @@ fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
                     let xr = (x as i64 - d) as usize;
                     for ny in rows.clone() {
                         if !left.masked[(x, ny)] && !right.masked[(xr, ny)] {
-                            running.0 +=
-                                u64::from(difference(&left.pixels[(x, ny)], &right.pixels[(xr, ny)]));
+                            running.0 += u64::from(difference(left.pixels[(x, ny)], right.pixels[(xr, ny)]));
                             running.1 += 1;
                         }
                     }

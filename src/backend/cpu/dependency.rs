@@ -51,7 +51,9 @@ pub(super) fn run<M: Message>(
                     }
                     if cut.rule == CutRule::Absolute {
                         let min = q.iter().copied().min().unwrap_or_default();
-                        q.iter_mut().for_each(|q| *q = *q - min);
+                        for q in q.iter_mut() {
+                            *q = *q - min;
+                        }
                     }
                     for (total, &q) in total.iter_mut().zip(q.iter()) {
                         *total = *total + q;

@@ -85,9 +85,6 @@ impl<M: Message> Volumes<M> {
 
     fn read(&self, volume: Volume) -> Vec<u32> {
         let (_, labels, stride) = volume_shape(&self.plan, volume);
-        fn gather<T: Copy + Into<u32>>(data: &[T], labels: usize, stride: usize) -> Vec<u32> {
-            data.chunks_exact(stride).flat_map(|row| row[..labels].iter().map(|&v| v.into())).collect()
-        }
         match volume {
             Volume::Cost(0) => gather(&self.fine_cost, labels, stride),
             Volume::Cost(z) => gather(&self.levels[z].cost, labels, stride),
@@ -102,15 +99,6 @@ impl<M: Message> Volumes<M> {
     fn write(&mut self, volume: Volume, values: &[u32]) {
         let (rows, labels, stride) = volume_shape(&self.plan, volume);
         assert_eq!(values.len(), rows * labels, "values of {volume:?}");
-        // Padding must never look better than a label: it repeats the row's largest value.
-        fn scatter<T>(data: &mut [T], values: &[u32], labels: usize, stride: usize, f: impl Fn(u32) -> T) {
-            for (row, values) in data.chunks_exact_mut(stride).zip(values.chunks_exact(labels)) {
-                let most = values.iter().copied().max().unwrap_or(0);
-                for (d, out) in row.iter_mut().enumerate() {
-                    *out = f(values.get(d).copied().unwrap_or(most));
-                }
-            }
-        }
         match volume {
             Volume::Cost(0) => scatter(&mut self.fine_cost, values, labels, stride, |v| v as u8),
             Volume::Cost(z) => scatter(&mut self.levels[z].cost, values, labels, stride, |v| v as u16),
@@ -224,5 +212,21 @@ impl Backend for Cpu {
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         on_volumes!(self, v => v.write(volume, values));
         Ok(())
+    }
+}
+
+/// Rows of a padded volume without their padding.
+fn gather<T: Copy + Into<u32>>(data: &[T], labels: usize, stride: usize) -> Vec<u32> {
+    data.chunks_exact(stride).flat_map(|row| row[..labels].iter().map(|&v| v.into())).collect()
+}
+
+/// Fills the rows of a padded volume.
+/// Padding must never look better than a label: it repeats the row's largest value.
+fn scatter<T>(data: &mut [T], values: &[u32], labels: usize, stride: usize, f: impl Fn(u32) -> T) {
+    for (row, values) in data.chunks_exact_mut(stride).zip(values.chunks_exact(labels)) {
+        let most = values.iter().copied().max().unwrap_or(0);
+        for (d, out) in row.iter_mut().enumerate() {
+            *out = f(values.get(d).copied().unwrap_or(most));
+        }
     }
 }

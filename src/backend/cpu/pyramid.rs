@@ -46,7 +46,9 @@ pub(super) fn run<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mu
                         *sum += wx * v;
                     }
                 }
-                smooth.iter_mut().for_each(|sum| *sum >>= 8);
+                for sum in smooth.iter_mut() {
+                    *sum >>= 8;
+                }
                 reduce_labels(&smooth[..fl.labels], offset, minimum, &mut costs[..cl.labels]);
                 costs[cl.labels..].fill(u16::MAX);
             }

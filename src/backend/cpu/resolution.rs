@@ -102,7 +102,9 @@ fn variable_message<M: Message>(belief: &[u16], message: &[M], q: &mut [u32], cu
     }
     if cut.rule == CutRule::Absolute {
         let min = q.iter().copied().min().unwrap_or(0);
-        q.iter_mut().for_each(|q| *q -= min);
+        for q in q.iter_mut() {
+            *q -= min;
+        }
     }
 }
 

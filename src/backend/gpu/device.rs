@@ -122,21 +122,19 @@ fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
             wanted.parse::<usize>().ok().filter(|&i| i < adapters.len()).or_else(named)
         }
     };
-    match place {
-        Some(place) => Ok(adapters.swap_remove(place)),
-        None => {
-            let names: Vec<_> =
-                adapters.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect();
-            Err(Error::option(
-                "--device",
-                format!(
-                    "no device is called `{}`; there are {}",
-                    wanted.unwrap_or_default(),
-                    names.join(", ")
-                ),
-            ))
-        }
+    if let Some(place) = place {
+        return Ok(adapters.swap_remove(place));
     }
+    let names: Vec<_> =
+        adapters.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect();
+    Err(Error::option(
+        "--device",
+        format!(
+            "no device is called `{}`; `mrfgs devices` lists {}",
+            wanted.unwrap_or_default(),
+            names.join(", ")
+        ),
+    ))
 }
 
 /// Whether `auto` finds a device to its taste.
@@ -154,7 +152,7 @@ pub struct Ceiling {
 
 /// An open device with its queue and the first failure it reported.
 pub(super) struct Device {
-    pub(super) device: wgpu::Device,
+    pub(super) inner: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
     pub(super) max_binding: u64,
@@ -205,7 +203,7 @@ impl Device {
             name: format!("{} ({})", info.name, api(info.backend)),
             max_binding: device.limits().max_storage_buffer_binding_size.min(max_binding),
             max_buffer: device.limits().max_buffer_size,
-            device,
+            inner: device,
             queue,
             failure,
         })
@@ -225,7 +223,7 @@ impl Device {
 
     /// Waits for everything submitted so far.
     pub(super) fn wait(&self) -> Result<()> {
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let polled = self.inner.poll(wgpu::PollType::wait_indefinitely());
         self.check()?;
         polled.map(|_| ()).map_err(|e| Error::Device(format!("{}: {e}", self.name)))
     }

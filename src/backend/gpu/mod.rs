@@ -157,11 +157,11 @@ impl Gpu {
         if let Some(pipeline) = self.pipelines.get(&(kernel, variant)) {
             return Ok(pipeline.clone());
         }
-        let module = self.device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let module = self.device.inner.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(kernel.name()),
             source: wgpu::ShaderSource::Wgsl(kernel.source(variant).into()),
         });
-        let pipeline = self.device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let pipeline = self.device.inner.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(kernel.name()),
             layout: None,
             module: &module,
@@ -184,7 +184,7 @@ impl Gpu {
                 self.device.max_buffer >> 20
             )));
         }
-        Ok(self.device.device.create_buffer(&wgpu::BufferDescriptor {
+        Ok(self.device.inner.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size,
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
@@ -205,7 +205,7 @@ impl Gpu {
         bindings: &[Binding],
         threads: (u32, u32),
     ) -> Dispatch {
-        let device = &self.device.device;
+        let device = &self.device.inner;
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
             size: size_of::<Params>() as u64,
@@ -282,10 +282,12 @@ impl Gpu {
 
     /// Records the dispatches of a stage, in order.
     fn record(&mut self, dispatches: &[Dispatch]) -> Result<()> {
-        let device = &self.device.device;
-        let encoder = self.encoder.get_or_insert_with(|| device.create_command_encoder(&Default::default()));
+        let device = &self.device.inner;
+        let encoder = self
+            .encoder
+            .get_or_insert_with(|| device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default()));
         {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             for dispatch in dispatches {
                 pass.set_pipeline(&dispatch.pipeline);
                 pass.set_bind_group(0, &dispatch.bind_group, &[]);
@@ -307,13 +309,14 @@ impl Gpu {
     /// The words of `buffer`, after everything recorded so far.
     fn download(&mut self, buffer: &wgpu::Buffer) -> Result<Vec<u32>> {
         self.submit()?;
-        let staging = self.device.device.create_buffer(&wgpu::BufferDescriptor {
+        let staging = self.device.inner.create_buffer(&wgpu::BufferDescriptor {
             label: Some("staging"),
             size: buffer.size(),
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = self.device.device.create_command_encoder(&Default::default());
+        let mut encoder =
+            self.device.inner.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
         self.device.queue.submit([encoder.finish()]);
         let (sender, receiver) = std::sync::mpsc::channel();
@@ -746,8 +749,8 @@ fn transposed(graph: &LevelGraph, params: &LevelParams) -> (Vec<u32>, Vec<u32>, 
     let mut entries = Vec::with_capacity(graph.incoming().len() + kernels::ALIGN_WORDS * graph.height());
     let mut rows = vec![0];
     for (y, starts) in starts.chunks_exact_mut(pitch).enumerate() {
-        for x in 0..width {
-            starts[x] = entries.len() as u32;
+        for (x, start) in starts[..width].iter_mut().enumerate() {
+            *start = entries.len() as u32;
             for &entry in graph.incoming_of(y * width + x) {
                 let (factor, slot) = (entry as usize / slots, entry as usize % slots);
                 // From the pixel to the factor: against the way from the factor to its member.
