@@ -68,7 +68,12 @@ pub struct Progress {
 /// # Errors
 /// Whatever the backend reports, [`Error::Mismatch`] when the plan is for another size, and [`Error::Interrupted`]
 /// when `observer` breaks.
-pub fn solve(backend: &mut impl Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Solution> {
+pub fn solve(
+    backend: &mut (impl Backend + ?Sized),
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer,
+) -> Result<Solution> {
     if plan.size() != pair.size() {
         return Err(Error::Mismatch(format!("a plan for {:?} and a pair of {:?}", plan.size(), pair.size())));
     }
@@ -96,7 +101,7 @@ pub fn solve(backend: &mut impl Backend, plan: &Plan, pair: &Pair, observer: Obs
 ///
 /// # Errors
 /// Whatever the backend reports.
-pub fn flood(backend: &mut impl Backend, plan: &Plan) -> Result<u32> {
+pub fn flood(backend: &mut (impl Backend + ?Sized), plan: &Plan) -> Result<u32> {
     propagate(
         backend,
         plan,
@@ -104,7 +109,7 @@ pub fn flood(backend: &mut impl Backend, plan: &Plan) -> Result<u32> {
     )
 }
 
-fn propagate(backend: &mut impl Backend, plan: &Plan, work: &mut Work) -> Result<u32> {
+fn propagate(backend: &mut (impl Backend + ?Sized), plan: &Plan, work: &mut Work) -> Result<u32> {
     let coarsest = plan.levels.len() - 1;
     let tolerance = plan.method.tolerance;
     let mut iterations = 0;
