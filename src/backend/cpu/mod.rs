@@ -123,7 +123,13 @@ impl<M: Message> Volumes<M> {
             Volume::Down(z) => scatter(&mut self.levels[z].down, values, labels, stride, M::from_u32),
             Volume::Up(z) => scatter(&mut self.levels[z].up, values, labels, stride, M::from_u32),
             Volume::Belief(z) => {
-                scatter(&mut self.levels[z].belief, values, labels, stride, |v| v as u16);
+                let belief = &mut self.levels[z].belief;
+                scatter(belief, values, labels, stride, |v| v as u16);
+                // Messages are yet to be taken off: padding stays the largest whatever it loses.
+                let most = self.plan.dependency.tau.max(self.plan.resolution.tau);
+                for row in belief.chunks_exact_mut(stride) {
+                    row[labels..].iter_mut().for_each(|b| *b = b.saturating_add(most));
+                }
             }
         }
     }
