@@ -110,9 +110,11 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
     let mut iterations = 0;
     for phase in &plan.phases {
         if phase.finest < coarsest && plan.phases.len() > 1 {
-            // What the coarser levels know reaches the new one before its own messages start.
+            // What the coarser levels know reaches the new one before its own messages start. The coarser level's
+            // beliefs take in what came up, or the next resolution would take off a message that they do not hold.
             backend.resolution(phase.finest + 1)?;
             backend.belief(phase.finest)?;
+            backend.belief(phase.finest + 1)?;
         }
         let converges = tolerance > 0.0 && phase.finest == 0;
         if converges {

@@ -162,3 +162,43 @@ pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
     let level = &plan.levels[volume.level()];
     (level.pixels() * rows, level.labels, level.stride)
 }
+
+/// Values for a volume, as rows of labels to be stored with padding.
+struct PaddedRows<'a> {
+    values: &'a [u32],
+    labels: usize,
+    stride: usize,
+    /// How far the padding is above a row's largest value.
+    margin: u32,
+}
+
+impl<'a> PaddedRows<'a> {
+    fn new(plan: &Plan, volume: Volume, values: &'a [u32]) -> Self {
+        let (rows, labels, stride) = volume_shape(plan, volume);
+        assert_eq!(values.len(), rows * labels, "values of {volume:?}");
+        // Padding must never look better than a label, also after a message is taken off a belief.
+        let margin = match volume {
+            Volume::Belief(_) => plan.dependency.tau.max(plan.resolution.tau).into(),
+            _ => 0,
+        };
+        Self { values, labels, stride, margin }
+    }
+
+    /// Rows of `stride` values each.
+    fn iter(&self) -> impl Iterator<Item = Vec<u32>> {
+        self.values.chunks_exact(self.labels).map(|row| {
+            let padding = row.iter().copied().max().unwrap_or(0) + self.margin;
+            let mut row = row.to_vec();
+            row.resize(self.stride, padding);
+            row
+        })
+    }
+
+    fn fill<T>(&self, out: &mut [T], convert: impl Fn(u32) -> T) {
+        for (out, row) in out.chunks_exact_mut(self.stride).zip(self.iter()) {
+            for (out, value) in out.iter_mut().zip(row) {
+                *out = convert(value);
+            }
+        }
+    }
+}

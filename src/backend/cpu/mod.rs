@@ -9,7 +9,7 @@ mod message;
 mod pyramid;
 mod resolution;
 
-use super::{Backend, Estimate, Volume, volume_shape};
+use super::{Backend, Estimate, PaddedRows, Volume, volume_shape};
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::Pair;
@@ -97,22 +97,16 @@ impl<M: Message> Volumes<M> {
     }
 
     fn write(&mut self, volume: Volume, values: &[u32]) {
-        let (rows, labels, stride) = volume_shape(&self.plan, volume);
-        assert_eq!(values.len(), rows * labels, "values of {volume:?}");
+        let rows = PaddedRows::new(&self.plan, volume, values);
+        let z = volume.level();
         match volume {
-            Volume::Cost(0) => scatter(&mut self.fine_cost, values, labels, stride, |v| v as u8),
-            Volume::Cost(z) => scatter(&mut self.levels[z].cost, values, labels, stride, |v| v as u16),
-            Volume::Evidence(z) => {
-                scatter(&mut self.levels[z].evidence, values, labels, stride, |v| v as u8);
-            }
-            Volume::Dependency(z) => {
-                scatter(&mut self.levels[z].dependency, values, labels, stride, M::from_u32);
-            }
-            Volume::Down(z) => scatter(&mut self.levels[z].down, values, labels, stride, M::from_u32),
-            Volume::Up(z) => scatter(&mut self.levels[z].up, values, labels, stride, M::from_u32),
-            Volume::Belief(z) => {
-                scatter(&mut self.levels[z].belief, values, labels, stride, |v| v as u16);
-            }
+            Volume::Cost(0) => rows.fill(&mut self.fine_cost, |v| v as u8),
+            Volume::Cost(_) => rows.fill(&mut self.levels[z].cost, |v| v as u16),
+            Volume::Evidence(_) => rows.fill(&mut self.levels[z].evidence, |v| v as u8),
+            Volume::Dependency(_) => rows.fill(&mut self.levels[z].dependency, M::from_u32),
+            Volume::Down(_) => rows.fill(&mut self.levels[z].down, M::from_u32),
+            Volume::Up(_) => rows.fill(&mut self.levels[z].up, M::from_u32),
+            Volume::Belief(_) => rows.fill(&mut self.levels[z].belief, |v| v as u16),
         }
     }
 }
@@ -218,15 +212,4 @@ impl Backend for Cpu {
 /// Rows of a padded volume without their padding.
 fn gather<T: Copy + Into<u32>>(data: &[T], labels: usize, stride: usize) -> Vec<u32> {
     data.chunks_exact(stride).flat_map(|row| row[..labels].iter().map(|&v| v.into())).collect()
-}
-
-/// Fills the rows of a padded volume.
-/// Padding must never look better than a label: it repeats the row's largest value.
-fn scatter<T>(data: &mut [T], values: &[u32], labels: usize, stride: usize, f: impl Fn(u32) -> T) {
-    for (row, values) in data.chunks_exact_mut(stride).zip(values.chunks_exact(labels)) {
-        let most = values.iter().copied().max().unwrap_or(0);
-        for (d, out) in row.iter_mut().enumerate() {
-            *out = f(values.get(d).copied().unwrap_or(most));
-        }
-    }
 }

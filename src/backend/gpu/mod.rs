@@ -7,7 +7,7 @@
 mod device;
 mod kernels;
 
-use super::{Backend, Estimate, Peak, Volume, volume_shape};
+use super::{Backend, Estimate, PaddedRows, Peak, Volume, volume_shape};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane};
@@ -688,20 +688,16 @@ impl Backend for Gpu {
         self.submit()?;
         let (buffer, pitch, per_word) = self.volume(volume);
         let plan = &self.state().plan;
-        let (rows, labels, stride) = volume_shape(plan, volume);
-        assert_eq!(values.len(), rows * labels, "values of {volume:?}");
         let height = plan.levels[volume.level()].height;
+        let rows = PaddedRows::new(plan, volume, values);
+        let per_line = volume_shape(plan, volume).0 / height;
         let bits = 32 / per_word;
         let mut words = vec![0u32; pitch * height];
-        for (line, values) in words.chunks_exact_mut(pitch).zip(values.chunks_exact(rows / height * labels)) {
-            for (i, row) in values.chunks_exact(labels).enumerate() {
-                // Padding must never look better than a label: it repeats the row's largest value.
-                let most = row.iter().copied().max().unwrap_or(0);
-                for d in 0..stride {
-                    let at = i * stride + d;
-                    let value = row.get(d).copied().unwrap_or(most);
-                    line[at / per_word] |= value << (bits * (at % per_word));
-                }
+        for (i, row) in rows.iter().enumerate() {
+            let line = &mut words[i / per_line * pitch..];
+            for (d, value) in row.into_iter().enumerate() {
+                let at = i % per_line * rows.stride + d;
+                line[at / per_word] |= value << (bits * (at % per_word));
             }
         }
         self.device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&words));

@@ -1,0 +1,381 @@
+//! Seeded random input: images, pairs, methods, graphs, and states of the volumes that keep the invariants.
+
+use super::twin;
+use mrfgs::backend::{Backend, Estimate, NO_LABEL, Peak, Volume};
+use mrfgs::graph::LevelGraph;
+use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::options::{Cost, DisparityRange, Fill, Median, Method, Potential, Pyramid, Resolution, Schedule};
+use mrfgs::plan::Plan;
+use mrfgs::refine::flag;
+
+/// The splitmix64 generator (Steele, Lea and Flood 2014).
+pub struct Random(u64);
+
+impl Random {
+    /// The generator that starts at `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number in `low ..= high`.
+    pub fn within(&mut self, low: u32, high: u32) -> u32 {
+        low + (self.bits() % (u64::from(high - low) + 1)) as u32
+    }
+
+    /// True with probability 1 / `n`.
+    pub fn one_in(&mut self, n: u32) -> bool {
+        self.within(1, n) == 1
+    }
+
+    /// One of `choices`.
+    pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.within(0, choices.len() as u32 - 1) as usize]
+    }
+
+    /// `low` times a power, up to `high`.
+    pub fn log_within(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(f64::from(self.within(0, 1000)) / 1000.0)
+    }
+
+    /// `choices` in random order.
+    pub fn shuffled<T: Clone>(&mut self, choices: &[T]) -> Vec<T> {
+        let mut out = choices.to_vec();
+        for i in (1..out.len()).rev() {
+            out.swap(i, self.within(0, i as u32) as usize);
+        }
+        out
+    }
+}
+
+fn pixel(r: u16, g: u16, b: u16) -> [u16; 4] {
+    [r, g, b, ((u32::from(r) + u32::from(g) + u32::from(b)) / 3) as u16]
+}
+
+/// An image of full noise, faint noise, few values or one, and some of it, none of it or all of it masked.
+pub fn image(random: &mut Random, width: usize, height: usize) -> Image {
+    let style = random.within(0, 3);
+    let base = random.within(0, 60_000);
+    let pixels = Plane::from_fn(width, height, |_, _| {
+        let mut value = || match style {
+            0 => random.within(0, 65_535) as u16,
+            1 => (base + random.within(0, 5_000)) as u16,
+            2 => (base / 4 * random.within(0, 4)) as u16,
+            _ => base as u16,
+        };
+        pixel(value(), value(), value())
+    });
+    let masked = mask(random, width, height);
+    Image { pixels, masked }
+}
+
+fn mask(random: &mut Random, width: usize, height: usize) -> Plane<bool> {
+    let density = random.pick(&[0, 0, 0, 20, 5, 2, 1]);
+    let block = random.pick(&[1, 3]);
+    let seeds = Plane::from_fn(width.div_ceil(block), height.div_ceil(block), |_, _| {
+        density > 0 && random.one_in(density)
+    });
+    Plane::from_fn(width, height, |x, y| seeds[(x / block, y / block)])
+}
+
+/// A pair of unrelated images, or one whose right image is the left one moved and disturbed.
+pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
+    let left = image(random, width, height);
+    let mut right = image(random, width, height);
+    if !random.one_in(3) {
+        let step = random.within(0, 9) as usize;
+        let noise = random.pick(&[0, 300, 8000]);
+        right.pixels = Plane::from_fn(width, height, |x, y| {
+            let source = left.pixels[((x + step).min(width - 1), y)];
+            let [r, g, b, _] = source.map(|v| v.saturating_add(random.within(0, noise) as u16));
+            pixel(r, g, b)
+        });
+    }
+    Pair::new(left, right).unwrap()
+}
+
+/// A method with every parameter that the stages read drawn anew, and `neighbours` a factor.
+pub fn method(random: &mut Random, neighbours: usize) -> Method {
+    let mut m = Method::default();
+    m.cost = random.pick(&[Cost::Sad, Cost::AdCensus]);
+    m.sad_window = random.pick(&[1, 3, 5, 7, 9]);
+    m.outside_cost = match m.cost {
+        Cost::Sad => f64::from(random.within(0, 254)),
+        Cost::AdCensus => f64::from(random.within(0, 200)) / 100.0,
+    };
+    m.temperature = match m.cost {
+        Cost::Sad => random.log_within(0.1, 300.0),
+        Cost::AdCensus => random.log_within(0.01, 10.0),
+    };
+    m.evidence_cap = random.pick(&[0.25, 3.0, 8.0, 63.75]);
+    m.evidence_gain = random.pick(&[1.0, 1.7, 3.0, 4.0]);
+    m.pyramid = random.pick(&[Pyramid::LowPass, Pyramid::Minimum]);
+    m.levels = random.within(1, 5);
+    m.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
+    m.sigma_space = random.log_within(0.5, 30.0);
+    m.sigma_range = random.log_within(0.01, 3.0);
+    m.potential = random.pick(&[Potential::Soft, Potential::Exact, Potential::Hard]);
+    m.dependency_cut = random.pick(&[0.25, 2.0, 10.0, 63.75, 64.0, 255.75]);
+    m.resolution = random.pick(&[Resolution::Strict, Resolution::Interpolating]);
+    m.resolution_cut = random.pick(&[0.25, 8.0, 63.75, 255.75]);
+    m.schedule = random.pick(&[Schedule::Together, Schedule::CoarseFirst]);
+    m.iterations = random.within(1, 3);
+    m.final_iterations = random.within(0, 3);
+    m.visibility = !random.one_in(3);
+    m.region_size = random.pick(&[0, 3, 20]);
+    m.sub_pixel = random.pick(&[false, true]);
+    m.fill = random.pick(&[Fill::None, Fill::Row, Fill::Row]);
+    m.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
+    m.median_window = random.pick(&[3, 5, 15]);
+    m.median_sigma_space = random.log_within(0.3, 30.0);
+    m.median_sigma_range = random.log_within(0.01, 3.0);
+    m.confidence_floor = random.pick(&[0, 16, 255]);
+    m
+}
+
+/// The plan of `method` for `labels` labels from `min` on.
+pub fn plan((width, height): (usize, usize), min: i32, labels: usize, method: &Method) -> Plan {
+    let range = DisparityRange::new(min, min + labels as i32 - 1).unwrap();
+    Plan::new(width, height, range, method).unwrap()
+}
+
+/// Graphs of any shape for every level of `plan`: each factor takes random neighbours in random slots.
+pub fn graphs(random: &mut Random, plan: &Plan) -> Vec<LevelGraph> {
+    let window: Vec<u8> = (0..49).filter(|&code| code != 24).collect();
+    plan.levels
+        .iter()
+        .map(|level| {
+            let mut codes = Vec::new();
+            for y in 0..level.height {
+                for x in 0..level.width {
+                    let present = random.pick(&[1, 1, 2, 5]);
+                    let order = random.shuffled(&window);
+                    codes.extend(order.into_iter().take(plan.neighbours).map(|code| {
+                        let nx = x as i32 + i32::from(code) % 7 - 3;
+                        let ny = y as i32 + i32::from(code) / 7 - 3;
+                        let inside =
+                            nx >= 0 && ny >= 0 && nx < level.width as i32 && ny < level.height as i32;
+                        if inside && random.one_in(present) { code } else { 255 }
+                    }));
+                }
+            }
+            LevelGraph::new(level.width, level.height, plan.neighbours, codes)
+        })
+        .collect()
+}
+
+/// All volumes of a flood, a vector a level; empty where a level has none.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    /// Evidence.
+    pub evidence: Vec<Vec<u32>>,
+    /// Dependency messages.
+    pub dependency: Vec<Vec<u32>>,
+    /// Messages from the level above.
+    pub down: Vec<Vec<u32>>,
+    /// Messages from the level below.
+    pub up: Vec<Vec<u32>>,
+    /// Beliefs.
+    pub belief: Vec<Vec<u32>>,
+}
+
+impl State {
+    /// Random evidence, messages 0, beliefs equal to the evidence.
+    pub fn fresh(plan: &Plan, evidence: Vec<Vec<u32>>) -> Self {
+        let last = plan.levels.len() - 1;
+        let cells = |z: usize| plan.levels[z].pixels() * plan.levels[z].labels;
+        Self {
+            dependency: (0..=last).map(|z| vec![0; cells(z) * plan.slots()]).collect(),
+            down: (0..=last).map(|z| vec![0; if z == last { 0 } else { cells(z) }]).collect(),
+            up: (0..=last).map(|z| vec![0; if z == 0 { 0 } else { cells(z) }]).collect(),
+            belief: evidence.clone(),
+            evidence,
+        }
+    }
+
+    /// Every volume of it, with its values.
+    pub fn volumes(&self) -> Vec<(Volume, &[u32])> {
+        let mut all: Vec<(Volume, &[u32])> = Vec::new();
+        for z in 0..self.evidence.len() {
+            all.push((Volume::Evidence(z), &self.evidence[z]));
+            all.push((Volume::Dependency(z), &self.dependency[z]));
+            if !self.down[z].is_empty() {
+                all.push((Volume::Down(z), &self.down[z]));
+            }
+            if !self.up[z].is_empty() {
+                all.push((Volume::Up(z), &self.up[z]));
+            }
+            all.push((Volume::Belief(z), &self.belief[z]));
+        }
+        all
+    }
+
+    /// Puts all of it into `backend`.
+    pub fn write(&self, backend: &mut dyn Backend) {
+        for (volume, values) in self.volumes() {
+            backend.write(volume, values).unwrap();
+        }
+    }
+
+    /// The twin's new beliefs of every level.
+    pub fn believe(&mut self, plan: &Plan, graphs: &[LevelGraph]) {
+        for z in 0..plan.levels.len() {
+            self.believe_at(plan, graphs, z);
+        }
+    }
+
+    /// The twin's new beliefs of one level.
+    pub fn believe_at(&mut self, plan: &Plan, graphs: &[LevelGraph], z: usize) {
+        self.belief[z] = twin::belief::belief(
+            &graphs[z],
+            plan.levels[z].labels,
+            &self.evidence[z],
+            &self.dependency[z],
+            &self.down[z],
+            &self.up[z],
+        );
+    }
+}
+
+/// The largest belief that `plan` allows for.
+pub fn belief_bound(plan: &Plan) -> u32 {
+    plan.levels[0].evidence.cap + 49 * u32::from(plan.dependency.tau) + 2 * u32::from(plan.resolution.tau)
+}
+
+/// A message: minimum 0, at most `tau`.
+fn message(random: &mut Random, labels: usize, tau: u32) -> Vec<u32> {
+    let style = random.within(0, 3);
+    let most = random.within(0, tau);
+    let mut out: Vec<u32> = (0..labels)
+        .map(|_| match style {
+            0 => 0,
+            1 => tau * random.within(0, 1),
+            2 => random.within(0, tau),
+            _ => random.within(0, most),
+        })
+        .collect();
+    out[random.within(0, labels as u32 - 1) as usize] = 0;
+    out
+}
+
+/// Random evidence for every level.
+pub fn evidence(random: &mut Random, plan: &Plan) -> Vec<Vec<u32>> {
+    plan.levels
+        .iter()
+        .map(|level| {
+            (0..level.pixels()).flat_map(|_| message(random, level.labels, level.evidence.cap)).collect()
+        })
+        .collect()
+}
+
+/// A state in the middle of a flood: messages with minimum 0 and at most their cut, 0 where a slot has no member or
+/// a factor no second one, and beliefs that are the sum of their parts, or, where `loose`, any that are within
+/// the plan's bound and not below a message that is part of them.
+pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: bool) -> State {
+    let mut state = State::fresh(plan, evidence(random, plan));
+    for (z, level) in plan.levels.iter().enumerate() {
+        let labels = level.labels;
+        let tau = u32::from(plan.dependency.tau);
+        for factor in 0..level.pixels() {
+            let members = twin::members(&graphs[z], factor);
+            if members.iter().flatten().count() < 2 {
+                continue;
+            }
+            for (slot, _) in members.iter().enumerate().filter(|(_, m)| m.is_some()) {
+                let at = (factor * plan.slots() + slot) * labels;
+                state.dependency[z][at..at + labels].copy_from_slice(&message(random, labels, tau));
+            }
+        }
+        let tau = u32::from(plan.resolution.tau);
+        for volume in [&mut state.down[z], &mut state.up[z]] {
+            for row in volume.chunks_mut(labels) {
+                row.copy_from_slice(&message(random, labels, tau));
+            }
+        }
+    }
+    state.believe(plan, graphs);
+    if loose {
+        let bound = belief_bound(plan);
+        for z in 0..plan.levels.len() {
+            let labels = plan.levels[z].labels;
+            let mut least = vec![0; state.belief[z].len()];
+            for volume in [&state.down[z], &state.up[z]] {
+                for (least, &m) in least.iter_mut().zip(volume) {
+                    *least = m.max(*least);
+                }
+            }
+            for factor in 0..plan.levels[z].pixels() {
+                for (slot, member) in twin::members(&graphs[z], factor).into_iter().enumerate() {
+                    if let Some(pixel) = member {
+                        let at = (factor * plan.slots() + slot) * labels;
+                        for d in 0..labels {
+                            let least = &mut least[pixel * labels + d];
+                            *least = state.dependency[z][at + d].max(*least);
+                        }
+                    }
+                }
+            }
+            for row in 0..plan.levels[z].pixels() {
+                let style = random.within(0, 2);
+                for i in row * labels..(row + 1) * labels {
+                    state.belief[z][i] = match style {
+                        0 => random.within(least[i], bound),
+                        1 => least[i] + random.within(0, (bound - least[i]).min(9)),
+                        _ => least[i],
+                    };
+                }
+            }
+        }
+    }
+    state
+}
+
+/// Peaks and a right view as a backend may leave them: some at the ends of the range, some flat.
+pub fn estimate(random: &mut Random, width: usize, height: usize, labels: u16) -> Estimate {
+    let spread = random.pick(&[1, 20, 5000]);
+    let peaks = Plane::from_fn(width, height, |_, _| {
+        let label = random.within(0, u32::from(labels) - 1) as u16;
+        let best = random.within(0, 50_000) as u16;
+        let mut above = |there: bool| if there { best + random.within(0, spread) as u16 } else { u16::MAX };
+        Peak { label, best, rival: above(label > 1 || label + 2 < labels) }
+    });
+    let right = Plane::from_fn(width, height, |_, _| {
+        if random.one_in(5) { NO_LABEL } else { random.within(0, u32::from(labels) - 1) as u16 }
+    });
+    let offsets = Plane::from_fn(width, height, |_, _| random.within(0, 256) as i16 - 128);
+    Estimate { peaks, offsets, right }
+}
+
+/// Flags as they may stand before the fill, or, where `filled`, after it.
+pub fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<u8> {
+    let density = random.pick(&[1, 2, 3, 10, 1000]);
+    Plane::from_fn(width, height, |_, _| {
+        if !random.one_in(density) {
+            return random.pick(&[0, 0, flag::LOW_CONFIDENCE]);
+        }
+        if random.one_in(6) {
+            return flag::MASKED;
+        }
+        let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION]);
+        if filled && !random.one_in(4) { reason | flag::FILLED } else { reason }
+    })
+}
+
+/// A disparity map in 1/256 px with patches, steps of about a pixel, and noise.
+pub fn disparity(random: &mut Random, width: usize, height: usize) -> Plane<i32> {
+    let patch = random.pick(&[1, 2, 5]);
+    let step = random.pick(&[1, 128, 255, 256, 257, 3000]);
+    let patches =
+        Plane::from_fn(width.div_ceil(patch), height.div_ceil(patch), |_, _| random.within(0, 3) as i32);
+    Plane::from_fn(width, height, |x, y| {
+        step * patches[(x / patch, y / patch)] - 2000 + random.pick(&[0, 0, 0, 1, -1, 256])
+    })
+}

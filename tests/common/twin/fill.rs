@@ -1,0 +1,37 @@
+use mrfgs::image::Plane;
+use mrfgs::refine::flag;
+
+/// Whether a pixel's disparity is given up before the fill.
+pub fn invalid(flags: u8) -> bool {
+    [flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION, flag::MASKED].iter().any(|bit| flags & bit != 0)
+}
+
+/// Fills what is invalid and not masked.
+pub fn fill(disparity: &mut Plane<i32>, flags: &mut Plane<u8>) {
+    let (width, height) = disparity.size();
+    let (old, old_flags) = (disparity.clone(), flags.clone());
+    let valid = |x: usize, y: usize| !invalid(old_flags[(x, y)]);
+    // What place x of row y holds once the row is filled from its own valid pixels.
+    let on_row = |x: usize, y: usize| {
+        let left = (0..=x).rev().find(|&x| valid(x, y)).map(|x| old[(x, y)]);
+        let right = (x..width).find(|&x| valid(x, y)).map(|x| old[(x, y)]);
+        left.into_iter().chain(right).min()
+    };
+    for y in 0..height {
+        for x in 0..width {
+            if valid(x, y) || old_flags[(x, y)] & flag::MASKED != 0 {
+                continue;
+            }
+            // Rows by distance, the upper of two equals first.
+            let value = (0..height)
+                .flat_map(|step| [y.checked_sub(step), Some(y + step)])
+                .flatten()
+                .filter(|&row| row < height)
+                .find_map(|row| on_row(x, row));
+            if let Some(value) = value {
+                disparity[(x, y)] = value;
+                flags[(x, y)] |= flag::FILLED;
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/mod.rs` and
+//! `src/refine` and from nothing else: one cell at a time, wide integers, no padding, no table, nothing clever. It
+//! shares data types and documented constants with the library, and no function that computes.
+//!
+//! Volumes are `Vec<u32>` in the layout of [`mrfgs::backend::Volume`]: \[y\]\[x\]\[slot\]\[label\].
+
+pub mod belief;
+pub mod census;
+pub mod change;
+pub mod confidence;
+pub mod cost;
+pub mod dependency;
+pub mod estimate;
+pub mod evidence;
+pub mod fill;
+pub mod graph;
+pub mod median;
+pub mod pyramid;
+pub mod region;
+pub mod resolution;
+pub mod sub_pixel;
+pub mod visibility;
+
+use mrfgs::graph::LevelGraph;
+use mrfgs::plan::{Cut, CutRule};
+
+/// The 1 4 6 4 1 of the binomial filter, for places -2 ..= 2.
+pub fn binomial(place: i64) -> i64 {
+    match place.abs() {
+        0 => 6,
+        1 => 4,
+        2 => 1,
+        _ => 0,
+    }
+}
+
+/// "No label agrees", and where sums saturate.
+pub const INFINITE: i64 = 1 << 20;
+
+/// Cuts the sums `s` into a message.
+pub fn cut(s: &[i64], cut: Cut) -> Vec<u32> {
+    let tau = i64::from(cut.tau);
+    let smallest = *s.iter().min().unwrap();
+    s.iter()
+        .map(|&s| match cut.rule {
+            CutRule::Relative => s.min(smallest + tau) - smallest,
+            CutRule::Absolute => s.min(tau) - smallest.min(tau),
+        })
+        .map(|m| u32::try_from(m).unwrap())
+        .collect()
+}
+
+/// What a variable says to a factor: its belief less the factor's old message, and where the cut is absolute less
+/// the minimum of that.
+pub fn variable_message(belief: &[u32], old: &[u32], cut: Cut) -> Vec<i64> {
+    let q: Vec<i64> = belief.iter().zip(old).map(|(&b, &m)| i64::from(b) - i64::from(m)).collect();
+    assert!(q.iter().all(|&q| q >= 0), "a belief below a message that is part of it");
+    match cut.rule {
+        CutRule::Relative => q,
+        CutRule::Absolute => {
+            let smallest = *q.iter().min().unwrap();
+            q.iter().map(|q| q - smallest).collect()
+        }
+    }
+}
+
+/// The pixel in each slot of `factor`, decoded from the graph's codes: a place in the 7 x 7 window in raster
+/// order, 255 for none.
+pub fn members(graph: &LevelGraph, factor: usize) -> Vec<Option<usize>> {
+    let (width, neighbours) = (graph.width(), graph.slots() - 1);
+    let mut members = vec![Some(factor)];
+    for &code in &graph.codes()[factor * neighbours..(factor + 1) * neighbours] {
+        members.push((code != 255).then(|| {
+            let x = factor % width + usize::from(code % 7) - 3;
+            let y = factor / width + usize::from(code / 7) - 3;
+            assert!(x < width && y < graph.height());
+            y * width + x
+        }));
+    }
+    members
+}

@@ -1,0 +1,38 @@
+use mrfgs::backend::Peak;
+use mrfgs::image::Plane;
+use mrfgs::plan::Plan;
+
+/// How far the disparity of each pixel is above its label, in 1/256 px.
+pub fn sub_pixel(plan: &Plan, cost: &[u32], peaks: &Plane<Peak>) -> Plane<i16> {
+    let level = &plan.levels[0];
+    let (width, height, labels) = (level.width as i64, level.height as i64, level.labels as i64);
+    Plane::from_fn(level.width, level.height, |x, y| {
+        let label = i64::from(peaks[(x, y)].label);
+        if label == 0 || label == labels - 1 {
+            return 0;
+        }
+        let sum_at = |wanted: i64| {
+            let mut sum = 0;
+            for v in y as i64 - 1..=y as i64 + 1 {
+                for u in x as i64 - 1..=x as i64 + 1 {
+                    if u < 0 || v < 0 || u >= width || v >= height {
+                        continue;
+                    }
+                    if (i64::from(peaks[(u as usize, v as usize)].label) - label).abs() <= 1 {
+                        sum += i64::from(cost[((v * width + u) * labels + wanted) as usize]);
+                    }
+                }
+            }
+            sum
+        };
+        let (a, b, c) = (sum_at(label - 1), sum_at(label), sum_at(label + 1));
+        let s = a.max(c) - b;
+        if s <= 0 {
+            return 0;
+        }
+        // Floats hold these fractions exactly enough, as a quotient by 2 s is never closer to a whole number than
+        // 1 / (2 s) unless it is one.
+        let exact = (256 * (a - c) + s) as f64 / (2 * s) as f64;
+        exact.floor().clamp(-128.0, 128.0) as i16
+    })
+}
