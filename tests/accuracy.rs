@@ -1,0 +1,88 @@
+//! What the default preset reaches, as floors: on rendered scenes always, on real pairs where `MRFGS_MIDDLEBURY` names
+//! their folder. The maps are integers, so the figures are the same on every machine; the floors leave a little room
+//! for changes that trade.
+
+use mrfgs::evaluation::{Report, evaluate};
+use mrfgs::image::{Plane, calib::Calibration, pfm, read};
+use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::refine::FRACTION;
+use mrfgs::{Matched, match_pair};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+fn matched(folder: &Path, method: &Method) -> Matched {
+    let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
+    let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
+    let range = DisparityRange::new(0, ndisp as i32 - 1).unwrap();
+    let pair = read::pair(&left, &right, None).unwrap();
+    let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+    match_pair(&pair, range, method, &execution, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn report(folder: &Path, map: &Plane<f32>) -> Report {
+    let pfm::Pfm::Grey(truth) = pfm::read(&folder.join("disp0GT.pfm")).unwrap() else {
+        panic!("colour truth")
+    };
+    let mask = read::grey8(&folder.join("mask0nocc.png")).unwrap();
+    evaluate(map, &truth, Some(&mask)).unwrap()
+}
+
+/// A map and itself in whole pixels.
+fn rounded(matched: &Matched) -> Plane<f32> {
+    let map = &matched.solution.disparity;
+    map.map(|&d| (d + FRACTION / 2).div_euclid(FRACTION) as f32)
+}
+
+#[test]
+fn rendered_scenes() {
+    // Average error in pixels, bad2.0 and bad0.5 in percent.
+    let floors = [
+        ("slanted", 0.5, 5.0, 15.0),
+        ("thin", 1.0, 10.0, 20.0),
+        ("wall", 0.5, 5.0, 20.0),
+        ("repetitive", 0.5, 5.0, 15.0),
+        ("exposure", 0.6, 6.0, 20.0),
+        ("mixed", 0.6, 6.0, 18.0),
+    ];
+    for (scene, avg, bad2, bad05) in floors {
+        let folder = Path::new("testdata").join(scene);
+        let matched = matched(&folder, &Method::default());
+        let all = report(&folder, &matched.solution.final_map()).all;
+        println!("{scene}: avg {:.3}, bad2.0 {:.2}, bad0.5 {:.2}", all.avg.unwrap(), all.bad[2], all.bad[0]);
+        assert!((all.density - 100.0).abs() < 1e-9);
+        assert!(all.avg.unwrap() <= avg && all.bad[2] <= bad2 && all.bad[0] <= bad05, "{scene}: {all:?}");
+        let whole = report(&folder, &rounded(&matched)).all;
+        assert!(all.bad[0] < whole.bad[0], "{scene}: {} against {}", all.bad[0], whole.bad[0]);
+    }
+}
+
+#[test]
+fn real_pairs() {
+    let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") else {
+        let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
+        return;
+    };
+    // Final: average error in pixels, bad2.0 in percent. Raw: the paper's table 1, average error, PSNR in dB, bad2.0.
+    let floors = [
+        ("Teddy", (0.75, 7.0), (2.09, 32.43, 13.90)),
+        ("Cones", (0.90, 7.8), (2.29, 35.14, 16.52)),
+        ("Dolls", (0.92, 8.5), (2.63, 35.11, 18.50)),
+        ("Rocks1", (0.60, 4.1), (3.21, 33.31, 11.96)),
+        ("Motorcycle", (1.60, 9.0), (3.40, 29.90, 19.53)),
+    ];
+    for (pair, (avg, bad2), (raw_avg, raw_psnr, raw_bad2)) in floors {
+        let folder = Path::new(&folder).join(pair);
+        let matched = matched(&folder, &Method::default());
+        let all = report(&folder, &matched.solution.final_map()).all;
+        println!("{pair}: avg {:.3}, bad2.0 {:.2}, bad0.5 {:.2}", all.avg.unwrap(), all.bad[2], all.bad[0]);
+        assert!((all.density - 100.0).abs() < 1e-9);
+        assert!(all.avg.unwrap() <= avg && all.bad[2] <= bad2, "{pair}: {all:?}");
+        assert!(all.bad[0] < report(&folder, &rounded(&matched)).all.bad[0], "{pair}");
+        let raw = report(&folder, &matched.solution.raw_map()).all;
+        assert!(
+            raw.avg.unwrap() < raw_avg && raw.psnr.unwrap() > raw_psnr && raw.bad[2] < raw_bad2,
+            "{pair}: {raw:?}"
+        );
+    }
+}
