@@ -209,7 +209,7 @@ fn control_changes_are_found() {
     let (disparity, flags) = loop {
         let maps =
             (random::disparity(&mut random, width, height), random::flags(&mut random, width, height, true));
-        let valid = maps.1.data().iter().filter(|&&f| f == 0).count();
+        let valid = maps.1.data().iter().filter(|&f| f & flag::INVALID == 0).count();
         if valid > 300 && valid < 600 {
             break maps;
         }
