@@ -10,7 +10,9 @@ const RANGE_ENTRIES: usize = 1024;
 const WEIGHT_BITS: u32 = 10;
 
 /// Integer weights of the bilateral window: the product of a spatial weight and a range weight, each round(1024
-/// exp(-e)), shifted right by 10.
+/// exp(-e)), shifted right by 10. For the range weight, the squared colour difference in sixteenths of an 8-bit level
+/// is rounded down to whole steps of 2^k, the smallest (up to 2^26) of which 1024 exceed 16 variances; a difference of
+/// 1024 steps or more weighs nothing.
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     radius: usize,
