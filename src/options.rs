@@ -230,7 +230,7 @@ impl Default for Method {
             resolution: Resolution::Interpolating,
             resolution_cut: 4.0,
             schedule: Schedule::CoarseFirst,
-            iterations: 5,
+            iterations: 3,
             final_iterations: 3,
             tolerance: 0.0,
             visibility: true,

@@ -96,7 +96,7 @@ fn a_device_that_shows_little_at_once() {
         let method = Method::preset(preset).unwrap();
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         // From a few bands to bands of a row or two.
-        for max_binding in [4 << 20, 1 << 20, 400_000] {
+        for max_binding in [4 << 20, 1 << 20, 700_000] {
             let Some(mut gpu) = devices::open(Ceiling { max_binding: Some(max_binding) }) else { return };
             let actual = matched(&mut gpu, &pair, range, &method);
             assert!(

@@ -10,9 +10,7 @@ use common::random::{self, Random};
 use common::twin;
 use mrfgs::backend::{Estimate, NO_LABEL, Peak};
 use mrfgs::image::{Image, Pair, Plane};
-use mrfgs::options::{
-    Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule, SubPixel,
-};
+use mrfgs::options::{Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule};
 use mrfgs::plan::Plan;
 use mrfgs::refine::{self, MedianWeights, flag};
 use mrfgs::solver::{self, Solution};
@@ -20,7 +18,6 @@ use mrfgs::{graph, match_pair};
 use std::ops::ControlFlow;
 
 const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (24, 31)];
-const SUB_PIXEL: &[SubPixel] = &[SubPixel::None, SubPixel::Parabola, SubPixel::Equiangular];
 
 /// Runs `check` on every size with many seeds.
 fn on_all(rounds: u64, check: impl Fn(&mut Random, usize, usize) -> Result<(), String>) {
@@ -30,43 +27,6 @@ fn on_all(rounds: u64, check: impl Fn(&mut Random, usize, usize) -> Result<(), S
                 panic!("{width} x {height}, seed {seed}: {e}");
             }
         }
-    }
-}
-
-#[test]
-fn sub_pixel() {
-    on_all(20, |random, width, height| {
-        let estimate = random::estimate(random, width, height, 257);
-        for &method in SUB_PIXEL {
-            for min in [-20, 0, 5] {
-                compare_maps(
-                    "disparity",
-                    &refine::sub_pixel(&estimate.peaks, min, method),
-                    &twin::sub_pixel::sub_pixel(&estimate.peaks, min, method),
-                )?;
-            }
-        }
-        Ok(())
-    });
-}
-
-/// Every small neighbourhood, and the largest numbers there are.
-#[test]
-fn sub_pixel_of_every_shape() {
-    let mut peaks = Vec::new();
-    for best in [0, 50_000] {
-        for below in (0..40).chain([15_000, 15_534]) {
-            for above in (0..40).chain([15_000, 15_534]) {
-                let (lower, upper) = (best + below, best + above);
-                peaks.push(Peak { label: 7, best, lower, upper, rival: 60_000 });
-            }
-        }
-    }
-    let peaks = Plane::new(peaks.len(), 1, peaks);
-    for &method in SUB_PIXEL {
-        let actual = refine::sub_pixel(&peaks, -3, method);
-        compare_maps("disparity", &actual, &twin::sub_pixel::sub_pixel(&peaks, -3, method)).unwrap();
-        assert!(actual.data().iter().all(|d| (d - 4 * 256).abs() <= 128), "more than half a pixel");
     }
 }
 
@@ -221,16 +181,6 @@ fn control_changes_are_found() {
         }
     };
 
-    let actual = refine::sub_pixel(&estimate.peaks, 0, SubPixel::Parabola);
-    let other = twin::sub_pixel::sub_pixel(&estimate.peaks, 0, SubPixel::Equiangular);
-    assert!(compare_maps("sub-pixel", &actual, &other).is_err());
-    let other = twin::sub_pixel::sub_pixel(&estimate.peaks, 1, SubPixel::Parabola);
-    assert!(compare_maps("sub-pixel", &actual, &other).is_err());
-    let mut other = actual.clone();
-    other[(5, 7)] += 1;
-    let error = compare_maps("sub-pixel", &other, &actual).unwrap_err();
-    assert!(error.contains("1 of 744 pixels differ, first at x 5, y 7"), "{error}");
-
     let actual = refine::visibility(&estimate, 0);
     assert!(compare_maps("visibility", &actual, &twin::visibility::visibility(&estimate, 1)).is_err());
 
@@ -263,8 +213,13 @@ fn control_changes_are_found() {
 fn twin_refinement(estimate: &Estimate, plan: &Plan, pair: &Pair) -> Solution {
     let (method, min) = (&plan.method, plan.range.min);
     let (width, height) = pair.size();
-    let raw = twin::sub_pixel::sub_pixel(&estimate.peaks, min, method.sub_pixel);
-    let whole = twin::sub_pixel::sub_pixel(&estimate.peaks, min, SubPixel::None);
+    let whole = estimate.peaks.map(|peak| 256 * (min + i32::from(peak.label)));
+    let mut raw = whole.clone();
+    if method.sub_pixel {
+        for (raw, &offset) in raw.data_mut().iter_mut().zip(estimate.offsets.data()) {
+            *raw += i32::from(offset);
+        }
+    }
     let seen = twin::visibility::visibility(estimate, min);
     let mut validity = Plane::from_fn(width, height, |x, y| {
         if pair.left().masked[(x, y)] {
@@ -363,13 +318,13 @@ fn identical_views_have_no_disparity() {
         let mut random = Random::new(9);
         let view = texture(&mut random, 47, 26);
         let pair = Pair::new(view.clone(), view).unwrap();
-        for method_of_sub_pixel in SUB_PIXEL {
+        for sub_pixel in [false, true] {
             let mut method = Method::preset(preset).unwrap();
-            method.sub_pixel = *method_of_sub_pixel;
+            method.sub_pixel = sub_pixel;
             for (min, labels) in [(-3, 16), (0, 17), (-12, 13)] {
                 let plan = random::plan((47, 26), min, labels, &method);
                 for (name, solution) in solve(&pair, &plan) {
-                    let most = if method.sub_pixel == SubPixel::None { 0 } else { 128 };
+                    let most = if sub_pixel { 128 } else { 0 };
                     for map in [&solution.raw, &solution.disparity] {
                         let off = map.data().iter().filter(|d| d.abs() > most).count();
                         assert_eq!(off, 0, "{name}, {preset}, {min}: pixels that are not at 0");
@@ -549,7 +504,7 @@ fn masks_and_single_pixels_pass_through() {
 fn no_label_agrees_with_none() {
     let peaks = Plane::filled(5, 1, Peak::default());
     let right = Plane::filled(5, 1, NO_LABEL);
-    let flags = refine::visibility(&Estimate { peaks, right }, 0);
+    let flags = refine::visibility(&Estimate { peaks, offsets: Plane::filled(1, 1, 0), right }, 0);
     assert!(flags.data().iter().all(|&f| f == flag::OCCLUDED));
 }
 

@@ -112,8 +112,8 @@ pub trait Backend {
     ///
     /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
     /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, cut by
-    /// [`Plan::dependency`] with its bounds for the smallest s. A factor of one member sends 0. Slots without a
-    /// member keep 0.
+    /// [`Plan::dependency`] with its bounds for the smallest s. A factor of one member, and a slot without
+    /// one, keep the message they have: 0, from the start.
     fn dependency(&mut self, level: usize) -> Result<()>;
 
     /// Messages of the resolution factors between `level` (1 or coarser) and the next finer one, in both directions,

@@ -8,10 +8,10 @@ use mrfgs::graph::LevelGraph;
 use mrfgs::image::Pair;
 use mrfgs::plan::Plan;
 use std::io::Write;
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
-/// One device for all tests of a binary: opening it and compiling its shaders takes longer than most of them.
-static GPU: LazyLock<Option<Mutex<Gpu>>> = LazyLock::new(|| open(Ceiling::default()).map(Mutex::new));
+/// Devices that no test is using: opening one and compiling its shaders takes longer than most tests.
+static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
 /// A GPU of its own, kept below `ceiling`. `None`, said on stderr, where there is no driver; a panic where
 /// `MRFGS_REQUIRE_GPU` is set and not 0.
@@ -28,9 +28,10 @@ pub fn open(ceiling: Ceiling) -> Option<Gpu> {
     }
 }
 
-/// The device of this binary, for as long as the guard lives.
-pub fn gpu() -> Option<Shared> {
-    GPU.as_ref().map(|gpu| Shared(gpu.lock().unwrap_or_else(PoisonError::into_inner)))
+/// A device, an idle one if there is one.
+pub fn gpu() -> Option<Pooled> {
+    let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
+    idle.or_else(|| open(Ceiling::default())).map(|gpu| Pooled(Some(gpu)))
 }
 
 /// Name and a fresh instance of every backend.
@@ -44,55 +45,70 @@ pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
     all
 }
 
-/// The shared device, locked.
-pub struct Shared(MutexGuard<'static, Gpu>);
+/// A device that goes back to the idle ones when it is dropped.
+pub struct Pooled(Option<Gpu>);
 
-impl Backend for Shared {
+impl Pooled {
+    fn gpu(&mut self) -> &mut Gpu {
+        self.0.as_mut().expect("there until it is dropped")
+    }
+}
+
+impl Drop for Pooled {
+    fn drop(&mut self) {
+        // A test that panicked may have left it in any state.
+        if let Some(gpu) = self.0.take().filter(|_| !std::thread::panicking()) {
+            IDLE.lock().unwrap_or_else(PoisonError::into_inner).push(gpu);
+        }
+    }
+}
+
+impl Backend for Pooled {
     fn describe(&self) -> String {
-        self.0.describe()
+        self.0.as_ref().expect("there until it is dropped").describe()
     }
 
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
-        self.0.prepare(plan, pair, graphs)
+        self.gpu().prepare(plan, pair, graphs)
     }
 
     fn cost(&mut self) -> Result<()> {
-        self.0.cost()
+        self.gpu().cost()
     }
 
     fn pyramid(&mut self, level: usize) -> Result<()> {
-        self.0.pyramid(level)
+        self.gpu().pyramid(level)
     }
 
     fn evidence(&mut self, level: usize) -> Result<()> {
-        self.0.evidence(level)
+        self.gpu().evidence(level)
     }
 
     fn dependency(&mut self, level: usize) -> Result<()> {
-        self.0.dependency(level)
+        self.gpu().dependency(level)
     }
 
     fn resolution(&mut self, level: usize) -> Result<()> {
-        self.0.resolution(level)
+        self.gpu().resolution(level)
     }
 
     fn belief(&mut self, level: usize) -> Result<()> {
-        self.0.belief(level)
+        self.gpu().belief(level)
     }
 
     fn change(&mut self) -> Result<u64> {
-        self.0.change()
+        self.gpu().change()
     }
 
     fn estimate(&mut self) -> Result<Estimate> {
-        self.0.estimate()
+        self.gpu().estimate()
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
-        self.0.read(volume)
+        self.gpu().read(volume)
     }
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
-        self.0.write(volume, values)
+        self.gpu().write(volume, values)
     }
 }

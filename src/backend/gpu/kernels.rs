@@ -110,7 +110,10 @@ impl Kernel {
             }
             Self::Pyramid => 7 * 31,
             Self::Evidence | Self::Estimate => 2 * quads,
-            Self::Dependency => slots * (quads + 5) + 2 * quads * (2 * slots + 1),
+            Self::Dependency => {
+                let floors = if plan.dependency.rule == CutRule::Absolute { slots * (quads + 1) } else { 0 };
+                floors + 3 * slots + 2 * quads * (2 * slots + 1)
+            }
             Self::Resolution => fine_labels + 3 * l.stride + fine_labels / 2,
             // A pixel is a member of at most the 49 factors of its window.
             Self::Belief => 2 * 4 + 49 * 5,

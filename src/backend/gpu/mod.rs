@@ -269,11 +269,11 @@ impl Gpu {
             }
             if rows == 1 {
                 return Err(Error::Memory(format!(
-                    "a row of the image takes {} MiB and {} lets a shader see {} MiB at once: use --backend cpu, or a \
-                     smaller image or range",
-                    most >> 20,
+                    "what a row of the image depends on takes {} KiB and {} lets a shader see {} KiB at once: use \
+                     --backend cpu, or a smaller image or range",
+                    most >> 10,
                     self.device.name,
-                    self.device.max_binding >> 20
+                    self.device.max_binding >> 10
                 )));
             }
             rows -= rows.div_ceil(8).min(rows - 1);
