@@ -1,4 +1,46 @@
-//! Stereo disparity by a multi-resolution factor graph.
+//! Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
+//!
+//! From a rectified pair to a dense, sub-pixel disparity map with a confidence and a validity reason for every pixel,
+//! by belief propagation on the factor graph of Shabanian and Balasubramanian, *Multi-Resolution Factor Graph Based
+//! Stereo Correspondence Algorithm* (MR-FGS): variables V, evidence E and dependency factors S at every level of a
+//! pyramid, resolution factors R between levels.
+//!
+//! ```
+//! use mrfgs::image::read;
+//! use mrfgs::options::{DisparityRange, Execution, Method};
+//! use std::{ops::ControlFlow, path::Path};
+//!
+//! # fn main() -> mrfgs::Result<()> {
+//! let (left, right) = ("testdata/slanted/im0.png", "testdata/slanted/im1.png");
+//! let pair = read::pair(Path::new(left), Path::new(right), None)?;
+//! let range = DisparityRange::new(0, 31)?;
+//! let execution = Execution::default();
+//! let matched =
+//!     mrfgs::match_pair(&pair, range, &Method::default(), &execution, &mut |_| ControlFlow::Continue(()))?;
+//! let map = matched.solution.final_map(); // pixels, +inf where there is none
+//! assert_eq!(map.size(), pair.size());
+//! assert!(map.data().iter().all(|d| (0.0..=31.0).contains(d)));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # The way through
+//!
+//! ```text
+//! image ──> plan ──> graph ──> solver ──> Solution, evaluation
+//!                                │
+//!                             backend (the one seam): cpu, gpu
+//! ```
+//!
+//! - [`options::Method`] holds every parameter that determines the bits, [`options::Execution`] what does not.
+//! - [`plan::Plan`] works out levels, integer parameters, bounds and memory, before anything runs.
+//! - [`graph`] picks the members of each dependency factor.
+//! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
+//! - [`refine`] is what follows the estimate.
+//! - [`evaluation`] compares maps with ground truth.
+//!
+//! Beliefs, messages and evidence are costs in integers (see [`plan`]), so the CPU path and every GPU give the same
+//! maps bit for bit, whatever the number of threads.
 
 pub mod backend;
 pub mod error;
@@ -6,6 +48,7 @@ pub mod evaluation;
 pub mod graph;
 pub mod image;
 mod matcher;
+mod memory;
 pub mod options;
 pub mod plan;
 pub mod refine;

@@ -5,6 +5,7 @@ use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, Gpu};
 use crate::error::{Error, Result};
 use crate::image::Pair;
+use crate::memory;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::{self, Observer, Solution};
@@ -27,7 +28,7 @@ pub struct Matched {
 ///
 /// # Errors
 /// [`Error::Option`] for options out of range, [`Error::Device`] where the wanted device is missing or fails,
-/// [`Error::Interrupted`] when `observer` breaks.
+/// [`Error::Memory`] when the machine or the device cannot hold it, [`Error::Interrupted`] when `observer` breaks.
 pub fn match_pair(
     pair: &Pair,
     range: DisparityRange,
@@ -75,6 +76,7 @@ fn run(
     observer: Observer,
     note: Option<String>,
 ) -> Result<Matched> {
+    memory::check(&plan)?;
     let solution = solver::solve(backend, &plan, pair, observer)?;
     Ok(Matched { solution, plan, ran_on: backend.describe(), note })
 }
