@@ -145,7 +145,7 @@ fn match_writes_every_output_in_every_format() {
     let told = run(folder.path(), &first).succeeded();
     assert_eq!(told.stdout, "");
     assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
-    for words in ["mrfgs: 240 x 180, 32 labels, 28 iterations in ", " s on the CPU path, 2 threads\n"] {
+    for words in ["mrfgs: 240 x 180, 32 labels, ", " s on the CPU path, 2 threads\n"] {
         assert!(told.stderr.contains(words), "{}", told.stderr);
     }
 
@@ -421,25 +421,24 @@ fn every_failure_is_one_line_and_leaves_nothing() {
     }
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn a_folder_without_permission_is_named() {
     use std::os::unix::fs::PermissionsExt;
     let folder = workshop();
-    let locked = folder.path().join("locked");
+    let mut locked = folder.path().join("locked");
     fs::create_dir(&locked).unwrap();
     fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
     if fs::write(locked.join("probe"), "").is_ok() {
-        // Not by `eprintln`, which the test harness keeps to itself.
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED a_folder_without_permission_is_named: this user may write to a folder without write permission (root)"
-        );
-        return;
+        // This is root, who may write anywhere but where the kernel says no.
+        locked = "/sys".into();
     }
-    for output in [["locked/out.pfm", "raw.pfm"], ["out.pfm", "locked/raw.pfm"]] {
-        let args = ["match", "left.png", "right.png", output[0], "--raw", output[1], "--max-disparity", "9"];
-        run(folder.path(), &args).failed(1, &["locked", "no file can be created", "permission"], "locked");
+    let output = locked.join("out.pfm");
+    let output = output.to_str().unwrap();
+    for outputs in [[output, "raw.pfm"], ["out.pfm", output]] {
+        let args =
+            ["match", "left.png", "right.png", outputs[0], "--raw", outputs[1], "--max-disparity", "9"];
+        run(folder.path(), &args).failed(1, &[output, "no file can be created"], "locked");
         assert!(!folder.path().join("out.pfm").exists());
     }
 }

@@ -6,20 +6,21 @@
 
 mod device;
 mod kernels;
+mod stages;
+mod upload;
 
 use super::{Backend, Estimate, PaddedRows, Peak, Volume, volume_shape};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
-use crate::image::{Image, Pair, Plane};
-use crate::options::Cost;
+use crate::image::{Pair, Plane};
 use crate::plan::Plan;
-use crate::tables;
 use device::Device;
 pub use device::{Ceiling, DeviceInfo, devices, has_automatic};
 pub use kernels::{Kernel, LevelParams, Params, Variant};
+use stages::{Binding, Stages};
 use std::collections::HashMap;
 use std::num::NonZero;
-use std::ops::Range;
+use upload::{member_words, transposed};
 
 /// Largest number of iterations of all loops of one invocation together.
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
@@ -69,53 +70,11 @@ struct LevelBuffers {
     incoming_rows: Vec<u32>,
 }
 
-/// The dispatches of every stage, by level where there is one a level.
-#[derive(Default)]
-struct Stages {
-    cost: Vec<Dispatch>,
-    pyramid: Vec<Vec<Dispatch>>,
-    evidence: Vec<Vec<Dispatch>>,
-    dependency: Vec<Vec<Dispatch>>,
-    resolution: Vec<Vec<Dispatch>>,
-    belief: Vec<Vec<Dispatch>>,
-    estimate: Vec<Dispatch>,
-    change: Vec<Dispatch>,
-}
-
 #[derive(Clone)]
 struct Dispatch {
     pipeline: wgpu::ComputePipeline,
     bind_group: wgpu::BindGroup,
     groups: (u32, u32),
-}
-
-/// A range of a buffer to bind, at a byte offset that is a multiple of 256.
-struct Binding {
-    buffer: wgpu::Buffer,
-    bytes: Range<u64>,
-}
-
-impl Binding {
-    /// Rows of `words` 32-bit words each.
-    fn rows(buffer: &wgpu::Buffer, words: u32, rows: &Range<u32>) -> Self {
-        let bytes = 4 * u64::from(words);
-        Self { buffer: buffer.clone(), bytes: bytes * u64::from(rows.start)..bytes * u64::from(rows.end) }
-    }
-
-    fn whole(buffer: &wgpu::Buffer) -> Self {
-        Self { buffer: buffer.clone(), bytes: 0..buffer.size() }
-    }
-
-    /// Bytes that are bound; an empty buffer is bound whole, for shaders that name but never read it.
-    fn size(&self) -> u64 {
-        let end = self.bytes.end.min(self.buffer.size());
-        end.saturating_sub(self.bytes.start)
-    }
-}
-
-/// `rows` with up to `halo` rows above and below.
-fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32> {
-    rows.start.saturating_sub(halo)..(rows.end + halo).min(height)
 }
 
 impl Gpu {
@@ -234,52 +193,6 @@ impl Gpu {
         }
     }
 
-    /// The dispatches of `kernel` at `level`, one a band: `row_threads` invocations a row (`None`: an invocation a row),
-    /// `bind` the buffers for rows of the level.
-    fn stage(
-        &mut self,
-        kernel: Kernel,
-        plan: &Plan,
-        level: usize,
-        params: &Params,
-        row_threads: Option<u32>,
-        bind: impl Fn(&Range<u32>) -> Vec<Binding>,
-    ) -> Result<Vec<Dispatch>> {
-        let pipeline = self.pipeline(kernel, plan, level)?;
-        let bands = self.bands(params.level.height, &bind)?;
-        let dispatches = bands.into_iter().map(|rows| {
-            let params = Params { first_row: rows.start, rows: rows.len() as u32, ..*params };
-            let threads = row_threads.map_or((params.rows, 1), |threads| (threads, params.rows));
-            self.dispatch(&pipeline, &params, &bind(&rows), threads)
-        });
-        Ok(dispatches.collect())
-    }
-
-    /// Bands of rows, as few as possible, for which no binding exceeds what the device lets a shader see.
-    fn bands(&self, height: u32, bind: impl Fn(&Range<u32>) -> Vec<Binding>) -> Result<Vec<Range<u32>>> {
-        let largest = |rows: &Range<u32>| bind(rows).iter().map(Binding::size).max().unwrap_or(0);
-        // No more rows than a device has workgroups in a dimension.
-        let mut rows = height.min(65_535);
-        loop {
-            let bands: Vec<_> =
-                (0..height.div_ceil(rows)).map(|i| i * rows..((i + 1) * rows).min(height)).collect();
-            let most = bands.iter().map(largest).max().unwrap_or(0);
-            if most <= self.device.max_binding {
-                return Ok(bands);
-            }
-            if rows == 1 {
-                return Err(Error::Memory(format!(
-                    "what a row of the image depends on takes {} KiB and {} lets a shader see {} KiB at once: use \
-                     --backend cpu, or a smaller image or range",
-                    most >> 10,
-                    self.device.name,
-                    self.device.max_binding >> 10
-                )));
-            }
-            rows -= rows.div_ceil(8).min(rows - 1);
-        }
-    }
-
     /// Records the dispatches of a stage, in order.
     fn record(&mut self, dispatches: &[Dispatch]) -> Result<()> {
         let device = &self.device.inner;
@@ -351,210 +264,6 @@ impl Gpu {
             incoming_rows,
             params,
         })
-    }
-
-    fn stages(&mut self, plan: &Plan, pair: &Pair, state: &Buffers) -> Result<Stages> {
-        let mut stages = Stages::default();
-        for (z, b) in state.levels.iter().enumerate() {
-            let l = b.params;
-            let scale = plan.levels[z].evidence;
-            let base = Params {
-                level: l,
-                fine: state.levels[z.saturating_sub(1)].params,
-                outside_cost: plan.outside_cost.into(),
-                sad_radius: (plan.method.sad_window / 2) as i32,
-                label_offset: if z == 0 { 0 } else { plan.label_offset(z) },
-                evidence_multiplier: scale.multiplier,
-                evidence_limit: scale.limit,
-                evidence_cap: scale.cap,
-                ..Params::default()
-            };
-            let words = plan.message_bytes() as u32;
-            let cost_words = if z == 0 { l.pitch } else { 2 * l.pitch };
-            if z == 0 {
-                stages.cost = self.cost_stages(plan, pair, &base, &b.cost)?;
-                stages.pyramid.push(Vec::new());
-                stages.resolution.push(Vec::new());
-            } else {
-                let finer = &state.levels[z - 1];
-                let f = finer.params;
-                let fine_cost_words = if z == 1 { f.pitch } else { 2 * f.pitch };
-                let threads = Some(2 * l.width * l.quads);
-                stages.pyramid.push(self.stage(Kernel::Pyramid, plan, z, &base, threads, |rows| {
-                    let fine_rows = with_halo(&(2 * rows.start..(2 * rows.end).min(f.height)), 2, f.height);
-                    vec![
-                        Binding::rows(&finer.cost, fine_cost_words, &fine_rows),
-                        Binding::rows(&b.cost, cost_words, rows),
-                    ]
-                })?);
-                let params = Params { tau: plan.resolution.tau.into(), ..base };
-                stages.resolution.push(self.stage(
-                    Kernel::Resolution,
-                    plan,
-                    z,
-                    &params,
-                    Some(l.width),
-                    |rows| {
-                        let fine_rows = 2 * rows.start..(2 * rows.end).min(f.height);
-                        vec![
-                            Binding::rows(&finer.belief, 2 * f.pitch, &fine_rows),
-                            Binding::rows(&b.belief, 2 * l.pitch, rows),
-                            Binding::rows(&finer.down, words * f.pitch, &fine_rows),
-                            Binding::rows(&b.up, words * l.pitch, rows),
-                        ]
-                    },
-                )?);
-            }
-            stages.evidence.push(self.stage(Kernel::Evidence, plan, z, &base, Some(l.width), |rows| {
-                vec![
-                    Binding::rows(&b.cost, cost_words, rows),
-                    Binding::rows(&b.evidence, l.pitch, rows),
-                    Binding::rows(&b.belief, 2 * l.pitch, rows),
-                ]
-            })?);
-            let params = Params { tau: plan.dependency.tau.into(), ..base };
-            stages.dependency.push(self.stage(
-                Kernel::Dependency,
-                plan,
-                z,
-                &params,
-                Some(l.width),
-                |rows| {
-                    vec![
-                        Binding::rows(&b.members, l.member_pitch, rows),
-                        Binding::rows(&b.belief, 2 * l.pitch, &with_halo(rows, 3, l.height)),
-                        Binding::rows(&b.dependency, l.dependency_pitch, rows),
-                    ]
-                },
-            )?);
-            let incoming = |rows: &Range<u32>| {
-                let bytes = |row: u32| 4 * u64::from(b.incoming_rows[row as usize]);
-                Binding { buffer: b.incoming.clone(), bytes: bytes(rows.start)..bytes(rows.end) }
-            };
-            let threads = Some(l.width * (l.quads / 4));
-            stages.belief.push(self.stage(Kernel::Belief, plan, z, &base, threads, |rows| {
-                vec![
-                    Binding::rows(&b.evidence, l.pitch, rows),
-                    Binding::rows(&b.dependency, l.dependency_pitch, &with_halo(rows, 3, l.height)),
-                    Binding::rows(&b.starts, l.starts_pitch, rows),
-                    incoming(rows),
-                    if z + 1 == state.levels.len() {
-                        Binding::whole(&b.down)
-                    } else {
-                        Binding::rows(&b.down, words * l.pitch, rows)
-                    },
-                    if z == 0 { Binding::whole(&b.up) } else { Binding::rows(&b.up, words * l.pitch, rows) },
-                    Binding::rows(&b.belief, 2 * l.pitch, rows),
-                ]
-            })?);
-            if z == 0 {
-                stages.estimate = self.estimate_stages(plan, &base, b, state)?;
-                stages.change = self.change_stages(plan, &base, &b.belief, state)?;
-            }
-        }
-        Ok(stages)
-    }
-
-    fn cost_stages(
-        &mut self,
-        plan: &Plan,
-        pair: &Pair,
-        base: &Params,
-        cost: &wgpu::Buffer,
-    ) -> Result<Vec<Dispatch>> {
-        let l = base.level;
-        let images = [
-            self.uploaded("left", &image_words(pair.left(), l.pixel_pitch))?,
-            self.uploaded("right", &image_words(pair.right(), l.pixel_pitch))?,
-        ];
-        let image_rows =
-            |image: &wgpu::Buffer, rows: &Range<u32>| Binding::rows(image, 4 * l.pixel_pitch, rows);
-        if plan.method.cost == Cost::Sad {
-            let threads = Some(l.width.div_ceil(8) * l.quads);
-            return self.stage(Kernel::Sad, plan, 0, base, threads, |rows| {
-                let seen = with_halo(rows, plan.method.sad_window / 2, l.height);
-                vec![
-                    image_rows(&images[0], &seen),
-                    image_rows(&images[1], &seen),
-                    Binding::rows(cost, l.pitch, rows),
-                ]
-            });
-        }
-        let words = 2 * u64::from(l.pixel_pitch) * u64::from(l.height);
-        let census = [self.buffer("left census", words)?, self.buffer("right census", words)?];
-        let census_rows =
-            |census: &wgpu::Buffer, rows: &Range<u32>| Binding::rows(census, 2 * l.pixel_pitch, rows);
-        let mut dispatches = Vec::new();
-        for (image, census) in images.iter().zip(&census) {
-            dispatches.extend(self.stage(Kernel::Census, plan, 0, base, Some(l.width), |rows| {
-                vec![image_rows(image, &with_halo(rows, 3, l.height)), census_rows(census, rows)]
-            })?);
-        }
-        let entries: Vec<u32> =
-            tables::ad_cost().into_iter().chain(tables::census_cost()).map(u32::from).collect();
-        let table = self.uploaded("tables", &entries)?;
-        dispatches.extend(self.stage(Kernel::AdCensus, plan, 0, base, Some(l.width * l.quads), |rows| {
-            vec![
-                image_rows(&images[0], rows),
-                image_rows(&images[1], rows),
-                census_rows(&census[0], rows),
-                census_rows(&census[1], rows),
-                Binding::whole(&table),
-                Binding::rows(cost, l.pitch, rows),
-            ]
-        })?);
-        Ok(dispatches)
-    }
-
-    fn estimate_stages(
-        &mut self,
-        plan: &Plan,
-        base: &Params,
-        level: &LevelBuffers,
-        state: &Buffers,
-    ) -> Result<Vec<Dispatch>> {
-        let l = base.level;
-        let belief_rows = |rows: &Range<u32>| Binding::rows(&level.belief, 2 * l.pitch, rows);
-        let peak_rows = |rows: &Range<u32>| Binding::rows(&state.peaks, 2 * l.pixel_pitch, rows);
-        let threads = Some(l.width);
-        let mut dispatches = self.stage(Kernel::Estimate, plan, 0, base, threads, |rows| {
-            vec![belief_rows(rows), peak_rows(rows)]
-        })?;
-        dispatches.extend(self.stage(Kernel::SubPixel, plan, 0, base, threads, |rows| {
-            let seen = with_halo(rows, 1, l.height);
-            vec![
-                Binding::rows(&level.cost, l.pitch, &seen),
-                peak_rows(&seen),
-                Binding::rows(&state.offsets, l.pixel_pitch, rows),
-            ]
-        })?);
-        dispatches.extend(self.stage(Kernel::RightView, plan, 0, base, threads, |rows| {
-            vec![belief_rows(rows), Binding::rows(&state.right_labels, l.pixel_pitch, rows)]
-        })?);
-        Ok(dispatches)
-    }
-
-    fn change_stages(
-        &mut self,
-        plan: &Plan,
-        base: &Params,
-        belief: &wgpu::Buffer,
-        state: &Buffers,
-    ) -> Result<Vec<Dispatch>> {
-        let l = base.level;
-        let words = u64::from(l.pixel_pitch) * u64::from(l.height);
-        let (labels, squares) = (self.buffer("labels", words)?, self.buffer("squares", words)?);
-        let mut dispatches = self.stage(Kernel::Change, plan, 0, base, Some(l.width), |rows| {
-            vec![
-                Binding::rows(belief, 2 * l.pitch, rows),
-                Binding::rows(&labels, l.pixel_pitch, rows),
-                Binding::rows(&squares, l.pixel_pitch, rows),
-            ]
-        })?;
-        dispatches.extend(self.stage(Kernel::ChangeSum, plan, 0, base, None, |rows| {
-            vec![Binding::rows(&squares, l.pixel_pitch, rows), Binding::whole(&state.change_sums)]
-        })?);
-        Ok(dispatches)
     }
 
     fn state(&self) -> &State {
@@ -703,61 +412,4 @@ impl Backend for Gpu {
         self.device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&words));
         self.device.check()
     }
-}
-
-/// Pixels as the shaders read them: red | green << 16, blue | grey << 16, 1 if masked, 0.
-fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
-    let pitch = 4 * pitch as usize;
-    let mut words = vec![0; pitch * image.height()];
-    for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
-        let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
-        for (out, (pixel, &masked)) in row.chunks_exact_mut(4).zip(pixels) {
-            let [r, g, b, grey] = pixel.map(u32::from);
-            out.copy_from_slice(&[r | g << 16, b | grey << 16, masked.into(), 0]);
-        }
-    }
-    words
-}
-
-/// Codes of the factors' neighbours, four a word.
-fn member_words(graph: &LevelGraph, params: &LevelParams) -> Vec<u32> {
-    let neighbours = graph.slots() - 1;
-    let (per_pixel, pitch) = (neighbours.div_ceil(4), params.member_pitch as usize);
-    let mut words = vec![u32::MAX; pitch * graph.height()];
-    if neighbours > 0 {
-        for (factor, codes) in graph.codes().chunks_exact(neighbours).enumerate() {
-            let (x, y) = (factor % graph.width(), factor / graph.width());
-            for (slot, &code) in codes.iter().enumerate() {
-                let word = &mut words[y * pitch + x * per_pixel + slot / 4];
-                let shift = 8 * (slot % 4);
-                *word = *word & !(0xff << shift) | u32::from(code) << shift;
-            }
-        }
-    }
-    words
-}
-
-/// The transposed table as the shader reads it: where each pixel's entries start, the entries, and where each row's
-/// entries start, aligned so that any rows can be bound.
-fn transposed(graph: &LevelGraph, params: &LevelParams) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
-    let (width, slots, pitch) = (graph.width(), graph.slots(), params.starts_pitch as usize);
-    let mut starts = vec![0; pitch * graph.height()];
-    let mut entries = Vec::with_capacity(graph.incoming().len() + kernels::ALIGN_WORDS * graph.height());
-    let mut rows = vec![0];
-    for (y, starts) in starts.chunks_exact_mut(pitch).enumerate() {
-        for (x, start) in starts[..width].iter_mut().enumerate() {
-            *start = entries.len() as u32;
-            for &entry in graph.incoming_of(y * width + x) {
-                let (factor, slot) = (entry as usize / slots, entry as usize % slots);
-                // From the pixel to the factor: against the way from the factor to its member.
-                let dx = (factor % width) as i32 - x as i32;
-                let dy = (factor / width) as i32 - y as i32;
-                entries.push((dx + 3) as u32 | ((dy + 3) as u32) << 3 | (slot as u32) << 6);
-            }
-        }
-        starts[width] = entries.len() as u32;
-        entries.resize(entries.len().next_multiple_of(kernels::ALIGN_WORDS), 0);
-        rows.push(entries.len() as u32);
-    }
-    (starts, entries, rows)
 }

@@ -1,0 +1,62 @@
+//! Images and graphs as the shaders read them.
+
+use super::kernels::{ALIGN_WORDS, LevelParams};
+use crate::graph::LevelGraph;
+use crate::image::Image;
+
+/// Pixels as the shaders read them: red | green << 16, blue | grey << 16, 1 if masked, 0.
+pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
+    let pitch = 4 * pitch as usize;
+    let mut words = vec![0; pitch * image.height()];
+    for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
+        let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
+        for (out, (pixel, &masked)) in row.chunks_exact_mut(4).zip(pixels) {
+            let [r, g, b, grey] = pixel.map(u32::from);
+            out.copy_from_slice(&[r | g << 16, b | grey << 16, masked.into(), 0]);
+        }
+    }
+    words
+}
+
+/// Codes of the factors' neighbours, four a word.
+pub(super) fn member_words(graph: &LevelGraph, params: &LevelParams) -> Vec<u32> {
+    let neighbours = graph.slots() - 1;
+    let (per_pixel, pitch) = (neighbours.div_ceil(4), params.member_pitch as usize);
+    let mut words = vec![u32::MAX; pitch * graph.height()];
+    if neighbours > 0 {
+        for (factor, codes) in graph.codes().chunks_exact(neighbours).enumerate() {
+            let (x, y) = (factor % graph.width(), factor / graph.width());
+            for (slot, &code) in codes.iter().enumerate() {
+                let word = &mut words[y * pitch + x * per_pixel + slot / 4];
+                let shift = 8 * (slot % 4);
+                *word = *word & !(0xff << shift) | u32::from(code) << shift;
+            }
+        }
+    }
+    words
+}
+
+/// The transposed table as the shader reads it: where each pixel's entries start, the entries, and where each row's
+/// entries start, aligned so that any rows can be bound.
+pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
+    let (width, slots, pitch) = (graph.width(), graph.slots(), params.starts_pitch as usize);
+    let mut starts = vec![0; pitch * graph.height()];
+    let mut entries = Vec::with_capacity(graph.incoming().len() + ALIGN_WORDS * graph.height());
+    let mut rows = vec![0];
+    for (y, starts) in starts.chunks_exact_mut(pitch).enumerate() {
+        for (x, start) in starts[..width].iter_mut().enumerate() {
+            *start = entries.len() as u32;
+            for &entry in graph.incoming_of(y * width + x) {
+                let (factor, slot) = (entry as usize / slots, entry as usize % slots);
+                // From the pixel to the factor: against the way from the factor to its member.
+                let dx = (factor % width) as i32 - x as i32;
+                let dy = (factor / width) as i32 - y as i32;
+                entries.push((dx + 3) as u32 | ((dy + 3) as u32) << 3 | (slot as u32) << 6);
+            }
+        }
+        starts[width] = entries.len() as u32;
+        entries.resize(entries.len().next_multiple_of(ALIGN_WORDS), 0);
+        rows.push(entries.len() as u32);
+    }
+    (starts, entries, rows)
+}
