@@ -2,6 +2,8 @@
 //! their folder. The maps are integers, so the figures are the same on every machine; the floors leave a little room
 //! for changes that trade.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
 use mrfgs::evaluation::{Report, evaluate};
 use mrfgs::image::{Plane, calib::Calibration, pfm, read};
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};

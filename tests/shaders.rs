@@ -2,6 +2,8 @@
 //! its layouts are those of the Rust structs, it stays within the limits that every device has, and it translates to
 //! what the drivers of all platforms take.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
 use mrfgs::backend::gpu::{Kernel, LevelParams, MAX_LOOP_ITERATIONS, Params, Variant};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::plan::Plan;
