@@ -28,6 +28,15 @@ fn store_message(index: u32, value: vec4<u32>) {
     }
 }
 
+// A member's message to the factor: its belief less the factor's old message, less its minimum where the cut wants that.
+fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
+    let q = unpack_wide(belief[member]) - load_message(message);
+    if ABSOLUTE {
+        return q - vec4(least);
+    }
+    return q;
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.level.width || id.y >= params.rows {
@@ -64,8 +73,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             if bases[slot] != ABSENT {
                 var least = vec4(0xffffu);
                 for (var quad = 0u; quad < quads; quad++) {
-                    let b = unpack_wide(belief[bases[slot] + quad]);
-                    least = min(least, b - load_message(own + slot * quads + quad));
+                    least = min(least, to_factor(bases[slot] + quad, own + slot * quads + quad, 0u));
                 }
                 floors[slot] = smallest(least);
             }
@@ -82,10 +90,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                q[slot] = unpack_wide(belief[bases[slot] + quad]) - load_message(own + slot * quads + quad);
-                if ABSOLUTE {
-                    q[slot] -= vec4(floors[slot]);
-                }
+                q[slot] = to_factor(bases[slot] + quad, own + slot * quads + quad, floors[slot]);
                 total += q[slot];
             }
         }
@@ -108,10 +113,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                q[slot] = unpack_wide(belief[bases[slot] + quad]) - load_message(own + slot * quads + quad);
-                if ABSOLUTE {
-                    q[slot] -= vec4(floors[slot]);
-                }
+                q[slot] = to_factor(bases[slot] + quad, own + slot * quads + quad, floors[slot]);
                 total += q[slot];
             }
         }

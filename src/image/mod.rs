@@ -2,6 +2,7 @@
 
 pub mod calib;
 pub mod colour;
+mod decode;
 pub mod pfm;
 pub mod read;
 pub mod write;

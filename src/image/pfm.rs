@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Plane, read, write};
+use super::{Plane, decode as files, write};
 use crate::error::{Error, Result};
 
 /// What a PFM file holds, the top row first (the file has the bottom row first).
@@ -21,7 +21,7 @@ pub enum Pfm {
 /// # Errors
 /// [`Error::Read`] when there is no such file or it is no complete PFM file.
 pub fn read(path: &Path) -> Result<Pfm> {
-    decode(&read::load(path)?).map_err(|reason| Error::read(path, reason))
+    decode(&files::load(path)?).map_err(|reason| Error::read(path, reason))
 }
 
 /// Writes a plane as single-channel PFM, little endian with scale -1.0, whole or not at all.
@@ -56,7 +56,7 @@ pub(super) fn decode(bytes: &[u8]) -> std::result::Result<Pfm, String> {
     let mut at = 2;
     let width = dimension(bytes, &mut at, "width")?;
     let height = dimension(bytes, &mut at, "height")?;
-    read::check_size(width as u64, height as u64)?;
+    files::check_size(width as u64, height as u64)?;
     let word = token(bytes, &mut at).ok_or("the PFM header ends before the scale")?;
     let scale = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
     let Some(scale) = scale else {

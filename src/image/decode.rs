@@ -1,0 +1,341 @@
+//! Decoding image files: what they are by their first bytes, and their samples as they stand.
+
+use std::fs::{self, File};
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::tags::Tag;
+
+use super::{Plane, pfm};
+use crate::error::{Error, Result};
+
+/// The most pixels that one image may have.
+pub const MAX_PIXELS: u64 = 1 << 30;
+
+/// The most bytes that one file may have: four channels of the widest kind for every pixel.
+const MAX_BYTES: u64 = 32 * MAX_PIXELS;
+
+/// No codec here packs more pixels than this into a byte; a header that claims more lies, and believing it
+/// would cost memory in vain.
+const MAX_PIXELS_PER_BYTE: u64 = 10_000;
+
+/// The bytes of a file that begins like an image.
+pub(super) fn load(path: &Path) -> Result<Vec<u8>> {
+    let error = |reason: &str| Err(Error::read(path, reason));
+    let io = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
+        _ => Error::read(path, e),
+    };
+    let metadata = fs::metadata(path).map_err(io)?;
+    if metadata.is_dir() {
+        return error("is a folder; give the image file");
+    }
+    if metadata.len() > MAX_BYTES {
+        return error("too large for an image; crop or tile it");
+    }
+    let mut file = File::open(path).map_err(io)?;
+    let mut bytes = Vec::new();
+    // Looking at the beginning first spares reading a large file that is no image, or one without end.
+    file.by_ref().take(64).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.is_empty() {
+        return error("the file is empty; get it again");
+    }
+    if Kind::of(&bytes).is_none() {
+        return Err(Error::read(path, unknown(&bytes)));
+    }
+    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(io)?;
+    Ok(bytes)
+}
+
+/// Errors when an image of this size will not be read.
+pub(super) fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
+    if width == 0 || height == 0 {
+        return Err(format!("is {width} x {height} and holds no pixel"));
+    }
+    if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) {
+        return Err(format!(
+            "claims {width} x {height} pixels and at most {MAX_PIXELS} are read; crop or tile it, if that is true"
+        ));
+    }
+    Ok(())
+}
+
+/// As [`check_size`], for formats that compress.
+fn check_claim(width: u64, height: u64, bytes: &[u8]) -> std::result::Result<(), String> {
+    check_size(width, height)?;
+    if width * height > MAX_PIXELS_PER_BYTE * bytes.len() as u64 {
+        return Err(format!(
+            "claims {width} x {height} pixels in {} bytes: truncated or damaged; get the file again",
+            bytes.len()
+        ));
+    }
+    Ok(())
+}
+
+/// What a file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Pfm,
+    Tiff,
+    Coded(ImageFormat),
+}
+
+impl Kind {
+    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+        if pfm::is_pfm(bytes) {
+            return Some(Self::Pfm);
+        }
+        Some(match bytes {
+            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Self::Tiff,
+            [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Self::Coded(ImageFormat::Png),
+            [0xff, 0xd8, 0xff, ..] => Self::Coded(ImageFormat::Jpeg),
+            [b'P', b'1'..=b'7', c, ..] if c.is_ascii_whitespace() || *c == b'#' => {
+                Self::Coded(ImageFormat::Pnm)
+            }
+            _ => return None,
+        })
+    }
+}
+
+/// The message for a file that is none of the known kinds.
+fn unknown(bytes: &[u8]) -> String {
+    const REMEDY: &str = "give PNG, JPEG, PNM, TIFF or PFM";
+    match image::guess_format(bytes) {
+        Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Pnm | ImageFormat::Tiff) | Err(_) => {
+            format!("not an image of a known format; {REMEDY}")
+        }
+        Ok(other) => format!("is a {} file; {REMEDY}", other.extensions_str()[0]),
+    }
+}
+
+/// Samples as a file holds them, all channels of a pixel next to each other.
+pub(super) enum Samples {
+    Byte(Vec<u8>),
+    Word(Vec<u16>),
+    Float(Vec<f32>),
+    /// Also the integers that do not fit a word.
+    Double(Vec<f64>),
+}
+
+impl Samples {
+    pub(super) fn is_float(&self) -> bool {
+        matches!(self, Self::Float(_) | Self::Double(_))
+    }
+}
+
+/// An image as a file holds it.
+pub(super) struct Raster {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
+    pub(super) channels: usize,
+    pub(super) samples: Samples,
+}
+
+impl Raster {
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// `f` of the grey or colour samples of each pixel.
+    pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
+        Plane::new(self.width, self.height, values)
+    }
+
+    /// `true` where alpha is 0 or a value is not finite.
+    pub(super) fn masked(&self) -> Plane<bool> {
+        fn masked<S: Copy>(
+            raster: &Raster,
+            samples: &[S],
+            clear: impl Fn(S) -> bool,
+            ok: impl Fn(S) -> bool,
+        ) -> Plane<bool> {
+            let n = raster.channels;
+            let colours = if n < 3 { 1 } else { 3 };
+            let pixel = |p: &[S]| (n > colours && clear(p[colours])) || !p[..colours].iter().all(|&v| ok(v));
+            Plane::new(raster.width, raster.height, samples.chunks_exact(n).map(pixel).collect())
+        }
+        match &self.samples {
+            Samples::Byte(v) => masked(self, v, |a| a == 0, |_| true),
+            Samples::Word(v) => masked(self, v, |a| a == 0, |_| true),
+            Samples::Float(v) => masked(self, v, |a| a == 0.0, f32::is_finite),
+            Samples::Double(v) => masked(self, v, |a| a == 0.0, f64::is_finite),
+        }
+    }
+
+    /// Calls `f` with the grey or colour samples of every pixel that is not masked.
+    pub(super) fn each<S: Copy>(&self, samples: &[S], masked: &Plane<bool>, mut f: impl FnMut(S)) {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        for (pixel, _) in samples.chunks_exact(self.channels).zip(masked.data()).filter(|(_, m)| !**m) {
+            pixel[..colours].iter().for_each(|&v| f(v));
+        }
+    }
+
+    pub(super) fn each_word(&self, masked: &Plane<bool>, f: impl FnMut(u16)) {
+        match &self.samples {
+            Samples::Byte(v) => {
+                let mut f = f;
+                self.each(v, masked, |v| f(stretched(v)));
+            }
+            Samples::Word(v) => self.each(v, masked, f),
+            Samples::Float(_) | Samples::Double(_) => {}
+        }
+    }
+
+    pub(super) fn each_double(&self, masked: &Plane<bool>, mut f: impl FnMut(f64)) {
+        match &self.samples {
+            Samples::Float(v) => self.each(v, masked, |v| f(v as f64)),
+            Samples::Double(v) => self.each(v, masked, f),
+            Samples::Byte(_) | Samples::Word(_) => {}
+        }
+    }
+}
+
+/// An 8-bit level on the 16-bit scale.
+pub(super) fn stretched(v: u8) -> u16 {
+    v as u16 * 257
+}
+
+pub(super) fn raster(path: &Path) -> Result<Raster> {
+    decode(&load(path)?).map_err(|reason| Error::read(path, reason))
+}
+
+/// Decodes a whole file; the error says in one line what is wrong with it.
+pub(super) fn decode(bytes: &[u8]) -> std::result::Result<Raster, String> {
+    let raster = match Kind::of(bytes) {
+        Some(Kind::Pfm) => decode_pfm(bytes),
+        Some(Kind::Tiff) => decode_tiff(bytes),
+        Some(Kind::Coded(format)) => decode_coded(bytes, format),
+        None => Err(unknown(bytes)),
+    };
+    raster.map_err(|reason| reason.split_whitespace().collect::<Vec<_>>().join(" "))
+}
+
+fn decode_pfm(bytes: &[u8]) -> std::result::Result<Raster, String> {
+    let (width, height, channels, samples) = match pfm::decode(bytes)? {
+        pfm::Pfm::Grey(p) => (p.width(), p.height(), 1, p.into_data()),
+        pfm::Pfm::Colour(p) => (p.width(), p.height(), 3, p.into_data().into_flattened()),
+    };
+    Ok(Raster { width, height, channels, samples: Samples::Float(samples) })
+}
+
+/// The decoder's error with what to do about it.
+fn damaged(e: impl std::fmt::Display) -> String {
+    format!("{e}; truncated or damaged? get the file again, or convert it to PNG")
+}
+
+fn decode_coded(bytes: &[u8], format: ImageFormat) -> std::result::Result<Raster, String> {
+    // The decoder fills up what is missing of a JPEG file with grey and says nothing.
+    if format == ImageFormat::Jpeg && !jpeg_is_whole(bytes) {
+        return Err(damaged("the JPEG data has no end"));
+    }
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(MAX_BYTES);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    check_claim(width as u64, height as u64, bytes)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    let (channels, samples) = match image {
+        DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw())),
+        DynamicImage::ImageLumaA8(i) => (2, Samples::Byte(i.into_raw())),
+        DynamicImage::ImageRgb8(i) => (3, Samples::Byte(i.into_raw())),
+        DynamicImage::ImageRgba8(i) => (4, Samples::Byte(i.into_raw())),
+        DynamicImage::ImageLuma16(i) => (1, Samples::Word(i.into_raw())),
+        DynamicImage::ImageLumaA16(i) => (2, Samples::Word(i.into_raw())),
+        DynamicImage::ImageRgb16(i) => (3, Samples::Word(i.into_raw())),
+        DynamicImage::ImageRgba16(i) => (4, Samples::Word(i.into_raw())),
+        DynamicImage::ImageRgb32F(i) => (3, Samples::Float(i.into_raw())),
+        DynamicImage::ImageRgba32F(i) => (4, Samples::Float(i.into_raw())),
+        other => {
+            return Err(format!("pixels of the kind {:?} are not read; convert it to PNG", other.color()));
+        }
+    };
+    Ok(Raster { width: width as usize, height: height as usize, channels, samples })
+}
+
+/// Whether the last scan of a JPEG file is followed by an end mark. Within a scan, 0xff 0xd9 cannot occur.
+fn jpeg_is_whole(bytes: &[u8]) -> bool {
+    let last = |mark: u8| bytes.windows(2).rposition(|w| w == [0xff, mark]);
+    matches!((last(0xda), last(0xd9)), (Some(scan), Some(end)) if end > scan)
+}
+
+/// Integer and float TIFF. What is packed into less than a byte, or is neither grey nor RGB, is left to the
+/// general decoder.
+fn decode_tiff(bytes: &[u8]) -> std::result::Result<Raster, String> {
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(damaged)?;
+    let (width, height) = decoder.dimensions().map_err(damaged)?;
+    check_claim(width as u64, height as u64, bytes)?;
+    // Sixteen samples of the widest kind for a pixel, and room for a strip of a small picture.
+    let most = width as usize * height as usize * 128 + (1 << 26);
+    let mut limits = tiff::decoder::Limits::unlimited();
+    limits.decoding_buffer_size = most;
+    limits.intermediate_buffer_size = most;
+    limits.ifd_value_size = bytes.len();
+    decoder = decoder.with_limits(limits);
+
+    let colour = decoder.colortype().map_err(damaged)?;
+    let channels = match colour {
+        tiff::ColorType::Gray(n) if n >= 8 => 1,
+        tiff::ColorType::RGB(_) => 3,
+        tiff::ColorType::RGBA(_) => 4,
+        tiff::ColorType::Multiband { num_samples, .. } => {
+            let extra: Vec<u16> =
+                decoder.find_tag_unsigned_vec(Tag::ExtraSamples).map_err(damaged)?.unwrap_or_default();
+            // 1 and 2 are the two kinds of alpha.
+            if num_samples != 2 || !matches!(extra[..], [1 | 2]) {
+                return Err(format!("has {num_samples} bands; extract one, or red, green and blue"));
+            }
+            2
+        }
+        _ => return decode_coded(bytes, ImageFormat::Tiff),
+    };
+
+    let mut result = DecodingResult::U8(Vec::new());
+    let layout = decoder.read_image_to_buffer(&mut result).map_err(damaged)?;
+    let samples = match result {
+        DecodingResult::U8(v) => Samples::Byte(v),
+        DecodingResult::U16(v) => Samples::Word(v),
+        DecodingResult::F32(v) => Samples::Float(v),
+        DecodingResult::F64(v) => Samples::Double(v),
+        DecodingResult::F16(v) => Samples::Float(v.into_iter().map(f32::from).collect()),
+        DecodingResult::I8(v) => Samples::Float(v.into_iter().map(f32::from).collect()),
+        DecodingResult::I16(v) => Samples::Float(v.into_iter().map(f32::from).collect()),
+        DecodingResult::I32(v) => Samples::Double(v.into_iter().map(f64::from).collect()),
+        DecodingResult::U32(v) => Samples::Double(v.into_iter().map(f64::from).collect()),
+        DecodingResult::U64(v) => Samples::Double(v.into_iter().map(|v| v as f64).collect()),
+        DecodingResult::I64(v) => Samples::Double(v.into_iter().map(|v| v as f64).collect()),
+    };
+    let (width, height) = (width as usize, height as usize);
+    let planar = layout.planes > 1;
+    let samples = match samples {
+        Samples::Byte(v) => Samples::Byte(interleaved(v, width * height, channels, planar)?),
+        Samples::Word(v) => Samples::Word(interleaved(v, width * height, channels, planar)?),
+        Samples::Float(v) => Samples::Float(interleaved(v, width * height, channels, planar)?),
+        Samples::Double(v) => Samples::Double(interleaved(v, width * height, channels, planar)?),
+    };
+    Ok(Raster { width, height, channels, samples })
+}
+
+/// The samples with all channels of a pixel next to each other, from those or from one plane after the other.
+fn interleaved<S: Copy>(
+    samples: Vec<S>,
+    pixels: usize,
+    channels: usize,
+    planar: bool,
+) -> std::result::Result<Vec<S>, String> {
+    // More planes than channels are bands that carry no colour.
+    let enough = if planar { samples.len() >= pixels * channels } else { samples.len() == pixels * channels };
+    if !enough {
+        return Err(damaged("the TIFF data does not have the size that its header says"));
+    }
+    if !planar {
+        return Ok(samples);
+    }
+    Ok((0..pixels).flat_map(|i| (0..channels).map(move |c| c * pixels + i)).map(|i| samples[i]).collect())
+}
