@@ -1,4 +1,4 @@
-//! Who depends on whom: the dependency factors S of one level (sections 3.1 and 4.1).
+//! Who depends on whom: the dependency factors S of one level (sections 2.1 and 3.1).
 //!
 //! There is one factor a pixel. Its members are the pixel and those neighbours in a 7 x 7 window whose bilateral
 //! coefficient `exp(-(dx^2 + dy^2) / 2 sigma_d^2 - |colour difference|^2 / 2 sigma_r^2)` reaches the percentile.

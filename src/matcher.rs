@@ -5,7 +5,6 @@ use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, Gpu};
 use crate::error::{Error, Result};
 use crate::image::Pair;
-use crate::memory;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::{self, Observer, Solution};
@@ -76,7 +75,6 @@ fn run(
     observer: Observer,
     note: Option<String>,
 ) -> Result<Matched> {
-    memory::check(&plan)?;
     let solution = solver::solve(backend, &plan, pair, observer)?;
     Ok(Matched { solution, plan, ran_on: backend.describe(), note })
 }

@@ -2,7 +2,7 @@
 //! ([`Execution`]).
 //!
 //! A [`Method`] is read from TOML or set key by key; [`keys`] lists each key with its unit, meaning and source.
-//! "Section 4.1" and the like are of Shabanian and Balasubramanian, *Multi-Resolution Factor Graph Based Stereo
+//! "Section 3.1" and the like are of Shabanian and Balasubramanian, *Multi-Resolution Factor Graph Based Stereo
 //! Correspondence Algorithm*; where a meaning says "open", the paper leaves the matter open and the choice is
 //! this project's.
 
@@ -68,7 +68,7 @@ impl DisparityRange {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cost {
-    /// Mean of the absolute colour difference over a square window (section 3.4), in 8-bit levels.
+    /// Mean of the absolute colour difference over a square window (section 2.4), in 8-bit levels.
     Sad,
     /// (1 - exp(-AD / 10)) + (1 - exp(-Hamming / 30)) with the colour difference AD and a 9 x 7 census
     /// (Mei et al. 2011), between 0 and 2.
@@ -94,7 +94,7 @@ pub enum Potential {
     Soft,
     /// exp(-cut) exactly: the P^n Potts model (Kohli et al. 2007).
     Exact,
-    /// 0, as the paper has it (section 3.2), up to a cap that acts only on labels long out of the race.
+    /// 0, as the paper has it (section 2.2), up to a cap that acts only on labels long out of the race.
     Hard,
 }
 
@@ -102,7 +102,7 @@ pub enum Potential {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Resolution {
-    /// d = 2 z (section 3.2): an odd label agrees with none.
+    /// d = 2 z (section 2.2): an odd label agrees with none.
     Strict,
     /// |d - 2 z| <= 1: an odd label agrees with both its coarse neighbours.
     Interpolating,
@@ -155,33 +155,33 @@ macro_rules! method {
 }
 
 method! {
-    cost: Cost, "sad | ad-census", "Matching cost. The paper's is the SAD (section 3.4).";
-    sad_window: u32, "pixels, odd, 1 to 31", "Side of the SAD window (section 4.1: 7).";
+    cost: Cost, "sad | ad-census", "Matching cost. The paper's is the SAD (section 2.4).";
+    sad_window: u32, "pixels, odd, 1 to 31", "Side of the SAD window (section 3.1: 7).";
     outside_cost: f64, "the cost's own",
         "Cost of a label that falls outside the right image or on a masked pixel: the same for each, so that \
          none is preferred (open).";
     temperature: f64, "cost per nat", "Cost that makes a label one nat less likely: evidence = cost / temperature \
-         (equation 6 read in the logarithmic domain; open).";
+         (equation 5 read in the logarithmic domain; open).";
     evidence_cap: f64, "nats, up to 63.75", "Largest evidence against a label.";
     evidence_gain: f64, "factor per level, 1 to 4", "How much surer the evidence of a level is than that of the next \
          finer one, being a mean over more pixels (open).";
-    pyramid: Pyramid, "low-pass | minimum", "How a level's cost volume comes from the next finer one (section 3.4: \
+    pyramid: Pyramid, "low-pass | minimum", "How a level's cost volume comes from the next finer one (section 2.4: \
          low-pass).";
     levels: u32, "levels, 1 to 16", "Resolution levels; fewer where the image is too small for them (open).";
     percentile: f64, "percent, 0 to 100", "Bilateral coefficients at or above this percentile make a pixel a \
-         neighbour (section 4.1: 97), taken over the 48 pixels around the centre.";
-    sigma_space: f64, "pixels", "Domain parameter of the bilateral coefficients (section 4.1: 3).";
-    sigma_range: f64, "of the intensity range 0 to 1", "Range parameter of the bilateral coefficients (section 4.1: \
+         neighbour (section 3.1: 97), taken over the 48 pixels around the centre.";
+    sigma_space: f64, "pixels", "Domain parameter of the bilateral coefficients (section 3.1: 3).";
+    sigma_range: f64, "of the intensity range 0 to 1", "Range parameter of the bilateral coefficients (section 3.1: \
          0.1).";
-    potential: Potential, "soft | exact | hard", "Potential of factors whose members disagree (section 3.2: hard).";
+    potential: Potential, "soft | exact | hard", "Potential of factors whose members disagree (section 2.2: hard).";
     dependency_cut: f64, "nats, up to 255.75", "What disagreement costs in a dependency factor; not used by hard \
          potentials.";
-    resolution: Resolution, "strict | interpolating", "Which labels of two levels agree (section 3.2: strict).";
+    resolution: Resolution, "strict | interpolating", "Which labels of two levels agree (section 2.2: strict).";
     resolution_cut: f64, "nats, up to 255.75", "What disagreement costs in a resolution factor; not used by hard \
          potentials.";
     schedule: Schedule, "together | coarse-first", "Order of the flooding (algorithm 1: together).";
     iterations: u32, "iterations, 1 to 1000", "Iterations of all levels together, or after each added level but the \
-         finest (section 4: 20 to 30).";
+         finest (section 3: 20 to 30).";
     final_iterations: u32, "iterations, 0 to 1000", "Iterations once the finest level has joined; not used by the \
          schedule together.";
     tolerance: f64, "pixels", "Stop when the RMS change of the finest map from one iteration to the next is at most \
@@ -192,7 +192,7 @@ method! {
     sub_pixel: bool, "true | false", "Place the disparity between the labels, by the matching cost around the optimum \
          (open).";
     fill: Fill, "none | row", "What becomes of invalid pixels.";
-    median: Median, "off | filled | all", "Which pixels the weighted median touches (section 3.5).";
+    median: Median, "off | filled | all", "Which pixels the weighted median touches (section 2.5).";
     median_window: u32, "pixels, odd, 3 to 31", "Side of the median's window (open).";
     median_sigma_space: f64, "pixels", "Spatial parameter of the median's weights (open).";
     median_sigma_range: f64, "of the intensity range 0 to 1", "Range parameter of the median's weights (open).";

@@ -1,5 +1,5 @@
 //! What the messages compute: on trees, the min-marginals of the joint distribution of equation (1), by enumeration;
-//! on graphs with cycles, what the sum-product of equations (4) and (5) computes in floating point.
+//! on graphs with cycles, what the sum-product of equations (3) and (4) computes in floating point.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
@@ -396,7 +396,7 @@ fn control_a_changed_model_is_found() {
     }
 }
 
-/// Equations (4) and (5), in f64, literally: every sum runs over all labels of all other members.
+/// Equations (3) and (4), in f64, literally: every sum runs over all labels of all other members.
 struct SumProduct<'a> {
     model: &'a Model,
     /// Of each variable, exp(-evidence).
@@ -432,9 +432,9 @@ impl<'a> SumProduct<'a> {
         let model = self.model;
         let new = model.factors.iter().enumerate().map(|(f, factor)| {
             let variables = factor.variables();
-            // Equation (4).
+            // Equation (3).
             let incoming: Vec<Vec<f64>> = variables.iter().map(|&v| self.product(v, Some(f))).collect();
-            // Equation (5).
+            // Equation (4).
             let to = |i: usize| {
                 let mut out = vec![0.0; model.labels(variables[i])];
                 let mut labels = vec![0; variables.len()];
@@ -523,7 +523,7 @@ fn loopy(seed: u64) -> (Model, Vec<Vec<u32>>) {
 
 /// Under the hard potential, and with strict agreement between levels, one label of the receiver leaves the others a
 /// single choice: its own label for a dependency factor, twice or half of it for a resolution factor. So every sum
-/// of equation (5) has at most one term that is not 0; sum- and max-product are the same, products are sums of
+/// of equation (4) has at most one term that is not 0; sum- and max-product are the same, products are sums of
 /// costs, and integers hold them exactly as long as no cap acts. (Interpolating agreement leaves several choices,
 /// there the two differ.)
 #[test]

@@ -92,15 +92,6 @@ pub fn grey8(path: &Path, plane: &Plane<u8>) -> Result<()> {
     save(path, &png(path, plane.data(), plane.size(), ExtendedColorType::L8)?)
 }
 
-/// Writes 16-bit grey levels as PNG.
-///
-/// # Errors
-/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
-pub fn grey16(path: &Path, plane: &Plane<u16>) -> Result<()> {
-    png_extension(path)?;
-    save(path, &png(path, bytemuck::cast_slice(plane.data()), plane.size(), ExtendedColorType::L16)?)
-}
-
 /// Writes 8-bit colours (red, green, blue) as PNG.
 ///
 /// # Errors
@@ -339,8 +330,6 @@ mod tests {
             image::open(&path).unwrap(),
             image::DynamicImage::ImageLuma8(image::GrayImage::from_raw(2, 1, vec![3, 200]).unwrap())
         );
-        grey16(&path, &Plane::new(1, 2, vec![3, 65535])).unwrap();
-        assert_eq!(image::open(&path).unwrap().into_luma16().into_raw(), [3, 65535]);
         rgb8(&path, &Plane::new(1, 1, vec![[1, 2, 3]])).unwrap();
         assert_eq!(image::open(&path).unwrap().into_rgb8().into_raw(), [1, 2, 3]);
         assert!(grey8(&path, &Plane::new(0, 0, vec![])).is_err());

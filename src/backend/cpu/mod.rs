@@ -13,6 +13,7 @@ use super::{Backend, Estimate, PaddedRows, Volume, volume_shape};
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::Pair;
+use crate::memory;
 use crate::plan::{MessageWidth, Plan};
 use message::Message;
 
@@ -128,6 +129,9 @@ impl Backend for Cpu {
     }
 
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
+        // What the last match holds goes before the next one asks for more.
+        self.state = None;
+        memory::check(plan)?;
         self.state = Some(match plan.message_width {
             MessageWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
             MessageWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)),

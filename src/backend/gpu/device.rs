@@ -155,6 +155,8 @@ pub(super) struct Device {
     pub(super) inner: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
+    /// Whether its memory is the machine's own.
+    pub(super) software: bool,
     pub(super) max_binding: u64,
     pub(super) max_buffer: u64,
     failure: Arc<Mutex<Option<String>>>,
@@ -201,6 +203,7 @@ impl Device {
         });
         Ok(Self {
             name: format!("{} ({})", info.name, api(info.backend)),
+            software: info.device_type == wgpu::DeviceType::Cpu,
             max_binding: device.limits().max_storage_buffer_binding_size.min(max_binding),
             max_buffer: device.limits().max_buffer_size,
             inner: device,

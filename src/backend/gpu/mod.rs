@@ -13,6 +13,7 @@ use super::{Backend, Estimate, PaddedRows, Peak, Volume, volume_shape};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
+use crate::memory;
 use crate::plan::Plan;
 use device::Device;
 pub use device::{Ceiling, DeviceInfo, devices, has_automatic};
@@ -305,6 +306,9 @@ impl Backend for Gpu {
         // What the last match holds goes before the next one asks for more.
         self.encoder = None;
         self.state = None;
+        if self.device.software {
+            memory::check(plan)?;
+        }
         let levels = graphs
             .iter()
             .enumerate()
