@@ -8,12 +8,11 @@ mod scenes;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::Gpu;
-use mrfgs::backend::{Backend, Volume};
+use mrfgs::backend::{Backend, Stage};
 use mrfgs::image::{Image, Pair};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::plan::Plan;
-use mrfgs::{graph, refine, solver};
-use std::hint::black_box;
+use mrfgs::{graph, solver};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -25,9 +24,21 @@ fn pair_of(width: usize, height: usize, labels: u32) -> Pair {
     Pair::new(Image::from_rgb8(&scene.left), Image::from_rgb8(&scene.right)).expect("one size")
 }
 
-/// Waits for the device: commands are recorded and run later.
-fn settle(backend: &mut dyn Backend, coarsest: usize) {
-    black_box(backend.read(Volume::Evidence(coarsest)).expect("a volume"));
+/// What is timed: a name, and the stages that belong to it.
+fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
+    let pyramid = (1..plan.levels.len()).map(Stage::Pyramid).collect();
+    vec![
+        ("cost", vec![Stage::Cost]),
+        ("pyramid", pyramid),
+        ("evidence", vec![Stage::Evidence(0)]),
+        ("dependency", vec![Stage::Dependency(0)]),
+        ("resolution", vec![Stage::Resolution(1)]),
+        ("belief", vec![Stage::Belief(0)]),
+        ("estimate", vec![Stage::Estimate, Stage::RightView, Stage::SubPixel]),
+        ("region filter", vec![Stage::Visibility, Stage::RegionFilter]),
+        ("fill", vec![Stage::Fill]),
+        ("median", vec![Stage::Median]),
+    ]
 }
 
 fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backend) {
@@ -37,7 +48,6 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
         for preset in ["default", "paper"] {
             let method = Method::preset(preset).expect("a preset");
             let plan = Plan::new(width, height, range, &method).expect("a plan");
-            let coarsest = plan.levels.len() - 1;
             let mut group = criterion.benchmark_group(format!("{case}/{preset}"));
             group
                 .sample_size(10)
@@ -45,41 +55,17 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                 .warm_up_time(Duration::from_millis(500));
 
             // Whatever a stage needs is there, and the device is warm.
-            let solution =
-                solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
-            group.bench_function(format!("cost/{name}"), |b| {
-                b.iter(|| {
-                    backend.cost().expect("cost");
-                    settle(backend, coarsest);
+            solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
+            for (stage, stages) in groups(&plan) {
+                group.bench_function(format!("{stage}/{name}"), |b| {
+                    b.iter(|| {
+                        for &stage in &stages {
+                            backend.run(stage).expect("a stage");
+                        }
+                        backend.wait().expect("a device that goes on");
+                    });
                 });
-            });
-            group.bench_function(format!("pyramid/{name}"), |b| {
-                b.iter(|| {
-                    (1..=coarsest).for_each(|z| backend.pyramid(z).expect("pyramid"));
-                    settle(backend, coarsest);
-                });
-            });
-            group.bench_function(format!("dependency/{name}"), |b| {
-                b.iter(|| {
-                    backend.dependency(0).expect("dependency");
-                    settle(backend, coarsest);
-                });
-            });
-            group.bench_function(format!("resolution/{name}"), |b| {
-                b.iter(|| {
-                    backend.resolution(1).expect("resolution");
-                    settle(backend, coarsest);
-                });
-            });
-            group.bench_function(format!("belief/{name}"), |b| {
-                b.iter(|| {
-                    backend.belief(0).expect("belief");
-                    settle(backend, coarsest);
-                });
-            });
-            group.bench_function(format!("estimate/{name}"), |b| {
-                b.iter(|| black_box(backend.estimate().expect("an estimate")));
-            });
+            }
             group.bench_function(format!("match/{name}"), |b| {
                 b.iter(|| {
                     solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match")
@@ -87,18 +73,6 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
             });
             if name == "cpu" {
                 group.bench_function("graph", |b| b.iter(|| graph::build(pair.left(), &plan)));
-                let weights = refine::MedianWeights::new(15, 5.0, 0.1);
-                group.bench_function("median", |b| {
-                    b.iter(|| {
-                        refine::weighted_median(
-                            &solution.raw,
-                            &solution.validity,
-                            pair.left(),
-                            &weights,
-                            |_| true,
-                        )
-                    });
-                });
             }
             group.finish();
         }

@@ -11,7 +11,8 @@
 const AD_ENTRIES: u32 = 768u;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     let width = params.level.width;
     let x = id.x / params.level.quads;
     let quad = id.x - x * params.level.quads;

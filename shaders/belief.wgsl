@@ -14,7 +14,8 @@ const RADIUS: u32 = 3u;
 const QUADS: u32 = 4u;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     let quads = params.level.quads;
     let blocks = quads / QUADS;
     let x = id.x / blocks;

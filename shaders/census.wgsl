@@ -8,7 +8,8 @@ const RADIUS_X: i32 = 4;
 const RADIUS_Y: i32 = 3;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     let width = params.level.width;
     if id.x >= width || id.y >= params.rows {
         return;

@@ -5,8 +5,9 @@
 @group(0) @binding(2) var<storage, read_write> sums: array<vec2<u32>>;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= params.rows {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.rows || id.y > 0u {
         return;
     }
     var sum = vec2<u32>();

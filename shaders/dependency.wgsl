@@ -38,7 +38,8 @@ fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }

@@ -32,7 +32,8 @@ fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
 var<private> WEIGHTS: array<u32, 5> = array(1u, 4u, 6u, 4u, 1u);
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     let pairs = 2u * params.level.quads;
     let x = id.x / pairs;
     let pair = id.x - x * pairs;

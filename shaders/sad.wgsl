@@ -9,7 +9,8 @@ const RUN: i32 = 8;
 const COST_MAX: u32 = 254u;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     let width = i32(params.level.width);
     let run = id.x / params.level.quads;
     let quad = id.x - run * params.level.quads;

@@ -1,14 +1,15 @@
-// How far the disparity of every pixel is above its label, by the matching cost around it. One invocation a pixel.
+// Every pixel's disparity: its label, and how far it is above that by the matching cost around it. One invocation a
+// pixel.
 
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
 // label | best << 16, rival.
 @group(0) @binding(2) var<storage, read> peaks: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> offsets: array<i32>;
-
-const FRACTION: i32 = 256;
+@group(0) @binding(3) var<storage, read_write> raw: array<i32>;
+@group(0) @binding(4) var<storage, read_write> disparity: array<i32>;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }
@@ -18,7 +19,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let y = i32(params.first_row + id.y);
     let label = i32(peaks[u32(y - top) * pitch + id.x].x & 0xffffu);
     var offset = 0;
-    if label > 0 && label + 1 < i32(params.level.labels) {
+    if params.sub_pixel == 1u && label > 0 && label + 1 < i32(params.level.labels) {
         var sums = vec3<i32>();
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
             for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {
@@ -38,5 +39,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             offset = (FRACTION * (difference + slope) + slope) / (2 * slope) - FRACTION / 2;
         }
     }
-    offsets[id.y * pitch + id.x] = offset;
+    let fixed = FRACTION * (params.level.low + label) + offset;
+    raw[id.y * pitch + id.x] = fixed;
+    disparity[id.y * pitch + id.x] = fixed;
 }

@@ -17,7 +17,7 @@
 //! let execution = Execution::default();
 //! let matched =
 //!     mrfgs::match_pair(&pair, range, &Method::default(), &execution, &mut |_| ControlFlow::Continue(()))?;
-//! let map = matched.solution.final_map(); // pixels, +inf where there is none
+//! let map = matched.maps.final_map(); // pixels, +inf where there is none
 //! assert_eq!(map.size(), pair.size());
 //! assert!(map.data().iter().all(|d| (0.0..=31.0).contains(d)));
 //! # Ok(())
@@ -27,7 +27,7 @@
 //! # The way through
 //!
 //! ```text
-//! image ──> plan ──> graph ──> solver ──> Solution, evaluation
+//! image ──> plan ──> graph ──> solver ──> maps, evaluation
 //!                                │
 //!                             backend (the one seam): cpu, gpu
 //! ```
@@ -36,7 +36,7 @@
 //! - [`plan::Plan`] works out levels, integer parameters, bounds and memory, before anything runs.
 //! - [`graph`] picks the members of each dependency factor.
 //! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
-//! - [`refine`] is what follows the estimate.
+//! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.
 //! - [`evaluation`] compares maps with ground truth.
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`plan`]), so the CPU path and every GPU give the same
@@ -47,13 +47,13 @@ pub mod error;
 pub mod evaluation;
 pub mod graph;
 pub mod image;
+pub mod maps;
 mod matcher;
 mod memory;
 pub mod options;
 pub mod plan;
-pub mod refine;
 pub mod solver;
 pub mod tables;
 
 pub use error::{Error, Result};
-pub use matcher::{Matched, match_pair};
+pub use matcher::{Matched, Matcher, Timing, match_pair};

@@ -1,33 +1,155 @@
-//! From a pair to its maps in one call.
+//! From pairs to their maps: opens what runs the stages, checks it, and falls back where that is allowed.
 
-use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, Gpu};
+use crate::backend::{Backend, Stage};
 use crate::error::{Error, Result};
-use crate::image::Pair;
+use crate::image::{Image, Pair, Plane};
+use crate::maps::Maps;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::{self, Observer, Solution};
+use std::ops::ControlFlow;
+use std::time::Duration;
 
 /// The maps of a pair, and what made them.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Matched {
     /// The maps.
-    pub solution: Solution,
+    pub maps: Maps,
+    /// Iterations done, of all phases together.
+    pub iterations: u32,
     /// The plan that was followed.
     pub plan: Plan,
     /// What ran the stages, for people.
     pub ran_on: String,
     /// Why it is not the device that was hoped for, where that is so.
     pub note: Option<String>,
+    /// The time of every stage, in the order of their first run; empty unless [`Execution::timings`] asks.
+    pub timings: Vec<Timing>,
+}
+
+/// The time that a stage took, over all its runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// The stage, or what the host does around the stages: "graph", "upload", "download".
+    pub stage: &'static str,
+    /// Its level, where it has one.
+    pub level: Option<usize>,
+    /// How often it ran.
+    pub runs: u32,
+    /// All runs together, by the device's own clock where it has one.
+    pub time: Duration,
+}
+
+/// Matches pair after pair, and keeps in between what is dear: the device, its compiled shaders, its buffers.
+pub struct Matcher {
+    pool: rayon::ThreadPool,
+    cpu: Cpu,
+    gpu: Option<Gpu>,
+    /// The last method that the device was seen to compute as the CPU path does.
+    checked: Option<Method>,
+    /// Whether the CPU path may step in.
+    falls_back: bool,
+    /// Why there is no device any more.
+    given_up: Option<String>,
+    timings: bool,
+}
+
+impl Matcher {
+    /// Opens what `execution` names.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for what makes no sense, [`Error::Device`] where the wanted device is missing or cannot be
+    /// opened.
+    pub fn new(execution: &Execution) -> Result<Self> {
+        let device = execution.device.as_deref();
+        match execution.backend {
+            Choice::Cpu if device.is_some() => Err(Error::option(
+                "--device",
+                "names a device, and --backend cpu uses none: leave one of them out",
+            )),
+            Choice::Cpu => Self::build(None, false, execution),
+            // Who names a device means it.
+            Choice::Gpu => Self::build(Some(Gpu::new(device)), false, execution),
+            Choice::Auto if device.is_some() => Self::build(Some(Gpu::new(device)), false, execution),
+            Choice::Auto => Self::build(gpu::has_automatic().then(|| Gpu::new(None)), true, execution),
+        }
+    }
+
+    /// On `gpu` as long as it serves, on the CPU path from then on.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for a number of threads that cannot be had.
+    pub fn with_fallback(gpu: Result<Gpu>, execution: &Execution) -> Result<Self> {
+        Self::build(Some(gpu), true, execution)
+    }
+
+    fn build(gpu: Option<Result<Gpu>>, falls_back: bool, execution: &Execution) -> Result<Self> {
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = execution.threads {
+            pool = pool.num_threads(threads);
+        }
+        let pool = pool.build().map_err(|e| Error::option("--threads", e.to_string()))?;
+        let (gpu, given_up) = match gpu.transpose() {
+            Ok(gpu) => (gpu, None),
+            Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e.to_string())),
+            Err(e) => return Err(e),
+        };
+        Ok(Self {
+            pool,
+            cpu: Cpu::default(),
+            gpu,
+            checked: None,
+            falls_back,
+            given_up,
+            timings: execution.timings,
+        })
+    }
+
+    /// Matches `pair` over `range` by `method`; `observer` hears of progress and can stop it.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for options out of range, [`Error::Device`] where the wanted device fails, [`Error::Memory`] when
+    /// the machine or the device cannot hold it, [`Error::Interrupted`] when `observer` breaks.
+    pub fn run(
+        &mut self,
+        pair: &Pair,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer,
+    ) -> Result<Matched> {
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?;
+        let Self { pool, cpu, gpu, checked, falls_back, given_up, timings } = self;
+        pool.install(|| {
+            let mut note = given_up.clone();
+            if let Some(device) = gpu {
+                let served = check(device, &plan.method, checked)
+                    .and_then(|()| timed(device, *timings, &plan, pair, &mut *observer));
+                match served {
+                    // The bits are the same on the CPU path, so a device that fails costs time and nothing else.
+                    Err(e @ (Error::Device(_) | Error::Memory(_))) if *falls_back => {
+                        note = Some(e.to_string());
+                        // What is too large for it this time may fit the next.
+                        if matches!(e, Error::Device(_)) {
+                            *gpu = None;
+                            given_up.clone_from(&note);
+                        }
+                    }
+                    served => return served,
+                }
+            }
+            timed(cpu, *timings, &plan, pair, observer).map(|matched| Matched { note, ..matched })
+        })
+    }
 }
 
 /// Matches `pair` over `range` by `method`, where `execution` says; `observer` hears of progress and can stop it.
 ///
 /// # Errors
-/// [`Error::Option`] for options out of range, [`Error::Device`] where the wanted device is missing or fails,
-/// [`Error::Memory`] when the machine or the device cannot hold it, [`Error::Interrupted`] when `observer` breaks.
+/// Those of [`Matcher::new`] and [`Matcher::run`].
 pub fn match_pair(
     pair: &Pair,
     range: DisparityRange,
@@ -35,46 +157,71 @@ pub fn match_pair(
     execution: &Execution,
     observer: Observer,
 ) -> Result<Matched> {
-    let (width, height) = pair.size();
-    let plan = Plan::new(width, height, range, method)?;
-    let mut pool = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = execution.threads {
-        pool = pool.num_threads(threads);
-    }
-    let pool = pool.build().map_err(|e| Error::option("--threads", e.to_string()))?;
-    pool.install(|| match execution.backend {
-        Choice::Cpu if execution.device.is_some() => Err(Error::option(
-            "--device",
-            "names a device, and --backend cpu uses none: leave one of them out",
-        )),
-        Choice::Cpu => run(&mut Cpu::default(), plan, pair, observer, None),
-        Choice::Gpu => run(&mut Gpu::new(execution.device.as_deref())?, plan, pair, observer, None),
-        // Who names a device means it.
-        Choice::Auto if execution.device.is_some() => {
-            run(&mut Gpu::new(execution.device.as_deref())?, plan, pair, observer, None)
-        }
-        Choice::Auto if !gpu::has_automatic() => run(&mut Cpu::default(), plan, pair, observer, None),
-        Choice::Auto => {
-            let tried =
-                Gpu::new(None).and_then(|mut gpu| run(&mut gpu, plan.clone(), pair, &mut *observer, None));
-            match tried {
-                // The bits are the same on the CPU path, so a device that fails costs time and nothing else.
-                Err(e @ (Error::Device(_) | Error::Memory(_))) => {
-                    run(&mut Cpu::default(), plan, pair, observer, Some(e.to_string()))
-                }
-                other => other,
-            }
-        }
+    Matcher::new(execution)?.run(pair, range, method, observer)
+}
+
+fn timed(
+    backend: &mut dyn Backend,
+    timings: bool,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer,
+) -> Result<Matched> {
+    backend.keep_time(timings)?;
+    let solution = solver::solve(backend, plan, pair, observer)?;
+    Ok(Matched {
+        timings: if timings { summed(&solution, &backend.times()?) } else { Vec::new() },
+        maps: solution.maps,
+        iterations: solution.iterations,
+        plan: plan.clone(),
+        ran_on: backend.describe(),
+        note: None,
     })
 }
 
-fn run(
-    backend: &mut dyn Backend,
-    plan: Plan,
-    pair: &Pair,
-    observer: Observer,
-    note: Option<String>,
-) -> Result<Matched> {
-    let solution = solver::solve(backend, &plan, pair, observer)?;
-    Ok(Matched { solution, plan, ran_on: backend.describe(), note })
+/// One entry a stage and level.
+fn summed(solution: &Solution, times: &[(Stage, Duration)]) -> Vec<Timing> {
+    let mut all: Vec<Timing> = Vec::new();
+    let [graph, upload, download] = solution.around.map(|(name, time)| (name, None, time));
+    let stages = times.iter().map(|&(stage, time)| (stage.name(), stage.level(), time));
+    for (stage, level, time) in [graph, upload].into_iter().chain(stages).chain([download]) {
+        match all.iter_mut().find(|t| (t.stage, t.level) == (stage, level)) {
+            Some(timing) => {
+                timing.runs += 1;
+                timing.time += time;
+            }
+            None => all.push(Timing { stage, level, runs: 1, time }),
+        }
+    }
+    all
+}
+
+/// Sees that a device computes a small pair by `method` as the CPU path does, before it is trusted with a large
+/// one: a driver that gets arithmetic, loops or memory wrong says nothing.
+fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>) -> Result<()> {
+    if checked.as_ref() == Some(method) {
+        return Ok(());
+    }
+    let (width, height) = (48, 20);
+    let texture = |x: usize, y: usize| {
+        let hash = (x as u32 * 73 + y as u32 * 179 + 1).wrapping_mul(0x9e37_79b9);
+        [hash >> 24, hash >> 16 & 0xff, hash >> 8 & 0xff].map(|v| v as u8)
+    };
+    // Two surfaces, the nearer below.
+    let step = |y: usize| if y < height / 2 { 3 } else { 8 };
+    let left = Image::from_rgb8(&Plane::from_fn(width, height, texture));
+    let right = Image::from_rgb8(&Plane::from_fn(width, height, |x, y| texture(x + step(y), y)));
+    let pair = Pair::new(left, right)?;
+    let plan = Plan::new(width, height, DisparityRange::new(-1, 16)?, method)?;
+    let quiet = &mut |_| ControlFlow::Continue(());
+    let expected = solver::solve(&mut Cpu::default(), &plan, &pair, quiet)?;
+    let found = solver::solve(gpu, &plan, &pair, quiet)?;
+    if found.maps != expected.maps {
+        return Err(Error::Device(format!(
+            "{} computes other maps than the CPU path on a test pair: update its driver, or use --backend cpu",
+            gpu.describe()
+        )));
+    }
+    *checked = Some(method.clone());
+    Ok(())
 }

@@ -457,6 +457,8 @@ pub struct Execution {
     pub device: Option<String>,
     /// Threads of the CPU path; `None` takes one a core.
     pub threads: Option<usize>,
+    /// Whether to take the time of every stage.
+    pub timings: bool,
 }
 
 #[cfg(test)]

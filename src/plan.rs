@@ -288,10 +288,16 @@ impl Plan {
         cells * volumes as u64 + graph as u64
     }
 
-    /// Bytes that all volumes and graphs take together.
+    /// Bytes that the images and all maps take, at most.
+    #[must_use]
+    pub fn map_bytes(&self) -> u64 {
+        96 * self.levels[0].pixels() as u64
+    }
+
+    /// Bytes that all volumes, graphs and maps take together.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        (0..self.levels.len()).map(|z| self.level_bytes(z)).sum()
+        self.map_bytes() + (0..self.levels.len()).map(|z| self.level_bytes(z)).sum::<u64>()
     }
 }
 

@@ -1,54 +1,25 @@
 //! The only place that knows levels, iterations, convergence and the order of what follows.
 
-use crate::backend::{Backend, Estimate};
+use crate::backend::{Backend, Stage};
 use crate::error::{Error, Result};
 use crate::graph;
-use crate::image::{Pair, Plane};
-use crate::options::{Fill, Median};
+use crate::image::Pair;
+use crate::maps::Maps;
+use crate::options::{Fill, Median, Method};
 use crate::plan::Plan;
-use crate::refine::{self, FRACTION, MedianWeights, flag};
+use std::iter;
 use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
-/// What a match leaves behind; all maps have the size of the images.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What a match leaves behind.
+#[derive(Clone, Debug)]
 pub struct Solution {
-    /// The final disparity in 1/256 px; meaningless where [`Solution::has_disparity`] says no.
-    pub disparity: Plane<i32>,
-    /// The disparity before post-processing, in 1/256 px, of every pixel that is not masked.
-    pub raw: Plane<i32>,
-    /// Confidence 0 ..= 255.
-    pub confidence: Plane<u8>,
-    /// Bits of [`refine::flag`].
-    pub validity: Plane<u8>,
+    /// The maps.
+    pub maps: Maps,
     /// Iterations done, of all phases together.
     pub iterations: u32,
-}
-
-impl Solution {
-    /// Whether a pixel with these validity bits has a disparity in the final map.
-    #[must_use]
-    pub fn has_disparity(validity: u8) -> bool {
-        validity & flag::INVALID == 0 || validity & flag::FILLED != 0
-    }
-
-    /// The final map in pixels, `+inf` where there is none.
-    #[must_use]
-    pub fn final_map(&self) -> Plane<f32> {
-        pixels(&self.disparity, &self.validity, Self::has_disparity)
-    }
-
-    /// The map before post-processing in pixels, `+inf` on masked pixels.
-    #[must_use]
-    pub fn raw_map(&self) -> Plane<f32> {
-        pixels(&self.raw, &self.validity, |f| f & flag::MASKED == 0)
-    }
-}
-
-fn pixels(fixed: &Plane<i32>, validity: &Plane<u8>, known: impl Fn(u8) -> bool) -> Plane<f32> {
-    let (width, height) = fixed.size();
-    Plane::from_fn(width, height, |x, y| {
-        if known(validity[(x, y)]) { fixed[(x, y)] as f32 / FRACTION as f32 } else { f32::INFINITY }
-    })
+    /// What the stages stood between, and its time: the graph, handing it and the pair over, fetching the maps.
+    pub around: [(&'static str, Duration); 3],
 }
 
 /// Told how far a match is; answers whether to go on.
@@ -74,22 +45,26 @@ pub fn solve(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
     }
     let mut work = Work { observer, done: 0.0, total: total_work(plan) };
     work.begin("graph", 0.0)?;
-    backend.prepare(plan, pair, graph::build(pair.left(), plan))?;
-    work.begin("cost", cells(plan, 0))?;
-    backend.cost()?;
-    for level in 1..plan.levels.len() {
-        work.begin("pyramid", cells(plan, level))?;
-        backend.pyramid(level)?;
-    }
-    for level in 0..plan.levels.len() {
-        work.begin("evidence", 0.0)?;
-        backend.evidence(level)?;
+    let clock = Instant::now();
+    let graphs = graph::build(pair.left(), plan);
+    let graph_time = clock.elapsed();
+    backend.prepare(plan, pair, graphs)?;
+    let upload_time = clock.elapsed().saturating_sub(graph_time);
+    let levels = 0..plan.levels.len();
+    let pyramid = levels.clone().skip(1).map(Stage::Pyramid);
+    for stage in iter::once(Stage::Cost).chain(pyramid).chain(levels.map(Stage::Evidence)) {
+        work.run(backend, plan, stage)?;
     }
     let iterations = propagate(backend, plan, &mut work)?;
-    work.begin("estimate", 0.0)?;
-    let estimate = backend.estimate()?;
-    work.begin("refine", 0.0)?;
-    Ok(refine_estimate(&estimate, plan, pair, iterations))
+    for stage in finish(&plan.method) {
+        work.run(backend, plan, stage)?;
+    }
+    work.begin("maps", 0.0)?;
+    backend.wait()?;
+    let clock = Instant::now();
+    let maps = backend.maps()?;
+    let around = [("graph", graph_time), ("upload", upload_time), ("download", clock.elapsed())];
+    Ok(Solution { maps, iterations, around })
 }
 
 /// Runs the flooding of `plan` on the evidence that `backend` holds; returns the number of iterations.
@@ -112,9 +87,10 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
         if phase.finest < coarsest && plan.phases.len() > 1 {
             // What the coarser levels know reaches the new one before its own messages start. The coarser level's
             // beliefs take in what came up, or the next resolution would take off a message that they do not hold.
-            backend.resolution(phase.finest + 1)?;
-            backend.belief(phase.finest)?;
-            backend.belief(phase.finest + 1)?;
+            let (joining, above) = (phase.finest, phase.finest + 1);
+            for stage in [Stage::Resolution(above), Stage::Belief(joining), Stage::Belief(above)] {
+                work.run(backend, plan, stage)?;
+            }
         }
         let converges = tolerance > 0.0 && phase.finest == 0;
         if converges {
@@ -122,15 +98,14 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
         }
         for _ in 0..phase.iterations {
             iterations += 1;
-            for level in phase.finest..=coarsest {
-                work.begin("dependency", cells(plan, level))?;
-                backend.dependency(level)?;
-            }
-            for level in phase.finest + 1..=coarsest {
-                backend.resolution(level)?;
-            }
-            for level in phase.finest..=coarsest {
-                backend.belief(level)?;
+            let levels = phase.finest..=coarsest;
+            let stages = levels
+                .clone()
+                .map(Stage::Dependency)
+                .chain(levels.clone().skip(1).map(Stage::Resolution))
+                .chain(levels.map(Stage::Belief));
+            for stage in stages {
+                work.run(backend, plan, stage)?;
             }
             if converges {
                 let (sum, pixels) = (backend.change()? as f64, plan.levels[0].pixels() as f64);
@@ -143,41 +118,24 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
     Ok(iterations)
 }
 
-fn refine_estimate(estimate: &Estimate, plan: &Plan, pair: &Pair, iterations: u32) -> Solution {
-    let method = &plan.method;
-    let min = plan.range.min;
-    let guide = pair.left();
-    let (width, height) = plan.size();
-    let labels = estimate.peaks.map(|peak| (min + i32::from(peak.label)) * FRACTION);
-    let raw = if method.sub_pixel {
-        Plane::from_fn(width, height, |x, y| labels[(x, y)] + i32::from(estimate.offsets[(x, y)]))
-    } else {
-        labels.clone()
-    };
-    let mut validity =
-        if method.visibility { refine::visibility(estimate, min) } else { Plane::filled(width, height, 0) };
-    for (flags, &masked) in validity.data_mut().iter_mut().zip(guide.masked.data()) {
-        if masked {
-            *flags = flag::MASKED;
-        }
+/// What follows the last iteration.
+fn finish(method: &Method) -> Vec<Stage> {
+    let mut stages = vec![Stage::Estimate];
+    if method.visibility {
+        stages.push(Stage::RightView);
     }
-    refine::region_filter(&labels, &mut validity, method.region_size as usize);
-    let confidence = refine::confidence(&estimate.peaks, &mut validity, method.confidence_floor);
-    let mut disparity = raw.clone();
-    if method.fill == Fill::Row {
-        refine::fill(&mut disparity, &mut validity);
+    stages.extend([Stage::SubPixel, Stage::Visibility]);
+    if method.region_size > 1 {
+        stages.push(Stage::RegionFilter);
+    }
+    stages.push(Stage::Confidence);
+    if method.fill != Fill::None {
+        stages.push(Stage::Fill);
     }
     if method.median != Median::Off {
-        let weights = MedianWeights::new(
-            method.median_window as usize,
-            method.median_sigma_space,
-            method.median_sigma_range,
-        );
-        let all = method.median == Median::All;
-        disparity =
-            refine::weighted_median(&disparity, &validity, guide, &weights, |f| all || f & flag::FILLED != 0);
+        stages.push(Stage::Median);
     }
-    Solution { disparity, raw, confidence, validity, iterations }
+    stages
 }
 
 /// Progress in cells (pixels times labels) of dependency messages, which take nearly all the time.
@@ -188,6 +146,16 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
+    fn run(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
+        let cells = match stage {
+            Stage::Cost => cells(plan, 0),
+            Stage::Pyramid(z) | Stage::Dependency(z) => cells(plan, z),
+            _ => 0.0,
+        };
+        self.begin(stage.name(), cells)?;
+        backend.run(stage)
+    }
+
     fn begin(&mut self, stage: &'static str, cells: f64) -> Result<()> {
         let progress = Progress { stage, done: (self.done / self.total).min(1.0) };
         self.done += cells;

@@ -1,6 +1,8 @@
 //! Tables of exponentials in integers: the only transcendental function of the method, the same on every
 //! machine because it is evaluated with IEEE additions, multiplications and divisions alone.
 
+use crate::options::Method;
+
 /// exp(-x) for x >= 0, by a Taylor series of exp(x / 2^k) and k squarings; to a relative 1e-11.
 #[must_use]
 pub fn exp_neg(x: f64) -> f64 {
@@ -45,6 +47,80 @@ pub fn census_cost() -> Vec<u8> {
     (0..CENSUS_ENTRIES)
         .map(|h| (AD_CENSUS_UNITS * (1.0 - exp_neg(h as f64 / 30.0)) + 0.5).floor() as u8)
         .collect()
+}
+
+/// Entries of the range table; differences beyond it weigh nothing.
+const MEDIAN_RANGE_ENTRIES: usize = 1024;
+/// Bits of each of the two weights that are multiplied.
+const MEDIAN_WEIGHT_BITS: u32 = 10;
+
+/// Integer weights of the bilateral window: the product of a spatial weight and a range weight, each round(1024
+/// exp(-e)), shifted right by 10. For the range weight, the squared colour difference in sixteenths of an 8-bit level
+/// is rounded down to whole steps of 2^k, the smallest (up to 2^26) of which 1024 exceed 16 variances; a difference of
+/// 1024 steps or more weighs nothing.
+#[derive(Clone, Debug)]
+pub struct MedianWeights {
+    radius: usize,
+    /// By |dx| and |dy|, \[dy\]\[dx\].
+    space: Vec<u32>,
+    /// By squared colour difference, in steps of 2^shift.
+    range: Vec<u32>,
+    shift: u32,
+}
+
+impl MedianWeights {
+    /// The weights that `method` asks for.
+    #[must_use]
+    pub fn of(method: &Method) -> Self {
+        let window = method.median_window as usize;
+        Self::new(window, method.median_sigma_space, method.median_sigma_range)
+    }
+
+    /// Weights for a window of `window` pixels, sigmas in pixels and in the intensity range 0 to 1.
+    #[must_use]
+    pub fn new(window: usize, sigma_space: f64, sigma_range: f64) -> Self {
+        let radius = window / 2;
+        let weight = |e: f64| (f64::from(1 << MEDIAN_WEIGHT_BITS) * exp_neg(e) + 0.5).floor() as u32;
+        let space = (0..=radius)
+            .flat_map(|dy| (0..=radius).map(move |dx| (dx * dx + dy * dy) as f64))
+            .map(|d| weight(d / (2.0 * sigma_space * sigma_space)))
+            .collect();
+        // In squared sixteenths of an 8-bit level; exp(-8) is below half a unit of weight.
+        let twice_variance = 2.0 * (sigma_range * 4080.0) * (sigma_range * 4080.0);
+        let mut shift = 0;
+        while f64::from(1u32 << shift) * MEDIAN_RANGE_ENTRIES as f64 <= 8.0 * twice_variance && shift < 26 {
+            shift += 1;
+        }
+        let range = (0..MEDIAN_RANGE_ENTRIES)
+            .map(|i| weight(i as f64 * f64::from(1u32 << shift) / twice_variance))
+            .collect();
+        Self { radius, space, range, shift }
+    }
+
+    /// Radius of the window in pixels.
+    #[must_use]
+    pub fn radius(&self) -> usize {
+        self.radius
+    }
+
+    /// Bits by which a squared colour difference is shifted right to find its weight.
+    #[must_use]
+    pub fn shift(&self) -> u32 {
+        self.shift
+    }
+
+    /// Spatial weights by |dy| and |dx|, then range weights, as the shader takes them.
+    #[must_use]
+    pub fn words(&self) -> Vec<u32> {
+        [self.space.as_slice(), &self.range].concat()
+    }
+
+    /// Weight of a pixel |dx|, |dy| away whose squared colour difference is `distance`.
+    #[must_use]
+    pub fn weight(&self, dx: usize, dy: usize, distance: u32) -> u32 {
+        let range = self.range.get((distance >> self.shift) as usize).copied().unwrap_or(0);
+        (self.space[dy * (self.radius + 1) + dx] * range) >> MEDIAN_WEIGHT_BITS
+    }
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@
 
 use mrfgs::evaluation::{Report, evaluate};
 use mrfgs::image::{Plane, calib::Calibration, pfm, read};
+use mrfgs::maps::FRACTION;
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
-use mrfgs::refine::FRACTION;
 use mrfgs::{Matched, match_pair};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -32,7 +32,7 @@ fn report(folder: &Path, map: &Plane<f32>) -> Report {
 
 /// A map and itself in whole pixels.
 fn rounded(matched: &Matched) -> Plane<f32> {
-    let map = &matched.solution.disparity;
+    let map = &matched.maps.disparity;
     map.map(|&d| (d + FRACTION / 2).div_euclid(FRACTION) as f32)
 }
 
@@ -50,7 +50,7 @@ fn rendered_scenes() {
     for (scene, avg, bad2, bad05) in floors {
         let folder = Path::new("testdata").join(scene);
         let matched = matched(&folder, &Method::default());
-        let all = report(&folder, &matched.solution.final_map()).all;
+        let all = report(&folder, &matched.maps.final_map()).all;
         println!("{scene}: avg {:.3}, bad2.0 {:.2}, bad0.5 {:.2}", all.avg.unwrap(), all.bad[2], all.bad[0]);
         assert!((all.density - 100.0).abs() < 1e-9);
         assert!(all.avg.unwrap() <= avg && all.bad[2] <= bad2 && all.bad[0] <= bad05, "{scene}: {all:?}");
@@ -76,12 +76,12 @@ fn real_pairs() {
     for (pair, (avg, bad2), (raw_avg, raw_psnr, raw_bad2)) in floors {
         let folder = Path::new(&folder).join(pair);
         let matched = matched(&folder, &Method::default());
-        let all = report(&folder, &matched.solution.final_map()).all;
+        let all = report(&folder, &matched.maps.final_map()).all;
         println!("{pair}: avg {:.3}, bad2.0 {:.2}, bad0.5 {:.2}", all.avg.unwrap(), all.bad[2], all.bad[0]);
         assert!((all.density - 100.0).abs() < 1e-9);
         assert!(all.avg.unwrap() <= avg && all.bad[2] <= bad2, "{pair}: {all:?}");
         assert!(all.bad[0] < report(&folder, &rounded(&matched)).all.bad[0], "{pair}");
-        let raw = report(&folder, &matched.solution.raw_map()).all;
+        let raw = report(&folder, &matched.maps.raw_map()).all;
         assert!(
             raw.avg.unwrap() < raw_avg && raw.psnr.unwrap() > raw_psnr && raw.bad[2] < raw_bad2,
             "{pair}: {raw:?}"

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use mrfgs::image::read;
+use mrfgs::maps::flag;
 use mrfgs::options::{self, Method};
-use mrfgs::refine::flag;
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -7,8 +7,8 @@ mod common;
 
 use common::devices;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::Ceiling;
-use mrfgs::backend::{Backend, Volume};
+use mrfgs::backend::gpu::Handicap;
+use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::plan::Plan;
@@ -38,10 +38,10 @@ fn differences(a: &Solution, b: &Solution) -> Vec<&'static str> {
             all.push(name);
         }
     };
-    add("disparity", a.disparity != b.disparity);
-    add("raw", a.raw != b.raw);
-    add("confidence", a.confidence != b.confidence);
-    add("validity", a.validity != b.validity);
+    add("disparity", a.maps.disparity != b.maps.disparity);
+    add("raw", a.maps.raw != b.maps.raw);
+    add("confidence", a.maps.confidence != b.maps.confidence);
+    add("validity", a.maps.validity != b.maps.validity);
     add("iterations", a.iterations != b.iterations);
     all
 }
@@ -99,7 +99,11 @@ fn a_device_that_shows_little_at_once() {
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         // From a few bands to bands of a row or two.
         for max_binding in [4 << 20, 1 << 20, 700_000] {
-            let Some(mut gpu) = devices::open(Ceiling { max_binding: Some(max_binding) }) else { return };
+            let Some(mut gpu) =
+                devices::open(Handicap { max_binding: Some(max_binding), ..Handicap::default() })
+            else {
+                return;
+            };
             let actual = matched(&mut gpu, &pair, range, &method);
             assert!(
                 differences(&actual, &expected).is_empty(),
@@ -112,7 +116,9 @@ fn a_device_that_shows_little_at_once() {
 
 #[test]
 fn a_device_that_shows_too_little_says_so() {
-    let Some(mut gpu) = devices::open(Ceiling { max_binding: Some(100_000) }) else { return };
+    let Some(mut gpu) = devices::open(Handicap { max_binding: Some(100_000), ..Handicap::default() }) else {
+        return;
+    };
     let (pair, range) = load(Path::new("testdata/mixed"));
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
@@ -186,7 +192,7 @@ fn volumes_of_a_real_pair() {
     let backends: [&mut dyn Backend; 2] = [&mut cpu, &mut gpu];
     let costs = backends.map(|backend| {
         backend.prepare(&plan, &pair, graphs.clone()).unwrap();
-        backend.cost().unwrap();
+        backend.run(Stage::Cost).unwrap();
         backend.read(Volume::Cost(0)).unwrap()
     });
     assert!(costs[0] == costs[1]);

@@ -6,11 +6,11 @@
 
 mod common;
 
-use common::compare::{compare, compare_maps};
+use common::compare::{compare, compare_finest, compare_maps};
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::backend::{Backend, Volume};
+use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
 use mrfgs::options::{Cost, Method, PRESETS, Potential, Pyramid, Resolution, Schedule};
@@ -159,7 +159,7 @@ fn cost() {
             backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();
             let poison: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, 255)).collect();
             backend.write(Volume::Cost(0), &poison).unwrap();
-            backend.cost().unwrap();
+            backend.run(Stage::Cost).unwrap();
             same(&plan, backend, Volume::Cost(0), &twin::cost::cost(&plan, &case.pair))?;
         }
         Ok(())
@@ -175,7 +175,7 @@ fn cost_with_the_largest_window() {
     let pair = random::pair(&mut random, 37, 33);
     for (name, mut backend) in backends() {
         backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
-        backend.cost().unwrap();
+        backend.run(Stage::Cost).unwrap();
         if let Err(e) = same(&plan, backend.as_mut(), Volume::Cost(0), &twin::cost::cost(&plan, &pair)) {
             panic!("{name}: {e}");
         }
@@ -190,7 +190,7 @@ fn pyramid() {
             let poison = random_cost(random, &case.plan, z);
             backend.write(Volume::Cost(z - 1), &fine).unwrap();
             backend.write(Volume::Cost(z), &poison).unwrap();
-            backend.pyramid(z).unwrap();
+            backend.run(Stage::Pyramid(z)).unwrap();
             same(&case.plan, backend, Volume::Cost(z), &twin::pyramid::pyramid(&case.plan, z, &fine))?;
             same(&case.plan, backend, Volume::Cost(z - 1), &fine)?;
         }
@@ -207,7 +207,7 @@ fn evidence() {
             backend.write(Volume::Cost(z), &cost).unwrap();
             backend.write(Volume::Evidence(z), &poison).unwrap();
             backend.write(Volume::Belief(z), &poison).unwrap();
-            backend.evidence(z).unwrap();
+            backend.run(Stage::Evidence(z)).unwrap();
             let expected = twin::evidence::evidence(&case.plan, z, &cost);
             same(&case.plan, backend, Volume::Evidence(z), &expected)?;
             same(&case.plan, backend, Volume::Belief(z), &expected)?;
@@ -223,7 +223,7 @@ fn dependency() {
             let state = random::state(random, &case.plan, &case.graphs, loose);
             state.write(backend);
             for (z, graph) in case.graphs.iter().enumerate() {
-                backend.dependency(z).unwrap();
+                backend.run(Stage::Dependency(z)).unwrap();
                 let expected = twin::dependency::dependency(
                     &case.plan,
                     z,
@@ -246,7 +246,7 @@ fn resolution() {
             let mut state = random::state(random, &case.plan, &case.graphs, loose);
             state.write(backend);
             for z in 1..case.plan.levels.len() {
-                backend.resolution(z).unwrap();
+                backend.run(Stage::Resolution(z)).unwrap();
                 resolve(&case.plan, &mut state, z);
                 same(&case.plan, backend, Volume::Down(z - 1), &state.down[z - 1])?;
                 same(&case.plan, backend, Volume::Up(z), &state.up[z])?;
@@ -263,7 +263,7 @@ fn belief() {
         state.write(backend);
         for z in 0..case.plan.levels.len() {
             backend.write(Volume::Belief(z), &vec![50_000; cells(&case.plan, z)]).unwrap();
-            backend.belief(z).unwrap();
+            backend.run(Stage::Belief(z)).unwrap();
             same(&case.plan, backend, Volume::Belief(z), &state.belief[z])?;
         }
         Ok(())
@@ -279,7 +279,7 @@ fn a_flood_goes_on_from_a_written_state() {
             state.write(backend);
             for _ in 0..2 {
                 for (z, graph) in case.graphs.iter().enumerate() {
-                    backend.dependency(z).unwrap();
+                    backend.run(Stage::Dependency(z)).unwrap();
                     state.dependency[z] = twin::dependency::dependency(
                         &case.plan,
                         z,
@@ -289,11 +289,11 @@ fn a_flood_goes_on_from_a_written_state() {
                     );
                 }
                 for z in 1..case.plan.levels.len() {
-                    backend.resolution(z).unwrap();
+                    backend.run(Stage::Resolution(z)).unwrap();
                     resolve(&case.plan, &mut state, z);
                 }
                 for z in 0..case.plan.levels.len() {
-                    backend.belief(z).unwrap();
+                    backend.run(Stage::Belief(z)).unwrap();
                 }
                 state.believe(&case.plan, &case.graphs);
                 for (volume, expected) in state.volumes() {
@@ -332,14 +332,22 @@ fn estimate() {
             backend.write(Volume::Belief(0), &belief).unwrap();
             let cost = random_cost(random, &case.plan, 0);
             backend.write(Volume::Cost(0), &cost).unwrap();
-            let (actual, expected) =
-                (backend.estimate().unwrap(), twin::estimate::estimate(&case.plan, &cost, &belief));
-            compare_maps("peaks", &actual.peaks, &expected.peaks)?;
-            compare_maps("offsets", &actual.offsets, &expected.offsets)?;
-            compare_maps("right view", &actual.right, &expected.right)?;
+            let mut maps = random::finest(random, &case.plan, false);
+            maps.write(backend);
+            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+                backend.run(stage).unwrap();
+            }
+            twin_estimate(&case.plan, &cost, &belief, &mut maps);
+            compare_finest(backend, &maps)?;
         }
         Ok(())
     });
+}
+
+fn twin_estimate(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {
+    twin::estimate::estimate(plan, belief, maps);
+    twin::estimate::right_view(plan, belief, maps);
+    twin::sub_pixel::sub_pixel(plan, cost, maps);
 }
 
 /// The twin's resolution messages of one level, into the state.
@@ -413,16 +421,17 @@ fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
         costs.iter().enumerate().map(|(z, cost)| twin::evidence::evidence(plan, z, cost)).collect();
     let mut state = State::fresh(plan, evidence);
     let iterations = twin_flood(plan, &graphs, &mut state);
-    let estimate = twin::estimate::estimate(plan, &costs[0], &state.belief[0]);
+    let mut maps = twin::Finest::zero(plan.size());
+    twin_estimate(plan, &costs[0], &state.belief[0], &mut maps);
     for (name, mut backend) in backends() {
         let backend = backend.as_mut();
         backend.prepare(plan, pair, graphs.clone()).unwrap();
-        backend.cost().unwrap();
+        backend.run(Stage::Cost).unwrap();
         for z in 1..plan.levels.len() {
-            backend.pyramid(z).unwrap();
+            backend.run(Stage::Pyramid(z)).unwrap();
         }
         for z in 0..plan.levels.len() {
-            backend.evidence(z).unwrap();
+            backend.run(Stage::Evidence(z)).unwrap();
         }
         let check = |backend: &mut dyn Backend| -> Result<(), String> {
             let actual = solver::flood(backend, plan).unwrap();
@@ -435,10 +444,11 @@ fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
             for (volume, expected) in state.volumes() {
                 same(plan, backend, volume, expected)?;
             }
-            let actual = backend.estimate().unwrap();
-            compare_maps("peaks", &actual.peaks, &estimate.peaks)?;
-            compare_maps("offsets", &actual.offsets, &estimate.offsets)?;
-            compare_maps("right view", &actual.right, &estimate.right)
+            twin::Finest::zero(plan.size()).write(backend);
+            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+                backend.run(stage).unwrap();
+            }
+            compare_finest(backend, &maps)
         };
         if let Err(e) = check(backend) {
             panic!("{name}: {e}\n{:?}", plan.method);

@@ -28,6 +28,9 @@ struct Params {
     // The band: the stage works on rows first_row .. first_row + rows of the level.
     @align(16) first_row: u32,
     rows: u32,
+    // Workgroups that make up a row, and workgroups of the dispatch in x.
+    row_groups: u32,
+    grid: u32,
     outside_cost: u32,
     sad_radius: i32,
     // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
@@ -37,9 +40,37 @@ struct Params {
     evidence_cap: u32,
     // Cut of the messages that the stage writes.
     tau: u32,
+    // What of the method is wanted, 1 or 0.
+    sub_pixel: u32,
+    visibility: u32,
+    median_all: u32,
+    // Regions of fewer pixels are too small.
+    region_size: u32,
+    confidence_floor: u32,
+    // Rows around the band that the stage sees.
+    halo: u32,
+    // Rows of the blocks that are joined, 0 to join the segments of each row, and the columns to do it in.
+    span: u32,
+    first_column: u32,
+    columns: u32,
+    // Rows of the map that the fill takes values from.
+    source_first_row: u32,
+    source_rows: u32,
+    median_radius: u32,
+    median_shift: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
+
+const GROUP: u32 = 64u;
+
+// Column and row of an invocation. Rows follow each other in workgroups that fold where a dispatch allows no more of
+// them in one dimension.
+fn place(group: vec3<u32>, lane: u32) -> vec2<u32> {
+    let linear = group.x + group.y * params.grid;
+    let row = linear / params.row_groups;
+    return vec2((linear - row * params.row_groups) * GROUP + lane, row);
+}
 
 // Rows that a stage reads above its band start here.
 fn halo_start(halo: u32) -> u32 {

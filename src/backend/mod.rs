@@ -1,7 +1,7 @@
-//! The seam: what every backend can do, one method a stage.
+//! The seam: what every backend can do, stage by stage.
 //!
 //! A backend knows stages, not their order; [`crate::solver`] alone knows that. Everything from the matching cost
-//! on is integer arithmetic, so all backends give the same bits. The documentation of each method is the
+//! on is integer arithmetic, so all backends give the same bits. The documentation of each [`Stage`] is the
 //! definition that the CPU stage, the shader and the naive twin in the tests follow independently.
 
 pub mod cpu;
@@ -10,33 +10,12 @@ pub mod gpu;
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
+use crate::maps::Maps;
 use crate::plan::Plan;
+use std::time::Duration;
 
 /// Stands for "no label", in the right view where no left pixel projects.
 pub const NO_LABEL: u16 = u16::MAX;
-
-/// The belief of one pixel around its optimum, in units.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Peak {
-    /// Index of the label with the smallest belief, the lowest on ties.
-    pub label: u16,
-    /// Its belief.
-    pub best: u16,
-    /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
-    pub rival: u16,
-}
-
-/// What leaves a backend after the last iteration.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Estimate {
-    /// The optimum of each pixel of the reference view.
-    pub peaks: Plane<Peak>,
-    /// How far the disparity of each pixel is above its label, in 1/256 px, -128 ..= 128.
-    pub offsets: Plane<i16>,
-    /// Label index of each pixel of the right view, read off the same beliefs; [`NO_LABEL`] where no left pixel
-    /// projects.
-    pub right: Plane<u16>,
-}
 
 /// A volume that tests and diagnostics may read and write, in the layout \[y\]\[x\]\[slot\]\[label\] (slot only
 /// for dependency messages), unpadded, one value an element.
@@ -71,18 +50,44 @@ impl Volume {
     }
 }
 
-/// The stages of the method. Each fails with [`crate::Error::Device`] when its device does, and otherwise never.
-#[allow(clippy::missing_errors_doc, reason = "said once, above")]
-pub trait Backend {
-    /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
-    fn describe(&self) -> String;
+/// A map that tests and diagnostics may read and write, one value a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Map {
+    /// Index of the label with the smallest belief, the lowest on ties.
+    Label,
+    /// Its belief, in units.
+    Best,
+    /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
+    Rival,
+    /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
+    RightLabel,
+    /// Disparity before post-processing, in 1/256 px.
+    Raw,
+    /// Disparity as far as post-processing is done, in 1/256 px.
+    Disparity,
+    /// Bits of [`crate::maps::flag`].
+    Validity,
+    /// Confidence, 0 ..= 255.
+    Confidence,
+}
 
-    /// Takes the pair and the graphs of all levels of `plan`, allocates all buffers, and sets all messages to 0.
-    ///
-    /// # Errors
-    /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
-    fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
+impl Map {
+    /// Every map there is.
+    pub const ALL: [Self; 8] = [
+        Self::Label,
+        Self::Best,
+        Self::Rival,
+        Self::RightLabel,
+        Self::Raw,
+        Self::Disparity,
+        Self::Validity,
+        Self::Confidence,
+    ];
+}
 
+/// A stage of the method, with its level where it has one. Each variant's documentation is the exact definition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
     /// Matching cost of level 0, 0 ..= [`crate::plan::COST_MAX`].
     ///
     /// The cost of pixel (x, y) and disparity d compares left (x, y) with right (x - d, y). It is
@@ -93,30 +98,26 @@ pub trait Backend {
     /// - AD-census: [`crate::tables::ad_cost`] at (|dr| + |dg| + |db|) >> 8 plus [`crate::tables::census_cost`] at the
     ///   number of census bits that differ. The census of a pixel has a bit for each other place of a 9 x 7
     ///   window, set where that place, clamped to the image, is unmasked and its grey is below the centre's.
-    fn cost(&mut self) -> Result<()>;
-
-    /// Cost of `level` (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
+    Cost,
+    /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
     /// 256 times).
     ///
     /// First x and y: for each fine label the 5 x 5 binomial mean (1 4 6 4 1, outer product) around (2 x, 2 y),
     /// coordinates clamped to the image, rounded as (sum + 128) >> 8. Then d, from those means: for coarse label z, with
     /// low-pass their binomial mean over the fine labels 2 z - 2 ..= 2 z + 2, labels clamped to the fine range, rounded as
     /// (sum + 8) >> 4; with the minimum, the smallest at those labels of 2 z - 1 ..= 2 z + 1 that are in the range.
-    fn pyramid(&mut self, level: usize) -> Result<()>;
-
-    /// Evidence of `level` from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
+    Pyramid(usize),
+    /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
     /// beliefs equal to the evidence.
-    fn evidence(&mut self, level: usize) -> Result<()>;
-
-    /// Messages of the dependency factors of `level`, from the beliefs and their own old messages.
+    Evidence(usize),
+    /// Messages of the dependency factors of a level, from the beliefs and their own old messages.
     ///
     /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
     /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, cut by
     /// [`Plan::dependency`] with its bounds for the smallest s. A factor of one member, and a slot without
     /// one, keep the message they have: 0, from the start.
-    fn dependency(&mut self, level: usize) -> Result<()>;
-
-    /// Messages of the resolution factors between `level` (1 or coarser) and the next finer one, in both directions,
+    Dependency(usize),
+    /// Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both directions,
     /// from the beliefs and their own old messages.
     ///
     /// Each coarse pixel (x, y) has one factor with its children (2 x, 2 y) to (2 x + 1, 2 y + 1), as far as they are
@@ -126,33 +127,139 @@ pub trait Backend {
     /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
     /// infinite if none does. Each s is cut by [`Plan::resolution`] with its bounds for the smallest s. Infinite is
     /// 2^20, and sums saturate there; where every s is infinite, the message is 0.
-    fn resolution(&mut self, level: usize) -> Result<()>;
-
-    /// Beliefs of `level`: evidence, plus every dependency message to the pixel, plus the resolution messages from
+    Resolution(usize),
+    /// Beliefs of a level: evidence, plus every dependency message to the pixel, plus the resolution messages from
     /// above and from below.
-    fn belief(&mut self, level: usize) -> Result<()>;
-
+    Belief(usize),
     /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
-    /// call (of label indices; from 0 on the first call).
-    fn change(&mut self) -> Result<u64>;
-
-    /// The optimum of every pixel, its offset between labels, and the map of the right view.
+    /// time (of label indices; from 0 the first time), which [`Backend::change`] returns.
+    Change,
+    /// [`Map::Label`], [`Map::Best`] and [`Map::Rival`] of level 0.
+    Estimate,
+    /// [`Map::RightLabel`]: at (x, y) the label with the smallest belief of left pixel (x + d, y) among those inside, the
+    /// lowest on ties.
+    RightView,
+    /// [`Map::Raw`], and [`Map::Disparity`] equal to it: the label and, where [`crate::options::Method::sub_pixel`] asks
+    /// for it, its offset.
     ///
     /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
     /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 3 x 3
     /// neighbourhood, as far as it is inside, whose own label is at most one away. With s = max(a, c) - b it is
     /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0 or at an end of the range. (The cost and
     /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
+    SubPixel,
+    /// [`Map::Validity`]: [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
+    /// [`crate::options::Method::visibility`] asks for it, [`flag::OUTSIDE`] where the match is outside the right image
+    /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
     ///
-    /// The right view has at (x, y) the d with the smallest belief of left pixel (x + d, y) among those inside, the lowest
-    /// on ties.
-    fn estimate(&mut self) -> Result<Estimate>;
+    /// [`flag::MASKED`]: crate::maps::flag::MASKED
+    /// [`flag::OUTSIDE`]: crate::maps::flag::OUTSIDE
+    /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
+    Visibility,
+    /// Sets [`flag::SMALL_REGION`](crate::maps::flag::SMALL_REGION) on every pixel of each region of fewer than
+    /// [`crate::options::Method::region_size`] pixels. Regions are of the pixels that [`Stage::Visibility`] left without a
+    /// flag, 4-connected; labels that differ by at most one connect.
+    RegionFilter,
+    /// [`Map::Confidence`]: how far the best rival is behind the optimum, in half units (eighths of a nat), at most 255;
+    /// 255 where there is no rival, 0 for invalid pixels. Sets
+    /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
+    /// [`crate::options::Method::confidence_floor`].
+    Confidence,
+    /// Fills [`Map::Disparity`] on every invalid pixel that is not masked with the smaller of the nearest valid
+    /// disparities to the left and to the right on its row, or the one there is: what is occluded belongs to the
+    /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
+    /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
+    Fill,
+    /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::Method::median`] names and that have a
+    /// disparity, over the pixels of the window that have one: the smallest value at which half of the weight is
+    /// reached. Weights are [`crate::tables::MedianWeights`] of the left image.
+    Median,
+}
+
+impl Stage {
+    /// Its name, which is its shader's and its module's too.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cost => "cost",
+            Self::Pyramid(_) => "pyramid",
+            Self::Evidence(_) => "evidence",
+            Self::Dependency(_) => "dependency",
+            Self::Resolution(_) => "resolution",
+            Self::Belief(_) => "belief",
+            Self::Change => "change",
+            Self::Estimate => "estimate",
+            Self::RightView => "right view",
+            Self::SubPixel => "sub-pixel",
+            Self::Visibility => "visibility",
+            Self::RegionFilter => "region filter",
+            Self::Confidence => "confidence",
+            Self::Fill => "fill",
+            Self::Median => "median",
+        }
+    }
+
+    /// The level it works on, where it is not the finest by nature.
+    #[must_use]
+    pub fn level(self) -> Option<usize> {
+        match self {
+            Self::Pyramid(z)
+            | Self::Evidence(z)
+            | Self::Dependency(z)
+            | Self::Resolution(z)
+            | Self::Belief(z) => Some(z),
+            _ => None,
+        }
+    }
+}
+
+/// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
+#[allow(clippy::missing_errors_doc, reason = "said once, above")]
+pub trait Backend {
+    /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
+    fn describe(&self) -> String;
+
+    /// Takes the pair and the graphs of all levels of `plan`, and sets all messages, and the map that
+    /// [`Stage::Change`] compares with, to 0. All that the stages need is allocated here, from the plan alone; a second
+    /// pair of the same plan goes into the same buffers.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
+    fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
+
+    /// Runs a stage. Devices may still be at it when this returns.
+    fn run(&mut self, stage: Stage) -> Result<()>;
+
+    /// Runs [`Stage::Change`] and returns its sum.
+    fn change(&mut self) -> Result<u64>;
+
+    /// Waits until every stage has run.
+    fn wait(&mut self) -> Result<()>;
+
+    /// The maps, once all stages before have run.
+    fn maps(&mut self) -> Result<Maps>;
+
+    /// Starts to take the time of every stage, or stops.
+    fn keep_time(&mut self, on: bool) -> Result<()>;
+
+    /// The time of every run of a stage since [`Backend::keep_time`] was last called, in order: a device's own where it has
+    /// a clock.
+    fn times(&mut self) -> Result<Vec<(Stage, Duration)>>;
 
     /// The values of `volume`.
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>>;
 
     /// Replaces the values of `volume`.
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()>;
+
+    /// The values of `map`.
+    fn read_map(&mut self, map: Map) -> Result<Plane<i32>>;
+
+    /// Replaces the values of `map`.
+    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()>;
+
+    /// Overwrites every buffer with `byte`: whatever the next match of the same plan reads before it wrote it, shows.
+    fn poison(&mut self, byte: u8) -> Result<()>;
 }
 
 /// Number of values in `volume` under `plan`, and labels in a row of them, without and with padding.

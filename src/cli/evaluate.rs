@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mrfgs::evaluation::{GroundTruth, Report, Row, mean, table};
 use mrfgs::image::{Pair, Plane, calib::Calibration, read, write};
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Error, Result};
+use mrfgs::{Error, Matcher, Result};
 use serde::Serialize;
 
 use super::{ExecutionArgs, MethodArgs, outputs};
@@ -194,16 +194,17 @@ fn match_all(args: &Args) -> Result<Findings> {
             }
         }
     }
+    let mut matcher = Matcher::new(&execution)?;
     let mut figures = Vec::new();
     let mut ran_on = None;
     for dir in &args.dirs {
         let scene = Scene::read(dir)?;
         let name = Some(scene.name.as_str());
         let (matched, time) =
-            super::match_and_tell(&scene.pair, scene.range, &method, &execution, name, false)?;
+            super::match_and_tell(&mut matcher, &scene.pair, scene.range, &method, name, false)?;
         figures.push(Figures {
-            raw: Some(scene.ground.evaluate(&matched.solution.raw_map())?),
-            finished: scene.ground.evaluate(&matched.solution.final_map())?,
+            raw: Some(scene.ground.evaluate(&matched.maps.raw_map())?),
+            finished: scene.ground.evaluate(&matched.maps.final_map())?,
             name: scene.name,
             seconds: Some(time.as_secs_f64()),
         });

@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use mrfgs::image::{Pair, calib::Calibration, colour, read, write};
+use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
 use mrfgs::plan::{MessageWidth, Plan};
-use mrfgs::solver::Solution;
-use mrfgs::{Error, Result};
+use mrfgs::{Error, Matcher, Result};
 
 use super::outputs::{self, Written};
 use super::{ExecutionArgs, MethodArgs, bytes, plural};
@@ -51,7 +51,7 @@ pub(super) struct Args {
     #[arg(long)]
     dry_run: bool,
     /// Prints nothing but failures
-    #[arg(long)]
+    #[arg(long, conflicts_with = "timings")]
     quiet: bool,
 
     #[command(flatten)]
@@ -94,8 +94,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.dry_run {
         return super::print(&describe(&Plan::new(pair.size().0, pair.size().1, range, &method)?));
     }
-    let (matched, _) = super::match_and_tell(&pair, range, &method, &execution, None, args.quiet)?;
-    write_outputs(args, range, &matched.solution)
+    let mut matcher = Matcher::new(&execution)?;
+    let (matched, _) = super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet)?;
+    write_outputs(args, range, &matched.maps)
 }
 
 /// The range to search.
@@ -160,18 +161,18 @@ fn check_outputs(args: &Args, range: DisparityRange) -> Result<()> {
 }
 
 /// Writes all outputs or leaves none of them.
-fn write_outputs(args: &Args, range: DisparityRange, solution: &Solution) -> Result<()> {
-    let map = solution.final_map();
+fn write_outputs(args: &Args, range: DisparityRange, maps: &Maps) -> Result<()> {
+    let map = maps.final_map();
     let mut written = Written::default();
     written.note(&args.output, write::disparity(&args.output, &map))?;
     if let Some(path) = &args.raw {
-        written.note(path, write::disparity(path, &solution.raw_map()))?;
+        written.note(path, write::disparity(path, &maps.raw_map()))?;
     }
     if let Some(path) = &args.confidence {
-        written.note(path, write::grey8(path, &solution.confidence))?;
+        written.note(path, write::grey8(path, &maps.confidence))?;
     }
     if let Some(path) = &args.validity {
-        written.note(path, write::grey8(path, &solution.validity))?;
+        written.note(path, write::grey8(path, &maps.validity))?;
     }
     if let Some(path) = &args.preview {
         let picture = colour::preview(&map, range.min as f32, range.max as f32);
@@ -199,6 +200,7 @@ fn describe(plan: &Plan) -> String {
         let labels = format!("{} to {} ({})", level.min, level.max(), level.labels);
         let _ = writeln!(out, "{z:>5}  {size:>18}    {labels:20} {:>9}", bytes(plan.level_bytes(z)));
     }
+    let _ = writeln!(out, " maps{:>52}", bytes(plan.map_bytes()));
     let _ = writeln!(out, "  all{:>52}\n", bytes(plan.bytes()));
     let width = match plan.message_width {
         MessageWidth::Narrow => 8,

@@ -7,7 +7,7 @@ mod outputs;
 mod presets;
 mod progress;
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -18,7 +18,7 @@ use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
-use mrfgs::{Error, Matched, Result, match_pair};
+use mrfgs::{Error, Matched, Matcher, Result, Timing};
 use progress::Bar;
 
 const ABOUT: &str = "\
@@ -201,6 +201,9 @@ struct ExecutionArgs {
     /// Threads of the CPU path, 1 to 1024 [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Prints the time of every stage to standard error, by the device's own clock where it has one
+    #[arg(long)]
+    timings: bool,
 }
 
 impl ExecutionArgs {
@@ -217,6 +220,7 @@ impl ExecutionArgs {
             },
             device: self.device.clone(),
             threads: self.threads.map(usize::from),
+            timings: self.timings,
         })
     }
 }
@@ -234,16 +238,16 @@ fn calibrated_range(path: &Path, calibration: &Calibration, min: i32) -> Result<
 /// Matches a pair with a progress bar, and says on standard error what ran where and how long. `name` tells pairs
 /// apart where there are several.
 fn match_and_tell(
+    matcher: &mut Matcher,
     pair: &Pair,
     range: DisparityRange,
     method: &Method,
-    execution: &Execution,
     name: Option<&str>,
     quiet: bool,
 ) -> Result<(Matched, Duration)> {
     let start = Instant::now();
     let mut bar = Bar::new(name, quiet);
-    let matched = match_pair(pair, range, method, execution, &mut |progress| bar.update(progress));
+    let matched = matcher.run(pair, range, method, &mut |progress| bar.update(progress));
     bar.finish();
     let (matched, time) = (matched?, start.elapsed());
     if !quiet {
@@ -252,7 +256,7 @@ fn match_and_tell(
         }
         let (width, height) = matched.plan.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
-        let (labels, iterations) = (range.labels(), matched.solution.iterations);
+        let (labels, iterations) = (range.labels(), matched.iterations);
         say(&format!(
             "{name}{width} x {height}, {labels} label{}, {iterations} iteration{} in {:.2} s on {}",
             plural(labels),
@@ -260,8 +264,27 @@ fn match_and_tell(
             time.as_secs_f64(),
             matched.ran_on
         ));
+        if !matched.timings.is_empty() {
+            let _ = std::io::stderr().write_all(timing_table(&matched.timings, time).as_bytes());
+        }
     }
     Ok((matched, time))
+}
+
+/// Stages and their times for people; `whole` is the time of it all.
+fn timing_table(timings: &[Timing], whole: Duration) -> String {
+    let mut out = format!("{:<24}{:>6}{:>12}{:>9}\n", "stage", "runs", "ms", "share");
+    let mut row = |name: &str, runs: &str, time: Duration| {
+        let share = 100.0 * time.as_secs_f64() / whole.as_secs_f64();
+        let _ = writeln!(out, "{name:<24}{runs:>6}{:>12.2}{share:>7.1} %", 1000.0 * time.as_secs_f64());
+    };
+    for timing in timings {
+        let level = timing.level.map_or(String::new(), |z| format!(", level {z}"));
+        row(&format!("{}{level}", timing.stage), &timing.runs.to_string(), timing.time);
+    }
+    row("rest", "", whole.saturating_sub(timings.iter().map(|t| t.time).sum()));
+    row("all", "", whole);
+    out
 }
 
 fn plural(count: usize) -> &'static str {

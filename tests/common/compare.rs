@@ -1,6 +1,7 @@
 //! Comparison of volumes and maps that says where they part.
 
-use mrfgs::backend::{Volume, volume_shape};
+use super::twin::Finest;
+use mrfgs::backend::{Backend, Volume, volume_shape};
 use mrfgs::image::Plane;
 use mrfgs::plan::Plan;
 use std::fmt::Debug;
@@ -30,6 +31,14 @@ pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) ->
         actual[first],
         expected[first]
     ))
+}
+
+/// The first map of a backend that differs from the twin's.
+pub fn compare_finest(backend: &mut dyn Backend, expected: &Finest) -> Result<(), String> {
+    for (map, plane) in expected.planes() {
+        compare_maps(&format!("{map:?}"), &backend.read_map(map).unwrap(), plane)?;
+    }
+    Ok(())
 }
 
 /// Where two maps first differ, and how often.

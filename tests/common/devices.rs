@@ -2,21 +2,23 @@
 
 use mrfgs::Result;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::{Ceiling, Gpu};
-use mrfgs::backend::{Backend, Estimate, Volume};
+use mrfgs::backend::gpu::{Gpu, Handicap};
+use mrfgs::backend::{Backend, Map, Stage, Volume};
 use mrfgs::graph::LevelGraph;
-use mrfgs::image::Pair;
+use mrfgs::image::{Pair, Plane};
+use mrfgs::maps::Maps;
 use mrfgs::plan::Plan;
 use std::io::Write;
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 /// Devices that no test is using: opening one and compiling its shaders takes longer than most tests.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
-/// A GPU of its own, kept below `ceiling`. `None`, said on stderr, where there is no driver; a panic where
+/// A GPU of its own, with a handicap. `None`, said on stderr, where there is no driver; a panic where
 /// `MRFGS_REQUIRE_GPU` is set and not 0.
-pub fn open(ceiling: Ceiling) -> Option<Gpu> {
-    match Gpu::with_ceiling(None, ceiling) {
+pub fn open(handicap: Handicap) -> Option<Gpu> {
+    match Gpu::with_handicap(None, handicap) {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
@@ -31,7 +33,7 @@ pub fn open(ceiling: Ceiling) -> Option<Gpu> {
 /// A device, an idle one if there is one.
 pub fn gpu() -> Option<Pooled> {
     let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
-    idle.or_else(|| open(Ceiling::default())).map(|gpu| Pooled(Some(gpu)))
+    idle.or_else(|| open(Handicap::default())).map(|gpu| Pooled(Some(gpu)))
 }
 
 /// Name and a fresh instance of every backend.
@@ -72,36 +74,28 @@ impl Backend for Pooled {
         self.gpu().prepare(plan, pair, graphs)
     }
 
-    fn cost(&mut self) -> Result<()> {
-        self.gpu().cost()
-    }
-
-    fn pyramid(&mut self, level: usize) -> Result<()> {
-        self.gpu().pyramid(level)
-    }
-
-    fn evidence(&mut self, level: usize) -> Result<()> {
-        self.gpu().evidence(level)
-    }
-
-    fn dependency(&mut self, level: usize) -> Result<()> {
-        self.gpu().dependency(level)
-    }
-
-    fn resolution(&mut self, level: usize) -> Result<()> {
-        self.gpu().resolution(level)
-    }
-
-    fn belief(&mut self, level: usize) -> Result<()> {
-        self.gpu().belief(level)
+    fn run(&mut self, stage: Stage) -> Result<()> {
+        self.gpu().run(stage)
     }
 
     fn change(&mut self) -> Result<u64> {
         self.gpu().change()
     }
 
-    fn estimate(&mut self) -> Result<Estimate> {
-        self.gpu().estimate()
+    fn wait(&mut self) -> Result<()> {
+        self.gpu().wait()
+    }
+
+    fn maps(&mut self) -> Result<Maps> {
+        self.gpu().maps()
+    }
+
+    fn keep_time(&mut self, on: bool) -> Result<()> {
+        self.gpu().keep_time(on)
+    }
+
+    fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
+        self.gpu().times()
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
@@ -110,5 +104,17 @@ impl Backend for Pooled {
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         self.gpu().write(volume, values)
+    }
+
+    fn read_map(&mut self, map: Map) -> Result<Plane<i32>> {
+        self.gpu().read_map(map)
+    }
+
+    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
+        self.gpu().write_map(map, values)
+    }
+
+    fn poison(&mut self, byte: u8) -> Result<()> {
+        self.gpu().poison(byte)
     }
 }

@@ -1,12 +1,12 @@
 //! Seeded random input: images, pairs, methods, graphs, and states of the volumes that keep the invariants.
 
-use super::twin;
-use mrfgs::backend::{Backend, Estimate, NO_LABEL, Peak, Volume};
+use super::twin::{self, Finest};
+use mrfgs::backend::{Backend, NO_LABEL, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::maps::flag;
 use mrfgs::options::{Cost, DisparityRange, Fill, Median, Method, Potential, Pyramid, Resolution, Schedule};
 use mrfgs::plan::Plan;
-use mrfgs::refine::flag;
 
 /// The splitmix64 generator (Steele, Lea and Flood 2014).
 pub struct Random(u64);
@@ -338,39 +338,56 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
     state
 }
 
-/// Peaks and a right view as a backend may leave them: some at the ends of the range, some flat.
-pub fn estimate(random: &mut Random, width: usize, height: usize, labels: u16) -> Estimate {
+/// Maps as they may stand somewhere after the estimate; the validity, where `filled`, after the fill.
+pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
+    let (width, height) = plan.size();
+    let labels = plan.levels[0].labels as u32;
+    let mut maps = Finest::zero((width, height));
     let spread = random.pick(&[1, 20, 5000]);
-    let peaks = Plane::from_fn(width, height, |_, _| {
-        let label = random.within(0, u32::from(labels) - 1) as u16;
-        let best = random.within(0, 50_000) as u16;
-        let mut above = |there: bool| if there { best + random.within(0, spread) as u16 } else { u16::MAX };
-        Peak { label, best, rival: above(label > 1 || label + 2 < labels) }
+    let patch = random.pick(&[1, 2, 7]);
+    let patches = Plane::from_fn(width.div_ceil(patch), height.div_ceil(patch), |_, _| {
+        let few = random.within(0, 3).min(labels - 1);
+        let any = random.within(0, labels - 1);
+        random.pick(&[few, few, any])
     });
-    let right = Plane::from_fn(width, height, |_, _| {
-        if random.one_in(5) { NO_LABEL } else { random.within(0, u32::from(labels) - 1) as u16 }
-    });
-    let offsets = Plane::from_fn(width, height, |_, _| random.within(0, 256) as i16 - 128);
-    Estimate { peaks, offsets, right }
+    for y in 0..height {
+        for x in 0..width {
+            let at = (x, y);
+            maps.label[at] = patches[(x / patch, y / patch)] as i32;
+            maps.best[at] = random.within(0, 50_000) as i32;
+            maps.rival[at] = match (labels, maps.label[at]) {
+                (1 | 2, _) | (3, 1) => 65_535,
+                _ => maps.best[at] + random.within(0, spread) as i32,
+            };
+            maps.right_label[at] =
+                if random.one_in(5) { NO_LABEL.into() } else { random.within(0, labels - 1) as i32 };
+            maps.confidence[at] = random.within(0, 255) as i32;
+        }
+    }
+    maps.raw = disparity(random, width, height);
+    maps.disparity = disparity(random, width, height);
+    maps.validity = flags(random, width, height, filled);
+    maps
 }
 
 /// Flags as they may stand before the fill, or, where `filled`, after it.
-pub fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<u8> {
+fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<i32> {
     let density = random.pick(&[1, 2, 3, 10, 1000]);
     Plane::from_fn(width, height, |_, _| {
-        if !random.one_in(density) {
-            return random.pick(&[0, 0, flag::LOW_CONFIDENCE]);
-        }
-        if random.one_in(6) {
-            return flag::MASKED;
-        }
-        let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION]);
-        if filled && !random.one_in(4) { reason | flag::FILLED } else { reason }
+        let validity = if !random.one_in(density) {
+            random.pick(&[0, 0, flag::LOW_CONFIDENCE])
+        } else if random.one_in(6) {
+            flag::MASKED
+        } else {
+            let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION]);
+            if filled && !random.one_in(4) { reason | flag::FILLED } else { reason }
+        };
+        validity.into()
     })
 }
 
 /// A disparity map in 1/256 px with patches, steps of about a pixel, and noise.
-pub fn disparity(random: &mut Random, width: usize, height: usize) -> Plane<i32> {
+fn disparity(random: &mut Random, width: usize, height: usize) -> Plane<i32> {
     let patch = random.pick(&[1, 2, 5]);
     let step = random.pick(&[1, 128, 255, 256, 257, 3000]);
     let patches =

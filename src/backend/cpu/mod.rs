@@ -1,26 +1,36 @@
 //! The CPU path: every stage, parallel over rows, its inner loops over labels.
 
 mod belief;
+mod confidence;
 mod cost;
 mod dependency;
 mod estimate;
 mod evidence;
+mod fill;
+mod median;
 mod message;
 mod pyramid;
+mod region_filter;
 mod resolution;
+mod sub_pixel;
+mod visibility;
 
-use super::{Backend, Estimate, PaddedRows, Volume, volume_shape};
+use super::{Backend, Map, PaddedRows, Stage, Volume, volume_shape};
 use crate::error::Result;
 use crate::graph::LevelGraph;
-use crate::image::Pair;
+use crate::image::{Pair, Plane};
+use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{MessageWidth, Plan};
 use message::Message;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
 
 /// The CPU path.
 #[derive(Default)]
 pub struct Cpu {
     state: Option<State>,
+    times: Option<Vec<(Stage, Duration)>>,
 }
 
 /// Volumes in the message width that the plan asks for.
@@ -36,8 +46,71 @@ struct Volumes<M> {
     /// Cost of level 0; coarser ones are in `levels`.
     fine_cost: Vec<u8>,
     levels: Vec<Level<M>>,
-    /// Label map of the last call of `change`.
+    /// Label map of the last change, and its sum.
     labels: Vec<u16>,
+    change: u64,
+    maps: Finest,
+}
+
+/// What the finest level knows of each pixel, at last.
+struct Finest {
+    peaks: Plane<Peak>,
+    right: Plane<u16>,
+    raw: Plane<i32>,
+    disparity: Plane<i32>,
+    validity: Plane<u8>,
+    confidence: Plane<u8>,
+}
+
+/// The belief of one pixel around its optimum, in units.
+#[derive(Clone, Copy, Default)]
+struct Peak {
+    label: u16,
+    best: u16,
+    rival: u16,
+}
+
+impl Finest {
+    fn new((width, height): (usize, usize)) -> Self {
+        Self {
+            peaks: Plane::filled(width, height, Peak::default()),
+            right: Plane::filled(width, height, 0),
+            raw: Plane::filled(width, height, 0),
+            disparity: Plane::filled(width, height, 0),
+            validity: Plane::filled(width, height, 0),
+            confidence: Plane::filled(width, height, 0),
+        }
+    }
+
+    fn read(&self, map: Map) -> Plane<i32> {
+        match map {
+            Map::Label => self.peaks.map(|p| p.label.into()),
+            Map::Best => self.peaks.map(|p| p.best.into()),
+            Map::Rival => self.peaks.map(|p| p.rival.into()),
+            Map::RightLabel => self.right.map(|&v| v.into()),
+            Map::Raw => self.raw.clone(),
+            Map::Disparity => self.disparity.clone(),
+            Map::Validity => self.validity.map(|&v| v.into()),
+            Map::Confidence => self.confidence.map(|&v| v.into()),
+        }
+    }
+
+    fn write(&mut self, map: Map, values: &Plane<i32>) {
+        fn put<T>(plane: &mut Plane<T>, values: &Plane<i32>, set: impl Fn(&mut T, i32)) {
+            assert_eq!(plane.size(), values.size(), "a map of the size of the images");
+            plane.data_mut().iter_mut().zip(values.data()).for_each(|(old, &new)| set(old, new));
+        }
+        match map {
+            Map::Label => put(&mut self.peaks, values, |p, v| p.label = v as u16),
+            Map::Best => put(&mut self.peaks, values, |p, v| p.best = v as u16),
+            Map::Rival => put(&mut self.peaks, values, |p, v| p.rival = v as u16),
+            Map::RightLabel => put(&mut self.right, values, |old, v| *old = v as u16),
+            Map::Raw => put(&mut self.raw, values, |old, v| *old = v),
+            Map::Disparity => put(&mut self.disparity, values, |old, v| *old = v),
+            Map::Validity => put(&mut self.validity, values, |old, v| *old = v as u8),
+            Map::Confidence => put(&mut self.confidence, values, |old, v| *old = v as u8),
+        }
+    }
 }
 
 /// Volumes of one level, each \[y\]\[x\]\[slot\]\[label\] with padded labels.
@@ -81,6 +154,85 @@ impl<M: Message> Volumes<M> {
             fine_cost: vec![0; fine.pixels() * fine.stride],
             levels,
             labels: vec![0; fine.pixels()],
+            change: 0,
+            maps: Finest::new(plan.size()),
+        }
+    }
+
+    /// Ready for another pair of the same plan, as [`Self::new`] would be.
+    fn reset(&mut self, pair: &Pair, graphs: Vec<LevelGraph>) {
+        self.pair = pair.clone();
+        self.labels.fill(0);
+        for (level, graph) in self.levels.iter_mut().zip(graphs) {
+            level.graph = graph;
+            for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
+                messages.par_chunks_mut(1 << 20).for_each(|part| part.fill(M::default()));
+            }
+        }
+    }
+
+    fn poison(&mut self, byte: u8) {
+        let wide = u16::from_ne_bytes([byte; 2]);
+        self.fine_cost.fill(byte);
+        self.labels.fill(wide);
+        for level in &mut self.levels {
+            level.cost.fill(wide);
+            level.evidence.fill(byte);
+            level.belief.fill(wide);
+            for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
+                messages.fill(M::from_u32(wide.into()));
+            }
+        }
+        for map in Map::ALL {
+            let (width, height) = self.plan.size();
+            self.maps.write(map, &Plane::filled(width, height, i32::from_ne_bytes([byte; 4])));
+        }
+    }
+
+    fn run(&mut self, stage: Stage) {
+        let Self { plan, pair, fine_cost, levels, labels, change, maps } = self;
+        match stage {
+            Stage::Cost => cost::run(plan, pair, fine_cost),
+            Stage::Pyramid(z) => {
+                let (finer, coarser) = levels.split_at_mut(z);
+                let out = &mut coarser[0].cost;
+                if z == 1 {
+                    pyramid::run(plan, z, fine_cost, out);
+                } else {
+                    pyramid::run(plan, z, &finer[z - 1].cost, out);
+                }
+            }
+            Stage::Evidence(z) => {
+                let l = &mut levels[z];
+                if z == 0 {
+                    evidence::run(&plan.levels[z], fine_cost, &mut l.evidence, &mut l.belief);
+                } else {
+                    evidence::run(&plan.levels[z], &l.cost, &mut l.evidence, &mut l.belief);
+                }
+            }
+            Stage::Dependency(z) => {
+                let l = &mut levels[z];
+                dependency::run(plan, z, &l.graph, &l.belief, &mut l.dependency);
+            }
+            Stage::Resolution(z) => {
+                let (finer, coarser) = levels.split_at_mut(z);
+                let (fine, coarse) = (&mut finer[z - 1], &mut coarser[0]);
+                resolution::run(plan, z, &fine.belief, &coarse.belief, &mut fine.down, &mut coarse.up);
+            }
+            Stage::Belief(z) => {
+                let stride = plan.levels[z].stride;
+                let l = &mut levels[z];
+                belief::run(stride, &l.graph, &l.evidence, &l.dependency, &l.down, &l.up, &mut l.belief);
+            }
+            Stage::Change => *change = estimate::change(plan, &levels[0].belief, labels),
+            Stage::Estimate => estimate::run(plan, &levels[0].belief, maps),
+            Stage::RightView => estimate::right_view(plan, &levels[0].belief, maps),
+            Stage::SubPixel => sub_pixel::run(plan, fine_cost, maps),
+            Stage::Visibility => visibility::run(plan, pair.left(), maps),
+            Stage::RegionFilter => region_filter::run(plan.method.region_size as usize, maps),
+            Stage::Confidence => confidence::run(plan.method.confidence_floor, maps),
+            Stage::Fill => fill::run(maps),
+            Stage::Median => median::run(plan, pair.left(), maps),
         }
     }
 
@@ -129,78 +281,57 @@ impl Backend for Cpu {
     }
 
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
-        // What the last match holds goes before the next one asks for more.
-        self.state = None;
-        memory::check(plan)?;
-        self.state = Some(match plan.message_width {
-            MessageWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
-            MessageWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)),
-        });
-        Ok(())
-    }
-
-    fn cost(&mut self) -> Result<()> {
-        on_volumes!(self, v => cost::run(&v.plan, &v.pair, &mut v.fine_cost));
-        Ok(())
-    }
-
-    fn pyramid(&mut self, level: usize) -> Result<()> {
-        on_volumes!(self, v => {
-            let (finer, coarser) = v.levels.split_at_mut(level);
-            let out = &mut coarser[0].cost;
-            if level == 1 {
-                pyramid::run(&v.plan, level, &v.fine_cost, out);
-            } else {
-                pyramid::run(&v.plan, level, &finer[level - 1].cost, out);
+        match self.state.as_mut() {
+            Some(State::Narrow(volumes)) if volumes.plan == *plan => volumes.reset(pair, graphs),
+            Some(State::Wide(volumes)) if volumes.plan == *plan => volumes.reset(pair, graphs),
+            _ => {
+                // What the last match holds goes before the next one asks for more.
+                self.state = None;
+                memory::check(plan)?;
+                self.state = Some(match plan.message_width {
+                    MessageWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
+                    MessageWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)),
+                });
             }
-        });
+        }
         Ok(())
     }
 
-    fn evidence(&mut self, level: usize) -> Result<()> {
-        on_volumes!(self, v => {
-            let l = &mut v.levels[level];
-            if level == 0 {
-                evidence::run(&v.plan.levels[level], &v.fine_cost, &mut l.evidence, &mut l.belief);
-            } else {
-                evidence::run(&v.plan.levels[level], &l.cost, &mut l.evidence, &mut l.belief);
-            }
-        });
-        Ok(())
-    }
-
-    fn dependency(&mut self, level: usize) -> Result<()> {
-        on_volumes!(self, v => {
-            let l = &mut v.levels[level];
-            dependency::run(&v.plan, level, &l.graph, &l.belief, &mut l.dependency);
-        });
-        Ok(())
-    }
-
-    fn resolution(&mut self, level: usize) -> Result<()> {
-        on_volumes!(self, v => {
-            let (finer, coarser) = v.levels.split_at_mut(level);
-            let (fine, coarse) = (&mut finer[level - 1], &mut coarser[0]);
-            resolution::run(&v.plan, level, &fine.belief, &coarse.belief, &mut fine.down, &mut coarse.up);
-        });
-        Ok(())
-    }
-
-    fn belief(&mut self, level: usize) -> Result<()> {
-        on_volumes!(self, v => {
-            let stride = v.plan.levels[level].stride;
-            let l = &mut v.levels[level];
-            belief::run(stride, &l.graph, &l.evidence, &l.dependency, &l.down, &l.up, &mut l.belief);
-        });
+    fn run(&mut self, stage: Stage) -> Result<()> {
+        let start = Instant::now();
+        on_volumes!(self, v => v.run(stage));
+        if let Some(times) = &mut self.times {
+            times.push((stage, start.elapsed()));
+        }
         Ok(())
     }
 
     fn change(&mut self) -> Result<u64> {
-        Ok(on_volumes!(self, v => estimate::change(&v.plan, &v.levels[0].belief, &mut v.labels)))
+        self.run(Stage::Change)?;
+        Ok(on_volumes!(self, v => v.change))
     }
 
-    fn estimate(&mut self) -> Result<Estimate> {
-        Ok(on_volumes!(self, v => estimate::run(&v.plan, &v.fine_cost, &v.levels[0].belief)))
+    fn wait(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    fn maps(&mut self) -> Result<Maps> {
+        let Finest { raw, disparity, validity, confidence, .. } = on_volumes!(self, v => &v.maps);
+        Ok(Maps {
+            disparity: disparity.clone(),
+            raw: raw.clone(),
+            confidence: confidence.clone(),
+            validity: validity.clone(),
+        })
+    }
+
+    fn keep_time(&mut self, on: bool) -> Result<()> {
+        self.times = on.then(Vec::new);
+        Ok(())
+    }
+
+    fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
+        Ok(self.times.clone().unwrap_or_default())
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
@@ -209,6 +340,20 @@ impl Backend for Cpu {
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         on_volumes!(self, v => v.write(volume, values));
+        Ok(())
+    }
+
+    fn read_map(&mut self, map: Map) -> Result<Plane<i32>> {
+        Ok(on_volumes!(self, v => v.maps.read(map)))
+    }
+
+    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
+        on_volumes!(self, v => v.maps.write(map, values));
+        Ok(())
+    }
+
+    fn poison(&mut self, byte: u8) -> Result<()> {
+        on_volumes!(self, v => v.poison(byte));
         Ok(())
     }
 }

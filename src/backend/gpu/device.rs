@@ -1,7 +1,9 @@
 //! Adapters: which there are, which one to take, and a device on it that reports its failures.
 
 use crate::error::{Error, Result};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// An adapter as `mrfgs devices` lists it.
 #[derive(Clone, Debug)]
@@ -28,12 +30,21 @@ pub struct DeviceInfo {
 }
 
 fn adapters() -> Vec<wgpu::Adapter> {
-    let descriptor = wgpu::InstanceDescriptor {
-        backends: wgpu::Backends::VULKAN | wgpu::Backends::METAL,
+    adapters_of(wgpu::Backends::VULKAN | wgpu::Backends::METAL)
+}
+
+fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor {
+        backends,
         flags: wgpu::InstanceFlags::empty(),
+        // Past this share of what the driver says it can have, buffers are refused instead of others' evicted.
+        memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
+            for_resource_creation: Some(95),
+            for_device_loss: None,
+        },
         ..wgpu::InstanceDescriptor::new_without_display_handle()
     };
-    let backends = descriptor.backends;
+    descriptor.backend_options.noop.enable = backends.contains(wgpu::Backends::NOOP);
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
 }
 
@@ -143,40 +154,96 @@ pub fn has_automatic() -> bool {
     adapters().iter().any(|a| is_automatic(a.get_info().device_type))
 }
 
-/// Limits that are kept below what a device offers: tests run the engine as if on a lesser device.
+/// What a device is denied, or does wrong, on purpose: tests run the engine as if on a lesser device, or a failing one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Ceiling {
+pub struct Handicap {
     /// Largest binding in bytes.
     pub max_binding: Option<u64>,
+    /// Largest buffer in bytes.
+    pub max_buffer: Option<u64>,
+    /// Most workgroups of a dispatch in one dimension.
+    pub max_groups: Option<u32>,
+    /// Most invocations of a workgroup.
+    pub max_invocations: Option<u32>,
+    /// Bytes of memory.
+    pub memory: Option<u64>,
+    /// How long a submission may take.
+    pub patience: Option<Duration>,
+    /// The device is lost after this many stages.
+    pub lost_after: Option<usize>,
+    /// It has no clock.
+    pub no_clock: bool,
+    /// Instead of a driver, something that takes every command and computes nothing.
+    pub noop: bool,
 }
+
+/// How long a submission may take before the device counts as hung. Drivers that watch over it give up sooner.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Submissions that may be under way: more keep no device busier, and a hang is noticed late.
+const SUBMISSIONS: usize = 4;
 
 /// An open device with its queue and the first failure it reported.
 pub(super) struct Device {
-    pub(super) inner: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
+    /// Gone once the device hangs.
+    open: Option<(wgpu::Device, wgpu::Queue)>,
     pub(super) name: String,
     /// Whether its memory is the machine's own.
     pub(super) software: bool,
     pub(super) max_binding: u64,
     pub(super) max_buffer: u64,
-    failure: Arc<Mutex<Option<String>>>,
+    pub(super) max_groups: u32,
+    pub(super) memory: Option<u64>,
+    /// Nanoseconds of a tick of its clock, where it has one.
+    pub(super) tick: Option<f64>,
+    patience: Duration,
+    lost_after: Option<usize>,
+    under_way: VecDeque<wgpu::SubmissionIndex>,
+    failure: Arc<Mutex<Option<Error>>>,
+    /// What went through, for people who tune: submissions, bytes up, bytes down.
+    pub(super) traffic: Traffic,
+}
+
+/// What a match asked of the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Dispatches recorded.
+    pub dispatches: u64,
+    /// Submissions to the queue.
+    pub submissions: u64,
+    /// Bytes written to the device.
+    pub bytes_up: u64,
+    /// Bytes read from it.
+    pub bytes_down: u64,
 }
 
 impl Device {
-    pub(super) fn open(wanted: Option<&str>, ceiling: Ceiling) -> Result<Self> {
-        let adapter = select(wanted)?;
+    pub(super) fn open(wanted: Option<&str>, handicap: Handicap) -> Result<Self> {
+        let adapter = if handicap.noop {
+            let noop = adapters_of(wgpu::Backends::NOOP).pop();
+            noop.ok_or_else(|| Error::Device("this build has no device that computes nothing".into()))?
+        } else {
+            select(wanted)?
+        };
         let info = adapter.get_info();
         let offered = adapter.limits();
-        let max_binding =
-            offered.max_storage_buffer_binding_size.min(ceiling.max_binding.unwrap_or(u64::MAX));
-        let required_limits = wgpu::Limits {
-            max_buffer_size: offered.max_buffer_size,
-            max_storage_buffer_binding_size: max_binding,
-            ..wgpu::Limits::default()
-        };
+        // No more than every device of WebGPU has, but for the sizes of buffers and bindings.
+        let mut limits = wgpu::Limits::default().or_worse_values_from(&offered);
+        limits.max_buffer_size = offered.max_buffer_size.min(handicap.max_buffer.unwrap_or(u64::MAX));
+        limits.max_storage_buffer_binding_size =
+            offered.max_storage_buffer_binding_size.min(handicap.max_binding.unwrap_or(u64::MAX));
+        if let Some(groups) = handicap.max_groups {
+            limits.max_compute_workgroups_per_dimension = groups;
+        }
+        if let Some(invocations) = handicap.max_invocations {
+            limits.max_compute_invocations_per_workgroup = invocations;
+            limits.max_compute_workgroup_size_x = invocations;
+        }
+        let clock = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+        let features = if handicap.no_clock { wgpu::Features::empty() } else { clock };
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("mrfgs"),
-            required_limits,
+            required_features: features,
+            required_limits: limits.clone(),
             ..Default::default()
         });
         let (device, queue) = pollster::block_on(request).map_err(|e| {
@@ -186,48 +253,152 @@ impl Device {
             ))
         })?;
         let failure = Arc::new(Mutex::new(None));
-        let note = |failure: &Arc<Mutex<Option<String>>>| {
+        let note = |failure: &Arc<Mutex<Option<Error>>>| {
             let failure = Arc::clone(failure);
-            move |reason: String| {
+            move |error: Error| {
                 if let Ok(mut failure) = failure.lock() {
-                    failure.get_or_insert(reason);
+                    failure.get_or_insert(error);
                 }
             }
         };
-        let uncaptured = note(&failure);
-        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| uncaptured(e.to_string())));
-        let lost = note(&failure);
+        let name = format!("{} ({})", info.name, api(info.backend));
+        let (uncaptured, device_name) = (note(&failure), name.clone());
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+            uncaptured(match e {
+                wgpu::Error::OutOfMemory { .. } => Error::Memory(format!(
+                    "{device_name} is out of memory: use --backend cpu, another --device, or a smaller image or range"
+                )),
+                e => failed(&device_name, &e),
+            });
+        }));
+        let (lost, device_name) = (note(&failure), name.clone());
         device.set_device_lost_callback(move |reason, message| {
             // Dropping the device says so too, when nobody listens any more.
-            lost(format!("the device was lost ({reason:?}) {message}"));
+            lost(failed(&device_name, &format!("the device was lost ({reason:?}) {message}")));
         });
         Ok(Self {
-            name: format!("{} ({})", info.name, api(info.backend)),
             software: info.device_type == wgpu::DeviceType::Cpu,
-            max_binding: device.limits().max_storage_buffer_binding_size.min(max_binding),
-            max_buffer: device.limits().max_buffer_size,
-            inner: device,
-            queue,
+            max_binding: limits.max_storage_buffer_binding_size,
+            max_buffer: limits.max_buffer_size,
+            max_groups: limits.max_compute_workgroups_per_dimension,
+            memory: handicap.memory,
+            tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
+            patience: handicap.patience.unwrap_or(PATIENCE),
+            lost_after: handicap.lost_after,
+            under_way: VecDeque::new(),
             failure,
+            traffic: Traffic::default(),
+            open: Some((device, queue)),
+            name,
         })
     }
 
-    /// The first failure since the device was opened, if any.
+    pub(super) fn inner(&self) -> Result<&wgpu::Device> {
+        self.check()?;
+        self.open.as_ref().map(|open| &open.0).ok_or_else(|| self.hung())
+    }
+
+    fn queue(&self) -> Result<&wgpu::Queue> {
+        self.check()?;
+        self.open.as_ref().map(|open| &open.1).ok_or_else(|| self.hung())
+    }
+
+    /// The first failure since the device was opened, if any. Lack of memory passes: it is said once.
     pub(super) fn check(&self) -> Result<()> {
-        let failure = self.failure.lock().ok().and_then(|f| f.clone());
-        match failure {
+        let Ok(mut failure) = self.failure.lock() else { return Ok(()) };
+        match &*failure {
             None => Ok(()),
-            Some(reason) => {
-                let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
-                Err(Error::Device(format!("{}: {reason}; use another --device or --backend cpu", self.name)))
-            }
+            Some(Error::Memory(_)) => failure.take().map_or(Ok(()), Err),
+            Some(e) => Err(Error::Device(e.to_string())),
         }
     }
 
-    /// Waits for everything submitted so far.
-    pub(super) fn wait(&self) -> Result<()> {
-        let polled = self.inner.poll(wgpu::PollType::wait_indefinitely());
-        self.check()?;
-        polled.map(|_| ()).map_err(|e| Error::Device(format!("{}: {e}", self.name)))
+    pub(super) fn write(&mut self, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
+        self.queue()?.write_buffer(buffer, 0, bytes);
+        self.traffic.bytes_up += bytes.len() as u64;
+        Ok(())
     }
+
+    pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder) -> Result<()> {
+        while self.under_way.len() >= SUBMISSIONS {
+            self.wait_for_one()?;
+        }
+        let index = self.queue()?.submit([encoder.finish()]);
+        self.under_way.push_back(index);
+        self.traffic.submissions += 1;
+        self.check()
+    }
+
+    /// Waits for everything submitted so far.
+    pub(super) fn wait(&mut self) -> Result<()> {
+        while !self.under_way.is_empty() {
+            self.wait_for_one()?;
+        }
+        self.check()
+    }
+
+    fn wait_for_one(&mut self) -> Result<()> {
+        let Some(index) = self.under_way.pop_front() else { return Ok(()) };
+        let waiting = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.patience) };
+        match self.inner()?.poll(waiting) {
+            Err(wgpu::PollError::Timeout) => {
+                // Closing a device waits for its work, and this one's never ends.
+                std::mem::forget(self.open.take());
+                self.under_way.clear();
+                Err(self.hung())
+            }
+            Err(e) => {
+                self.check()?;
+                Err(failed(&self.name, &e))
+            }
+            Ok(_) => self.check(),
+        }
+    }
+
+    /// The words of each staging buffer, once what was submitted has filled them.
+    pub(super) fn mapped(&mut self, staged: &[wgpu::Buffer]) -> Result<Vec<Vec<u32>>> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        for buffer in staged {
+            let sender = sender.clone();
+            buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
+                // Nobody listens when the wait below failed.
+                let _ = sender.send(mapped);
+            });
+        }
+        self.wait()?;
+        // What was submitted long ago is mapped by any poll.
+        self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
+        for _ in staged {
+            let mapped = receiver.try_recv().map_err(|e| failed(&self.name, &e))?;
+            mapped.map_err(|e| failed(&self.name, &e))?;
+        }
+        let mut all = Vec::new();
+        for buffer in staged {
+            let view = buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?;
+            self.traffic.bytes_down += view.len() as u64;
+            all.push(bytemuck::pod_collect_to_vec(&view));
+        }
+        self.check()?;
+        Ok(all)
+    }
+
+    fn hung(&self) -> Error {
+        failed(&self.name, &format!("it did not finish its work within {:?}: it hangs", self.patience))
+    }
+
+    /// Loses the device once it has run as many stages as its handicap allows.
+    pub(super) fn count_stage(&mut self) {
+        if let (Some(left), Some((device, _))) = (&mut self.lost_after, &self.open) {
+            match left.checked_sub(1) {
+                Some(fewer) => *left = fewer,
+                None => device.destroy(),
+            }
+        }
+    }
+}
+
+/// The failure of the device called `name`, in one line.
+pub(super) fn failed(name: &str, reason: &dyn std::fmt::Display) -> Error {
+    let reason = reason.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    Error::Device(format!("{name}: {reason}; use another --device or --backend cpu"))
 }

@@ -5,6 +5,13 @@ use bytemuck::{Pod, Zeroable};
 
 const PARAMS: &str = include_str!("../../../shaders/shared/params.wgsl");
 const IMAGE: &str = include_str!("../../../shaders/shared/image.wgsl");
+const MAPS: &str = include_str!("../../../shaders/shared/maps.wgsl");
+const REGION: &str = include_str!("../../../shaders/shared/region.wgsl");
+
+/// Pixels of a segment of a row, `SEGMENT` of `shaders/shared/region.wgsl`.
+pub(super) const SEGMENT: u32 = 64;
+/// Columns in which blocks of rows are joined in one go: it bounds the chains that the shader follows.
+pub(super) const JOINED_COLUMNS: u32 = 4096;
 
 /// A stage's shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,11 +30,22 @@ pub enum Kernel {
     RightView,
     Change,
     ChangeSum,
+    RegionRuns,
+    RegionJoin,
+    RegionFlatten,
+    RegionCount,
+    RegionFilter,
+    Visibility,
+    Confidence,
+    FillRows,
+    FillSources,
+    Fill,
+    Median,
 }
 
 impl Kernel {
     /// Every shader there is.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 24] = [
         Self::Census,
         Self::AdCensus,
         Self::Sad,
@@ -41,6 +59,17 @@ impl Kernel {
         Self::RightView,
         Self::Change,
         Self::ChangeSum,
+        Self::RegionRuns,
+        Self::RegionJoin,
+        Self::RegionFlatten,
+        Self::RegionCount,
+        Self::RegionFilter,
+        Self::Visibility,
+        Self::Confidence,
+        Self::FillRows,
+        Self::FillSources,
+        Self::Fill,
+        Self::Median,
     ];
 
     /// Name of its file in `shaders/`, without the extension.
@@ -60,6 +89,17 @@ impl Kernel {
             Self::RightView => "right_view",
             Self::Change => "change",
             Self::ChangeSum => "change_sum",
+            Self::RegionRuns => "region_runs",
+            Self::RegionJoin => "region_join",
+            Self::RegionFlatten => "region_flatten",
+            Self::RegionCount => "region_count",
+            Self::RegionFilter => "region_filter",
+            Self::Visibility => "visibility",
+            Self::Confidence => "confidence",
+            Self::FillRows => "fill_rows",
+            Self::FillSources => "fill_sources",
+            Self::Fill => "fill",
+            Self::Median => "median",
         }
     }
 
@@ -78,6 +118,17 @@ impl Kernel {
             Self::RightView => include_str!("../../../shaders/right_view.wgsl"),
             Self::Change => include_str!("../../../shaders/change.wgsl"),
             Self::ChangeSum => include_str!("../../../shaders/change_sum.wgsl"),
+            Self::RegionRuns => include_str!("../../../shaders/region_runs.wgsl"),
+            Self::RegionJoin => include_str!("../../../shaders/region_join.wgsl"),
+            Self::RegionFlatten => include_str!("../../../shaders/region_flatten.wgsl"),
+            Self::RegionCount => include_str!("../../../shaders/region_count.wgsl"),
+            Self::RegionFilter => include_str!("../../../shaders/region_filter.wgsl"),
+            Self::Visibility => include_str!("../../../shaders/visibility.wgsl"),
+            Self::Confidence => include_str!("../../../shaders/confidence.wgsl"),
+            Self::FillRows => include_str!("../../../shaders/fill_rows.wgsl"),
+            Self::FillSources => include_str!("../../../shaders/fill_sources.wgsl"),
+            Self::Fill => include_str!("../../../shaders/fill.wgsl"),
+            Self::Median => include_str!("../../../shaders/median.wgsl"),
         }
     }
 
@@ -89,7 +140,7 @@ impl Kernel {
         format!(
             "const NARROW = {narrow};\nconst FINE_NARROW = {fine_narrow};\nconst SLOTS = {slots}u;\n\
              const ABSOLUTE = {absolute};\nconst INTERPOLATING = {interpolating};\nconst LOW_PASS = {low_pass};\n\
-             const HAS_DOWN = {has_down};\nconst HAS_UP = {has_up};\n{PARAMS}\n{IMAGE}\n{}",
+             const HAS_DOWN = {has_down};\nconst HAS_UP = {has_up};\n{PARAMS}\n{IMAGE}\n{MAPS}\n{REGION}\n{}",
             self.body()
         )
     }
@@ -120,7 +171,18 @@ impl Kernel {
             Self::SubPixel => 3 + 9 * 4,
             Self::RightView => l.labels,
             Self::Change => quads,
-            Self::ChangeSum => l.width,
+            Self::ChangeSum | Self::FillRows | Self::Fill => l.width,
+            Self::FillSources => l.height,
+            Self::RegionRuns => SEGMENT as usize,
+            // The pixels on both sides of a border, or the segments of a row, followed from two pixels.
+            Self::RegionJoin => 4 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 8,
+            Self::RegionFlatten => 2 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 4,
+            Self::RegionCount | Self::RegionFilter | Self::Visibility | Self::Confidence => 0,
+            Self::Median => {
+                // One pass, and one for every three bits of what the disparities of a window may span.
+                let window = plan.method.median_window as usize;
+                (1 + 8) * (window + 1) * window + 8
+            }
         }
     }
 }
@@ -220,6 +282,8 @@ pub struct Params {
     pub padding_1: [u32; 2],
     pub first_row: u32,
     pub rows: u32,
+    pub row_groups: u32,
+    pub grid: u32,
     pub outside_cost: u32,
     pub sad_radius: i32,
     pub label_offset: i32,
@@ -227,5 +291,17 @@ pub struct Params {
     pub evidence_limit: u32,
     pub evidence_cap: u32,
     pub tau: u32,
-    pub padding_2: [u32; 3],
+    pub sub_pixel: u32,
+    pub visibility: u32,
+    pub median_all: u32,
+    pub region_size: u32,
+    pub confidence_floor: u32,
+    pub halo: u32,
+    pub span: u32,
+    pub first_column: u32,
+    pub columns: u32,
+    pub source_first_row: u32,
+    pub source_rows: u32,
+    pub median_radius: u32,
+    pub median_shift: u32,
 }

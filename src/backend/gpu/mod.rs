@@ -1,33 +1,44 @@
-//! The GPU path: wgpu on Vulkan or Metal, one shader a stage.
+//! The GPU path: wgpu on Vulkan or Metal, one shader or a few a stage.
 //!
 //! Volumes are \[y\]\[x\]\[slot\]\[label\], labels padded to blocks of 16, packed four 8-bit or two 16-bit values a word. Rows start
 //! at multiples of 256 bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a
-//! shader see at once, a stage runs band by band, each band bound with the rows above and below that it reads.
+//! shader see at once, a stage runs band by band, each band bound with the rows above and below that it reads; where
+//! it exceeds the largest buffer, it is several ([`buffers`]). The pair and its graph go up once, the maps come down
+//! once, and in between nothing leaves the device but the sum of [`Stage::Change`].
 
+mod buffers;
 mod device;
 mod kernels;
 mod stages;
+mod timer;
 mod upload;
 
-use super::{Backend, Estimate, PaddedRows, Peak, Volume, volume_shape};
+use super::{Backend, Map, PaddedRows, Stage, Volume, volume_shape};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
+use crate::maps::Maps;
 use crate::memory;
 use crate::plan::Plan;
+use crate::tables::{self, MedianWeights};
+use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
-pub use device::{Ceiling, DeviceInfo, devices, has_automatic};
+pub use device::{DeviceInfo, Handicap, Traffic, devices, has_automatic};
 pub use kernels::{Kernel, LevelParams, Params, Variant};
-use stages::{Binding, Stages};
+use stages::{Step, Steps};
 use std::collections::HashMap;
-use std::num::NonZero;
-use upload::{member_words, transposed};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use timer::Timer;
+use upload::{image_words, member_words, transposed};
 
 /// Largest number of iterations of all loops of one invocation together.
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
-/// Passes recorded before they are submitted: short enough for drivers that stop long jobs.
+/// Passes recorded before they are submitted.
 const PASSES_PER_SUBMIT: usize = 16;
-const ALIGN_BYTES: u64 = 256;
+/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop
+/// long jobs, and for a bar that moves.
+const WORK_PER_SUBMIT: u64 = 1 << 30;
 const WORKGROUP: u32 = 64;
 
 /// The GPU path on one device.
@@ -36,46 +47,16 @@ pub struct Gpu {
     pipelines: HashMap<(Kernel, Variant), wgpu::ComputePipeline>,
     encoder: Option<wgpu::CommandEncoder>,
     passes: usize,
+    work: u64,
+    timer: Option<Timer>,
     state: Option<State>,
 }
 
-/// Everything that belongs to one match.
+/// Everything that belongs to one plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
-    stages: Stages,
-}
-
-struct Buffers {
-    levels: Vec<LevelBuffers>,
-    /// Sums of the squared changes of each row, lower and upper half.
-    change_sums: wgpu::Buffer,
-    peaks: wgpu::Buffer,
-    offsets: wgpu::Buffer,
-    right_labels: wgpu::Buffer,
-}
-
-/// Volumes of one level.
-struct LevelBuffers {
-    params: LevelParams,
-    cost: wgpu::Buffer,
-    evidence: wgpu::Buffer,
-    dependency: wgpu::Buffer,
-    down: wgpu::Buffer,
-    up: wgpu::Buffer,
-    belief: wgpu::Buffer,
-    members: wgpu::Buffer,
-    starts: wgpu::Buffer,
-    incoming: wgpu::Buffer,
-    /// First word of each row in `incoming`, and the end.
-    incoming_rows: Vec<u32>,
-}
-
-#[derive(Clone)]
-struct Dispatch {
-    pipeline: wgpu::ComputePipeline,
-    bind_group: wgpu::BindGroup,
-    groups: (u32, u32),
+    steps: Steps,
 }
 
 impl Gpu {
@@ -85,21 +66,29 @@ impl Gpu {
     /// [`Error::Device`] when there is no driver or the device cannot be opened, [`Error::Option`] when no device has
     /// that name.
     pub fn new(wanted: Option<&str>) -> Result<Self> {
-        Self::with_ceiling(wanted, Ceiling::default())
+        Self::with_handicap(wanted, Handicap::default())
     }
 
-    /// As [`Gpu::new`], staying below `ceiling`.
+    /// As [`Gpu::new`], with a handicap.
     ///
     /// # Errors
     /// As [`Gpu::new`].
-    pub fn with_ceiling(wanted: Option<&str>, ceiling: Ceiling) -> Result<Self> {
+    pub fn with_handicap(wanted: Option<&str>, handicap: Handicap) -> Result<Self> {
         Ok(Self {
-            device: Device::open(wanted, ceiling)?,
+            device: Device::open(wanted, handicap)?,
             pipelines: HashMap::new(),
             encoder: None,
             passes: 0,
+            work: 0,
+            timer: None,
             state: None,
         })
+    }
+
+    /// What went through since the last [`Backend::prepare`], which is included.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        self.device.traffic
     }
 
     /// The pipeline of `kernel` at `level`, compiled on first use.
@@ -107,7 +96,10 @@ impl Gpu {
         let loops = kernel.loop_iterations(plan, level);
         if loops > MAX_LOOP_ITERATIONS {
             return Err(Error::Device(format!(
-                "{} labels with {} neighbours are too many for one invocation of the shader `{}`: use --backend cpu",
+                "{} x {} pixels and {} labels with {} neighbours are too many for one invocation of the shader `{}`: use \
+                 --backend cpu",
+                plan.levels[0].width,
+                plan.levels[0].height,
                 plan.levels[0].labels,
                 plan.neighbours,
                 kernel.name()
@@ -117,11 +109,12 @@ impl Gpu {
         if let Some(pipeline) = self.pipelines.get(&(kernel, variant)) {
             return Ok(pipeline.clone());
         }
-        let module = self.device.inner.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let device = self.device.inner()?;
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(kernel.name()),
             source: wgpu::ShaderSource::Wgsl(kernel.source(variant).into()),
         });
-        let pipeline = self.device.inner.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(kernel.name()),
             layout: None,
             module: &module,
@@ -134,166 +127,167 @@ impl Gpu {
         Ok(pipeline)
     }
 
-    fn buffer(&self, label: &str, words: u64) -> Result<wgpu::Buffer> {
-        let size = (4 * words).max(ALIGN_BYTES);
-        if size > self.device.max_buffer {
-            return Err(Error::Memory(format!(
-                "the {label} buffer needs {} MiB and {} allows {}: use --backend cpu, or a smaller image or range",
-                size >> 20,
-                self.device.name,
-                self.device.max_buffer >> 20
-            )));
+    fn encoder(&mut self) -> Result<&mut wgpu::CommandEncoder> {
+        if self.encoder.is_none() {
+            let descriptor = wgpu::CommandEncoderDescriptor::default();
+            self.encoder = Some(self.device.inner()?.create_command_encoder(&descriptor));
         }
-        Ok(self.device.inner.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        }))
+        Ok(self.encoder.as_mut().expect("just made"))
     }
 
-    fn uploaded(&self, label: &str, words: &[u32]) -> Result<wgpu::Buffer> {
-        let buffer = self.buffer(label, words.len() as u64)?;
-        self.device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(words));
-        Ok(buffer)
-    }
-
-    fn dispatch(
-        &self,
-        pipeline: &wgpu::ComputePipeline,
-        params: &Params,
-        bindings: &[Binding],
-        threads: (u32, u32),
-    ) -> Dispatch {
-        let device = &self.device.inner;
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("params"),
-            size: size_of::<Params>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        self.device.queue.write_buffer(&uniform, 0, bytemuck::bytes_of(params));
-        let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
-        entries.extend(bindings.iter().zip(1..).map(|(binding, place)| wgpu::BindGroupEntry {
-            binding: place,
-            resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                buffer: &binding.buffer,
-                offset: binding.bytes.start,
-                size: NonZero::new(binding.size()),
-            }),
-        }));
-        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        });
-        Dispatch {
-            pipeline: pipeline.clone(),
-            bind_group,
-            groups: (threads.0.div_ceil(WORKGROUP), threads.1),
-        }
-    }
-
-    /// Records the dispatches of a stage, in order.
-    fn record(&mut self, dispatches: &[Dispatch]) -> Result<()> {
-        let device = &self.device.inner;
-        let encoder = self
-            .encoder
-            .get_or_insert_with(|| device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default()));
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            for dispatch in dispatches {
-                pass.set_pipeline(&dispatch.pipeline);
-                pass.set_bind_group(0, &dispatch.bind_group, &[]);
-                pass.dispatch_workgroups(dispatch.groups.0, dispatch.groups.1, 1);
+    /// Records steps, and submits whenever enough is recorded.
+    fn record(&mut self, steps: &[Step]) -> Result<()> {
+        let mut rest = steps;
+        while let Some(first) = rest.first() {
+            let mut recorded = 1;
+            match first {
+                Step::Copy(copy) => {
+                    let (from, to) = (&copy.from, &copy.to);
+                    self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
+                }
+                Step::Dispatch(_) => {
+                    let mut timer = self.timer.take();
+                    let writes = timer.as_mut().and_then(Timer::pass);
+                    let mut work = self.work;
+                    {
+                        let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                            label: None,
+                            timestamp_writes: writes,
+                        });
+                        recorded = 0;
+                        while let Some(Step::Dispatch(dispatch)) = rest.get(recorded) {
+                            pass.set_pipeline(&dispatch.pipeline);
+                            pass.set_bind_group(0, &dispatch.bind_group, &[]);
+                            pass.dispatch_workgroups(dispatch.groups.0, dispatch.groups.1, 1);
+                            work += dispatch.work;
+                            recorded += 1;
+                            if work >= WORK_PER_SUBMIT {
+                                break;
+                            }
+                        }
+                    }
+                    self.timer = timer;
+                    self.work = work;
+                    self.passes += 1;
+                    self.device.traffic.dispatches += recorded as u64;
+                }
+            }
+            rest = &rest[recorded..];
+            if self.passes >= PASSES_PER_SUBMIT || self.work >= WORK_PER_SUBMIT {
+                self.submit()?;
             }
         }
-        self.passes += 1;
-        if self.passes >= PASSES_PER_SUBMIT { self.submit() } else { Ok(()) }
+        Ok(())
     }
 
     fn submit(&mut self) -> Result<()> {
-        self.passes = 0;
-        if let Some(encoder) = self.encoder.take() {
-            self.device.queue.submit([encoder.finish()]);
+        (self.passes, self.work) = (0, 0);
+        if let Some(mut encoder) = self.encoder.take() {
+            if let Some(timer) = &mut self.timer {
+                timer.submit(&self.device, &mut encoder)?;
+            }
+            self.device.submit(encoder)?;
         }
         self.device.check()
     }
 
-    /// The words of `buffer`, after everything recorded so far.
-    fn download(&mut self, buffer: &wgpu::Buffer) -> Result<Vec<u32>> {
+    /// The words of each range of bytes, after everything recorded so far.
+    fn download(&mut self, ranges: &[(wgpu::Buffer, std::ops::Range<u64>)]) -> Result<Vec<Vec<u32>>> {
+        let mut staged = Vec::new();
+        for (buffer, bytes) in ranges {
+            let size = bytes.end - bytes.start;
+            let staging = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("staging"),
+                size,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            self.encoder()?.copy_buffer_to_buffer(buffer, bytes.start, &staging, 0, size);
+            staged.push(staging);
+        }
         self.submit()?;
-        let staging = self.device.inner.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: buffer.size(),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder =
-            self.device.inner.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-        self.device.queue.submit([encoder.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            // Nobody listens when the wait below failed.
-            let _ = sender.send(mapped);
-        });
-        self.device.wait()?;
-        let failed = |e: &dyn std::fmt::Display| Error::Device(format!("{}: {e}", self.device.name));
-        receiver.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-        let view = staging.get_mapped_range(..).map_err(|e| failed(&e))?;
-        Ok(bytemuck::pod_collect_to_vec(&view))
+        self.device.mapped(&staged)
     }
 
-    fn level_buffers(&self, plan: &Plan, z: usize, graph: &LevelGraph) -> Result<LevelBuffers> {
-        let params = LevelParams::new(plan, &plan.levels[z]);
-        let rows = u64::from(params.height);
-        let narrow = u64::from(params.pitch) * rows;
-        let message = narrow * plan.message_bytes() as u64;
-        let last = plan.levels.len() - 1;
-        let (starts, incoming, incoming_rows) = transposed(graph, &params);
-        Ok(LevelBuffers {
-            cost: self.buffer("cost", if z == 0 { narrow } else { 2 * narrow })?,
-            evidence: self.buffer("evidence", narrow)?,
-            dependency: self.buffer("dependency", u64::from(params.dependency_pitch) * rows)?,
-            down: self.buffer("down", if z == last { 0 } else { message })?,
-            up: self.buffer("up", if z == 0 { 0 } else { message })?,
-            belief: self.buffer("belief", 2 * narrow)?,
-            members: self.uploaded("members", &member_words(graph, &params))?,
-            starts: self.uploaded("starts", &starts)?,
-            incoming: self.uploaded("incoming", &incoming)?,
-            incoming_rows,
-            params,
-        })
+    /// The words of all rows.
+    fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
+        let counts: Vec<usize> = rows.iter().map(|r| r.own().len()).collect();
+        let parts: Vec<_> = rows.iter().flat_map(|r| r.own()).collect();
+        let mut words = self.download(&parts)?.into_iter();
+        Ok(counts.into_iter().map(|n| words.by_ref().take(n).collect::<Vec<_>>().concat()).collect())
     }
 
     fn state(&self) -> &State {
         self.state.as_ref().expect("prepare comes before every stage")
     }
 
-    fn run(&mut self, pick: impl Fn(&Stages) -> &[Dispatch]) -> Result<()> {
-        let dispatches = pick(&self.state().stages).to_vec();
-        self.record(&dispatches)
+    /// Puts the pair and its graphs into the buffers, and messages at their start.
+    fn load(&mut self, state: &mut State, pair: &Pair, graphs: &[LevelGraph]) -> Result<()> {
+        let State { plan, buffers, steps } = state;
+        let device = &mut self.device;
+        let pitch = buffers.levels[0].params.pixel_pitch;
+        buffers.left.write(device, &image_words(pair.left(), pitch))?;
+        buffers.right.write(device, &image_words(pair.right(), pitch))?;
+        let words = |bytes: Vec<u8>| bytes.into_iter().map(u32::from);
+        let costs: Vec<u32> = words(tables::ad_cost()).chain(words(tables::census_cost())).collect();
+        device.write(&buffers.cost_tables, bytemuck::cast_slice(&costs))?;
+        let weights = MedianWeights::of(&plan.method).words();
+        device.write(&buffers.median_weights, bytemuck::cast_slice(&weights))?;
+        for (level, graph) in buffers.levels.iter_mut().zip(graphs) {
+            level.members.write(device, &member_words(graph, &level.params))?;
+            level.write_incoming(device, transposed(graph, &level.params))?;
+        }
+        for z in 0..plan.levels.len() {
+            steps.insert(Stage::Belief(z), self.belief(plan, buffers, z)?.into());
+        }
+        let zeroed = buffers.levels.iter().flat_map(LevelBuffers::messages).chain([&buffers.labels]);
+        let encoder = self.encoder()?;
+        for buffer in zeroed.flat_map(Rows::buffers) {
+            encoder.clear_buffer(buffer, 0, None);
+        }
+        self.device.check()
     }
 
-    /// Buffer, words a row and values a word of a volume.
-    fn volume(&self, volume: Volume) -> (wgpu::Buffer, usize, usize) {
+    /// Where a volume is, words a row and values a word.
+    fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
         let state = self.state();
         let narrow = if state.plan.message_bytes() == 1 { 4 } else { 2 };
-        let (z, buffer, per_word): (usize, fn(&LevelBuffers) -> &wgpu::Buffer, usize) = match volume {
-            Volume::Cost(z) => (z, |b| &b.cost, if z == 0 { 4 } else { 2 }),
-            Volume::Evidence(z) => (z, |b| &b.evidence, 4),
-            Volume::Dependency(z) => (z, |b| &b.dependency, narrow),
-            Volume::Down(z) => (z, |b| &b.down, narrow),
-            Volume::Up(z) => (z, |b| &b.up, narrow),
-            Volume::Belief(z) => (z, |b| &b.belief, 2),
+        let level = &state.buffers.levels[volume.level()];
+        let (rows, per_word) = match volume {
+            Volume::Cost(z) => (&level.cost, if z == 0 { 4 } else { 2 }),
+            Volume::Evidence(_) => (&level.evidence, 4),
+            Volume::Dependency(_) => (&level.dependency, narrow),
+            Volume::Down(_) => (&level.down, narrow),
+            Volume::Up(_) => (&level.up, narrow),
+            Volume::Belief(_) => (&level.belief, 2),
         };
-        let b = &state.buffers.levels[z];
         let pitch = match volume {
-            Volume::Dependency(_) => b.params.dependency_pitch,
-            _ => b.params.pitch * (4 / per_word as u32),
+            Volume::Dependency(_) => level.params.dependency_pitch,
+            _ => level.params.pitch * (4 / per_word as u32),
         };
-        (buffer(b).clone(), pitch as usize, per_word)
+        (rows.clone(), pitch as usize, per_word)
+    }
+
+    /// Where a map is: the buffer, words a pixel, the word, the lowest bit and the mask.
+    fn map(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
+        let b = &self.state().buffers;
+        let (rows, words, word, bit, mask) = match map {
+            Map::Label => (&b.peaks, 2, 0, 0, 0xffff),
+            Map::Best => (&b.peaks, 2, 0, 16, 0xffff),
+            Map::Rival => (&b.peaks, 2, 1, 0, 0xffff),
+            Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
+            Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),
+            Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
+            Map::Validity => (&b.flags, 1, 0, 0, 0xff),
+            Map::Confidence => (&b.flags, 1, 0, 8, 0xff),
+        };
+        (rows.clone(), words, word, bit, mask)
+    }
+
+    /// Width, height, and elements in a row of maps.
+    fn map_shape(&self) -> (usize, usize, usize) {
+        let (width, height) = self.state().plan.size();
+        (width, height, self.state().buffers.levels[0].params.pixel_pitch as usize)
     }
 }
 
@@ -303,86 +297,80 @@ impl Backend for Gpu {
     }
 
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
-        // What the last match holds goes before the next one asks for more.
-        self.encoder = None;
-        self.state = None;
-        if self.device.software {
-            memory::check(plan)?;
-        }
-        let levels = graphs
-            .iter()
-            .enumerate()
-            .map(|(z, graph)| self.level_buffers(plan, z, graph))
-            .collect::<Result<Vec<_>>>()?;
-        let fine = levels[0].params;
-        let pixels = u64::from(fine.pixel_pitch) * u64::from(fine.height);
-        let buffers = Buffers {
-            change_sums: self.buffer("change", 2 * u64::from(fine.height))?,
-            peaks: self.buffer("peaks", 2 * pixels)?,
-            offsets: self.buffer("offsets", pixels)?,
-            right_labels: self.buffer("right labels", pixels)?,
-            levels,
+        (self.encoder, self.passes, self.work) = (None, 0, 0);
+        self.device.traffic = Traffic::default();
+        let mut state = match self.state.take() {
+            Some(state) if state.plan == *plan => state,
+            other => {
+                // What the last match holds goes before the next one asks for more.
+                drop(other);
+                if self.device.software {
+                    memory::check(plan)?;
+                }
+                let buffers = Buffers::new(&self.device, plan)?;
+                let steps = self.steps(plan, &buffers)?;
+                State { plan: plan.clone(), buffers, steps }
+            }
         };
-        let stages = self.stages(plan, pair, &buffers)?;
-        self.device.check()?;
-        self.state = Some(State { plan: plan.clone(), buffers, stages });
+        self.load(&mut state, pair, &graphs)?;
+        self.state = Some(state);
         Ok(())
     }
 
-    fn cost(&mut self) -> Result<()> {
-        self.run(|s| &s.cost)
-    }
-
-    fn pyramid(&mut self, level: usize) -> Result<()> {
-        self.run(|s| &s.pyramid[level])
-    }
-
-    fn evidence(&mut self, level: usize) -> Result<()> {
-        self.run(|s| &s.evidence[level])
-    }
-
-    fn dependency(&mut self, level: usize) -> Result<()> {
-        self.run(|s| &s.dependency[level])
-    }
-
-    fn resolution(&mut self, level: usize) -> Result<()> {
-        self.run(|s| &s.resolution[level])
-    }
-
-    fn belief(&mut self, level: usize) -> Result<()> {
-        self.run(|s| &s.belief[level])
+    fn run(&mut self, stage: Stage) -> Result<()> {
+        self.device.count_stage();
+        let steps = Arc::clone(&self.state().steps[&stage]);
+        let Some(timer) = &mut self.timer else { return self.record(&steps) };
+        timer.begin(stage);
+        if timer.has_clock() {
+            return self.record(&steps);
+        }
+        let start = Instant::now();
+        self.record(&steps)?;
+        self.wait()?;
+        if let Some(timer) = &mut self.timer {
+            timer.measured(start.elapsed());
+        }
+        Ok(())
     }
 
     fn change(&mut self) -> Result<u64> {
-        self.run(|s| &s.change)?;
+        self.run(Stage::Change)?;
         let sums = self.state().buffers.change_sums.clone();
-        let words = self.download(&sums)?;
         let rows = self.state().plan.levels[0].height;
-        Ok(words.chunks_exact(2).take(rows).map(|half| u64::from(half[1]) << 32 | u64::from(half[0])).sum())
+        let words = self.download(&[(sums, 0..8 * rows as u64)])?;
+        Ok(words[0].chunks_exact(2).map(|half| u64::from(half[1]) << 32 | u64::from(half[0])).sum())
     }
 
-    fn estimate(&mut self) -> Result<Estimate> {
-        self.run(|s| &s.estimate)?;
-        let Buffers { peaks, offsets, right_labels, .. } = &self.state().buffers;
-        let (peaks, offsets, right) = (peaks.clone(), offsets.clone(), right_labels.clone());
-        let (peaks, offsets, right) =
-            (self.download(&peaks)?, self.download(&offsets)?, self.download(&right)?);
-        let state = self.state();
-        let (width, height) = state.plan.size();
-        let pitch = state.buffers.levels[0].params.pixel_pitch as usize;
-        Ok(Estimate {
-            peaks: Plane::from_fn(width, height, |x, y| {
-                let [first, second] = [0, 1].map(|i| peaks[2 * (y * pitch + x) + i]);
-                Peak { label: first as u16, best: (first >> 16) as u16, rival: second as u16 }
-            }),
-            offsets: Plane::from_fn(width, height, |x, y| offsets[y * pitch + x] as i16),
-            right: Plane::from_fn(width, height, |x, y| right[y * pitch + x] as u16),
-        })
+    fn wait(&mut self) -> Result<()> {
+        self.submit()?;
+        self.device.wait()
+    }
+
+    fn maps(&mut self) -> Result<Maps> {
+        let b = &self.state().buffers;
+        let (disparity, raw, flags) = (b.disparity.clone(), b.raw.clone(), b.flags.clone());
+        let words = self.rows(&[&disparity, &raw, &flags])?;
+        let (width, height, pitch) = self.map_shape();
+        let plane = |i: usize| Plane::from_fn(width, height, |x, y| words[i][y * pitch + x].cast_signed());
+        let byte =
+            |bit: u32| Plane::from_fn(width, height, |x, y| (words[2][y * pitch + x] >> bit & 0xff) as u8);
+        Ok(Maps { disparity: plane(0), raw: plane(1), confidence: byte(8), validity: byte(0) })
+    }
+
+    fn keep_time(&mut self, on: bool) -> Result<()> {
+        self.timer = on.then(|| Timer::new(&self.device)).transpose()?;
+        Ok(())
+    }
+
+    fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
+        self.wait()?;
+        self.timer.as_mut().map_or(Ok(Vec::new()), |timer| timer.times(&mut self.device))
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
         let (buffer, pitch, per_word) = self.volume(volume);
-        let words = self.download(&buffer)?;
+        let words = self.rows(&[&buffer])?.remove(0);
         let plan = &self.state().plan;
         let (rows, labels, stride) = volume_shape(plan, volume);
         let lines = rows / plan.levels[volume.level()].height;
@@ -413,7 +401,37 @@ impl Backend for Gpu {
                 line[at / per_word] |= value << (bits * (at % per_word));
             }
         }
-        self.device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&words));
-        self.device.check()
+        buffer.write(&mut self.device, &words)
+    }
+
+    fn read_map(&mut self, map: Map) -> Result<Plane<i32>> {
+        let (rows, words, word, bit, mask) = self.map(map);
+        let data = self.rows(&[&rows])?.remove(0);
+        let (width, height, pitch) = self.map_shape();
+        let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
+        Ok(Plane::from_fn(width, height, value))
+    }
+
+    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
+        let (rows, words, word, bit, mask) = self.map(map);
+        let mut data = self.rows(&[&rows])?.remove(0);
+        let (width, height, pitch) = self.map_shape();
+        assert_eq!(values.size(), (width, height), "a map of the size of the images");
+        for y in 0..height {
+            for x in 0..width {
+                let old = &mut data[words * (y * pitch + x) + word];
+                *old = *old & !(mask << bit) | (values[(x, y)].cast_unsigned() & mask) << bit;
+            }
+        }
+        rows.write(&mut self.device, &data)
+    }
+
+    fn poison(&mut self, byte: u8) -> Result<()> {
+        self.submit()?;
+        let all = self.state().buffers.all().to_vec();
+        for buffer in all {
+            self.device.write(&buffer, &vec![byte; buffer.size() as usize])?;
+        }
+        Ok(())
     }
 }

@@ -36,9 +36,16 @@ pub(super) fn member_words(graph: &LevelGraph, params: &LevelParams) -> Vec<u32>
     words
 }
 
-/// The transposed table as the shader reads it: where each pixel's entries start, the entries, and where each row's
-/// entries start, aligned so that any rows can be bound.
-pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
+/// The transposed table as the shader reads it.
+pub(super) struct Incoming {
+    /// Where each pixel's entries start, and one more a row.
+    pub(super) starts: Vec<u32>,
+    pub(super) entries: Vec<u32>,
+    /// Where each row's entries start, aligned so that any rows can be bound, and the end.
+    pub(super) rows: Vec<u32>,
+}
+
+pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> Incoming {
     let (width, slots, pitch) = (graph.width(), graph.slots(), params.starts_pitch as usize);
     let mut starts = vec![0; pitch * graph.height()];
     let mut entries = Vec::with_capacity(graph.incoming().len() + ALIGN_WORDS * graph.height());
@@ -58,5 +65,5 @@ pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> (Vec<u32>,
         entries.resize(entries.len().next_multiple_of(ALIGN_WORDS), 0);
         rows.push(entries.len() as u32);
     }
-    (starts, entries, rows)
+    Incoming { starts, entries, rows }
 }

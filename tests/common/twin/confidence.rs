@@ -1,20 +1,19 @@
+use super::Finest;
 use super::fill::invalid;
-use mrfgs::backend::Peak;
-use mrfgs::image::Plane;
-use mrfgs::refine::flag;
+use mrfgs::maps::flag;
+use mrfgs::plan::Plan;
 
 /// Confidence of each pixel: 16 for every 8 units that the rival is behind.
-pub fn confidence(peaks: &Plane<Peak>, flags: &mut Plane<u8>, floor: u32) -> Plane<u8> {
-    let (width, height) = peaks.size();
-    Plane::from_fn(width, height, |x, y| {
-        if invalid(flags[(x, y)]) {
-            return 0;
+pub fn confidence(plan: &Plan, maps: &mut Finest) {
+    let (width, height) = plan.size();
+    for y in 0..height {
+        for x in 0..width {
+            let at = (x, y);
+            let lead = ((maps.rival[at] - maps.best[at]) * 16 / 8).min(255);
+            maps.confidence[at] = if invalid(maps.validity[at]) { 0 } else { lead };
+            if !invalid(maps.validity[at]) && i64::from(lead) < i64::from(plan.method.confidence_floor) {
+                maps.validity[at] |= i32::from(flag::LOW_CONFIDENCE);
+            }
         }
-        let peak = peaks[(x, y)];
-        let confidence = ((i64::from(peak.rival) - i64::from(peak.best)) * 16 / 8).min(255);
-        if confidence < i64::from(floor) {
-            flags[(x, y)] |= flag::LOW_CONFIDENCE;
-        }
-        confidence as u8
-    })
+    }
 }

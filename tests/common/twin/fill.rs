@@ -1,15 +1,17 @@
-use mrfgs::image::Plane;
-use mrfgs::refine::flag;
+use super::Finest;
+use mrfgs::maps::flag;
 
 /// Whether a pixel's disparity is given up before the fill.
-pub fn invalid(flags: u8) -> bool {
-    [flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION, flag::MASKED].iter().any(|bit| flags & bit != 0)
+pub fn invalid(validity: i32) -> bool {
+    [flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION, flag::MASKED]
+        .iter()
+        .any(|&bit| validity & i32::from(bit) != 0)
 }
 
 /// Fills what is invalid and not masked.
-pub fn fill(disparity: &mut Plane<i32>, flags: &mut Plane<u8>) {
-    let (width, height) = disparity.size();
-    let (old, old_flags) = (disparity.clone(), flags.clone());
+pub fn fill(maps: &mut Finest) {
+    let (width, height) = maps.disparity.size();
+    let (old, old_flags) = (maps.disparity.clone(), maps.validity.clone());
     let valid = |x: usize, y: usize| !invalid(old_flags[(x, y)]);
     // What place x of row y holds once the row is filled from its own valid pixels.
     let on_row = |x: usize, y: usize| {
@@ -19,7 +21,7 @@ pub fn fill(disparity: &mut Plane<i32>, flags: &mut Plane<u8>) {
     };
     for y in 0..height {
         for x in 0..width {
-            if valid(x, y) || old_flags[(x, y)] & flag::MASKED != 0 {
+            if valid(x, y) || old_flags[(x, y)] & i32::from(flag::MASKED) != 0 {
                 continue;
             }
             // Rows by distance, the upper of two equals first.
@@ -29,8 +31,8 @@ pub fn fill(disparity: &mut Plane<i32>, flags: &mut Plane<u8>) {
                 .filter(|&row| row < height)
                 .find_map(|row| on_row(x, row));
             if let Some(value) = value {
-                disparity[(x, y)] = value;
-                flags[(x, y)] |= flag::FILLED;
+                maps.disparity[(x, y)] = value;
+                maps.validity[(x, y)] |= i32::from(flag::FILLED);
             }
         }
     }

@@ -1,7 +1,10 @@
+use super::Finest;
 use super::fill::invalid;
 use super::graph::colour_distance;
-use mrfgs::image::{Image, Plane};
-use mrfgs::refine::flag;
+use mrfgs::image::{Pair, Plane};
+use mrfgs::maps::flag;
+use mrfgs::options::Median;
+use mrfgs::plan::Plan;
 
 /// Integer weight of a pixel at (dx, dy) whose squared colour difference is `distance`.
 pub fn weight(dx: i64, dy: i64, distance: i64, sigma_space: f64, sigma_range: f64) -> i64 {
@@ -17,20 +20,23 @@ pub fn weight(dx: i64, dy: i64, distance: i64, sigma_space: f64, sigma_range: f6
     space * range / 1024
 }
 
-/// Weighted median over windows of `window` pixels: sort, and take the first value at which half of the weight is
-/// reached.
-pub fn weighted_median(
-    disparity: &Plane<i32>,
-    flags: &Plane<u8>,
-    guide: &Image,
-    (window, sigma_space, sigma_range): (usize, f64, f64),
-    touch: impl Fn(u8) -> bool,
-) -> Plane<i32> {
-    let (width, height) = disparity.size();
-    let radius = (window / 2) as i64;
-    let known = |x: usize, y: usize| !invalid(flags[(x, y)]) || flags[(x, y)] & flag::FILLED != 0;
-    Plane::from_fn(width, height, |x, y| {
-        if !known(x, y) || !touch(flags[(x, y)]) {
+/// Weighted median: sort the window, and take the first value at which half of the weight is reached.
+pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
+    let (width, height) = plan.size();
+    let method = &plan.method;
+    let (sigma_space, sigma_range) = (method.median_sigma_space, method.median_sigma_range);
+    let radius = i64::from(method.median_window / 2);
+    let guide = pair.left();
+    let Finest { disparity, validity, .. } = &*maps;
+    let filled = |x: usize, y: usize| validity[(x, y)] & i32::from(flag::FILLED) != 0;
+    let known = |x: usize, y: usize| !invalid(validity[(x, y)]) || filled(x, y);
+    let touched = |x: usize, y: usize| match method.median {
+        Median::Off => false,
+        Median::Filled => filled(x, y),
+        Median::All => known(x, y),
+    };
+    maps.disparity = Plane::from_fn(width, height, |x, y| {
+        if !touched(x, y) {
             return disparity[(x, y)];
         }
         let mut values = Vec::new();
@@ -57,5 +63,5 @@ pub fn weighted_median(
             }
         }
         unreachable!("the centre has weight")
-    })
+    });
 }

@@ -1,5 +1,4 @@
-//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/mod.rs` and
-//! `src/refine` and from nothing else: one cell at a time, wide integers, no padding, no table, nothing clever. It
+//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/mod.rs` and from nothing else: one cell at a time, wide integers, no padding, no table, nothing clever. It
 //! shares data types and documented constants with the library, and no function that computes.
 //!
 //! Volumes are `Vec<u32>` in the layout of [`mrfgs::backend::Volume`]: \[y\]\[x\]\[slot\]\[label\].
@@ -21,8 +20,61 @@ pub mod resolution;
 pub mod sub_pixel;
 pub mod visibility;
 
+use mrfgs::backend::{Backend, Map};
 use mrfgs::graph::LevelGraph;
+use mrfgs::image::Plane;
 use mrfgs::plan::{Cut, CutRule};
+
+/// What the finest level knows of each pixel: the plane of every [`Map`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finest {
+    pub label: Plane<i32>,
+    pub best: Plane<i32>,
+    pub rival: Plane<i32>,
+    pub right_label: Plane<i32>,
+    pub raw: Plane<i32>,
+    pub disparity: Plane<i32>,
+    pub validity: Plane<i32>,
+    pub confidence: Plane<i32>,
+}
+
+impl Finest {
+    /// Zero everywhere.
+    pub fn zero((width, height): (usize, usize)) -> Self {
+        let zero = || Plane::filled(width, height, 0);
+        Self {
+            label: zero(),
+            best: zero(),
+            rival: zero(),
+            right_label: zero(),
+            raw: zero(),
+            disparity: zero(),
+            validity: zero(),
+            confidence: zero(),
+        }
+    }
+
+    /// Every map with its plane.
+    pub fn planes(&self) -> [(Map, &Plane<i32>); 8] {
+        [
+            (Map::Label, &self.label),
+            (Map::Best, &self.best),
+            (Map::Rival, &self.rival),
+            (Map::RightLabel, &self.right_label),
+            (Map::Raw, &self.raw),
+            (Map::Disparity, &self.disparity),
+            (Map::Validity, &self.validity),
+            (Map::Confidence, &self.confidence),
+        ]
+    }
+
+    /// Puts all maps into `backend`.
+    pub fn write(&self, backend: &mut dyn Backend) {
+        for (map, plane) in self.planes() {
+            backend.write_map(map, plane).unwrap();
+        }
+    }
+}
 
 /// The 1 4 6 4 1 of the binomial filter, for places -2 ..= 2.
 pub fn binomial(place: i64) -> i64 {

@@ -1,22 +1,22 @@
-use super::fill::invalid;
+use super::Finest;
 use mrfgs::image::Plane;
-use mrfgs::refine::flag;
+use mrfgs::maps::flag;
+use mrfgs::plan::Plan;
 
 /// Flags small regions. Every pixel starts as its own region; regions that touch take the smaller number until
 /// nothing changes.
-pub fn region_filter(disparity: &Plane<i32>, flags: &mut Plane<u8>, size: usize) {
-    let (width, height) = disparity.size();
+pub fn region_filter(plan: &Plan, maps: &mut Finest) {
+    let (width, height) = plan.size();
     let mut region = Plane::from_fn(width, height, |x, y| y * width + x);
-    let connected = |flags: &Plane<u8>, a: (usize, usize), b: (usize, usize)| {
-        let step = i64::from(disparity[a]) - i64::from(disparity[b]);
-        !invalid(flags[a]) && !invalid(flags[b]) && step.abs() <= 256
+    let connected = |a: (usize, usize), b: (usize, usize)| {
+        maps.validity[a] == 0 && maps.validity[b] == 0 && (maps.label[a] - maps.label[b]).abs() <= 1
     };
     loop {
         let mut changed = false;
         for y in 0..height {
             for x in 0..width {
                 for other in [(x + 1, y), (x, y + 1)] {
-                    if other.0 >= width || other.1 >= height || !connected(flags, (x, y), other) {
+                    if other.0 >= width || other.1 >= height || !connected((x, y), other) {
                         continue;
                     }
                     let smaller = region[(x, y)].min(region[other]);
@@ -33,9 +33,9 @@ pub fn region_filter(disparity: &Plane<i32>, flags: &mut Plane<u8>, size: usize)
     for &r in region.data() {
         members[r] += 1;
     }
-    for (flags, &r) in flags.data_mut().iter_mut().zip(region.data()) {
-        if !invalid(*flags) && members[r] < size {
-            *flags |= flag::SMALL_REGION;
+    for (validity, &r) in maps.validity.data_mut().iter_mut().zip(region.data()) {
+        if *validity == 0 && members[r] < plan.method.region_size {
+            *validity |= i32::from(flag::SMALL_REGION);
         }
     }
 }

@@ -1,13 +1,13 @@
-use mrfgs::backend::Peak;
+use super::Finest;
 use mrfgs::image::Plane;
 use mrfgs::plan::Plan;
 
-/// How far the disparity of each pixel is above its label, in 1/256 px.
-pub fn sub_pixel(plan: &Plan, cost: &[u32], peaks: &Plane<Peak>) -> Plane<i16> {
+/// The disparity of each pixel, in 1/256 px.
+pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, height, labels) = (level.width as i64, level.height as i64, level.labels as i64);
-    Plane::from_fn(level.width, level.height, |x, y| {
-        let label = i64::from(peaks[(x, y)].label);
+    let offset = |x: usize, y: usize| {
+        let label = i64::from(maps.label[(x, y)]);
         if label == 0 || label == labels - 1 {
             return 0;
         }
@@ -18,7 +18,7 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], peaks: &Plane<Peak>) -> Plane<i16> {
                     if u < 0 || v < 0 || u >= width || v >= height {
                         continue;
                     }
-                    if (i64::from(peaks[(u as usize, v as usize)].label) - label).abs() <= 1 {
+                    if (i64::from(maps.label[(u as usize, v as usize)]) - label).abs() <= 1 {
                         sum += i64::from(cost[((v * width + u) * labels + wanted) as usize]);
                     }
                 }
@@ -33,6 +33,11 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], peaks: &Plane<Peak>) -> Plane<i16> {
         // Floats hold these fractions exactly enough, as a quotient by 2 s is never closer to a whole number than
         // 1 / (2 s) unless it is one.
         let exact = (256 * (a - c) + s) as f64 / (2 * s) as f64;
-        exact.floor().clamp(-128.0, 128.0) as i16
-    })
+        exact.floor().clamp(-128.0, 128.0) as i32
+    };
+    maps.raw = Plane::from_fn(level.width, level.height, |x, y| {
+        let whole = 256 * (plan.range.min + maps.label[(x, y)]);
+        if plan.method.sub_pixel { whole + offset(x, y) } else { whole }
+    });
+    maps.disparity = maps.raw.clone();
 }

@@ -1,17 +1,28 @@
-use mrfgs::backend::Estimate;
-use mrfgs::image::Plane;
-use mrfgs::refine::flag;
+use super::Finest;
+use mrfgs::image::Pair;
+use mrfgs::maps::flag;
+use mrfgs::plan::Plan;
 
-/// Flags of each pixel by the map of the right view.
-pub fn visibility(estimate: &Estimate, min: i32) -> Plane<u8> {
-    let (width, height) = estimate.peaks.size();
-    Plane::from_fn(width, height, |x, y| {
-        let label = i64::from(estimate.peaks[(x, y)].label);
-        let right = x as i64 - (i64::from(min) + label);
-        if right < 0 || right >= width as i64 {
-            return flag::OUTSIDE;
+/// Validity of each pixel by the mask and the map of the right view.
+pub fn visibility(plan: &Plan, pair: &Pair, maps: &mut Finest) {
+    let (width, height) = pair.size();
+    for y in 0..height {
+        for x in 0..width {
+            let label = i64::from(maps.label[(x, y)]);
+            let right = x as i64 - (i64::from(plan.range.min) + label);
+            let inside = right >= 0 && right < width as i64;
+            let reason = if pair.left().masked[(x, y)] {
+                flag::MASKED
+            } else if !plan.method.visibility {
+                0
+            } else if !inside {
+                flag::OUTSIDE
+            } else if (i64::from(maps.right_label[(right as usize, y)]) - label).abs() > 1 {
+                flag::OCCLUDED
+            } else {
+                0
+            };
+            maps.validity[(x, y)] = reason.into();
         }
-        let theirs = i64::from(estimate.right[(right as usize, y)]);
-        if (theirs - label).abs() > 1 { flag::OCCLUDED } else { 0 }
-    })
+    }
 }

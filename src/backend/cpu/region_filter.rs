@@ -1,17 +1,16 @@
-use super::{FRACTION, flag};
-use crate::image::Plane;
+//! Regions too small to be trusted: see [`crate::backend::Stage::RegionFilter`].
 
-/// Sets [`flag::SMALL_REGION`] on every pixel of each region of fewer than `size` valid pixels. Regions are
-/// 4-connected; a step of at most one pixel of disparity connects.
-pub fn region_filter(disparity: &Plane<i32>, flags: &mut Plane<u8>, size: usize) {
-    if size < 2 {
-        return;
-    }
-    let (width, height) = disparity.size();
-    let d = disparity.data();
-    let mut seen: Vec<bool> = flags.data().iter().map(|f| f & flag::INVALID != 0).collect();
+use super::Finest;
+use crate::maps::flag;
+
+pub(super) fn run(size: usize, maps: &mut Finest) {
+    let Finest { peaks, validity, .. } = maps;
+    let (width, height) = peaks.size();
+    let labels = peaks.data();
+    let flags = validity.data_mut();
+    let mut seen: Vec<bool> = flags.iter().map(|&f| f != 0).collect();
     let mut region = Vec::new();
-    for start in 0..d.len() {
+    for start in 0..labels.len() {
         if seen[start] {
             continue;
         }
@@ -29,7 +28,7 @@ pub fn region_filter(disparity: &Plane<i32>, flags: &mut Plane<u8>, size: usize)
                 (y + 1 < height).then(|| at + width),
             ];
             for to in neighbours.into_iter().flatten() {
-                if !seen[to] && d[at].abs_diff(d[to]) <= FRACTION as u32 {
+                if !seen[to] && labels[at].label.abs_diff(labels[to].label) <= 1 {
                     seen[to] = true;
                     region.push(to);
                 }
@@ -37,7 +36,7 @@ pub fn region_filter(disparity: &Plane<i32>, flags: &mut Plane<u8>, size: usize)
         }
         if region.len() < size {
             for &at in &region {
-                flags.data_mut()[at] |= flag::SMALL_REGION;
+                flags[at] |= flag::SMALL_REGION;
             }
         }
     }

@@ -1,11 +1,10 @@
-use super::flag;
-use crate::image::Plane;
+//! The farther of two neighbours for what has no disparity of its own: see [`crate::backend::Stage::Fill`].
 
-/// Fills every invalid pixel that is not masked with the smaller of the nearest valid disparities to the left and to
-/// the right on its row, or the one there is: what is occluded belongs to the farther surface. A row without any
-/// valid pixel takes the nearest row that has one, the upper on ties. Sets [`flag::FILLED`]. Where no pixel at all is
-/// valid, nothing is filled.
-pub fn fill(disparity: &mut Plane<i32>, flags: &mut Plane<u8>) {
+use super::Finest;
+use crate::maps::flag;
+
+pub(super) fn run(maps: &mut Finest) {
+    let Finest { disparity, validity: flags, .. } = maps;
     let (width, height) = disparity.size();
     let valid_rows: Vec<usize> =
         (0..height).filter(|&y| flags.row(y).iter().any(|f| f & flag::INVALID == 0)).collect();

@@ -1,0 +1,96 @@
+// Weighted median of the disparities around every pixel. One invocation a pixel.
+//
+// The value sought is the smallest at which half of the weight is reached. An interval that holds it shrinks to an
+// eighth with every pass over the window, each of which takes the weights below eight thresholds at once: no list, no
+// sort, and no more than a few registers.
+
+@group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read> disparity: array<i32>;
+@group(0) @binding(3) var<storage, read> flags: array<u32>;
+// Spatial weights by |dy| and |dx|, then range weights.
+@group(0) @binding(4) var<storage, read> weights: array<u32>;
+@group(0) @binding(5) var<storage, read_write> smoothed: array<i32>;
+
+const RANGE_ENTRIES: u32 = 1024u;
+const WEIGHT_BITS: u32 = 10u;
+const FIRST: vec4<u32> = vec4(1u, 2u, 3u, 4u);
+const SECOND: vec4<u32> = vec4(5u, 6u, 7u, 8u);
+
+// In squared sixteenths of an 8-bit level.
+fn colour_distance(a: vec4<u32>, b: vec4<u32>) -> u32 {
+    let p = vec3<i32>(vec3(a.x & 0xffffu, a.x >> 16u, a.y & 0xffffu));
+    let q = vec3<i32>(vec3(b.x & 0xffffu, b.x >> 16u, b.y & 0xffffu));
+    let d = abs(p - q) >> vec3(4u);
+    return u32(d.x * d.x + d.y * d.y + d.z * d.z);
+}
+
+// Weight of the pixel at `at`, which is `away` from the one at the centre.
+fn weight(centre: vec4<u32>, at: u32, away: vec2<u32>) -> u32 {
+    let range = colour_distance(centre, left[at]) >> params.median_shift;
+    if range >= RANGE_ENTRIES {
+        return 0u;
+    }
+    let side = params.median_radius + 1u;
+    return (weights[away.y * side + away.x] * weights[side * side + range]) >> WEIGHT_BITS;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let pitch = params.level.pixel_pitch;
+    let radius = params.median_radius;
+    let top = halo_start(radius);
+    let y = params.first_row + id.y;
+    let here = (y - top) * pitch + id.x;
+    let centre = left[here];
+    let flags_here = flags[here];
+    var low = disparity[here];
+    if has_disparity(flags_here) && (params.median_all == 1u || (flags_here & FILLED) != 0u) {
+        let middle = vec2(id.x, y);
+        let first = max(middle, vec2(radius)) - vec2(radius);
+        let last = min(middle + vec2(radius + 1u), vec2(params.level.width, params.level.height));
+        var high = low;
+        var total = 0u;
+        for (var v = first.y; v < last.y; v++) {
+            for (var u = first.x; u < last.x; u++) {
+                let at = (v - top) * pitch + u;
+                if has_disparity(flags[at]) {
+                    let value = disparity[at];
+                    low = min(low, value);
+                    high = max(high, value);
+                    total += weight(centre, at, max(vec2(u, v), middle) - min(vec2(u, v), middle));
+                }
+            }
+        }
+        var width = u32(high - low) + 1u;
+        while width > 1u {
+            let step = (width + 7u) / 8u;
+            // Weight of values below low + k step, k = 1 to 8.
+            var below_first = vec4<u32>();
+            var below_second = vec4<u32>();
+            for (var v = first.y; v < last.y; v++) {
+                for (var u = first.x; u < last.x; u++) {
+                    let at = (v - top) * pitch + u;
+                    let value = disparity[at];
+                    if has_disparity(flags[at]) && value < low + i32(8u * step) {
+                        let w = vec4(weight(centre, at, max(vec2(u, v), middle) - min(vec2(u, v), middle)));
+                        let offset = vec4(value - low);
+                        below_first += select(vec4(0u), w, offset < vec4<i32>(FIRST * step));
+                        below_second += select(vec4(0u), w, offset < vec4<i32>(SECOND * step));
+                    }
+                }
+            }
+            // The first threshold below which half of the weight lies ends the interval.
+            let short = vec4<u32>(2u * below_first < vec4(total));
+            let short_second = vec4<u32>(2u * below_second < vec4(total));
+            let skipped = short.x + short.y + short.z + short.w
+                + short_second.x + short_second.y + short_second.z + short_second.w;
+            low += i32(skipped * step);
+            width = step;
+        }
+    }
+    smoothed[id.y * pitch + id.x] = low;
+}

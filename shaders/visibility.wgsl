@@ -1,0 +1,29 @@
+// What the right view says of every pixel. One invocation a pixel.
+
+// label | best << 16, rival.
+@group(0) @binding(1) var<storage, read> peaks: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> right_labels: array<u32>;
+@group(0) @binding(3) var<storage, read> left: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read_write> flags: array<u32>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let row = id.y * params.level.pixel_pitch;
+    var reason = 0u;
+    if left[row + id.x].z != 0u {
+        reason = MASKED;
+    } else if params.visibility == 1u {
+        let label = i32(peaks[row + id.x].x & 0xffffu);
+        let x = i32(id.x) - params.level.low - label;
+        if x < 0 || x >= i32(params.level.width) {
+            reason = OUTSIDE;
+        } else if abs(i32(right_labels[row + u32(x)]) - label) > 1 {
+            reason = OCCLUDED;
+        }
+    }
+    flags[row + id.x] = (flags[row + id.x] & ~VALIDITY) | reason;
+}

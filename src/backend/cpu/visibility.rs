@@ -1,0 +1,29 @@
+//! What the right view says of each pixel: see [`crate::backend::Stage::Visibility`].
+
+use super::Finest;
+use crate::image::Image;
+use crate::maps::flag;
+use crate::plan::Plan;
+use rayon::prelude::*;
+
+pub(super) fn run(plan: &Plan, left: &Image, maps: &mut Finest) {
+    let (width, min) = (plan.levels[0].width, i64::from(plan.range.min));
+    let Finest { peaks, right, validity, .. } = maps;
+    validity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, flags) in row.iter_mut().enumerate() {
+            let label = peaks[(x, y)].label;
+            let xr = x as i64 - min - i64::from(label);
+            *flags = if left.masked[(x, y)] {
+                flag::MASKED
+            } else if !plan.method.visibility {
+                0
+            } else if xr < 0 || xr >= width as i64 {
+                flag::OUTSIDE
+            } else if right[(xr as usize, y)].abs_diff(label) > 1 {
+                flag::OCCLUDED
+            } else {
+                0
+            };
+        }
+    });
+}

@@ -1,0 +1,366 @@
+//! The buffers of a match, allocated once and from the plan alone.
+//!
+//! What is larger than a device's largest buffer is cut into parts of whole rows. Each part also holds a few rows of its
+//! neighbours, so that a stage that looks around a pixel finds all of it in one part; a stage that writes what others look
+//! around in ends with copies of those rows.
+
+use super::device::Device;
+use super::kernels::{ALIGN_WORDS, LevelParams};
+use super::upload::Incoming;
+use crate::error::{Error, Result};
+use crate::plan::{GRAPH_WINDOW, Plan};
+use std::num::NonZero;
+use std::ops::Range;
+
+/// Rows of its neighbours that a part holds on either side: as far as any stage looks around in a volume.
+pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
+
+/// `rows` with up to `halo` rows above and below.
+pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32> {
+    rows.start.saturating_sub(halo)..rows.end.saturating_add(halo).min(height)
+}
+
+/// Something stored row by row, in as few buffers as the device allows.
+#[derive(Clone)]
+pub(super) struct Rows {
+    parts: Vec<Part>,
+    row_bytes: u64,
+}
+
+#[derive(Clone)]
+struct Part {
+    buffer: wgpu::Buffer,
+    /// The rows that are its own.
+    own: Range<u32>,
+    /// The rows that it holds.
+    held: Range<u32>,
+}
+
+/// A range of a buffer to bind, at a byte offset that is a multiple of 256.
+#[derive(Clone)]
+pub(super) struct Binding {
+    buffer: wgpu::Buffer,
+    bytes: Range<u64>,
+}
+
+impl Binding {
+    pub(super) fn whole(buffer: &wgpu::Buffer) -> Self {
+        Self { buffer: buffer.clone(), bytes: 0..buffer.size() }
+    }
+
+    /// Bytes that are bound.
+    pub(super) fn size(&self) -> u64 {
+        let end = self.bytes.end.min(self.buffer.size());
+        end.saturating_sub(self.bytes.start)
+    }
+
+    pub(super) fn resource(&self) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &self.buffer,
+            offset: self.bytes.start,
+            size: NonZero::new(self.size()),
+        })
+    }
+}
+
+/// Bytes from one buffer to another.
+#[derive(Clone)]
+pub(super) struct Copy {
+    pub(super) from: (wgpu::Buffer, u64),
+    pub(super) to: (wgpu::Buffer, u64),
+    pub(super) bytes: u64,
+}
+
+impl Rows {
+    /// `rows`, which one part owns, with what else that part holds of them: bound for a stage that writes them, or
+    /// looks around in them.
+    pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
+        let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;
+        let part = self.parts.iter().find(|p| within(&p.own)).or(self.parts.iter().find(|p| within(&p.held)));
+        let part = part.expect("bands stay within parts, and halos within what parts hold");
+        let at = |row: u32| u64::from(row - part.held.start) * self.row_bytes;
+        Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
+    }
+
+    /// Copies that renew what parts hold of their neighbours.
+    pub(super) fn exchange(&self) -> Vec<Copy> {
+        let mut copies = Vec::new();
+        for (i, to) in self.parts.iter().enumerate() {
+            for (j, from) in self.parts.iter().enumerate() {
+                let rows = to.held.start.max(from.own.start)..to.held.end.min(from.own.end);
+                if i != j && !rows.is_empty() {
+                    let at = |part: &Part| u64::from(rows.start - part.held.start) * self.row_bytes;
+                    copies.push(Copy {
+                        from: (from.buffer.clone(), at(from)),
+                        to: (to.buffer.clone(), at(to)),
+                        bytes: rows.len() as u64 * self.row_bytes,
+                    });
+                }
+            }
+        }
+        copies
+    }
+
+    /// Copies of everything to `to`, which has the same rows.
+    pub(super) fn copy_to(&self, to: &Self) -> Vec<Copy> {
+        let pairs = self.parts.iter().zip(&to.parts);
+        pairs
+            .map(|(from, to)| Copy {
+                from: (from.buffer.clone(), 0),
+                to: (to.buffer.clone(), 0),
+                bytes: from.held.len() as u64 * self.row_bytes,
+            })
+            .collect()
+    }
+
+    /// First rows of the parts.
+    pub(super) fn starts(&self) -> impl Iterator<Item = u32> {
+        self.parts.iter().map(|p| p.own.start)
+    }
+
+    pub(super) fn buffers(&self) -> impl Iterator<Item = &wgpu::Buffer> {
+        self.parts.iter().map(|p| &p.buffer)
+    }
+
+    /// Each part's buffer, and where in it its own rows are, in bytes.
+    pub(super) fn own(&self) -> Vec<(wgpu::Buffer, Range<u64>)> {
+        let own = self.parts.iter().map(|p| {
+            let at = |row: u32| u64::from(row - p.held.start) * self.row_bytes;
+            (p.buffer.clone(), at(p.own.start)..at(p.own.end))
+        });
+        own.collect()
+    }
+
+    /// Writes the words of all rows.
+    pub(super) fn write(&self, device: &mut Device, words: &[u32]) -> Result<()> {
+        let per_row = self.row_bytes as usize / 4;
+        for part in &self.parts {
+            let held = part.held.start as usize * per_row..part.held.end as usize * per_row;
+            device.write(&part.buffer, bytemuck::cast_slice(&words[held]))?;
+        }
+        Ok(())
+    }
+}
+
+/// Everything that a match needs on a device.
+pub(super) struct Buffers {
+    pub(super) levels: Vec<LevelBuffers>,
+    pub(super) left: Rows,
+    pub(super) right: Rows,
+    /// Census of the left and of the right image.
+    pub(super) census: [Rows; 2],
+    /// Matching costs by difference.
+    pub(super) cost_tables: wgpu::Buffer,
+    pub(super) median_weights: wgpu::Buffer,
+    /// Label map of the last change, and its squared differences.
+    pub(super) labels: Rows,
+    pub(super) squares: Rows,
+    /// Sums of the squared changes of each row, lower and upper half.
+    pub(super) change_sums: wgpu::Buffer,
+    pub(super) peaks: Rows,
+    pub(super) right_labels: Rows,
+    pub(super) raw: Rows,
+    pub(super) disparity: Rows,
+    /// Validity and confidence.
+    pub(super) flags: Rows,
+    /// What a stage that looks around writes, before it takes the place of what it looked at.
+    pub(super) spare_disparity: Rows,
+    pub(super) spare_flags: Rows,
+    pub(super) region_parents: Rows,
+    pub(super) region_sizes: Rows,
+    /// Whether each row holds a valid pixel, and where it takes its values from.
+    pub(super) filled_rows: wgpu::Buffer,
+    pub(super) source_rows: wgpu::Buffer,
+    all: Vec<wgpu::Buffer>,
+}
+
+/// Volumes of one level.
+pub(super) struct LevelBuffers {
+    pub(super) params: LevelParams,
+    pub(super) cost: Rows,
+    pub(super) evidence: Rows,
+    pub(super) dependency: Rows,
+    pub(super) down: Rows,
+    pub(super) up: Rows,
+    pub(super) belief: Rows,
+    pub(super) members: Rows,
+    pub(super) starts: Rows,
+    /// Entries of the transposed table, of what each part holds.
+    incoming: Vec<(wgpu::Buffer, Range<u32>)>,
+    /// First word of each row in the transposed table, and the end.
+    incoming_rows: Vec<u32>,
+}
+
+impl LevelBuffers {
+    /// Entries of the transposed table of `rows`.
+    pub(super) fn incoming(&self, rows: &Range<u32>) -> Binding {
+        let part = self.incoming.iter().find(|(_, own)| own.start <= rows.start && rows.end <= own.end);
+        let (buffer, own) = part.expect("bands stay within parts");
+        let first = self.incoming_rows[own.start as usize];
+        let at = |row: u32| 4 * u64::from(self.incoming_rows[row as usize] - first);
+        Binding { buffer: buffer.clone(), bytes: at(rows.start)..at(rows.end) }
+    }
+
+    pub(super) fn write_incoming(&mut self, device: &mut Device, incoming: Incoming) -> Result<()> {
+        for (buffer, own) in &self.incoming {
+            let words = incoming.rows[own.start as usize] as usize..incoming.rows[own.end as usize] as usize;
+            device.write(buffer, bytemuck::cast_slice(&incoming.entries[words]))?;
+        }
+        self.incoming_rows = incoming.rows;
+        self.starts.write(device, &incoming.starts)
+    }
+
+    /// The messages, which start at 0.
+    pub(super) fn messages(&self) -> [&Rows; 3] {
+        [&self.dependency, &self.down, &self.up]
+    }
+}
+
+/// Allocates, and remembers what it allocated.
+struct Allocator<'a> {
+    device: &'a Device,
+    all: Vec<wgpu::Buffer>,
+}
+
+impl Allocator<'_> {
+    fn buffer(&mut self, label: &str, words: u64) -> Result<wgpu::Buffer> {
+        let size = (4 * words).max(4 * ALIGN_WORDS as u64);
+        let (name, largest) = (&self.device.name, self.device.max_buffer);
+        if size > largest {
+            return Err(Error::Memory(format!(
+                "the {label} buffer needs {} MiB and {name} allows {}: use --backend cpu, or a smaller image",
+                size >> 20,
+                largest >> 20
+            )));
+        }
+        let buffer = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        self.device.check()?;
+        self.all.push(buffer.clone());
+        Ok(buffer)
+    }
+
+    /// Rows of `words` words each, in parts that start at `starts`, the last of which is the height.
+    fn rows(&mut self, label: &str, words: u32, starts: &[u32]) -> Result<Rows> {
+        let height = starts[starts.len() - 1];
+        let parts = starts.windows(2).map(|ends| {
+            let own = ends[0]..ends[1];
+            let held = with_halo(&own, HALO, height);
+            let buffer = self.buffer(label, u64::from(words) * held.len() as u64)?;
+            Ok(Part { buffer, own, held })
+        });
+        Ok(Rows { parts: parts.collect::<Result<_>>()?, row_bytes: 4 * u64::from(words) })
+    }
+}
+
+/// First rows of the parts of a level, and its height: even, so that the two rows of a coarser pixel stay together.
+fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec<u32>> {
+    let widest = params.dependency_pitch.max(2 * params.pitch);
+    let fitting = device.max_buffer / (4 * u64::from(widest));
+    if fitting >= u64::from(params.height) {
+        return Ok(vec![0, params.height]);
+    }
+    let own = fitting.saturating_sub(2 * u64::from(HALO)) as u32 & !1;
+    if own == 0 {
+        return Err(Error::Memory(format!(
+            "{} rows of {} labels need {} KiB and {} allows {} in a buffer: use --backend cpu, or a smaller image or range",
+            2 + 2 * HALO,
+            plan.levels[0].labels,
+            (u64::from(2 + 2 * HALO) * 4 * u64::from(widest)) >> 10,
+            device.name,
+            device.max_buffer >> 10
+        )));
+    }
+    Ok((0..params.height).step_by(own as usize).chain([params.height]).collect())
+}
+
+impl Buffers {
+    /// Everything that `plan` needs.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when it does not fit, [`Error::Device`] when the device fails.
+    pub(super) fn new(device: &Device, plan: &Plan) -> Result<Self> {
+        if let Some(memory) = device.memory.filter(|&m| m < plan.bytes()) {
+            return Err(Error::Memory(format!(
+                "the match needs {} MiB and {} has {}: use --backend cpu, or a smaller image or range",
+                plan.bytes() >> 20,
+                device.name,
+                memory >> 20
+            )));
+        }
+        let mut allocator = Allocator { device, all: Vec::new() };
+        let a = &mut allocator;
+        let last = plan.levels.len() - 1;
+        let mut levels = Vec::new();
+        for (z, level) in plan.levels.iter().enumerate() {
+            let p = LevelParams::new(plan, level);
+            let starts = part_starts(device, plan, &p)?;
+            // What a level does not have still has a name in the shaders.
+            let none = [0, 0];
+            let message = p.pitch * plan.message_bytes() as u32;
+            let incoming = starts.windows(2).map(|own| {
+                // The factors that hold a pixel are at most three rows away; rows are aligned.
+                let rows = with_halo(&(own[0]..own[1]), HALO, p.height).len() * p.width as usize;
+                let words = rows * plan.slots() + ALIGN_WORDS * (own[1] - own[0]) as usize;
+                Ok((a.buffer("transposed table", words as u64)?, own[0]..own[1]))
+            });
+            let incoming = incoming.collect::<Result<_>>()?;
+            levels.push(LevelBuffers {
+                cost: a.rows("cost", if z == 0 { p.pitch } else { 2 * p.pitch }, &starts)?,
+                evidence: a.rows("evidence", p.pitch, &starts)?,
+                dependency: a.rows("dependency messages", p.dependency_pitch, &starts)?,
+                down: a.rows("messages from above", message, if z == last { &none } else { &starts })?,
+                up: a.rows("messages from below", message, if z == 0 { &none } else { &starts })?,
+                belief: a.rows("belief", 2 * p.pitch, &starts)?,
+                members: a.rows("members", p.member_pitch, &starts)?,
+                starts: a.rows("starts", p.starts_pitch, &starts)?,
+                incoming,
+                incoming_rows: Vec::new(),
+                params: p,
+            });
+        }
+        let fine = levels[0].params;
+        let whole = [0, fine.height];
+        let mut map = |label: &str, words: u32| a.rows(label, words * fine.pixel_pitch, &whole);
+        let (left, right) = (map("left image", 4)?, map("right image", 4)?);
+        let census = [map("left census", 2)?, map("right census", 2)?];
+        let (labels, squares) = (map("labels", 1)?, map("squares", 1)?);
+        let (peaks, right_labels) = (map("peaks", 2)?, map("right labels", 1)?);
+        let (raw, disparity, flags) = (map("raw", 1)?, map("disparity", 1)?, map("flags", 1)?);
+        let (spare_disparity, spare_flags) = (map("spare disparity", 1)?, map("spare flags", 1)?);
+        let (region_parents, region_sizes) = (map("region parents", 1)?, map("region sizes", 1)?);
+        let rows = u64::from(fine.height);
+        Ok(Self {
+            cost_tables: a.buffer("cost tables", 1024)?,
+            median_weights: a.buffer("median weights", 2048)?,
+            change_sums: a.buffer("change", 2 * rows)?,
+            filled_rows: a.buffer("filled rows", rows)?,
+            source_rows: a.buffer("source rows", rows)?,
+            levels,
+            left,
+            right,
+            census,
+            labels,
+            squares,
+            peaks,
+            right_labels,
+            raw,
+            disparity,
+            flags,
+            spare_disparity,
+            spare_flags,
+            region_parents,
+            region_sizes,
+            all: allocator.all,
+        })
+    }
+
+    /// Every buffer.
+    pub(super) fn all(&self) -> &[wgpu::Buffer] {
+        &self.all
+    }
+}

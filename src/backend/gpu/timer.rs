@@ -1,0 +1,107 @@
+//! The time of every stage by the device's own clock.
+
+use super::PASSES_PER_SUBMIT;
+use super::device::Device;
+use crate::backend::Stage;
+use crate::error::Result;
+use std::time::Duration;
+
+/// Takes the time of passes and adds up those of one run of a stage.
+pub(super) struct Timer {
+    clock: Option<Clock>,
+    /// The runs so far, and what the host measured where the device has no clock.
+    runs: Vec<(Stage, Duration)>,
+}
+
+struct Clock {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    /// The run that each pass of the encoder at hand belongs to.
+    passes: Vec<usize>,
+    /// The same of all submissions, and what the clock said.
+    logs: Vec<(Vec<usize>, wgpu::Buffer)>,
+}
+
+const TICKS: u64 = 2 * PASSES_PER_SUBMIT as u64;
+
+impl Timer {
+    pub(super) fn new(device: &Device) -> Result<Self> {
+        if device.tick.is_none() {
+            return Ok(Self { clock: None, runs: Vec::new() });
+        }
+        let inner = device.inner()?;
+        let queries = inner.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("times"),
+            ty: wgpu::QueryType::Timestamp,
+            count: TICKS as u32,
+        });
+        let resolved = inner.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("times"),
+            size: 8 * TICKS,
+            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let clock = Some(Clock { queries, resolved, passes: Vec::new(), logs: Vec::new() });
+        Ok(Self { clock, runs: Vec::new() })
+    }
+
+    /// Whether the device has a clock; else the host measures, waiting for every stage.
+    pub(super) fn has_clock(&self) -> bool {
+        self.clock.is_some()
+    }
+
+    pub(super) fn begin(&mut self, stage: Stage) {
+        self.runs.push((stage, Duration::ZERO));
+    }
+
+    /// What the host measured of the run at hand.
+    pub(super) fn measured(&mut self, time: Duration) {
+        if let Some(run) = self.runs.last_mut() {
+            run.1 = time;
+        }
+    }
+
+    /// Where the next pass writes when it begins and ends.
+    pub(super) fn pass(&mut self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        let clock = self.clock.as_mut()?;
+        let first = 2 * clock.passes.len() as u32;
+        clock.passes.push(self.runs.len() - 1);
+        Some(wgpu::ComputePassTimestampWrites {
+            query_set: &clock.queries,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        })
+    }
+
+    /// Keeps the times of the passes in `encoder`, which is about to be submitted.
+    pub(super) fn submit(&mut self, device: &Device, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
+        let Some(clock) = self.clock.as_mut().filter(|c| !c.passes.is_empty()) else { return Ok(()) };
+        let passes = std::mem::take(&mut clock.passes);
+        let log = device.inner()?.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("times"),
+            size: 8 * TICKS,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        encoder.resolve_query_set(&clock.queries, 0..2 * passes.len() as u32, &clock.resolved, 0);
+        encoder.copy_buffer_to_buffer(&clock.resolved, 0, &log, 0, 16 * passes.len() as u64);
+        clock.logs.push((passes, log));
+        Ok(())
+    }
+
+    /// Every run so far and its time. Everything must have been submitted.
+    pub(super) fn times(&mut self, device: &mut Device) -> Result<Vec<(Stage, Duration)>> {
+        if let (Some(clock), Some(tick)) = (&mut self.clock, device.tick) {
+            for (passes, log) in clock.logs.drain(..) {
+                let words = device.mapped(&[log])?;
+                let ticks: Vec<u64> =
+                    words[0].chunks_exact(2).map(|w| u64::from(w[1]) << 32 | u64::from(w[0])).collect();
+                for (run, ends) in passes.into_iter().zip(ticks.chunks_exact(2)) {
+                    let passed = ends[1].saturating_sub(ends[0]) as f64 * tick;
+                    self.runs[run].1 += Duration::from_nanos(passed as u64);
+                }
+            }
+        }
+        Ok(self.runs.clone())
+    }
+}

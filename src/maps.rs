@@ -1,0 +1,64 @@
+//! The maps that a match leaves behind, and what a pixel of them means.
+
+use crate::image::Plane;
+
+/// Fixed-point units of disparity in one pixel.
+pub const FRACTION: i32 = 256;
+
+/// Why a pixel is what it is: bits of the validity map. A pixel of 0 is measured and trusted.
+pub mod flag {
+    /// The match is outside the right image.
+    pub const OUTSIDE: u8 = 1;
+    /// The right view disagrees: occluded, or mistaken.
+    pub const OCCLUDED: u8 = 2;
+    /// The pixel is in a region too small to be trusted.
+    pub const SMALL_REGION: u8 = 4;
+    /// The confidence is below the floor; the disparity stays.
+    pub const LOW_CONFIDENCE: u8 = 8;
+    /// The disparity is filled in from other pixels.
+    pub const FILLED: u8 = 16;
+    /// The pixel is masked in the input, and has no disparity.
+    pub const MASKED: u8 = 32;
+    /// Any of the reasons for which a disparity is given up before the fill.
+    pub const INVALID: u8 = OUTSIDE | OCCLUDED | SMALL_REGION | MASKED;
+}
+
+/// What a match leaves behind; all maps have the size of the images.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Maps {
+    /// The final disparity in 1/256 px; meaningless where [`has_disparity`] says no.
+    pub disparity: Plane<i32>,
+    /// The disparity before post-processing, in 1/256 px, of every pixel that is not masked.
+    pub raw: Plane<i32>,
+    /// Confidence 0 ..= 255.
+    pub confidence: Plane<u8>,
+    /// Bits of [`flag`].
+    pub validity: Plane<u8>,
+}
+
+/// Whether a pixel with these validity bits has a disparity.
+#[must_use]
+pub fn has_disparity(validity: u8) -> bool {
+    validity & flag::INVALID == 0 || validity & flag::FILLED != 0
+}
+
+impl Maps {
+    /// The final map in pixels, `+inf` where there is none.
+    #[must_use]
+    pub fn final_map(&self) -> Plane<f32> {
+        self.pixels(&self.disparity, has_disparity)
+    }
+
+    /// The map before post-processing in pixels, `+inf` on masked pixels.
+    #[must_use]
+    pub fn raw_map(&self) -> Plane<f32> {
+        self.pixels(&self.raw, |validity| validity & flag::MASKED == 0)
+    }
+
+    fn pixels(&self, fixed: &Plane<i32>, known: impl Fn(u8) -> bool) -> Plane<f32> {
+        let (width, height) = fixed.size();
+        Plane::from_fn(width, height, |x, y| {
+            if known(self.validity[(x, y)]) { fixed[(x, y)] as f32 / FRACTION as f32 } else { f32::INFINITY }
+        })
+    }
+}

@@ -1,0 +1,592 @@
+//! What follows the beliefs against its naive twins on every backend, the order of it all, and what must hold of whole
+//! matches.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
+
+mod common;
+
+use common::compare::{compare_finest, compare_maps};
+use common::devices::backends;
+use common::random::{self, Random};
+use common::twin::{self, Finest};
+use mrfgs::backend::{Map, NO_LABEL, Stage};
+use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::maps::{Maps, flag};
+use mrfgs::options::{Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule};
+use mrfgs::plan::Plan;
+use mrfgs::solver::{self, Solution};
+use mrfgs::tables::MedianWeights;
+use mrfgs::{graph, match_pair};
+use std::ops::ControlFlow;
+
+const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (24, 31), (150, 4)];
+
+/// A stage by its definition.
+type Twin = fn(&Plan, &Pair, &mut Finest);
+
+/// A plan with one level and no neighbours for a method drawn anew.
+fn small_plan(random: &mut Random, size: (usize, usize), change: impl Fn(&mut Method)) -> Plan {
+    let mut method = random::method(random, 0);
+    method.levels = 1;
+    change(&mut method);
+    let labels = random.pick(&[1, 2, 3, 9, 40]);
+    random::plan(size, random.pick(&[-20, -1, 0, 5]), labels, &method)
+}
+
+/// Runs `stage` on the maps that `input` makes, of every size with many seeds, and compares all maps with the twin's.
+fn on_all(
+    stage: Stage,
+    rounds: u64,
+    change: impl Fn(&mut Random, &mut Method),
+    input: impl Fn(&mut Random, &Plan) -> Finest,
+    twin: Twin,
+) {
+    let mut backends = backends();
+    for &size in SIZES {
+        for seed in 0..rounds {
+            let mut random = Random::new(seed);
+            let mut draw = Random::new(seed + 1000);
+            let draw = std::cell::RefCell::new(&mut draw);
+            let plan = small_plan(&mut random, size, |method| change(&mut draw.borrow_mut(), method));
+            let pair = random::pair(&mut random, size.0, size.1);
+            let maps = input(&mut random, &plan);
+            let mut expected = maps.clone();
+            twin(&plan, &pair, &mut expected);
+            for (name, backend) in &mut backends {
+                let backend = backend.as_mut();
+                backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+                maps.write(backend);
+                backend.run(stage).unwrap();
+                if let Err(e) = compare_finest(backend, &expected) {
+                    panic!("{name}, {size:?}, seed {seed}: {e}\n{:?}", plan.method);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn visibility() {
+    let input = |random: &mut Random, plan: &Plan| random::finest(random, plan, false);
+    on_all(Stage::Visibility, 20, |_, _| (), input, twin::visibility::visibility);
+}
+
+#[test]
+fn region_filter() {
+    let sizes = [0, 1, 2, 3, 5, 20, 10_000];
+    let change = |random: &mut Random, method: &mut Method| method.region_size = random.pick(&sizes);
+    let input = |random: &mut Random, plan: &Plan| {
+        let mut maps = random::finest(random, plan, false);
+        // As the visibility leaves it.
+        for validity in maps.validity.data_mut() {
+            *validity &= i32::from(flag::OUTSIDE | flag::OCCLUDED | flag::MASKED);
+        }
+        maps
+    };
+    on_all(Stage::RegionFilter, 40, change, input, |plan, _, maps| twin::region::region_filter(plan, maps));
+}
+
+/// Which pixels belong to a region.
+type Shape<'a> = &'a dyn Fn(usize, usize) -> bool;
+
+/// Regions of every shape that defeats a shortcut: a spiral, a comb, rows that meet at their ends alone.
+#[test]
+fn regions_that_wind() {
+    let (width, height) = (131, 70);
+    let spiral = |x: usize, y: usize| {
+        let ring = x.min(y).min(width - 1 - x).min(height - 1 - y);
+        let door = ring % 2 == 1 && (x, y) == (ring, ring + 1);
+        ring.is_multiple_of(2) || door
+    };
+    let comb = |x: usize, y: usize| x.is_multiple_of(2) || y == height - 1;
+    let snake = |x: usize, y: usize| y.is_multiple_of(2) || x == if y % 4 == 1 { width - 1 } else { 0 };
+    let stairs = |x: usize, y: usize| !(x + y).is_multiple_of(3);
+    let shapes: [(&str, Shape); 4] =
+        [("spiral", &spiral), ("comb", &comb), ("snake", &snake), ("stairs", &stairs)];
+    let mut random = Random::new(3);
+    let pair = random::pair(&mut random, width, height);
+    for (shape, inside) in shapes {
+        let area = (0..width * height).filter(|i| inside(i % width, i / width)).count() as u32;
+        for region_size in [2, 3, area / 2, area, area + 1] {
+            let plan = small_plan(&mut random, (width, height), |m| m.region_size = region_size);
+            let labels = plan.levels[0].labels as i32;
+            let mut maps = Finest::zero((width, height));
+            maps.validity = Plane::from_fn(width, height, |x, y| i32::from(!inside(x, y)) * 2);
+            maps.label = Plane::from_fn(width, height, |x, _| (x as i32 / 50).min(labels - 1));
+            let mut expected = maps.clone();
+            twin::region::region_filter(&plan, &mut expected);
+            for (name, mut backend) in backends() {
+                backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+                maps.write(backend.as_mut());
+                backend.run(Stage::RegionFilter).unwrap();
+                if let Err(e) = compare_finest(backend.as_mut(), &expected) {
+                    panic!("{name}, {shape}, {region_size}: {e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn fill() {
+    let input = |random: &mut Random, plan: &Plan| {
+        let mut maps = random::finest(random, plan, false);
+        let (width, height) = plan.size();
+        if random.one_in(2) {
+            // Whole rows without a valid pixel.
+            for y in 0..height {
+                if random.one_in(2) {
+                    for x in 0..width {
+                        let reason = if random.one_in(3) { flag::MASKED } else { flag::OCCLUDED };
+                        maps.validity[(x, y)] = reason.into();
+                    }
+                }
+            }
+        }
+        maps
+    };
+    on_all(Stage::Fill, 60, |_, _| (), input, |_, _, maps| twin::fill::fill(maps));
+}
+
+#[test]
+fn confidence() {
+    let floors = [0, 1, 16, 17, 255];
+    let change = |random: &mut Random, method: &mut Method| method.confidence_floor = random.pick(&floors);
+    let input = |random: &mut Random, plan: &Plan| random::finest(random, plan, false);
+    on_all(Stage::Confidence, 40, change, input, |plan, _, maps| twin::confidence::confidence(plan, maps));
+}
+
+#[test]
+fn median() {
+    let change = |random: &mut Random, method: &mut Method| {
+        method.median = random.pick(&[Median::Off, Median::Filled, Median::All, Median::All]);
+        method.median_sigma_space = random.log_within(0.1, 100.0);
+        method.median_sigma_range = random.log_within(0.001, 10.0);
+        method.median_window = random.pick(&[3, 5, 15, 31]);
+    };
+    let input = |random: &mut Random, plan: &Plan| {
+        let mut maps = random::finest(random, plan, true);
+        if random.one_in(4) {
+            // As far apart as disparities get.
+            for d in maps.disparity.data_mut() {
+                *d = random.within(0, 1 << 29) as i32 - (1 << 28);
+            }
+        }
+        maps
+    };
+    on_all(Stage::Median, 30, change, input, twin::median::median);
+}
+
+#[test]
+fn median_weights() {
+    let mut random = Random::new(4);
+    for _ in 0..300 {
+        let (space, range) = (random.log_within(0.1, 100.0), random.log_within(0.001, 10.0));
+        let weights = MedianWeights::new(31, space, range);
+        for _ in 0..200 {
+            let (dx, dy) = (random.within(0, 15), random.within(0, 15));
+            let most = random.pick(&[100, 10_000, 3 * 4095 * 4095]);
+            let distance = random.within(0, most);
+            assert_eq!(
+                i64::from(weights.weight(dx as usize, dy as usize, distance)),
+                twin::median::weight(dx.into(), dy.into(), distance.into(), space, range),
+                "({dx}, {dy}), {distance}; sigmas {space} and {range}"
+            );
+        }
+    }
+}
+
+/// Maps without anything to go by: all masked, or all given up.
+#[test]
+fn nothing_valid() {
+    for &size in SIZES {
+        let mut random = Random::new(1);
+        let plan = small_plan(&mut random, size, |m| (m.median, m.region_size) = (Median::All, 100));
+        let pair = random::pair(&mut random, size.0, size.1);
+        for all in [flag::MASKED, flag::OCCLUDED, flag::OUTSIDE | flag::LOW_CONFIDENCE, flag::SMALL_REGION] {
+            let mut maps = random::finest(&mut random, &plan, false);
+            maps.validity = Plane::filled(size.0, size.1, all.into());
+            let mut expected = maps.clone();
+            expected.confidence = Plane::filled(size.0, size.1, 0);
+            for (name, mut backend) in backends() {
+                backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+                maps.write(backend.as_mut());
+                for stage in [Stage::RegionFilter, Stage::Fill, Stage::Median, Stage::Confidence] {
+                    backend.run(stage).unwrap();
+                }
+                if let Err(e) = compare_finest(backend.as_mut(), &expected) {
+                    panic!("{name}, {size:?}, all {all}: {e}");
+                }
+            }
+        }
+    }
+}
+
+/// A stage, whether its input has visibility flags alone, its twin, and what makes that one differ.
+type Control = (Stage, bool, Twin, fn(&mut Plan));
+
+/// Negative control: every stage notices a parameter that is a little off, or a value that is.
+#[test]
+fn control_changes_are_found() {
+    let mut random = Random::new(21);
+    let mut method = Method::default();
+    (method.levels, method.percentile, method.median_window) = (1, 100.0, 5);
+    let plan = random::plan((24, 31), 0, 9, &method);
+    // Faint enough for neighbours to have weight in the median.
+    let faint = Plane::from_fn(24, 31, |_, _| [0; 3].map(|_: i32| random.within(100, 130) as u8));
+    let pair = Pair::new(Image::from_rgb8(&faint), texture(&mut random, 24, 31)).unwrap();
+    let maps = loop {
+        let mut maps = random::finest(&mut random, &plan, true);
+        maps.rival = maps.best.map(|best| best + best % 20);
+        let valid = maps.validity.data().iter().filter(|&&f| f & i32::from(flag::INVALID) == 0).count();
+        if valid > 300 && valid < 600 {
+            break maps;
+        }
+    };
+    let mut unflagged = maps.clone();
+    unflagged.validity = unflagged.validity.map(|v| v & i32::from(flag::OCCLUDED));
+    let region: Twin = |plan, _, maps| twin::region::region_filter(plan, maps);
+    let confidence: Twin = |plan, _, maps| twin::confidence::confidence(plan, maps);
+    // The larger of two instead of the smaller.
+    let larger: Twin = |_, _, maps| {
+        maps.disparity = maps.disparity.map(|d| -d);
+        twin::fill::fill(maps);
+        maps.disparity = maps.disparity.map(|d| -d);
+    };
+    let changes: &[Control] = &[
+        (Stage::Visibility, false, twin::visibility::visibility, |p| p.range.min += 1),
+        (Stage::RegionFilter, true, region, |p| p.method.region_size += 1),
+        (Stage::Fill, false, larger, |_| ()),
+        (Stage::Confidence, false, confidence, |p| p.method.confidence_floor += 4),
+        (Stage::Median, false, twin::median::median, |p| p.method.median_window = 7),
+        (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_space = 1.0),
+        (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_range = 0.02),
+    ];
+    let mut plan = plan;
+    plan.method.region_size = 3;
+    for (name, mut backend) in backends() {
+        for (stage, bare, twin, change) in changes {
+            let input = if *bare { &unflagged } else { &maps };
+            backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+            input.write(backend.as_mut());
+            backend.run(*stage).unwrap();
+            let mut other = plan.clone();
+            change(&mut other);
+            let mut expected = input.clone();
+            twin(&other, &pair, &mut expected);
+            assert!(compare_finest(backend.as_mut(), &expected).is_err(), "{name}: {stage:?}");
+        }
+    }
+}
+
+/// The maps by the twins, from the estimate on, in the order in which the stages are described.
+fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
+    twin::visibility::visibility(plan, pair, maps);
+    twin::region::region_filter(plan, maps);
+    twin::confidence::confidence(plan, maps);
+    if plan.method.fill == Fill::Row {
+        twin::fill::fill(maps);
+    }
+    twin::median::median(plan, pair, maps);
+}
+
+/// Where the maps of two matches differ.
+fn compare_all(actual: &Maps, expected: &Maps) -> Result<(), String> {
+    compare_maps("raw", &actual.raw, &expected.raw)?;
+    compare_maps("validity", &actual.validity, &expected.validity)?;
+    compare_maps("confidence", &actual.confidence, &expected.confidence)?;
+    compare_maps("disparity", &actual.disparity, &expected.disparity)
+}
+
+/// The maps of every backend.
+fn solve(pair: &Pair, plan: &Plan) -> Vec<(String, Solution)> {
+    backends()
+        .into_iter()
+        .map(|(name, mut backend)| {
+            let solution =
+                solver::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())).unwrap();
+            (name, solution)
+        })
+        .collect()
+}
+
+fn matched(pair: &Pair, plan: &Plan, threads: usize) -> Maps {
+    let execution = Execution { backend: Choice::Cpu, threads: Some(threads), ..Execution::default() };
+    let observer = &mut |_| ControlFlow::Continue(());
+    match_pair(pair, plan.range, &plan.method, &execution, observer).unwrap().maps
+}
+
+#[test]
+fn the_stages_run_in_order() {
+    for seed in 0..60 {
+        let mut random = Random::new(seed);
+        let size = random.pick(&[(1, 1), (1, 12), (15, 1), (23, 14), (30, 22)]);
+        let labels = random.pick(&[1, 2, 9, 17]);
+        let neighbours = random.pick(&[0, 2, 8]);
+        let min = random.pick(&[-20, -3, 0, 5]);
+        let plan = random::plan(size, min, labels, &random::method(&mut random, neighbours));
+        let pair = random::pair(&mut random, size.0, size.1);
+        for (name, mut backend) in backends() {
+            let backend = backend.as_mut();
+            backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+            backend.run(Stage::Cost).unwrap();
+            for z in 1..plan.levels.len() {
+                backend.run(Stage::Pyramid(z)).unwrap();
+            }
+            for z in 0..plan.levels.len() {
+                backend.run(Stage::Evidence(z)).unwrap();
+            }
+            let iterations = solver::flood(backend, &plan).unwrap();
+            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+                backend.run(stage).unwrap();
+            }
+            let mut finest = Finest::zero(size);
+            finest.label = backend.read_map(Map::Label).unwrap();
+            finest.best = backend.read_map(Map::Best).unwrap();
+            finest.rival = backend.read_map(Map::Rival).unwrap();
+            finest.right_label = backend.read_map(Map::RightLabel).unwrap();
+            finest.raw = backend.read_map(Map::Raw).unwrap();
+            finest.disparity = finest.raw.clone();
+            twin_maps(&mut finest, &plan, &pair);
+            let bytes = |plane: &Plane<i32>| plane.map(|&v| u8::try_from(v).unwrap());
+            let expected = Maps {
+                disparity: finest.disparity.clone(),
+                raw: finest.raw.clone(),
+                confidence: bytes(&finest.confidence),
+                validity: bytes(&finest.validity),
+            };
+            for (solver, actual) in solve(&pair, &plan) {
+                if let Err(e) = compare_all(&actual.maps, &expected) {
+                    panic!("{solver} against twins after {name}, seed {seed}: {e}\n{:?}", plan.method);
+                }
+                assert_eq!(actual.iterations, iterations);
+            }
+        }
+    }
+}
+
+/// Noise in every pixel.
+fn texture(random: &mut Random, width: usize, height: usize) -> Image {
+    Image::from_rgb8(&Plane::from_fn(width, height, |_, _| [0; 3].map(|_: i32| random.within(0, 255) as u8)))
+}
+
+#[test]
+fn identical_views_have_no_disparity() {
+    for preset in ["default", "paper"] {
+        let mut random = Random::new(9);
+        let view = texture(&mut random, 47, 26);
+        let pair = Pair::new(view.clone(), view).unwrap();
+        for sub_pixel in [false, true] {
+            let mut method = Method::preset(preset).unwrap();
+            method.sub_pixel = sub_pixel;
+            for (min, labels) in [(-3, 16), (0, 17), (-12, 13)] {
+                let plan = random::plan((47, 26), min, labels, &method);
+                for (name, solution) in solve(&pair, &plan) {
+                    let most = if sub_pixel { 128 } else { 0 };
+                    for map in [&solution.maps.raw, &solution.maps.disparity] {
+                        let off = map.data().iter().filter(|d| d.abs() > most).count();
+                        assert_eq!(off, 0, "{name}, {preset}, {min}: pixels that are not at 0");
+                    }
+                    let invalid = flag::INVALID;
+                    assert!(
+                        solution.maps.validity.data().iter().all(|f| f & invalid == 0),
+                        "{name}, {preset}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// When the right view moves by a whole pixel of the coarsest level, and the range with it, every level sees the same
+/// costs under other names, but where a border or what lies beyond it comes in. How far a border reaches: the
+/// window of the cost; the pyramid; in each iteration two radii of the graph at the coarsest level, and its
+/// resolution factors; the right view; the median.
+#[test]
+fn a_shift_of_view_and_range_changes_nothing_inside() {
+    let (width, height, levels, labels) = (420, 9, 3u32, 8);
+    let shift = 1 << (levels - 1);
+    for (cost, potential, schedule) in [
+        (Cost::AdCensus, Potential::Soft, Schedule::CoarseFirst),
+        (Cost::Sad, Potential::Hard, Schedule::Together),
+        (Cost::AdCensus, Potential::Exact, Schedule::CoarseFirst),
+    ] {
+        let mut random = Random::new(31);
+        let left = texture(&mut random, width, height);
+        // Moved by 0 to 7, changing along the row, with some noise: neither certain nor hopeless.
+        let moved = Plane::from_fn(width, height, |x, y| {
+            let d = (x / 23 + y / 3) % labels;
+            let [r, g, b, _] = left.pixels[((x + d).min(width - 1), y)];
+            [r, g, b].map(|v| ((v >> 8) / 2 + random.within(0, 90) as u16) as u8)
+        });
+        let right = Image::from_rgb8(&moved);
+        let further = Image::from_rgb8(&Plane::from_fn(width, height, |x, y| {
+            if x + shift < width { moved[(x + shift, y)] } else { [200, 20, 2] }
+        }));
+        let mut method = Method::default();
+        (method.cost, method.potential, method.schedule) = (cost, potential, schedule);
+        (method.levels, method.iterations, method.final_iterations) = (levels, 1, 1);
+        if cost == Cost::Sad {
+            (method.outside_cost, method.temperature) = (20.0, 8.0);
+        }
+        // The region filter and the fill reach as far as they like.
+        (method.region_size, method.fill, method.median_window) = (0, Fill::None, 5);
+        let iterations = 3;
+        let per_iteration = (2 * 3 + 2) * shift;
+        let margin = 4 + 2 * shift + iterations * per_iteration + (labels + shift) + 2 + labels + shift;
+        let near = random::plan((width, height), 0, labels, &method);
+        let far = random::plan((width, height), shift as i32, labels, &method);
+        let near_pair = Pair::new(left.clone(), right).unwrap();
+        let far_pair = Pair::new(left, further).unwrap();
+        let unshifted = solve(&near_pair, &near);
+        for ((name, a), (_, b)) in unshifted.iter().zip(solve(&far_pair, &far)) {
+            let (a, b) = (&a.maps, &b.maps);
+            let (mut inside, mut elsewhere, mut distinct) = (0, 0, [false; 8]);
+            for y in 0..height {
+                for x in 0..width {
+                    let at = (x, y);
+                    let moved = shift as i32 * 256;
+                    let same = b.raw[at] == a.raw[at] + moved
+                        && a.validity[at] == b.validity[at]
+                        && a.confidence[at] == b.confidence[at]
+                        && b.disparity[at] == a.disparity[at] + moved;
+                    if x >= margin && x < width - margin {
+                        assert!(same, "{name}, {cost:?}: differs at x {x}, y {y}");
+                        inside += 1;
+                        distinct[((a.raw[at] + 128) >> 8).clamp(0, 7) as usize] = true;
+                    } else if !same {
+                        elsewhere += 1;
+                    }
+                }
+            }
+            assert!(inside >= 500, "{inside} pixels inside");
+            // Control: borders do matter where they may, and the inside is no plain.
+            assert!(
+                elsewhere > 0 && distinct.iter().filter(|&&d| d).count() > 5,
+                "{elsewhere}, {distinct:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    for seed in 0..6 {
+        let mut random = Random::new(seed);
+        let mut method = random::method(&mut random, 4);
+        (method.median, method.fill) = (Median::All, Fill::Row);
+        let plan = random::plan((37, 23), -3, 17, &method);
+        let pair = random::pair(&mut random, 37, 23);
+        let one = matched(&pair, &plan, 1);
+        for threads in [2, 3] {
+            assert!(matched(&pair, &plan, threads) == one, "seed {seed}, {threads} threads");
+        }
+    }
+}
+
+/// The same image with other values where it is masked.
+fn poisoned(random: &mut Random, image: &Image) -> Image {
+    let mut pixels = image.pixels.clone();
+    for (pixel, &masked) in pixels.data_mut().iter_mut().zip(image.masked.data()) {
+        if masked {
+            *pixel = [0; 4].map(|_: i32| {
+                let bits = random.bits() as u16;
+                random.pick(&[0, 65_535, bits])
+            });
+        }
+    }
+    Image { pixels, masked: image.masked.clone() }
+}
+
+#[test]
+fn masked_values_are_never_looked_at() {
+    let mut masked_pixels = 0;
+    for seed in 0..40 {
+        let mut random = Random::new(seed);
+        let mut method = random::method(&mut random, 8);
+        (method.levels, method.median) = (4, Median::All);
+        let plan = random::plan((29, 18), random.pick(&[-9, -3, 0]), 13, &method);
+        let pair = random::pair(&mut random, 29, 18);
+        let other =
+            Pair::new(poisoned(&mut random, pair.left()), poisoned(&mut random, pair.right())).unwrap();
+        masked_pixels += pair.left().masked.data().iter().filter(|&&m| m).count();
+        for ((name, a), (_, b)) in solve(&pair, &plan).iter().zip(&solve(&other, &plan)) {
+            if let Err(e) = compare_all(&a.maps, &b.maps) {
+                panic!("{name}, seed {seed}: {e}\n{:?}", plan.method);
+            }
+            assert_eq!(a.iterations, b.iterations);
+        }
+    }
+    assert!(masked_pixels > 1000);
+}
+
+/// Negative control: values that are not masked do count.
+#[test]
+fn control_values_that_are_not_masked_are_looked_at() {
+    let mut random = Random::new(2);
+    let plan = random::plan((29, 18), 0, 13, &Method::default());
+    let pair = Pair::new(texture(&mut random, 29, 18), texture(&mut random, 29, 18)).unwrap();
+    let mut left = pair.left().clone();
+    left.masked = Plane::from_fn(29, 18, |x, _| x % 4 == 1);
+    let mut other = poisoned(&mut random, &left);
+    left.masked = Plane::filled(29, 18, false);
+    other.masked = left.masked.clone();
+    let other = Pair::new(other, pair.right().clone()).unwrap();
+    for ((_, a), (_, b)) in solve(&pair, &plan).iter().zip(&solve(&other, &plan)) {
+        assert!(compare_all(&a.maps, &b.maps).is_err());
+    }
+}
+
+#[test]
+fn masks_and_single_pixels_pass_through() {
+    for preset in ["default", "paper"] {
+        let method = Method::preset(preset).unwrap();
+        for &(width, height) in &[(1, 1), (1, 7), (9, 1), (12, 10)] {
+            for (left_masked, right_masked) in [(true, true), (true, false), (false, true), (false, false)] {
+                let mut random = Random::new(6);
+                let mut left = texture(&mut random, width, height);
+                let mut right = texture(&mut random, width, height);
+                left.masked = Plane::filled(width, height, left_masked);
+                right.masked = Plane::filled(width, height, right_masked);
+                let plan = random::plan((width, height), -1, 4, &method);
+                for (name, solution) in solve(&Pair::new(left, right).unwrap(), &plan) {
+                    let masked =
+                        solution.maps.validity.data().iter().filter(|&f| f & flag::MASKED != 0).count();
+                    assert_eq!(masked, if left_masked { width * height } else { 0 }, "{name}, {preset}");
+                    let known = solution.maps.final_map().data().iter().any(|d| d.is_finite());
+                    assert!(!(left_masked && known), "{name}, {preset}: a masked pixel has a disparity");
+                    assert!(solution.maps.raw_map().data().iter().all(|d| d.is_finite() != left_masked));
+                }
+            }
+        }
+    }
+}
+
+/// Negative control for the right view: where nothing projects, there is no label, and that is no agreement.
+#[test]
+fn no_label_agrees_with_none() {
+    let mut random = Random::new(1);
+    let plan = random::plan((5, 1), 0, 4, &Method::default());
+    let pair = Pair::new(texture(&mut random, 5, 1), texture(&mut random, 5, 1)).unwrap();
+    let mut maps = Finest::zero((5, 1));
+    maps.right_label = Plane::filled(5, 1, NO_LABEL.into());
+    for (name, mut backend) in backends() {
+        backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+        maps.write(backend.as_mut());
+        backend.run(Stage::Visibility).unwrap();
+        let validity = backend.read_map(Map::Validity).unwrap();
+        assert!(validity.data().iter().all(|&f| f == i32::from(flag::OCCLUDED)), "{name}");
+    }
+}
+
+#[test]
+fn a_plan_of_another_size_is_refused() {
+    let mut random = Random::new(1);
+    let pair = Pair::new(texture(&mut random, 8, 8), texture(&mut random, 8, 8)).unwrap();
+    let range = DisparityRange::new(0, 3).unwrap();
+    let plan = Plan::new(8, 9, range, &Method::default()).unwrap();
+    for (_, mut backend) in backends() {
+        let observer = &mut |_| ControlFlow::Continue(());
+        assert!(solver::solve(backend.as_mut(), &plan, &pair, observer).is_err());
+    }
+}
