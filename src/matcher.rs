@@ -78,12 +78,12 @@ impl Matcher {
         }
     }
 
-    /// On `gpu` as long as it serves, on the CPU path from then on.
+    /// On `gpu`; where that fails or cannot serve, on the CPU path if it `falls_back`.
     ///
     /// # Errors
-    /// [`Error::Option`] for a number of threads that cannot be had.
-    pub fn with_fallback(gpu: Result<Gpu>, execution: &Execution) -> Result<Self> {
-        Self::build(Some(gpu), true, execution)
+    /// [`Error::Option`] for a number of threads that cannot be had, and that of `gpu` unless it falls back.
+    pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
+        Self::build(Some(gpu), falls_back, execution)
     }
 
     fn build(gpu: Option<Result<Gpu>>, falls_back: bool, execution: &Execution) -> Result<Self> {

@@ -1,10 +1,13 @@
-//! Re-creates everything that `testdata/` holds: `cargo run --release --example render-scenes [folder]`.
+//! Re-creates everything that `testdata/` holds: `cargo run --release --example render-scenes [FOLDER]`.
+//!
+//! With a scene's name and a size it renders that scene alone, as large as one likes:
+//! `cargo run --release --example render-scenes FOLDER mixed 3000 2000 256`.
 
 #[path = "scenes.rs"]
 mod scenes;
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Result, Write};
+use std::io::{BufWriter, Error, Result, Write};
 use std::path::{Path, PathBuf};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -12,23 +15,36 @@ use image::{ExtendedColorType, ImageEncoder};
 use mrfgs::image::Plane;
 
 fn main() -> Result<()> {
-    let folder = match std::env::args_os().nth(1) {
-        Some(folder) => PathBuf::from(folder),
-        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata"),
-    };
-    for recipe in scenes::all() {
-        let scene = recipe.render();
-        let folder = folder.join(scene.name);
-        fs::create_dir_all(&folder)?;
-        let size = scene.left.size();
-        write_png(&folder.join("im0.png"), size, scene.left.data().as_flattened(), ExtendedColorType::Rgb8)?;
-        write_png(&folder.join("im1.png"), size, scene.right.data().as_flattened(), ExtendedColorType::Rgb8)?;
-        write_png(&folder.join("mask0nocc.png"), size, scene.mask.data(), ExtendedColorType::L8)?;
-        write_pfm(&folder.join("disp0GT.pfm"), &scene.truth)?;
-        let calib = format!("width={}\nheight={}\nndisp={}\n", size.0, size.1, scene.labels);
-        fs::write(folder.join("calib.txt"), calib)?;
-        println!("{}", folder.display());
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let folder =
+        args.first().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata"), PathBuf::from);
+    match args.get(1..).unwrap_or_default() {
+        [] => scenes::all().iter().try_for_each(|recipe| save(&recipe.render(), &folder)),
+        [name, size @ ..] if size.len() == 3 => {
+            let numbers: std::result::Result<Vec<u32>, _> = size.iter().map(|n| n.parse()).collect();
+            let Ok(&[width, height, labels]) = numbers.as_deref() else { return Err(usage()) };
+            save(&scenes::render(name, width as usize, height as usize, labels), &folder)
+        }
+        _ => Err(usage()),
     }
+}
+
+fn usage() -> Error {
+    Error::other("give [FOLDER [SCENE WIDTH HEIGHT LABELS]]")
+}
+
+/// Writes a scene in the layout of the Middlebury stereo benchmark.
+fn save(scene: &scenes::Scene, folder: &Path) -> Result<()> {
+    let folder = folder.join(scene.name);
+    fs::create_dir_all(&folder)?;
+    let size = scene.left.size();
+    write_png(&folder.join("im0.png"), size, scene.left.data().as_flattened(), ExtendedColorType::Rgb8)?;
+    write_png(&folder.join("im1.png"), size, scene.right.data().as_flattened(), ExtendedColorType::Rgb8)?;
+    write_png(&folder.join("mask0nocc.png"), size, scene.mask.data(), ExtendedColorType::L8)?;
+    write_pfm(&folder.join("disp0GT.pfm"), &scene.truth)?;
+    let calib = format!("width={}\nheight={}\nndisp={}\n", size.0, size.1, scene.labels);
+    fs::write(folder.join("calib.txt"), calib)?;
+    println!("{}", folder.display());
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use mrfgs::solver::{Solution, solve};
 use mrfgs::{Error, graph};
 use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 fn load(folder: &Path) -> (Pair, DisparityRange) {
     let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
@@ -91,27 +91,110 @@ fn one_option_less_shows() {
     );
 }
 
+/// What the least device of WebGPU has.
+fn minimum() -> Handicap {
+    Handicap { max_binding: Some(128 << 20), max_buffer: Some(256 << 20), ..Handicap::default() }
+}
+
 #[test]
-fn a_device_that_shows_little_at_once() {
+fn small_devices() {
     let (pair, range) = load(Path::new("testdata/mixed"));
-    for (preset, _) in PRESETS {
+    let binding = |bytes| Handicap { max_binding: Some(bytes), ..Handicap::default() };
+    let buffer = |bytes| Handicap { max_buffer: Some(bytes), ..Handicap::default() };
+    for &(preset, _) in PRESETS {
         let method = Method::preset(preset).unwrap();
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
-        // From a few bands to bands of a row or two.
-        for max_binding in [4 << 20, 1 << 20, 700_000] {
-            let Some(mut gpu) =
-                devices::open(Handicap { max_binding: Some(max_binding), ..Handicap::default() })
-            else {
-                return;
-            };
+        let handicaps = [
+            Handicap {
+                max_binding: Some(700_000),
+                max_buffer: Some(2 << 20),
+                max_groups: Some(150),
+                ..Handicap::default()
+            },
+            minimum(),
+            // From a few bands to bands of a row or two.
+            binding(4 << 20),
+            binding(1 << 20),
+            binding(700_000),
+            // From two parts to parts of a few rows.
+            buffer(16 << 20),
+            buffer(5 << 20),
+            buffer(2 << 20),
+            // Dispatches that fold.
+            Handicap { max_groups: Some(150), ..Handicap::default() },
+        ];
+        // The first has it all; the others tell what it was.
+        let tried = if preset == "default" { handicaps.len() } else { 1 };
+        for handicap in handicaps.into_iter().take(tried) {
+            let Some(mut gpu) = devices::open(handicap) else { return };
             let actual = matched(&mut gpu, &pair, range, &method);
             assert!(
                 differences(&actual, &expected).is_empty(),
-                "{preset} in bindings of {max_binding}: {:?}",
+                "{preset} with {handicap:?}: {:?}",
                 differences(&actual, &expected)
             );
         }
     }
+}
+
+/// Every buffer full of garbage: what is read was written before.
+#[test]
+fn poisoned_buffers() {
+    for (preset, _) in PRESETS {
+        let mut method = Method::preset(preset).unwrap();
+        method.tolerance = 0.5;
+        let (pair, range) = load(Path::new("testdata/thin"));
+        let expected = matched(&mut Cpu::default(), &pair, range, &method);
+        let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu::default())];
+        for max_buffer in [None, Some(2 << 20)] {
+            let gpu = devices::open(Handicap { max_buffer, ..Handicap::default() });
+            backends.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Backend>));
+        }
+        for backend in &mut backends {
+            let name = backend.describe();
+            matched(backend.as_mut(), &pair, range, &method);
+            for byte in [0xff, 0x5a] {
+                backend.poison(byte).unwrap();
+                let actual = matched(backend.as_mut(), &pair, range, &method);
+                assert!(
+                    differences(&actual, &expected).is_empty(),
+                    "{name}, {preset}, {byte}: {:?}",
+                    differences(&actual, &expected)
+                );
+            }
+            // Control: poison does arrive where results are.
+            backend.poison(0x5a).unwrap();
+            assert!(differences(&matched_maps_only(backend.as_mut()), &expected).contains(&"disparity"));
+        }
+    }
+}
+
+/// The maps as they stand.
+fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
+    Solution { maps: backend.maps().unwrap(), iterations: 0, around: Default::default() }
+}
+
+/// The image goes up once, the maps come down once, and nothing between.
+#[test]
+fn nothing_leaves_the_device_in_between() {
+    let Some(mut gpu) = devices::open(Handicap::default()) else { return };
+    let (pair, range) = load(Path::new("testdata/slanted"));
+    let method = Method::default();
+    matched(&mut gpu, &pair, range, &method);
+    let traffic = gpu.traffic();
+    // Disparity, raw disparity and flags of 240 x 180 pixels, rows of 256.
+    assert_eq!(traffic.bytes_down, 3 * 4 * 256 * 180, "{traffic:?}");
+    // The sums of every row of each iteration, too, where they are asked for.
+    let mut tolerant = method.clone();
+    tolerant.tolerance = 1e-6;
+    let iterations = matched(&mut gpu, &pair, range, &tolerant).iterations;
+    let sums = gpu.traffic().bytes_down - traffic.bytes_down;
+    assert!(sums >= 8 * 180 && sums <= u64::from(iterations + 1) * 8 * 180, "{sums}");
+    // A second pair of the same plan takes the same dispatches, and no new parameters.
+    matched(&mut gpu, &pair, range, &method);
+    matched(&mut gpu, &pair, range, &method);
+    assert_eq!(gpu.traffic().dispatches, traffic.dispatches);
+    assert!(gpu.traffic().bytes_up < traffic.bytes_up);
 }
 
 #[test]
@@ -176,17 +259,26 @@ fn a_device_is_used_for_pair_after_pair() {
     assert!(differences(&first, &matched(&mut gpu, &pair, range, &method)).is_empty());
 }
 
-#[test]
-fn volumes_of_a_real_pair() {
+/// Folders with a pair in `MRFGS_MIDDLEBURY`; none, said on stderr, where that is not set.
+fn real_pairs() -> Vec<PathBuf> {
     let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") else {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
-        return;
+        return Vec::new();
     };
+    let entries = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut pairs: Vec<_> = entries.filter(|path| path.join("im0.png").is_file()).collect();
+    pairs.sort();
+    assert!(!pairs.is_empty(), "{folder} holds no pair");
+    pairs
+}
+
+#[test]
+fn volumes_of_a_real_pair() {
+    let Some(folder) = real_pairs().pop() else { return };
     let Some(mut gpu) = devices::gpu() else { return };
-    let (pair, range) = load(&Path::new(&folder).join("Teddy"));
-    let method = Method::default();
+    let (pair, range) = load(&folder);
     let (width, height) = pair.size();
-    let plan = Plan::new(width, height, range, &method).unwrap();
+    let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     let mut cpu = Cpu::default();
     let graphs = graph::build(pair.left(), &plan);
     let backends: [&mut dyn Backend; 2] = [&mut cpu, &mut gpu];
@@ -196,6 +288,29 @@ fn volumes_of_a_real_pair() {
         backend.read(Volume::Cost(0)).unwrap()
     });
     assert!(costs[0] == costs[1]);
-    let (a, b) = (matched(&mut gpu, &pair, range, &method), matched(&mut cpu, &pair, range, &method));
-    assert!(differences(&a, &b).is_empty(), "{:?}", differences(&a, &b));
+}
+
+/// Real pairs, with all that the device has and with as little as WebGPU promises. Of the presets the default; both where
+/// `MRFGS_PARITY` is `all`.
+#[test]
+fn maps_of_real_pairs() {
+    let everything = std::env::var("MRFGS_PARITY").is_ok_and(|v| v == "all");
+    for folder in real_pairs() {
+        let (pair, range) = load(&folder);
+        for (preset, _) in PRESETS.iter().filter(|(name, _)| everything || *name == "default") {
+            let method = Method::preset(preset).unwrap();
+            let expected = matched(&mut Cpu::default(), &pair, range, &method);
+            for handicap in [Handicap::default(), minimum()] {
+                let Some(mut gpu) = devices::open(handicap) else { return };
+                let actual = matched(&mut gpu, &pair, range, &method);
+                let name = folder.display();
+                assert!(
+                    differences(&actual, &expected).is_empty(),
+                    "{name}, {preset}, {handicap:?}: {:?}",
+                    differences(&actual, &expected)
+                );
+                println!("{name}, {preset}, {handicap:?}: the same maps");
+            }
+        }
+    }
 }

@@ -347,9 +347,10 @@ impl Device {
                 self.under_way.clear();
                 Err(self.hung())
             }
-            Err(e) => {
+            // A submission that never was: the device took it without a word, and is gone.
+            Err(wgpu::PollError::WrongSubmissionIndex(..)) => {
                 self.check()?;
-                Err(failed(&self.name, &e))
+                Err(failed(&self.name, &"the device was lost"))
             }
             Ok(_) => self.check(),
         }

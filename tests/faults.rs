@@ -1,0 +1,225 @@
+//! Devices that fail, in every way that can be brought about without one that does: each failure is said in one clear
+//! line, and where falling back is allowed the maps come from the CPU path, bit for bit.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
+mod common;
+
+use common::devices;
+use mrfgs::backend::Backend;
+use mrfgs::backend::cpu::Cpu;
+use mrfgs::backend::gpu::{Gpu, Handicap};
+use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
+use mrfgs::maps::Maps;
+use mrfgs::options::{DisparityRange, Execution, Method};
+use mrfgs::plan::Plan;
+use mrfgs::solver::{Solution, solve};
+use mrfgs::{Error, Matched, Matcher, Result};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+fn scene() -> (Pair, DisparityRange) {
+    let folder = Path::new("testdata/slanted");
+    let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
+    let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
+    (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
+}
+
+/// The upper left corner of a pair.
+fn corner(pair: &Pair) -> Pair {
+    let cut = |image: &Image| Image {
+        pixels: Plane::from_fn(31, 17, |x, y| image.pixels[(x, y)]),
+        masked: Plane::from_fn(31, 17, |x, y| image.masked[(x, y)]),
+    };
+    Pair::new(cut(pair.left()), cut(pair.right())).unwrap()
+}
+
+fn on(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange) -> Result<Solution> {
+    let (width, height) = pair.size();
+    let plan = Plan::new(width, height, range, &Method::default()).unwrap();
+    solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(()))
+}
+
+fn expected(pair: &Pair, range: DisparityRange) -> Maps {
+    on(&mut Cpu::default(), pair, range).unwrap().maps
+}
+
+fn run(matcher: &mut Matcher, pair: &Pair, range: DisparityRange) -> Result<Matched> {
+    matcher.run(pair, range, &Method::default(), &mut |_| ControlFlow::Continue(()))
+}
+
+/// One line that says what to do.
+fn is_clear(message: &str) -> bool {
+    message.contains("--backend cpu") && !message.contains('\n')
+}
+
+/// A device with a handicap; `None` where there is no driver.
+fn device(handicap: Handicap) -> Option<Gpu> {
+    devices::open(handicap)
+}
+
+/// What falling back gives: the maps of the CPU path, and a note with the reason.
+fn assert_falls_back(gpu: Result<Gpu>, says: &str) {
+    let (pair, range) = scene();
+    let mut matcher = Matcher::on(gpu, true, &Execution::default()).unwrap();
+    for _ in 0..2 {
+        let matched = run(&mut matcher, &pair, range).unwrap();
+        assert!(matched.maps == expected(&pair, range));
+        assert!(matched.ran_on.contains("CPU"), "{}", matched.ran_on);
+        let note = matched.note.expect("a reason");
+        assert!(note.contains(says) && is_clear(&note), "{note}");
+    }
+}
+
+#[test]
+fn a_good_device_is_used() {
+    let Some(gpu) = device(Handicap::default()) else { return };
+    let (pair, range) = scene();
+    let mut matcher = Matcher::on(Ok(gpu), true, &Execution::default()).unwrap();
+    let matched = run(&mut matcher, &pair, range).unwrap();
+    assert!(matched.maps == expected(&pair, range));
+    assert!(matched.note.is_none() && !matched.ran_on.contains("CPU path"), "{}", matched.ran_on);
+}
+
+/// A device that is lost before the first stage, at any later one, or when the maps come down.
+#[test]
+fn lost() {
+    let (pair, range) = scene();
+    let Some(mut whole) = device(Handicap { lost_after: Some(10_000), ..Handicap::default() }) else {
+        return;
+    };
+    assert!(on(&mut whole, &pair, range).is_ok());
+    let mut lost = 0;
+    for lost_after in [0, 1, 5, 20, 60, 110, 150, 175, 180, 185, 190] {
+        let handicap = Handicap { lost_after: Some(lost_after), ..Handicap::default() };
+        let mut gpu = device(handicap).unwrap();
+        match on(&mut gpu, &pair, range) {
+            Err(Error::Device(reason)) => {
+                lost += 1;
+                assert!(reason.contains("lost") && is_clear(&reason), "after {lost_after}: {reason}");
+                // And it stays lost.
+                assert!(matches!(on(&mut gpu, &pair, range), Err(Error::Device(_))));
+            }
+            // It was through by then.
+            Ok(solution) => assert!(lost_after > 150 && solution.maps == expected(&pair, range)),
+            Err(e) => panic!("after {lost_after}: {e}"),
+        }
+    }
+    assert!(lost >= 7, "{lost}");
+    for lost_after in [0, 30] {
+        assert_falls_back(
+            Ok(device(Handicap { lost_after: Some(lost_after), ..Handicap::default() }).unwrap()),
+            "lost",
+        );
+    }
+}
+
+/// Where falling back is not allowed, the failure is the answer.
+#[test]
+fn lost_without_a_way_back() {
+    let Some(gpu) = device(Handicap { lost_after: Some(3), ..Handicap::default() }) else { return };
+    let (pair, range) = scene();
+    let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
+    assert!(matches!(run(&mut matcher, &pair, range), Err(Error::Device(e)) if is_clear(&e)));
+}
+
+#[test]
+fn not_there() {
+    let missing = || Err(Error::Device("there is none: use --backend cpu".into()));
+    assert!(Matcher::on(missing(), false, &Execution::default()).is_err());
+    assert_falls_back(missing(), "there is none");
+}
+
+/// Too little memory for the plan is seen before any buffer is asked for, and a smaller pair still fits.
+#[test]
+fn out_of_memory() {
+    let (pair, range) = scene();
+    let handicap = Handicap { memory: Some(20 << 20), ..Handicap::default() };
+    let Some(mut gpu) = device(handicap) else { return };
+    let error = on(&mut gpu, &pair, range).unwrap_err();
+    assert!(matches!(&error, Error::Memory(e) if e.contains("20") && is_clear(e)), "{error}");
+    assert_eq!(gpu.traffic().bytes_up, 0);
+    let small = corner(&pair);
+    assert!(on(&mut gpu, &small, range).unwrap().maps == expected(&small, range));
+
+    let mut matcher = Matcher::on(Ok(gpu), true, &Execution::default()).unwrap();
+    let matched = run(&mut matcher, &pair, range).unwrap();
+    assert!(matched.maps == expected(&pair, range));
+    assert!(matched.ran_on.contains("CPU") && matched.note.unwrap().contains("MiB"));
+    let matched = run(&mut matcher, &small, range).unwrap();
+    assert!(matched.maps == expected(&small, range));
+    assert!(!matched.ran_on.contains("CPU path") && matched.note.is_none(), "{}", matched.ran_on);
+}
+
+/// Buffers and bindings too small for a single row.
+#[test]
+fn too_small() {
+    let (pair, range) = scene();
+    for handicap in [
+        Handicap { max_buffer: Some(200_000), ..Handicap::default() },
+        Handicap { max_buffer: Some(700_000), ..Handicap::default() },
+        Handicap { max_binding: Some(100_000), ..Handicap::default() },
+    ] {
+        let Some(mut gpu) = device(handicap) else { return };
+        let error = on(&mut gpu, &pair, range).unwrap_err();
+        assert!(matches!(&error, Error::Memory(e) if is_clear(e)), "{handicap:?}: {error}");
+        assert_falls_back(Ok(gpu), "--backend cpu");
+    }
+}
+
+#[test]
+fn hangs() {
+    let handicap = Handicap { patience: Some(Duration::ZERO), ..Handicap::default() };
+    let Some(mut gpu) = device(handicap) else { return };
+    let (pair, range) = scene();
+    let error = on(&mut gpu, &pair, range).unwrap_err();
+    assert!(matches!(&error, Error::Device(e) if e.contains("hangs") && is_clear(e)), "{error}");
+    assert!(matches!(on(&mut gpu, &pair, range), Err(Error::Device(_))));
+    assert_falls_back(Ok(gpu), "hangs");
+}
+
+/// A driver that does not take a shader: here for its workgroups.
+#[test]
+fn refuses_a_shader() {
+    let handicap = Handicap { max_invocations: Some(32), ..Handicap::default() };
+    let Some(mut gpu) = device(handicap) else { return };
+    let (pair, range) = scene();
+    let error = on(&mut gpu, &pair, range).unwrap_err();
+    assert!(matches!(&error, Error::Device(e) if e.contains("workgroup") && is_clear(e)), "{error}");
+    assert_falls_back(Ok(gpu), "workgroup");
+}
+
+/// A driver that takes everything and computes nothing, or something else: a small pair finds it out.
+#[test]
+fn computes_nothing() {
+    let handicap = Handicap { noop: true, ..Handicap::default() };
+    let gpu = || Gpu::with_handicap(None, handicap);
+    let (pair, range) = scene();
+    // It does not even say so.
+    assert!(on(&mut gpu().unwrap(), &pair, range).unwrap().maps != expected(&pair, range));
+    assert_falls_back(gpu(), "test pair");
+    let mut matcher = Matcher::on(gpu(), false, &Execution::default()).unwrap();
+    let error = run(&mut matcher, &pair, range).unwrap_err();
+    assert!(matches!(&error, Error::Device(e) if e.contains("test pair") && is_clear(e)), "{error}");
+}
+
+/// Times are kept with the device's clock and without, and add up to something.
+#[test]
+fn a_device_without_a_clock() {
+    let (pair, range) = scene();
+    let execution = Execution { timings: true, ..Execution::default() };
+    for no_clock in [false, true] {
+        let Some(gpu) = device(Handicap { no_clock, ..Handicap::default() }) else { return };
+        let mut matcher = Matcher::on(Ok(gpu), true, &execution).unwrap();
+        let matched = run(&mut matcher, &pair, range).unwrap();
+        assert!(matched.maps == expected(&pair, range));
+        let of = |stage| matched.timings.iter().filter(move |t| t.stage == stage);
+        assert_eq!(of("dependency").count(), matched.plan.levels.len());
+        assert_eq!(of("dependency").map(|t| t.runs).max(), Some(18));
+        for stage in ["graph", "upload", "cost", "median", "download"] {
+            assert!(of(stage).all(|t| t.runs == 1 && t.time > Duration::ZERO), "{stage}, {no_clock}");
+            assert_eq!(of(stage).count(), 1, "{stage}");
+        }
+    }
+}
