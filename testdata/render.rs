@@ -57,7 +57,7 @@ fn write_png(
     let mut file = BufWriter::new(File::create(path)?);
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Adaptive)
         .write_image(bytes, width as u32, height as u32, colour)
-        .map_err(std::io::Error::other)?;
+        .map_err(Error::other)?;
     file.flush()
 }
 
