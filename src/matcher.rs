@@ -2,7 +2,7 @@
 
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, Gpu};
-use crate::backend::{Backend, Stage};
+use crate::backend::{Backend, Stage, Traffic};
 use crate::error::{Error, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
@@ -28,6 +28,8 @@ pub struct Matched {
     pub note: Option<String>,
     /// The time of every stage, in the order of their first run; empty unless [`Execution::timings`] asks.
     pub timings: Vec<Timing>,
+    /// What went through the device.
+    pub traffic: Traffic,
 }
 
 /// The time that a stage took, over all its runs.
@@ -171,6 +173,7 @@ fn timed(
     let solution = solver::solve(backend, plan, pair, observer)?;
     Ok(Matched {
         timings: if timings { summed(&solution, &backend.times()?) } else { Vec::new() },
+        traffic: backend.traffic(),
         maps: solution.maps,
         iterations: solution.iterations,
         plan: plan.clone(),

@@ -486,6 +486,33 @@ fn without_a_driver_gpu_says_what_to_do() {
 }
 
 #[test]
+fn timings_name_every_stage() {
+    let folder = workshop();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--timings"];
+    let table = run(folder.path(), &[&args[..], &["--backend", "cpu"]].concat()).succeeded().stderr;
+    let row = |name: &str| table.lines().find(|l| l.starts_with(name)).map(str::to_owned);
+    for stage in [
+        "stage ",
+        "graph ",
+        "cost ",
+        "pyramid, level 5",
+        "dependency, level 0",
+        "region filter ",
+        "median ",
+        "download ",
+        "rest ",
+        "all ",
+    ] {
+        assert!(row(stage).is_some(), "no `{stage}` in:\n{table}");
+    }
+    assert!(row("all ").unwrap().ends_with(" 100.0 %"), "{table}");
+    assert!(row("belief, level 5").unwrap().split_whitespace().nth(3) == Some("19"), "{table}");
+    assert!(!table.contains("dispatches"), "{table}");
+    let told = run(folder.path(), &[&args[..], &["--quiet"]].concat());
+    told.failed(2, &["--timings", "--quiet"], "--quiet and --timings");
+}
+
+#[test]
 fn an_unknown_device_is_named() {
     let folder = workshop();
     let before = listing(folder.path());

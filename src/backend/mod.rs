@@ -213,6 +213,19 @@ impl Stage {
     }
 }
 
+/// What a match asked of a device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Dispatches.
+    pub dispatches: u64,
+    /// Submissions to the queue.
+    pub submissions: u64,
+    /// Bytes written to the device.
+    pub bytes_up: u64,
+    /// Bytes read from it.
+    pub bytes_down: u64,
+}
+
 /// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Backend {
@@ -245,6 +258,9 @@ pub trait Backend {
     /// The time of every run of a stage since [`Backend::keep_time`] was last called, in order: a device's own where it has
     /// a clock.
     fn times(&mut self) -> Result<Vec<(Stage, Duration)>>;
+
+    /// What went through since [`Backend::prepare`], which is included; all 0 where there is no device.
+    fn traffic(&self) -> Traffic;
 
     /// The values of `volume`.
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>>;

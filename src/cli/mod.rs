@@ -18,7 +18,7 @@ use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
-use mrfgs::{Error, Matched, Matcher, Result, Timing};
+use mrfgs::{Error, Matched, Matcher, Result};
 use progress::Bar;
 
 const ABOUT: &str = "\
@@ -265,14 +265,15 @@ fn match_and_tell(
             matched.ran_on
         ));
         if !matched.timings.is_empty() {
-            let _ = std::io::stderr().write_all(timing_table(&matched.timings, time).as_bytes());
+            let _ = std::io::stderr().write_all(timing_table(&matched, time).as_bytes());
         }
     }
     Ok((matched, time))
 }
 
 /// Stages and their times for people; `whole` is the time of it all.
-fn timing_table(timings: &[Timing], whole: Duration) -> String {
+fn timing_table(matched: &Matched, whole: Duration) -> String {
+    let Matched { timings, traffic, .. } = matched;
     let mut out = format!("{:<24}{:>6}{:>12}{:>9}\n", "stage", "runs", "ms", "share");
     let mut row = |name: &str, runs: &str, time: Duration| {
         let share = 100.0 * time.as_secs_f64() / whole.as_secs_f64();
@@ -284,6 +285,16 @@ fn timing_table(timings: &[Timing], whole: Duration) -> String {
     }
     row("rest", "", whole.saturating_sub(timings.iter().map(|t| t.time).sum()));
     row("all", "", whole);
+    if traffic.dispatches > 0 {
+        let _ = writeln!(
+            out,
+            "{} dispatches in {} submissions, {} up, {} down",
+            traffic.dispatches,
+            traffic.submissions,
+            bytes(traffic.bytes_up),
+            bytes(traffic.bytes_down)
+        );
+    }
     out
 }
 

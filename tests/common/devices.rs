@@ -3,7 +3,7 @@
 use mrfgs::Result;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{Gpu, Handicap};
-use mrfgs::backend::{Backend, Map, Stage, Volume};
+use mrfgs::backend::{Backend, Map, Stage, Traffic, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Pair, Plane};
 use mrfgs::maps::Maps;
@@ -96,6 +96,10 @@ impl Backend for Pooled {
 
     fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
         self.gpu().times()
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.0.as_ref().expect("there until it is dropped").traffic()
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {

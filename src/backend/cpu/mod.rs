@@ -15,7 +15,7 @@ mod resolution;
 mod sub_pixel;
 mod visibility;
 
-use super::{Backend, Map, PaddedRows, Stage, Volume, volume_shape};
+use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
@@ -332,6 +332,10 @@ impl Backend for Cpu {
 
     fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
         Ok(self.times.clone().unwrap_or_default())
+    }
+
+    fn traffic(&self) -> Traffic {
+        Traffic::default()
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {

@@ -1,5 +1,6 @@
 //! Adapters: which there are, which one to take, and a device on it that reports its failures.
 
+use crate::backend::Traffic;
 use crate::error::{Error, Result};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -199,21 +200,7 @@ pub(super) struct Device {
     lost_after: Option<usize>,
     under_way: VecDeque<wgpu::SubmissionIndex>,
     failure: Arc<Mutex<Option<Error>>>,
-    /// What went through, for people who tune: submissions, bytes up, bytes down.
     pub(super) traffic: Traffic,
-}
-
-/// What a match asked of the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Traffic {
-    /// Dispatches recorded.
-    pub dispatches: u64,
-    /// Submissions to the queue.
-    pub submissions: u64,
-    /// Bytes written to the device.
-    pub bytes_up: u64,
-    /// Bytes read from it.
-    pub bytes_down: u64,
 }
 
 impl Device {

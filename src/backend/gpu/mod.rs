@@ -13,7 +13,7 @@ mod stages;
 mod timer;
 mod upload;
 
-use super::{Backend, Map, PaddedRows, Stage, Volume, volume_shape};
+use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
@@ -23,7 +23,7 @@ use crate::plan::Plan;
 use crate::tables::{self, MedianWeights};
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
-pub use device::{DeviceInfo, Handicap, Traffic, devices, has_automatic};
+pub use device::{DeviceInfo, Handicap, devices, has_automatic};
 pub use kernels::{Kernel, LevelParams, Params, Variant};
 use stages::{Step, Steps};
 use std::collections::HashMap;
@@ -83,12 +83,6 @@ impl Gpu {
             timer: None,
             state: None,
         })
-    }
-
-    /// What went through since the last [`Backend::prepare`], which is included.
-    #[must_use]
-    pub fn traffic(&self) -> Traffic {
-        self.device.traffic
     }
 
     /// The pipeline of `kernel` at `level`, compiled on first use.
@@ -366,6 +360,10 @@ impl Backend for Gpu {
     fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
         self.wait()?;
         self.timer.as_mut().map_or(Ok(Vec::new()), |timer| timer.times(&mut self.device))
+    }
+
+    fn traffic(&self) -> Traffic {
+        self.device.traffic
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
