@@ -118,6 +118,18 @@ pub enum Schedule {
     CoarseFirst,
 }
 
+/// How the map of the right view is found, with which the disparities are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Visibility {
+    /// It is not: no comparison (the paper, section 2.5).
+    Off,
+    /// Off the same beliefs: the right pixel takes the best of the labels that see it.
+    RightView,
+    /// By a second matching with the views exchanged: the left-right check of the paper's predecessor.
+    SecondMatch,
+}
+
 /// What becomes of the pixels that are invalid after visibility and region filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -186,8 +198,8 @@ method! {
          schedule together.";
     tolerance: f64, "pixels", "Stop when the RMS change of the finest map from one iteration to the next is at most \
          this; 0 runs all iterations (algorithm 1).";
-    visibility: bool, "true | false", "Compare with the map of the right view, read off the same beliefs, and call \
-         what disagrees by more than one pixel occluded (the paper does without).";
+    visibility: Visibility, "off | right-view | second-match", "Compare with the map of the right view, and call what \
+         disagrees by more than one pixel occluded (the paper does without).";
     region_size: u32, "pixels", "Regions smaller than this become invalid; 0 keeps all (open).";
     sub_pixel: bool, "true | false", "Place the disparity between the labels, by the matching cost around the optimum \
          (open).";
@@ -209,6 +221,7 @@ pub fn keys() -> Vec<(String, &'static str, &'static str)> {
 pub const PRESETS: &[(&str, &str)] = &[
     ("default", "the best this engine does"),
     ("paper", "the paper's choices wherever it states them, from the cost volume on"),
+    ("fgs", "the paper's predecessor: one resolution, and a left-right check by a second matching"),
 ];
 
 impl Default for Method {
@@ -233,7 +246,7 @@ impl Default for Method {
             iterations: 3,
             final_iterations: 3,
             tolerance: 0.0,
-            visibility: true,
+            visibility: Visibility::RightView,
             region_size: 200,
             sub_pixel: true,
             fill: Fill::Row,
@@ -268,11 +281,12 @@ impl Method {
                 schedule: Schedule::Together,
                 iterations: 30,
                 tolerance: 0.1,
-                visibility: false,
+                visibility: Visibility::Off,
                 region_size: 0,
                 sub_pixel: false,
                 ..Self::default()
             }),
+            "fgs" => Ok(Self { levels: 1, visibility: Visibility::SecondMatch, ..Self::preset("paper")? }),
             _ => {
                 let names: Vec<_> = PRESETS.iter().map(|p| p.0).collect();
                 Err(Error::option(
@@ -471,10 +485,15 @@ mod tests {
         method.set("cost", "sad").unwrap();
         method.set("cost", "\"sad\"").unwrap();
         method.set("temperature", "2").unwrap();
-        method.set("visibility", "false").unwrap();
+        method.set("visibility", "off").unwrap();
         method.set_all([("levels", "3"), ("levels", "4")]).unwrap();
-        let expected =
-            Method { cost: Cost::Sad, temperature: 2.0, visibility: false, levels: 4, ..Method::default() };
+        let expected = Method {
+            cost: Cost::Sad,
+            temperature: 2.0,
+            visibility: Visibility::Off,
+            levels: 4,
+            ..Method::default()
+        };
         assert_eq!(method, expected);
     }
 

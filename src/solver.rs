@@ -1,11 +1,11 @@
 //! The only place that knows levels, iterations, convergence and the order of what follows.
 
-use crate::backend::{Backend, Stage};
+use crate::backend::{Backend, Map, Stage};
 use crate::error::{Error, Result};
 use crate::graph;
 use crate::image::Pair;
 use crate::maps::Maps;
-use crate::options::{Fill, Median, Method};
+use crate::options::{Fill, Median, Method, Visibility};
 use crate::plan::Plan;
 use std::iter;
 use std::ops::ControlFlow;
@@ -43,19 +43,22 @@ pub fn solve(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
     if plan.size() != pair.size() {
         return Err(Error::Mismatch(format!("a plan for {:?} and a pair of {:?}", plan.size(), pair.size())));
     }
-    let mut work = Work { observer, done: 0.0, total: total_work(plan) };
-    work.begin("graph", 0.0)?;
-    let clock = Instant::now();
-    let graphs = graph::build(pair.left(), plan);
-    let graph_time = clock.elapsed();
-    backend.prepare(plan, pair, graphs)?;
-    let upload_time = clock.elapsed().saturating_sub(graph_time);
-    let levels = 0..plan.levels.len();
-    let pyramid = levels.clone().skip(1).map(Stage::Pyramid);
-    for stage in iter::once(Stage::Cost).chain(pyramid).chain(levels.map(Stage::Evidence)) {
-        work.run(backend, plan, stage)?;
+    let second = plan.method.visibility == Visibility::SecondMatch;
+    let matchings = if second { 2.0 } else { 1.0 };
+    let mut work = Work { observer, done: 0.0, total: matchings * total_work(plan) };
+    let mut around = [("graph", Duration::ZERO), ("upload", Duration::ZERO), ("download", Duration::ZERO)];
+    let right_labels = if second {
+        // The right view becomes the left one, its matches to the left again, when both are mirrored.
+        let mirrored = pair.mirrored();
+        estimate(backend, plan, &mirrored, &mut work, &mut around)?;
+        Some(backend.read_map(Map::Label)?.mirrored())
+    } else {
+        None
+    };
+    let iterations = estimate(backend, plan, pair, &mut work, &mut around)?;
+    if let Some(labels) = right_labels {
+        backend.write_map(Map::RightLabel, &labels)?;
     }
-    let iterations = propagate(backend, plan, &mut work)?;
     for stage in finish(&plan.method) {
         work.run(backend, plan, stage)?;
     }
@@ -63,8 +66,33 @@ pub fn solve(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
     backend.wait()?;
     let clock = Instant::now();
     let maps = backend.maps()?;
-    let around = [("graph", graph_time), ("upload", upload_time), ("download", clock.elapsed())];
+    around[2].1 += clock.elapsed();
     Ok(Solution { maps, iterations, around })
+}
+
+/// From the pair to the optimum of every pixel; the number of iterations.
+fn estimate(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    work: &mut Work,
+    around: &mut [(&'static str, Duration); 3],
+) -> Result<u32> {
+    work.begin("graph", 0.0)?;
+    let clock = Instant::now();
+    let graphs = graph::build(pair.left(), plan);
+    around[0].1 += clock.elapsed();
+    let clock = Instant::now();
+    backend.prepare(plan, pair, graphs)?;
+    around[1].1 += clock.elapsed();
+    let levels = 0..plan.levels.len();
+    let pyramid = levels.clone().skip(1).map(Stage::Pyramid);
+    for stage in iter::once(Stage::Cost).chain(pyramid).chain(levels.map(Stage::Evidence)) {
+        work.run(backend, plan, stage)?;
+    }
+    let iterations = propagate(backend, plan, work)?;
+    work.run(backend, plan, Stage::Estimate)?;
+    Ok(iterations)
 }
 
 /// Runs the flooding of `plan` on the evidence that `backend` holds; returns the number of iterations.
@@ -118,10 +146,10 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
     Ok(iterations)
 }
 
-/// What follows the last iteration.
+/// What follows the estimate.
 fn finish(method: &Method) -> Vec<Stage> {
-    let mut stages = vec![Stage::Estimate];
-    if method.visibility {
+    let mut stages = Vec::new();
+    if method.visibility == Visibility::RightView {
         stages.push(Stage::RightView);
     }
     stages.extend([Stage::SubPixel, Stage::Visibility]);

@@ -12,7 +12,9 @@ use common::twin::{self, Finest};
 use mrfgs::backend::{Map, NO_LABEL, Stage};
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::{Maps, flag};
-use mrfgs::options::{Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule};
+use mrfgs::options::{
+    Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule, Visibility,
+};
 use mrfgs::plan::Plan;
 use mrfgs::solver::{self, Solution};
 use mrfgs::tables::MedianWeights;
@@ -344,7 +346,10 @@ fn the_stages_run_in_order() {
             finest.label = backend.read_map(Map::Label).unwrap();
             finest.best = backend.read_map(Map::Best).unwrap();
             finest.rival = backend.read_map(Map::Rival).unwrap();
-            finest.right_label = backend.read_map(Map::RightLabel).unwrap();
+            finest.right_label = match plan.method.visibility {
+                Visibility::SecondMatch => second_match(&pair, &plan),
+                _ => backend.read_map(Map::RightLabel).unwrap(),
+            };
             finest.raw = backend.read_map(Map::Raw).unwrap();
             finest.disparity = finest.raw.clone();
             twin_maps(&mut finest, &plan, &pair);
@@ -363,6 +368,24 @@ fn the_stages_run_in_order() {
             }
         }
     }
+}
+
+/// Labels of the right view by a matching of its own: right x is left width - 1 - x of the mirrored pair.
+fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
+    let mirror = |image: &Image| {
+        let (width, height) = image.pixels.size();
+        Image {
+            pixels: Plane::from_fn(width, height, |x, y| image.pixels[(width - 1 - x, y)]),
+            masked: Plane::from_fn(width, height, |x, y| image.masked[(width - 1 - x, y)]),
+        }
+    };
+    let mirrored = Pair::new(mirror(pair.right()), mirror(pair.left())).unwrap();
+    let mut method = plan.method.clone();
+    (method.visibility, method.sub_pixel) = (Visibility::Off, false);
+    let (width, height) = pair.size();
+    let plan = Plan::new(width, height, plan.range, &method).unwrap();
+    let raw = matched(&mirrored, &plan, 1).raw;
+    Plane::from_fn(width, height, |x, y| raw[(width - 1 - x, y)] / 256 - plan.range.min)
 }
 
 /// Noise in every pixel.

@@ -149,7 +149,7 @@ pub enum Stage {
     /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
     SubPixel,
     /// [`Map::Validity`]: [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
-    /// [`crate::options::Method::visibility`] asks for it, [`flag::OUTSIDE`] where the match is outside the right image
+    /// [`crate::options::Method::visibility`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
     /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
     ///
     /// [`flag::MASKED`]: crate::maps::flag::MASKED

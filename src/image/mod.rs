@@ -87,6 +87,13 @@ impl<T> Plane<T> {
 }
 
 impl<T: Clone> Plane<T> {
+    /// The plane with left and right exchanged.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let data = self.data.chunks(self.width.max(1)).flat_map(|row| row.iter().rev().cloned());
+        Self { width: self.width, height: self.height, data: data.collect() }
+    }
+
     /// A plane that holds `value` everywhere.
     #[must_use]
     pub fn filled(width: usize, height: usize, value: T) -> Self {
@@ -191,6 +198,14 @@ impl Pair {
     #[must_use]
     pub fn right(&self) -> &Image {
         &self.right
+    }
+
+    /// The pair as in a mirror: the right view, mirrored, takes the left one's place, and disparities stay what they are.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let mirror =
+            |image: &Image| Image { pixels: image.pixels.mirrored(), masked: image.masked.mirrored() };
+        Self { left: mirror(&self.right), right: mirror(&self.left) }
     }
 
     /// (width, height) of both views.

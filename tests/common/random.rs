@@ -5,7 +5,9 @@ use mrfgs::backend::{Backend, NO_LABEL, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::flag;
-use mrfgs::options::{Cost, DisparityRange, Fill, Median, Method, Potential, Pyramid, Resolution, Schedule};
+use mrfgs::options::{
+    Cost, DisparityRange, Fill, Median, Method, Potential, Pyramid, Resolution, Schedule, Visibility,
+};
 use mrfgs::plan::Plan;
 
 /// The splitmix64 generator (Steele, Lea and Flood 2014).
@@ -129,7 +131,12 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     m.schedule = random.pick(&[Schedule::Together, Schedule::CoarseFirst]);
     m.iterations = random.within(1, 3);
     m.final_iterations = random.within(0, 3);
-    m.visibility = !random.one_in(3);
+    m.visibility = random.pick(&[
+        Visibility::Off,
+        Visibility::RightView,
+        Visibility::RightView,
+        Visibility::SecondMatch,
+    ]);
     m.region_size = random.pick(&[0, 3, 20]);
     m.sub_pixel = random.pick(&[false, true]);
     m.fill = random.pick(&[Fill::None, Fill::Row, Fill::Row]);

@@ -3,6 +3,7 @@
 use super::Finest;
 use crate::image::Image;
 use crate::maps::flag;
+use crate::options::Visibility;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
@@ -15,7 +16,7 @@ pub(super) fn run(plan: &Plan, left: &Image, maps: &mut Finest) {
             let xr = x as i64 - min - i64::from(label);
             *flags = if left.masked[(x, y)] {
                 flag::MASKED
-            } else if !plan.method.visibility {
+            } else if plan.method.visibility == Visibility::Off {
                 0
             } else if xr < 0 || xr >= width as i64 {
                 flag::OUTSIDE

@@ -6,7 +6,7 @@ use super::kernels::{JOINED_COLUMNS, Kernel, Params, SEGMENT};
 use super::{Gpu, WORKGROUP};
 use crate::backend::Stage;
 use crate::error::{Error, Result};
-use crate::options::{Cost, Median};
+use crate::options::{Cost, Median, Visibility};
 use crate::plan::Plan;
 use crate::tables::MedianWeights;
 use std::collections::{BTreeSet, HashMap};
@@ -52,7 +52,7 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         evidence_limit: scale.limit,
         evidence_cap: scale.cap,
         sub_pixel: method.sub_pixel.into(),
-        visibility: method.visibility.into(),
+        visibility: (method.visibility != Visibility::Off).into(),
         median_all: (method.median == Median::All).into(),
         region_size: method.region_size,
         confidence_floor: method.confidence_floor,

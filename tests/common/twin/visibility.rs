@@ -1,6 +1,7 @@
 use super::Finest;
 use mrfgs::image::Pair;
 use mrfgs::maps::flag;
+use mrfgs::options::Visibility;
 use mrfgs::plan::Plan;
 
 /// Validity of each pixel by the mask and the map of the right view.
@@ -13,7 +14,7 @@ pub fn visibility(plan: &Plan, pair: &Pair, maps: &mut Finest) {
             let inside = right >= 0 && right < width as i64;
             let reason = if pair.left().masked[(x, y)] {
                 flag::MASKED
-            } else if !plan.method.visibility {
+            } else if plan.method.visibility == Visibility::Off {
                 0
             } else if !inside {
                 flag::OUTSIDE
