@@ -64,6 +64,16 @@ impl DisparityRange {
     }
 }
 
+/// Correction of the illumination.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Illumination {
+    /// None.
+    None,
+    /// A homomorphic filter: log, minus low-pass, exp.
+    Homomorphic,
+}
+
 /// Matching cost of a pixel and a label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -167,6 +177,12 @@ macro_rules! method {
 }
 
 method! {
+    illumination: Illumination, "none | homomorphic", "Correction of both images before all else (sections 2.4 and 3.1: \
+         homomorphic filter, 21 x 21).";
+    zones: u32, "zones, 1 to 64", "Texture zones of the reference image, by K-means of Gabor responses; used where support \
+         is (section 3.1: 15).";
+    support: f64, "standard deviations, 0 to 100", "Labels of a pixel are limited to the mean disparity of its zone's sparse \
+         matches and this many standard deviations on either side; 0 keeps all labels (section 2.4: 1).";
     cost: Cost, "sad | ad-census", "Matching cost. The paper's is the SAD (section 2.4).";
     sad_window: u32, "pixels, odd, 1 to 31", "Side of the SAD window (section 3.1: 7).";
     outside_cost: f64, "the cost's own",
@@ -227,6 +243,9 @@ pub const PRESETS: &[(&str, &str)] = &[
 impl Default for Method {
     fn default() -> Self {
         Self {
+            illumination: Illumination::None,
+            zones: 15,
+            support: 0.0,
             cost: Cost::AdCensus,
             sad_window: 7,
             outside_cost: 0.8,
@@ -421,6 +440,8 @@ impl Method {
                 ))
             }
         };
+        within("zones", 1.0, 64.0)?;
+        within("support", 0.0, 100.0)?;
         within("sad-window", 1.0, 31.0)?;
         odd("sad-window", self.sad_window)?;
         within("outside-cost", 0.0, if self.cost == Cost::Sad { 254.0 } else { 2.0 })?;

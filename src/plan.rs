@@ -255,6 +255,12 @@ impl Plan {
         }
     }
 
+    /// Whether the texture zones limit the labels of their pixels.
+    #[must_use]
+    pub fn restricted(&self) -> bool {
+        self.method.support > 0.0
+    }
+
     /// Whether the pyramid takes the minimum over d instead of the low-pass.
     #[must_use]
     pub fn minimum_over_d(&self) -> bool {

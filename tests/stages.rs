@@ -12,7 +12,7 @@ use common::random::{self, Random, State};
 use common::twin;
 use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::graph::{self, LevelGraph};
-use mrfgs::image::Pair;
+use mrfgs::image::{Pair, Plane};
 use mrfgs::options::{Cost, Method, PRESETS, Potential, Pyramid, Resolution, Schedule};
 use mrfgs::plan::{COST_MAX, CutRule, MessageWidth, Plan};
 use mrfgs::solver;
@@ -193,6 +193,46 @@ fn pyramid() {
             backend.run(Stage::Pyramid(z)).unwrap();
             same(&case.plan, backend, Volume::Cost(z), &twin::pyramid::pyramid(&case.plan, z, &fine))?;
             same(&case.plan, backend, Volume::Cost(z - 1), &fine)?;
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn restrict() {
+    on_all(|case, backend, random| {
+        let mut method = case.plan.method.clone();
+        method.support = 1.0;
+        let (width, height) = case.plan.size();
+        let plan = Plan::new(width, height, case.plan.range, &method).unwrap();
+        backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();
+        let supports: Vec<Plane<[u16; 2]>> = plan
+            .levels
+            .iter()
+            .map(|level| {
+                Plane::from_fn(level.width, level.height, |_, _| {
+                    let last = level.labels as u32 - 1;
+                    let (a, b) = (random.within(0, last), random.within(0, last));
+                    if random.one_in(4) { [0, last as u16] } else { [a.min(b) as u16, a.max(b) as u16] }
+                })
+            })
+            .collect();
+        backend.restrict(&supports).unwrap();
+        for (z, support) in supports.iter().enumerate() {
+            let cost = random_cost(random, &plan, z);
+            backend.write(Volume::Cost(z), &cost).unwrap();
+            backend.run(Stage::Restrict(z)).unwrap();
+            let expected = twin::restrict::restrict(&plan, z, support, &cost);
+            same(&plan, backend, Volume::Cost(z), &expected)?;
+            // Control: the support does matter.
+            if expected != cost {
+                let mut other = support.clone();
+                other.data_mut().fill([0, plan.levels[z].labels as u16 - 1]);
+                assert!(
+                    same(&plan, backend, Volume::Cost(z), &twin::restrict::restrict(&plan, z, &other, &cost))
+                        .is_err()
+                );
+            }
         }
         Ok(())
     });

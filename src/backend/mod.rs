@@ -107,6 +107,9 @@ pub enum Stage {
     /// low-pass their binomial mean over the fine labels 2 z - 2 ..= 2 z + 2, labels clamped to the fine range, rounded as
     /// (sum + 8) >> 4; with the minimum, the smallest at those labels of 2 z - 1 ..= 2 z + 1 that are in the range.
     Pyramid(usize),
+    /// Costs of a level at labels outside the pixel's support, as given to [`Backend::restrict`], become the highest there
+    /// is: [`crate::plan::COST_MAX`] (256 times that at coarser levels).
+    Restrict(usize),
     /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
     /// beliefs equal to the evidence.
     Evidence(usize),
@@ -183,6 +186,7 @@ impl Stage {
         match self {
             Self::Cost => "cost",
             Self::Pyramid(_) => "pyramid",
+            Self::Restrict(_) => "restrict",
             Self::Evidence(_) => "evidence",
             Self::Dependency(_) => "dependency",
             Self::Resolution(_) => "resolution",
@@ -204,6 +208,7 @@ impl Stage {
     pub fn level(self) -> Option<usize> {
         match self {
             Self::Pyramid(z)
+            | Self::Restrict(z)
             | Self::Evidence(z)
             | Self::Dependency(z)
             | Self::Resolution(z)
@@ -239,6 +244,10 @@ pub trait Backend {
     /// # Errors
     /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
+
+    /// Takes the support of every pixel for [`Stage::Restrict`], once the pair is prepared: at each level the first and the
+    /// last label index that it may have. Only for plans whose method has a [`crate::options::Method::support`].
+    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()>;
 
     /// Runs a stage. Devices may still be at it when this returns.
     fn run(&mut self, stage: Stage) -> Result<()>;

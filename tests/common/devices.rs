@@ -74,6 +74,10 @@ impl Backend for Pooled {
         self.gpu().prepare(plan, pair, graphs)
     }
 
+    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()> {
+        self.gpu().restrict(supports)
+    }
+
     fn run(&mut self, stage: Stage) -> Result<()> {
         self.gpu().run(stage)
     }

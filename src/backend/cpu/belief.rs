@@ -1,4 +1,4 @@
-//! Beliefs: see [`crate::backend::Backend::belief`].
+//! Beliefs: see [`crate::backend::Stage::Belief`].
 
 use super::message::Message;
 use crate::graph::LevelGraph;

@@ -1,4 +1,4 @@
-//! Matching cost of level 0: see [`crate::backend::Backend::cost`].
+//! Matching cost of level 0: see [`crate::backend::Stage::Cost`].
 
 use crate::image::{Image, Pair, Pixel};
 use crate::options::Cost;

@@ -1,4 +1,4 @@
-//! Messages of the dependency factors: see [`crate::backend::Backend::dependency`].
+//! Messages of the dependency factors: see [`crate::backend::Stage::Dependency`].
 //!
 //! A factor reads old beliefs and its own old messages and writes its own messages only, so flooding is exact in
 //! place. Padding labels go through the same arithmetic as labels; their evidence is the largest there is, so by

@@ -1,4 +1,4 @@
-//! Evidence from cost: see [`crate::backend::Backend::evidence`].
+//! Evidence from cost: see [`crate::backend::Stage::Evidence`].
 
 use super::pyramid::StoredCost;
 use crate::plan::LevelPlan;

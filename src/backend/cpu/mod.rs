@@ -12,6 +12,7 @@ mod message;
 mod pyramid;
 mod region_filter;
 mod resolution;
+mod restrict;
 mod sub_pixel;
 mod visibility;
 
@@ -21,7 +22,7 @@ use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
-use crate::plan::{MessageWidth, Plan};
+use crate::plan::{COST_FRACTION_BITS, COST_MAX, MessageWidth, Plan};
 use message::Message;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -46,6 +47,8 @@ struct Volumes<M> {
     /// Cost of level 0; coarser ones are in `levels`.
     fine_cost: Vec<u8>,
     levels: Vec<Level<M>>,
+    /// First and last label of each pixel, by level; empty where all labels are in question.
+    supports: Vec<Plane<[u16; 2]>>,
     /// Label map of the last change, and its sum.
     labels: Vec<u16>,
     change: u64,
@@ -153,6 +156,7 @@ impl<M: Message> Volumes<M> {
             pair: pair.clone(),
             fine_cost: vec![0; fine.pixels() * fine.stride],
             levels,
+            supports: Vec::new(),
             labels: vec![0; fine.pixels()],
             change: 0,
             maps: Finest::new(plan.size()),
@@ -190,7 +194,7 @@ impl<M: Message> Volumes<M> {
     }
 
     fn run(&mut self, stage: Stage) {
-        let Self { plan, pair, fine_cost, levels, labels, change, maps } = self;
+        let Self { plan, pair, fine_cost, levels, supports, labels, change, maps } = self;
         match stage {
             Stage::Cost => cost::run(plan, pair, fine_cost),
             Stage::Pyramid(z) => {
@@ -201,6 +205,11 @@ impl<M: Message> Volumes<M> {
                 } else {
                     pyramid::run(plan, z, &finer[z - 1].cost, out);
                 }
+            }
+            Stage::Restrict(0) => restrict::run(&plan.levels[0], &supports[0], fine_cost, COST_MAX),
+            Stage::Restrict(z) => {
+                let highest = u16::from(COST_MAX) << COST_FRACTION_BITS;
+                restrict::run(&plan.levels[z], &supports[z], &mut levels[z].cost, highest);
             }
             Stage::Evidence(z) => {
                 let l = &mut levels[z];
@@ -294,6 +303,11 @@ impl Backend for Cpu {
                 });
             }
         }
+        Ok(())
+    }
+
+    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()> {
+        on_volumes!(self, v => v.supports = supports.to_vec());
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! Cost of a level from the next finer one: see [`crate::backend::Backend::pyramid`].
+//! Cost of a level from the next finer one: see [`crate::backend::Stage::Pyramid`].
 
 use crate::plan::Plan;
 use rayon::prelude::*;

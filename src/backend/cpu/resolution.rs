@@ -1,4 +1,4 @@
-//! Messages of the resolution factors: see [`crate::backend::Backend::resolution`].
+//! Messages of the resolution factors: see [`crate::backend::Stage::Resolution`].
 
 use super::message::Message;
 use crate::plan::{Cut, CutRule, Plan};

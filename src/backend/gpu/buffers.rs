@@ -183,6 +183,8 @@ pub(super) struct LevelBuffers {
     pub(super) down: Rows,
     pub(super) up: Rows,
     pub(super) belief: Rows,
+    /// First and last label of each pixel; nothing where all labels are in question.
+    pub(super) support: Rows,
     pub(super) members: Rows,
     pub(super) starts: Rows,
     /// Entries of the transposed table, of what each part holds.
@@ -316,6 +318,7 @@ impl Buffers {
                 down: a.rows("messages from above", message, if z == last { &none } else { &starts })?,
                 up: a.rows("messages from below", message, if z == 0 { &none } else { &starts })?,
                 belief: a.rows("belief", 2 * p.pitch, &starts)?,
+                support: a.rows("support", p.pixel_pitch, if plan.restricted() { &starts } else { &none })?,
                 members: a.rows("members", p.member_pitch, &starts)?,
                 starts: a.rows("starts", p.starts_pitch, &starts)?,
                 incoming,

@@ -21,6 +21,7 @@ pub enum Kernel {
     AdCensus,
     Sad,
     Pyramid,
+    Restrict,
     Evidence,
     Dependency,
     Resolution,
@@ -45,11 +46,12 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every shader there is.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 25] = [
         Self::Census,
         Self::AdCensus,
         Self::Sad,
         Self::Pyramid,
+        Self::Restrict,
         Self::Evidence,
         Self::Dependency,
         Self::Resolution,
@@ -80,6 +82,7 @@ impl Kernel {
             Self::AdCensus => "ad_census",
             Self::Sad => "sad",
             Self::Pyramid => "pyramid",
+            Self::Restrict => "restrict",
             Self::Evidence => "evidence",
             Self::Dependency => "dependency",
             Self::Resolution => "resolution",
@@ -109,6 +112,7 @@ impl Kernel {
             Self::AdCensus => include_str!("../../../shaders/ad_census.wgsl"),
             Self::Sad => include_str!("../../../shaders/sad.wgsl"),
             Self::Pyramid => include_str!("../../../shaders/pyramid.wgsl"),
+            Self::Restrict => include_str!("../../../shaders/restrict.wgsl"),
             Self::Evidence => include_str!("../../../shaders/evidence.wgsl"),
             Self::Dependency => include_str!("../../../shaders/dependency.wgsl"),
             Self::Resolution => include_str!("../../../shaders/resolution.wgsl"),
@@ -177,7 +181,9 @@ impl Kernel {
             // The pixels on both sides of a border, or the segments of a row, followed from two pixels.
             Self::RegionJoin => 4 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 8,
             Self::RegionFlatten => 2 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 4,
-            Self::RegionCount | Self::RegionFilter | Self::Visibility | Self::Confidence => 0,
+            Self::Restrict | Self::RegionCount | Self::RegionFilter | Self::Visibility | Self::Confidence => {
+                0
+            }
             Self::Median => {
                 // One pass, and one for every three bits of what the disparities of a window may span.
                 let window = plan.method.median_window as usize;
@@ -218,7 +224,11 @@ impl Variant {
         let potentials = looks(&[Kernel::Dependency, Kernel::Resolution]);
         Self {
             narrow: messages && plan.message_width == MessageWidth::Narrow,
-            fine_narrow: kernel == Kernel::Evidence && level == 0 || kernel == Kernel::Pyramid && level == 1,
+            fine_narrow: match kernel {
+                Kernel::Restrict | Kernel::Evidence => level == 0,
+                Kernel::Pyramid => level == 1,
+                _ => false,
+            },
             slots: if looks(&[Kernel::Dependency, Kernel::Belief]) { plan.slots() } else { 1 },
             absolute: potentials && plan.dependency.rule == CutRule::Absolute,
             interpolating: kernel == Kernel::Resolution && plan.interpolating(),

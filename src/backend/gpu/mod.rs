@@ -311,6 +311,21 @@ impl Backend for Gpu {
         Ok(())
     }
 
+    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()> {
+        for (z, support) in supports.iter().enumerate() {
+            let level = &self.state().buffers.levels[z];
+            let (rows, pitch) = (level.support.clone(), level.params.pixel_pitch as usize);
+            let mut words = vec![0; pitch * support.height()];
+            for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
+                for (word, &[first, last]) in row.iter_mut().zip(support.row(y)) {
+                    *word = u32::from(first) | u32::from(last) << 16;
+                }
+            }
+            rows.write(&mut self.device, &words)?;
+        }
+        Ok(())
+    }
+
     fn run(&mut self, stage: Stage) -> Result<()> {
         self.device.count_stage();
         let steps = Arc::clone(&self.state().steps[&stage]);

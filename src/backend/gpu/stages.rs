@@ -83,6 +83,9 @@ impl Gpu {
                 add(Stage::Pyramid(z), self.pyramid(plan, buffers, z, &cuts)?);
                 add(Stage::Resolution(z), self.resolution(plan, buffers, z, &cuts)?);
             }
+            if plan.restricted() {
+                add(Stage::Restrict(z), self.restrict(plan, buffers, z, &cuts)?);
+            }
             add(Stage::Evidence(z), self.evidence(plan, buffers, z, &cuts)?);
             add(Stage::Dependency(z), self.dependency(plan, buffers, z, &cuts)?);
         }
@@ -172,6 +175,15 @@ impl Gpu {
             let fine_rows = with_halo(&(2 * rows.start..(2 * rows.end).min(f.height)), 2, f.height);
             vec![finer.cost.bind(&fine_rows), b.cost.bind(rows)]
         })?;
+        steps.extend(renewed(&b.cost));
+        Ok(steps)
+    }
+
+    fn restrict(&mut self, plan: &Plan, buffers: &Buffers, z: usize, cuts: &[u32]) -> Result<Vec<Step>> {
+        let b = &buffers.levels[z];
+        let job = Job { kernel: Kernel::Restrict, plan, level: z, params: params(plan, buffers, z), cuts };
+        let threads = Some(b.params.width * b.params.quads);
+        let mut steps = self.stage(&job, threads, |rows| vec![b.cost.bind(rows), b.support.bind(rows)])?;
         steps.extend(renewed(&b.cost));
         Ok(steps)
     }

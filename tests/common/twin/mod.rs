@@ -17,6 +17,7 @@ pub mod median;
 pub mod pyramid;
 pub mod region;
 pub mod resolution;
+pub mod restrict;
 pub mod sub_pixel;
 pub mod visibility;
 

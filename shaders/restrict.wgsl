@@ -1,0 +1,35 @@
+// Costs outside the support of their pixel become the highest there is. One invocation a pixel and quad of labels.
+
+// 8-bit at level 0, 16-bit at coarser ones.
+@group(0) @binding(1) var<storage, read_write> cost: array<u32>;
+// First and last label of each pixel, first | last << 16.
+@group(0) @binding(2) var<storage, read> support: array<u32>;
+
+const COST_MAX: u32 = 254u;
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let quads = params.level.quads;
+    let x = id.x / quads;
+    let quad = id.x - x * quads;
+    if x >= params.level.width || id.y >= params.rows {
+        return;
+    }
+    let ends = support[id.y * params.level.pixel_pitch + x];
+    let labels = vec4(4u * quad) + vec4(0u, 1u, 2u, 3u);
+    let inside = labels >= vec4(ends & 0xffffu) & labels <= vec4(ends >> 16u);
+    if all(inside) {
+        return;
+    }
+    if FINE_NARROW {
+        let at = id.y * params.level.pitch + id.x;
+        cost[at] = pack_narrow(select(vec4(COST_MAX), unpack_narrow(cost[at]), inside));
+    } else {
+        let at = 2u * (id.y * params.level.pitch + id.x);
+        let kept = unpack_wide(vec2(cost[at], cost[at + 1u]));
+        let words = pack_wide(select(vec4(COST_MAX << 8u), kept, inside));
+        cost[at] = words.x;
+        cost[at + 1u] = words.y;
+    }
+}
