@@ -1,5 +1,7 @@
-//! Tables of exponentials in integers: the only transcendental function of the method, the same on every
-//! machine because it is evaluated with IEEE additions, multiplications and divisions alone.
+//! Exponentials, logarithms and integer tables of them: the transcendental functions of the method, the same on
+//! every machine because they are evaluated with IEEE additions, multiplications and divisions alone.
+
+use std::f64::consts::{LN_2, SQRT_2};
 
 use crate::options::Method;
 
@@ -24,6 +26,27 @@ pub fn exp_neg(x: f64) -> f64 {
         sum *= sum;
     }
     1.0 / sum
+}
+
+/// The natural logarithm of a positive, normal x, to a relative 1e-11: x = m 2^e with m from 1/sqrt 2 to sqrt 2, and
+/// ln m = 2 artanh((m - 1) / (m + 1)) by its series.
+#[must_use]
+pub fn ln(x: f64) -> f64 {
+    const MANTISSA_BITS: u32 = 52;
+    const MANTISSA: u64 = (1 << MANTISSA_BITS) - 1;
+    let mut exponent = (x.to_bits() >> MANTISSA_BITS) as i32 - 1023;
+    let mut m = f64::from_bits(x.to_bits() & MANTISSA | 1.0f64.to_bits());
+    if m > SQRT_2 {
+        m /= 2.0;
+        exponent += 1;
+    }
+    let s = (m - 1.0) / (m + 1.0);
+    let (mut power, mut sum) = (s, 0.0);
+    for n in 0..8 {
+        sum += power / f64::from(2 * n + 1);
+        power *= s * s;
+    }
+    f64::from(exponent) * LN_2 + 2.0 * sum
 }
 
 /// Cost units per unit of the AD-census cost: its range 0 to 2 takes 0 ..= 254.
@@ -135,5 +158,16 @@ mod tests {
             assert!((ours - libm).abs() <= 1e-11 * libm, "exp(-{x}): {ours} against {libm}");
         }
         assert!(exp_neg(1e6) < f64::MIN_POSITIVE);
+    }
+
+    #[test]
+    fn logarithms_agree_with_the_platform() {
+        let grid = (1..=65536).map(|i| f64::from(i) / 64.0);
+        let edges = [f64::MIN_POSITIVE, f64::MAX, SQRT_2, 0.5 * SQRT_2, 1.0 - 1e-9, 1.0 + 1e-9];
+        for x in grid.chain(edges) {
+            let (ours, libm) = (ln(x), x.ln());
+            assert!((ours - libm).abs() <= 1e-11 * libm.abs(), "ln {x}: {ours} against {libm}");
+        }
+        assert!(ln(1.0).abs() < f64::MIN_POSITIVE);
     }
 }
