@@ -45,6 +45,7 @@
 pub mod backend;
 pub mod error;
 pub mod evaluation;
+pub mod front;
 pub mod graph;
 pub mod image;
 pub mod maps;
