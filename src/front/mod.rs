@@ -1,4 +1,7 @@
-//! The front end of the paper (section 2.4): what is done to the images before there are costs.
+//! The front end of the paper (section 2.4): what is worked out from the images alone, before there are costs.
 
+pub mod check;
 pub mod illumination;
+pub mod matches;
+pub mod support;
 pub mod zones;

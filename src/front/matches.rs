@@ -1,0 +1,406 @@
+//! Sparse, highly confident matches (section 2.4): the corners of the left view, found again in the right one.
+//!
+//! Corners are those of Shi and Tomasi (*Good Features to Track*, 1994), which the paper names. It does not say how
+//! they are matched; here by zero-mean normalised cross-correlation (ZNCC), and whatever is in doubt is dropped: a
+//! match must score well, be clearly better than the next best place, be found from the right view too, and agree
+//! with matches around it.
+//!
+//! Sums are integers and the rest is + - * / and square roots in a fixed order, so every machine finds the same
+//! matches, whatever the number of threads.
+
+use crate::image::{Image, Pair, Plane};
+use crate::options::DisparityRange;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+/// Units of a pixel in a [`Match`].
+pub const FRACTION: i32 = 256;
+/// Pixels per corner, at least: dense enough for the statistics of a small zone.
+const SPACING: usize = 64;
+/// Side of the cells over which corners are spread evenly, in pixels, at a spacing of [`SPACING`].
+const CELL: usize = 32;
+/// Most corners, about, where there is no range to search: they are then for an overview, and each costs a whole row.
+const OVERVIEW: usize = 8192;
+/// Without a range, disparities up to this share of the width are searched, of either sign: one in `REACH`.
+const REACH: usize = 2;
+/// The structure tensor is a sum over 5 x 5 pixels.
+const TENSOR_RADIUS: usize = 2;
+/// A corner is the best within 5 x 5 pixels.
+const PEAK_RADIUS: usize = 2;
+/// The correlation window is 7 x 7 pixels: all that a corner's tensor saw, gradients included. (9 x 9 gave fewer matches
+/// on slanted surfaces and no fewer false ones.)
+const RADIUS: usize = TENSOR_RADIUS + 1;
+/// Least ZNCC of a match.
+const MIN_SCORE: f64 = 0.8;
+/// How far a match is from a perfect score, at most, as a share of how far its best rival is.
+const RATIO: f64 = 0.7;
+/// Places this close to the best, in pixels along both axes, belong to the same peak and are no rivals.
+const PEAK_REACH: usize = 2;
+/// A match is compared with this many of those around it.
+const NEIGHBOURS: usize = 8;
+/// This many of them must agree with it.
+const AGREEING: usize = 4;
+/// Matches agree where they differ by at most a pixel, and a pixel more for every so many between them (surfaces slant).
+const SLOPE: i64 = 8;
+
+const WINDOW: usize = 2 * RADIUS + 1;
+const WINDOW_PIXELS: i64 = (WINDOW * WINDOW) as i64;
+/// Grey is taken in 1/16 of an 8-bit level: the most for which the sums over a window fit 32 bits.
+const GREY_SHIFT: u32 = 4;
+const _: () = assert!(WINDOW_PIXELS * (0xffff >> GREY_SHIFT) * (0xffff >> GREY_SHIFT) <= i32::MAX as i64);
+
+/// A pixel of the left view with its disparity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Match {
+    /// Column in the left view, in pixels.
+    pub x: usize,
+    /// Row in the left view, in pixels.
+    pub y: usize,
+    /// Disparity in 1/256 px: the left pixel is seen at x - disparity / 256 in the right view.
+    pub disparity: i32,
+    /// How much lower it is seen in the right view, in 1/256 px; 0 where only its row was searched.
+    pub dy: i32,
+    /// Zero-mean normalised cross-correlation of the two windows, up to 1.
+    pub score: f64,
+}
+
+/// The matches of `pair`, in raster order: at most about one in 64 pixels.
+///
+/// `zones` is a map of zone indices and their number; each zone gives its own best corners, so that faint zones are
+/// not left without (pixels whose index is out of range give none). `range` is what to search; without it, all
+/// disparities of either sign up to half the width, for at most some 8000 corners. No masked pixel is ever part of a
+/// window.
+///
+/// # Panics
+/// When the map of zones has another size.
+#[must_use]
+pub fn find(pair: &Pair, zones: Option<(&Plane<u8>, usize)>, range: Option<DisparityRange>) -> Vec<Match> {
+    let (width, height) = pair.size();
+    let spacing = if range.is_some() { SPACING } else { width * height / OVERVIEW };
+    search(pair, zones, range, spacing, 0)
+}
+
+/// [`find`] with one corner in `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below its own.
+pub(super) fn search(
+    pair: &Pair,
+    zones: Option<(&Plane<u8>, usize)>,
+    range: Option<DisparityRange>,
+    spacing: usize,
+    rows: usize,
+) -> Vec<Match> {
+    let spacing = spacing.max(SPACING);
+    let reach = (pair.size().0 / REACH) as i32;
+    let (min, max) = range.map_or((-reach, reach), |r| (r.min, r.max));
+    let (left, right) = (View::new(pair.left()), View::new(pair.right()));
+    let matches = corners(&left, zones, spacing)
+        .into_par_iter()
+        .filter_map(|(x, y)| {
+            let there = peak(&left, (x, y), &right, x as i32 - max..=x as i32 - min, rows)?;
+            let (rx, ry) = (there.x as i32, there.y as i32);
+            let back = peak(&right, (there.x, there.y), &left, rx + min..=rx + max, rows)?;
+            (back.x.abs_diff(x) <= 1 && back.y.abs_diff(y) <= 1).then(|| Match {
+                x,
+                y,
+                disparity: (x as i32 - rx) * FRACTION - there.right,
+                dy: (ry - y as i32) * FRACTION + there.down,
+                score: there.score,
+            })
+        })
+        .collect();
+    consistent(matches, cell(spacing))
+}
+
+/// Side of a cell, in pixels, that holds about the same number of corners at any spacing.
+fn cell(spacing: usize) -> usize {
+    CELL * (spacing / SPACING).isqrt().max(1)
+}
+
+/// A view with the statistics of the window around each pixel.
+struct View {
+    /// In 1/16 of an 8-bit level.
+    grey: Plane<i16>,
+    /// Row by row, the sum over the window around each pixel.
+    sum: Vec<Vec<i32>>,
+    /// Row by row, n sigma of the n values of each window; 0 where it is uniform, masked or beyond the border.
+    norm: Vec<Vec<f64>>,
+}
+
+impl View {
+    fn new(image: &Image) -> Self {
+        let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
+        let rows = (0..grey.height()).into_par_iter().map(|y| {
+            let sum = box_sums(&grey, y, RADIUS, |x, y| grey[(x, y)] as i32);
+            let squares = box_sums(&grey, y, RADIUS, |x, y| (grey[(x, y)] as i32).pow(2));
+            let masked = box_sums(&grey, y, RADIUS, |x, y| image.masked[(x, y)] as i32);
+            let norm = (0..grey.width()).map(|x| {
+                let variance = WINDOW_PIXELS * squares[x] as i64 - (sum[x] as i64).pow(2);
+                if masked[x] == 0 { (variance as f64).sqrt() } else { 0.0 }
+            });
+            let norm = norm.collect();
+            (sum, norm)
+        });
+        let (sum, norm) = rows.unzip();
+        Self { grey, sum, norm }
+    }
+
+    /// The smaller eigenvalue of the structure tensor at each pixel of row `y`; 0 where no window fits.
+    fn eigenvalues(&self, y: usize) -> Vec<f64> {
+        let g = &self.grey;
+        let gradient = |x: usize, y: usize| {
+            let inside = (1..g.width() - 1).contains(&x);
+            let dx = if inside { (g[(x + 1, y)] - g[(x - 1, y)]) as i32 } else { 0 };
+            (dx, (g[(x, y + 1)] - g[(x, y - 1)]) as i32)
+        };
+        if y < RADIUS || y + RADIUS >= g.height() {
+            return vec![0.0; g.width()];
+        }
+        let xx = box_sums(g, y, TENSOR_RADIUS, |x, y| gradient(x, y).0.pow(2));
+        let xy = box_sums(g, y, TENSOR_RADIUS, |x, y| gradient(x, y).0 * gradient(x, y).1);
+        let yy = box_sums(g, y, TENSOR_RADIUS, |x, y| gradient(x, y).1.pow(2));
+        let eigenvalue = |x: usize| {
+            let [xx, xy, yy] = [&xx, &xy, &yy].map(|sums| sums[x] as f64);
+            let root = ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt();
+            if self.norm[y][x] > 0.0 { (xx + yy - root) / 2.0 } else { 0.0 }
+        };
+        (0..g.width()).map(eigenvalue).collect()
+    }
+}
+
+/// Sums of `value(x, y)` over the squares around the pixels of row `y`; 0 where a square leaves the plane.
+fn box_sums<T>(plane: &Plane<T>, y: usize, radius: usize, value: impl Fn(usize, usize) -> i32) -> Vec<i32> {
+    let (width, height) = plane.size();
+    let mut out = vec![0; width];
+    if y < radius || y + radius >= height || width <= 2 * radius {
+        return out;
+    }
+    let columns: Vec<i32> =
+        (0..width).map(|x| (y - radius..=y + radius).map(|y| value(x, y)).sum()).collect();
+    let mut sum: i32 = columns[..2 * radius].iter().sum();
+    for x in radius..width - radius {
+        sum += columns[x + radius];
+        out[x] = sum;
+        sum -= columns[x - radius];
+    }
+    out
+}
+
+/// Corners of `view` in raster order: of each zone in each cell of the image the best, one in `spacing` pixels.
+fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> Vec<(usize, usize)> {
+    let (width, height) = view.grey.size();
+    if let Some((map, _)) = zones {
+        assert_eq!(map.size(), (width, height), "the map of zones has the size of the images");
+    }
+    let values: Vec<Vec<f64>> = (0..height).into_par_iter().map(|y| view.eigenvalues(y)).collect();
+    // The earlier one in raster order wins a tie.
+    let is_peak = |x: usize, y: usize| {
+        let value = values[y][x];
+        value > 0.0
+            && (y - PEAK_RADIUS..=y + PEAK_RADIUS).all(|v| {
+                (x - PEAK_RADIUS..=x + PEAK_RADIUS)
+                    .all(|u| value.total_cmp(&values[v][u]).then((v, u).cmp(&(y, x))).is_ge())
+            })
+    };
+    let side = cell(spacing);
+    let cells: Vec<(usize, usize)> =
+        (0..height).step_by(side).flat_map(|y| (0..width).step_by(side).map(move |x| (x, y))).collect();
+    let mut out: Vec<_> = cells
+        .into_par_iter()
+        .flat_map_iter(|(left, top)| {
+            let mut of_zone = BTreeMap::<u8, (usize, Vec<(usize, usize)>)>::new();
+            for y in top..(top + side).min(height) {
+                for x in left..(left + side).min(width) {
+                    let zone = zones.map_or(0, |(map, _)| map[(x, y)]);
+                    if zones.is_none_or(|(_, count)| usize::from(zone) < count) {
+                        let (pixels, peaks) = of_zone.entry(zone).or_default();
+                        *pixels += 1;
+                        if is_peak(x, y) {
+                            peaks.push((x, y));
+                        }
+                    }
+                }
+            }
+            of_zone.into_values().flat_map(|(pixels, mut peaks)| {
+                peaks.sort_by(|a, b| values[b.1][b.0].total_cmp(&values[a.1][a.0]));
+                peaks.truncate(pixels.div_ceil(spacing));
+                peaks
+            })
+        })
+        .collect();
+    out.sort_by_key(|&(x, y)| (y, x));
+    out
+}
+
+/// Where a window is found again.
+struct Peak {
+    x: usize,
+    y: usize,
+    /// How much further right the top of the peak lies, in 1/256 px.
+    right: i32,
+    /// How much lower.
+    down: i32,
+    score: f64,
+}
+
+/// The one place in `columns` and within `rows` of its own row where the window of `of` around (x, y) is found in
+/// `within`. `None` where the best one scores too low, has a rival, or is no peak along the row.
+fn peak(
+    of: &View,
+    (x, y): (usize, usize),
+    within: &View,
+    columns: RangeInclusive<i32>,
+    rows: usize,
+) -> Option<Peak> {
+    let (width, height) = within.grey.size();
+    // As much again on either side: what repeats there is no sure match here, and a peak needs columns around it.
+    let aside = columns.end() - columns.start() + 1;
+    let first = (columns.start() - aside).max(RADIUS as i32);
+    let last = (columns.end() + aside).min(width as i32 - 1 - RADIUS as i32);
+    if last < first + 2 {
+        return None;
+    }
+    let (first, last) = (first as usize, last as usize);
+    let top = y.saturating_sub(rows).max(RADIUS);
+    let bottom = (y + rows).min(height - 1 - RADIUS);
+    let scores: Vec<Vec<f64>> =
+        (top..=bottom).map(|v| correlation(of, (x, y), within, v, first..=last)).collect();
+
+    let places = || (0..scores.len()).flat_map(|v| (0..scores[v].len()).map(move |u| (u, v)));
+    // Of equal scores the last one; the rival settles that there is none.
+    let (u, v) = places().max_by(|a, b| scores[a.1][a.0].total_cmp(&scores[b.1][b.0]))?;
+    let score = scores[v][u];
+    let rival = places()
+        .filter(|p| p.0.abs_diff(u) > PEAK_REACH || p.1.abs_diff(v) > PEAK_REACH)
+        .map(|p| scores[p.1][p.0])
+        .fold(-1.0, f64::max);
+    let sure = score >= MIN_SCORE && 1.0 - score <= RATIO * (1.0 - rival);
+    let is_peak = u > 0 && u + 1 < scores[v].len();
+    if !sure || !is_peak || !columns.contains(&((first + u) as i32)) {
+        return None;
+    }
+    let right = vertex(scores[v][u - 1], score, scores[v][u + 1]);
+    let down =
+        if v == 0 || v + 1 == scores.len() { 0 } else { vertex(scores[v - 1][u], score, scores[v + 1][u]) };
+    Some(Peak { x: first + u, y: top + v, right, down, score })
+}
+
+/// ZNCC of the window of `of` around (x, y) with those of `within` on row `v`; 0 where there is no window.
+fn correlation(
+    of: &View,
+    (x, y): (usize, usize),
+    within: &View,
+    v: usize,
+    columns: RangeInclusive<usize>,
+) -> Vec<f64> {
+    let (first, count) = (*columns.start(), columns.count());
+    let mut products = vec![0_i32; count];
+    for row in 0..WINDOW {
+        let template = &of.grey.row(y + row - RADIUS)[x - RADIUS..=x + RADIUS];
+        let line = &within.grey.row(v + row - RADIUS)[first - RADIUS..];
+        for (column, &t) in template.iter().enumerate() {
+            for (sum, &value) in products.iter_mut().zip(&line[column..]) {
+                *sum += t as i32 * value as i32;
+            }
+        }
+    }
+    let (sum, norm) = (of.sum[y][x] as i64, of.norm[y][x]);
+    (0..count)
+        .map(|i| {
+            let (there, norms) = (within.sum[v][first + i] as i64, norm * within.norm[v][first + i]);
+            if norms > 0.0 { (WINDOW_PIXELS * products[i] as i64 - sum * there) as f64 / norms } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Where the parabola through `(-1, before)`, `(0, peak)`, `(1, after)` has its vertex, in 1/256.
+fn vertex(before: f64, peak: f64, after: f64) -> i32 {
+    let bend = before - 2.0 * peak + after;
+    if bend < 0.0 { ((before - after) / (2.0 * bend) * f64::from(FRACTION) + 0.5).floor() as i32 } else { 0 }
+}
+
+/// The matches that agree with others around them, in the cells (of `side` pixels) next to theirs.
+fn consistent(matches: Vec<Match>, side: usize) -> Vec<Match> {
+    let mut cells = BTreeMap::<(usize, usize), Vec<&Match>>::new();
+    for m in &matches {
+        cells.entry((m.x / side, m.y / side)).or_default().push(m);
+    }
+    let agrees = |m: &Match| {
+        let (i, j) = (m.x / side, m.y / side);
+        let mut around: Vec<_> = (j.saturating_sub(1)..=j + 1)
+            .flat_map(|j| (i.saturating_sub(1)..=i + 1).map(move |i| (i, j)))
+            .filter_map(|cell| cells.get(&cell))
+            .flatten()
+            .map(|n| ((n.x.abs_diff(m.x).pow(2) + n.y.abs_diff(m.y).pow(2)) as i64, n))
+            .filter(|(distance, _)| *distance > 0)
+            .collect();
+        around.sort_by_key(|(distance, n)| (*distance, n.y, n.x));
+        let agreeing = around.iter().take(NEIGHBOURS).filter(|(distance, n)| {
+            let allowed = FRACTION as i64 * (SLOPE + distance.isqrt()) / SLOPE;
+            let apart = n.disparity.abs_diff(m.disparity).max(n.dy.abs_diff(m.dy));
+            i64::from(apart) <= allowed
+        });
+        agreeing.count() >= AGREEING
+    };
+    matches.iter().filter(|m| agrees(m)).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_zone_gives_its_own_best_corners() {
+        // Noise in bands of 16 rows, every other one with an eighth of the contrast.
+        let faint = |y: usize| y / 16 % 2 == 1;
+        let image = Image::from_rgb8(&Plane::from_fn(192, 128, |x, y| {
+            let seed = (x as u32).wrapping_mul(0x9e37_79b9) ^ (y as u32).wrapping_mul(0x85eb_ca6b);
+            let noise = ((seed ^ seed >> 15).wrapping_mul(0xc2b2_ae35) >> 24) as u8;
+            [if faint(y) { 112 + noise / 8 } else { noise }; 3]
+        }));
+        let view = View::new(&image);
+        let zones = Plane::from_fn(192, 128, |_, y| u8::from(faint(y)));
+        let found = |zones| {
+            let all = corners(&view, zones, 256);
+            assert!(all.len() <= 192 * 128 / 256);
+            all.iter().filter(|(_, y)| faint(*y)).count()
+        };
+        let (with, without) = (found(Some((&zones, 2))), found(None));
+        assert!(with >= 40 && without <= 10, "{with} with zones, {without} without");
+
+        // The best, and none is next to a better one.
+        let all = corners(&view, None, 256);
+        let values: Vec<Vec<f64>> = (0..128).map(|y| view.eigenvalues(y)).collect();
+        for &(x, y) in &all {
+            let around = (y - 2..=y + 2).flat_map(|v| (x - 2..=x + 2).map(move |u| (u, v)));
+            assert!(around.into_iter().all(|(u, v)| values[v][u] <= values[y][x]));
+        }
+    }
+
+    #[test]
+    fn a_corner_has_two_large_eigenvalues() {
+        // A square on black: its corners, not its sides.
+        let image = Image::from_rgb8(&Plane::from_fn(40, 40, |x, y| {
+            [if (10..30).contains(&x) && (10..30).contains(&y) { 200 } else { 0 }; 3]
+        }));
+        let view = View::new(&image);
+        let row = view.eigenvalues(20);
+        assert!(row.iter().all(|&value| value == 0.0), "{row:?}");
+        let found = corners(&view, None, 64);
+        assert_eq!(found.len(), 4, "{found:?}");
+        for (x, y) in found {
+            assert!([x, y].iter().all(|c| c.abs_diff(10).min(c.abs_diff(29)) <= 1), "{x}, {y}");
+        }
+        let at = |x: usize, y: usize| f64::from(view.grey[(x, y)]);
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for (x, y) in (8..13).flat_map(|y| (8..13).map(move |x| (x, y))) {
+            let (dx, dy) = (at(x + 1, y) - at(x - 1, y), at(x, y + 1) - at(x, y - 1));
+            xx += dx * dx;
+            xy += dx * dy;
+            yy += dy * dy;
+        }
+        let value = view.eigenvalues(10)[10];
+        // Of [[xx, xy], [xy, yy]]: the determinant of the tensor less the value on its diagonal is 0.
+        let determinant = (xx - value) * (yy - value) - xy * xy;
+        assert!(value > 0.0 && determinant.abs() < 1e-9 * xx * yy && value <= (xx + yy) / 2.0);
+    }
+}
