@@ -1,0 +1,87 @@
+//! Which labels a pixel may take (section 2.4): those near the disparities of its zone's matches.
+//!
+//! The paper takes the matches of a zone as normally distributed, N(mu, sigma), and the labels in mu +- sigma for
+//! all its pixels. That leaves out many true disparities, so the multiple of sigma is a parameter here.
+
+use super::matches::{FRACTION, Match};
+use crate::image::Plane;
+use crate::options::DisparityRange;
+
+/// A zone with fewer matches keeps the full range: no spread can be told from a handful (open).
+pub const MIN_MATCHES: i64 = 10;
+
+/// An interval of labels for each pixel of one level. Labels are disparities in pixels of that level, not indices:
+/// subtract the level's smallest label for those.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Support {
+    /// Smallest label of each pixel.
+    pub low: Plane<i32>,
+    /// Largest label of each pixel, not below `low`.
+    pub high: Plane<i32>,
+}
+
+/// The support at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded outwards and
+/// clipped to `range`. `k` is not negative; the paper's is 1.
+///
+/// `zones` is a map of zone indices and their number. The full range remains to a pixel whose index is out of range,
+/// and to zones with fewer than [`MIN_MATCHES`] matches or with none of `range` in their interval. Sigma is that of
+/// the matches themselves (divided by n).
+#[must_use]
+pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match], k: f64) -> Support {
+    let (map, count) = zones;
+    // Number, sum and sum of squares: integers, so that their order is of no consequence.
+    let mut sums = vec![(0_i64, 0_i64, 0_i64); count];
+    for m in matches {
+        if let Some((n, sum, squares)) = sums.get_mut(usize::from(map[(m.x, m.y)])) {
+            let d = i64::from(m.disparity);
+            *n += 1;
+            *sum += d;
+            *squares += d * d;
+        }
+    }
+    let intervals: Vec<(i32, i32)> = sums
+        .into_iter()
+        .map(|(n, sum, squares)| {
+            let full = (range.min, range.max);
+            if n < MIN_MATCHES {
+                return full;
+            }
+            let scale = n as f64 * f64::from(FRACTION);
+            // n^2 times the variance, exactly.
+            let variance = i128::from(n) * i128::from(squares) - i128::from(sum).pow(2);
+            let (mu, reach) = (sum as f64 / scale, k * (variance as f64).sqrt() / scale);
+            let low = ((mu - reach).floor() as i32).max(range.min);
+            let high = ((mu + reach).ceil() as i32).min(range.max);
+            if low <= high { (low, high) } else { full }
+        })
+        .collect();
+    let interval = |zone: &u8| intervals.get(usize::from(*zone)).copied().unwrap_or((range.min, range.max));
+    Support { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
+}
+
+impl Support {
+    /// The support at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2 children, in coarse
+    /// labels (floor(low / 2) to ceil(high / 2)).
+    #[must_use]
+    pub fn coarser(&self) -> Self {
+        let (width, height) = self.low.size();
+        let hull = |plane: &Plane<i32>, pick: fn(i32, i32) -> i32, halve: fn(i32) -> i32| {
+            Plane::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| {
+                let right = (2 * x + 1).min(width - 1);
+                let below = (2 * y + 1).min(height - 1);
+                let above = pick(plane[(2 * x, 2 * y)], plane[(right, 2 * y)]);
+                halve(pick(above, pick(plane[(2 * x, below)], plane[(right, below)])))
+            })
+        };
+        Self {
+            low: hull(&self.low, i32::min, |low| low.div_euclid(2)),
+            high: hull(&self.high, i32::max, |high| -(-high).div_euclid(2)),
+        }
+    }
+
+    /// Labels of all pixels together.
+    #[must_use]
+    pub fn labels(&self) -> u64 {
+        self.low.data().iter().zip(self.high.data()).map(|(low, high)| (high - low + 1) as u64).sum()
+    }
+}
