@@ -1,0 +1,438 @@
+//! Sparse matches and what follows from them, on rendered scenes always, on real pairs where `MRFGS_MIDDLEBURY` names
+//! their folder.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
+use mrfgs::front::check::{self, Warning};
+use mrfgs::front::matches::{self, FRACTION, Match};
+use mrfgs::front::support::{self, MIN_MATCHES, Support};
+use mrfgs::image::{Image, Pair, Plane, calib::Calibration, pfm, read};
+use mrfgs::options::DisparityRange;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"];
+
+struct Case {
+    name: String,
+    pair: Pair,
+    range: DisparityRange,
+    truth: Plane<f32>,
+    visible: Plane<u8>,
+}
+
+impl Case {
+    fn load(folder: &Path) -> Self {
+        let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
+        let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
+        let pfm::Pfm::Grey(truth) = pfm::read(&folder.join("disp0GT.pfm")).unwrap() else {
+            panic!("colour truth")
+        };
+        Self {
+            name: folder.display().to_string(),
+            pair: read::pair(&left, &right, None).unwrap(),
+            range: DisparityRange::new(0, ndisp as i32 - 1).unwrap(),
+            truth,
+            visible: read::grey8(&folder.join("mask0nocc.png")).unwrap(),
+        }
+    }
+
+    fn scene(name: &str) -> Self {
+        Self::load(&Path::new("testdata").join(name))
+    }
+
+    /// Pixels per match, and in percent the matches that are off by more than 1.5 px, of those that both views see.
+    fn accuracy(&self, found: &[Match]) -> (usize, f64) {
+        let errors: Vec<f32> = found
+            .iter()
+            .filter(|m| self.visible[(m.x, m.y)] == 255)
+            .map(|m| (m.disparity as f32 / FRACTION as f32 - self.truth[(m.x, m.y)]).abs())
+            .collect();
+        let bad = errors.iter().filter(|e| **e > 1.5).count();
+        (self.truth.data().len() / found.len().max(1), 100.0 * bad as f64 / errors.len() as f64)
+    }
+
+    /// Known true disparities.
+    fn truths(&self) -> impl Iterator<Item = f32> {
+        self.truth.data().iter().copied().filter(|t| t.is_finite())
+    }
+}
+
+/// The five real pairs, if there are any.
+fn real_pairs() -> Vec<Case> {
+    let Some(folder) = std::env::var_os("MRFGS_MIDDLEBURY").map(PathBuf::from) else {
+        let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
+        return Vec::new();
+    };
+    ["Teddy", "Cones", "Dolls", "Rocks1", "Motorcycle"].map(|pair| Case::load(&folder.join(pair))).into()
+}
+
+/// `image` with the pixel at (x, y) taken from `from(x, y)`, clamped to the image.
+fn moved(image: &Image, from: impl Fn(i32, i32) -> (i32, i32)) -> Image {
+    let (width, height) = image.pixels.size();
+    let at = |x: usize, y: usize| {
+        let (x, y) = from(x as i32, y as i32);
+        (x.clamp(0, width as i32 - 1) as usize, y.clamp(0, height as i32 - 1) as usize)
+    };
+    Image {
+        pixels: Plane::from_fn(width, height, |x, y| image.pixels[at(x, y)]),
+        masked: Plane::from_fn(width, height, |x, y| image.masked[at(x, y)]),
+    }
+}
+
+/// Zones of bands of five brightnesses in three columns of the image.
+fn crude_zones(image: &Image) -> Plane<u8> {
+    let mut greys: Vec<u16> = image.pixels.data().iter().map(|p| p[3]).collect();
+    greys.sort_unstable();
+    let limits: Vec<u16> = (1..5).map(|i| greys[greys.len() * i / 5]).collect();
+    let (width, height) = image.pixels.size();
+    Plane::from_fn(width, height, |x, y| {
+        let band = limits.iter().filter(|limit| image.pixels[(x, y)][3] >= **limit).count();
+        (3 * band + 3 * x / width) as u8
+    })
+}
+
+#[test]
+fn matches_of_rendered_scenes_are_right() {
+    // Most pixels per match, and most matches in percent off by more than 1.5 px.
+    let floors = [
+        ("slanted", 90, 1.5),
+        ("thin", 120, 4.0),
+        ("wall", 230, 2.5),
+        ("repetitive", 200, 5.0),
+        ("exposure", 90, 1.5),
+        ("mixed", 110, 2.5),
+    ];
+    for (scene, spacing, wrong) in floors {
+        let case = Case::scene(scene);
+        for range in [Some(case.range), None] {
+            let (pixels, bad) = case.accuracy(&matches::find(&case.pair, None, range));
+            println!("{scene} {range:?}: one in {pixels} px, {bad:.2} % off");
+            assert!(pixels <= spacing && bad <= wrong, "{scene}: one in {pixels} px, {bad:.2} % off");
+        }
+    }
+}
+
+#[test]
+fn matches_of_real_pairs_are_right() {
+    for case in real_pairs() {
+        for range in [Some(case.range), None] {
+            let (pixels, bad) = case.accuracy(&matches::find(&case.pair, None, range));
+            println!("{} {range:?}: one in {pixels} px, {bad:.2} % off", case.name);
+            assert!(pixels <= 150 && bad <= 4.0, "{}: one in {pixels} px, {bad:.2} % off", case.name);
+        }
+    }
+}
+
+#[test]
+fn disparities_lie_between_the_pixels() {
+    let case = Case::scene("slanted");
+    let found = matches::find(&case.pair, None, Some(case.range));
+    let mean = |disparity: fn(&Match) -> i32| {
+        let errors = found.iter().map(|m| {
+            let error = disparity(m) as f32 / FRACTION as f32 - case.truth[(m.x, m.y)];
+            error.abs().min(1.5)
+        });
+        errors.sum::<f32>() / found.len() as f32
+    };
+    let whole = mean(|m| (m.disparity + FRACTION / 2).div_euclid(FRACTION) * FRACTION);
+    let (exact, mirrored) = (
+        mean(|m| m.disparity),
+        // The fraction on the wrong side.
+        mean(|m| 2 * ((m.disparity + FRACTION / 2).div_euclid(FRACTION) * FRACTION) - m.disparity),
+    );
+    assert!(
+        exact < 0.6 * whole && exact < 0.4 * mirrored,
+        "{exact}, in whole pixels {whole}, mirrored {mirrored}"
+    );
+}
+
+#[test]
+fn the_score_is_the_correlation_of_the_windows() {
+    let case = Case::scene("exposure");
+    let window = |image: &Image, x: usize, y: usize| -> Vec<f64> {
+        let at = |i: usize| f64::from(image.pixels[(x + i % 7 - 3, y + i / 7 - 3)][3] >> 4);
+        let mean = (0..49).map(at).sum::<f64>() / 49.0;
+        (0..49).map(|i| at(i) - mean).collect()
+    };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let found = matches::find(&case.pair, None, Some(case.range));
+    assert!(found.len() > 100);
+    for m in found {
+        // The window stands on whole pixels, within half a pixel of the match.
+        let d = (m.disparity + FRACTION / 2).div_euclid(FRACTION);
+        let left = window(case.pair.left(), m.x, m.y);
+        let right = window(case.pair.right(), (m.x as i32 - d) as usize, m.y);
+        let score = dot(&left, &right) / (dot(&left, &left) * dot(&right, &right)).sqrt();
+        assert!((score - m.score).abs() < 1e-9, "{m:?}: {score}");
+    }
+}
+
+#[test]
+fn threads_change_nothing() {
+    let case = Case::scene("mixed");
+    let zones = crude_zones(case.pair.left());
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            (
+                matches::find(&case.pair, Some((&zones, 15)), Some(case.range)),
+                check::range(&case.pair),
+                check::warnings(&case.pair, None),
+            )
+        })
+    };
+    let one = on(1);
+    assert!(one.0.len() > 300);
+    assert!(one.0.is_sorted_by_key(|m| (m.y, m.x)));
+    assert_eq!(one, on(2));
+}
+
+#[test]
+fn only_the_range_is_searched() {
+    let case = Case::scene("slanted");
+    let range = DisparityRange::new(12, 15).unwrap();
+    let found = matches::find(&case.pair, None, Some(range));
+    assert!(!found.is_empty());
+    for m in found {
+        assert!((12 * FRACTION - 128..=15 * FRACTION + 128).contains(&m.disparity), "{m:?}");
+    }
+    // Seen from the other eye, all disparities are negative.
+    let swapped = Pair::new(case.pair.right().clone(), case.pair.left().clone()).unwrap();
+    let all = matches::find(&swapped, None, None);
+    let negative = DisparityRange::new(-31, 0).unwrap();
+    assert!(all.len() > 300 && matches::find(&swapped, None, Some(negative)).len() > 300);
+    assert!(all.iter().filter(|m| m.disparity < 0).count() * 100 >= all.len() * 98);
+    assert!(matches::find(&swapped, None, Some(case.range)).len() < 10);
+}
+
+#[test]
+fn masked_pixels_are_never_used() {
+    let case = Case::scene("slanted");
+    let (width, height) = case.pair.size();
+    let hide = |image: &Image, left: usize, junk: u16| {
+        let inside = |x: usize, y: usize| (left..left + 40).contains(&x) && (50..110).contains(&y);
+        Image {
+            pixels: Plane::from_fn(width, height, |x, y| {
+                if inside(x, y) { [(x * 7919 + y * 104_729) as u16 & junk; 4] } else { image.pixels[(x, y)] }
+            }),
+            masked: Plane::from_fn(width, height, inside),
+        }
+    };
+    let found = |junk: u16| {
+        let pair = Pair::new(hide(case.pair.left(), 60, junk), hide(case.pair.right(), 130, junk)).unwrap();
+        matches::find(&pair, None, Some(case.range))
+    };
+    let clean = found(0);
+    assert_eq!(clean, found(0xffff));
+    assert!(clean.len() > 200);
+    let near = |m: &Match| (57..103).contains(&m.x) && (47..113).contains(&m.y);
+    assert!(!clean.iter().any(near));
+    assert!(matches::find(&case.pair, None, Some(case.range)).iter().any(near));
+}
+
+#[test]
+fn pixels_of_no_zone_give_no_match() {
+    let case = Case::scene("slanted");
+    let (width, height) = case.pair.size();
+    let zones = Plane::from_fn(width, height, |x, _| u8::from(x >= 120));
+    let beyond = |count| {
+        let found = matches::find(&case.pair, Some((&zones, count)), Some(case.range));
+        assert!(found.iter().any(|m| m.x < 120));
+        found.iter().any(|m| m.x >= 120)
+    };
+    assert!(beyond(2) && !beyond(1));
+}
+
+#[test]
+fn there_is_nothing_to_match() {
+    let noise = |width, height| {
+        Image::from_rgb8(&Plane::from_fn(width, height, |x, y| {
+            let v = (x * x * 31 + y * y * 17 + x * y * 13) as u8;
+            [v, v.wrapping_mul(3), v ^ 0x55]
+        }))
+    };
+    let mut masked = noise(60, 50);
+    masked.masked = Plane::filled(60, 50, true);
+    let plain = Image::from_rgb8(&Plane::filled(60, 50, [90, 120, 30]));
+    for image in [noise(1, 1), noise(3, 40), noise(40, 3), noise(7, 7), plain, masked] {
+        let pair = Pair::new(image.clone(), image).unwrap();
+        for range in
+            [None, Some(DisparityRange::new(-5, 9).unwrap()), Some(DisparityRange::new(0, 0).unwrap())]
+        {
+            assert_eq!(matches::find(&pair, None, range), [], "{:?}", pair.size());
+        }
+        assert_eq!(check::range(&pair), None);
+        assert!(check::warnings(&pair, None).iter().all(|w| *w == Warning::Identical));
+    }
+    // The noise itself can be matched.
+    let pair = Pair::new(noise(60, 50), noise(60, 50)).unwrap();
+    assert!(!matches::find(&pair, None, None).is_empty());
+    // Views of different things cannot.
+    let (left, right) = (Case::scene("slanted"), Case::scene("thin"));
+    let strangers = Pair::new(left.pair.left().clone(), right.pair.right().clone()).unwrap();
+    assert_eq!(check::range(&strangers), None);
+}
+
+/// Matches at (0, 0), (1, 0) and so on.
+fn matches_of(disparities: &[i32]) -> Vec<Match> {
+    let at = |(x, &disparity): (usize, &i32)| Match { x, y: 0, disparity, dy: 0, score: 1.0 };
+    disparities.iter().enumerate().map(at).collect()
+}
+
+#[test]
+fn supports_are_mu_and_k_sigma() {
+    let range = DisparityRange::new(-4, 20).unwrap();
+    // Ten matches of mean 5.5 px and sigma 1.5 px in zone 0, none in zone 1, and one pixel of no zone.
+    let found = matches_of(&[4, 7, 4, 7, 4, 7, 4, 7, 4, 7].map(|d| d * FRACTION));
+    let zones = Plane::new(12, 1, vec![0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 7]);
+    let interval = |k: f64, found: &[Match]| {
+        let support = support::zonal(range, (&zones, 2), found, k);
+        for x in [10, 11] {
+            assert_eq!((support.low[(x, 0)], support.high[(x, 0)]), (-4, 20));
+        }
+        (support.low[(9, 0)], support.high[(9, 0)])
+    };
+    assert_eq!(interval(0.0, &found), (5, 6));
+    assert_eq!(interval(1.0, &found), (4, 7));
+    assert_eq!(interval(1.1, &found), (3, 8));
+    assert_eq!(interval(5.0, &found), (-2, 13));
+    assert_eq!(interval(100.0, &found), (-4, 20));
+    assert_eq!(interval(1.0, &found[..MIN_MATCHES as usize - 1]), (-4, 20));
+    // Nothing of the range in the interval.
+    assert_eq!(interval(1.0, &matches_of(&[100 * FRACTION; 10])), (-4, 20));
+}
+
+#[test]
+fn a_coarse_support_is_the_hull_of_its_childrens() {
+    let bits = |x: usize, y: usize| (x * 2_654_435_761 + y * 40_503 + x * y * 7_919) >> 7;
+    for (width, height) in [(1, 1), (2, 2), (7, 5), (8, 3), (1, 6)] {
+        let low = Plane::from_fn(width, height, |x, y| (bits(x, y) % 23) as i32 - 11);
+        let high = Plane::from_fn(width, height, |x, y| low[(x, y)] + (bits(y, x) % 9) as i32);
+        let fine = Support { low, high };
+        let coarse = fine.coarser();
+        assert_eq!(coarse.low.size(), (width.div_ceil(2), height.div_ceil(2)));
+        for y in 0..coarse.low.height() {
+            for x in 0..coarse.low.width() {
+                let children = || {
+                    (2 * y..(2 * y + 2).min(height))
+                        .flat_map(move |v| (2 * x..(2 * x + 2).min(width)).map(move |u| (u, v)))
+                };
+                let least = children().map(|c| fine.low[c]).min().unwrap();
+                let most = children().map(|c| fine.high[c]).max().unwrap();
+                let (low, high) = (coarse.low[(x, y)], coarse.high[(x, y)]);
+                assert!(2 * low <= least && 2 * low >= least - 1, "{low} for {least}");
+                assert!(2 * high >= most && 2 * high <= most + 1, "{high} for {most}");
+            }
+        }
+    }
+}
+
+/// Shares of the true disparities inside the support and of the labels left, in percent.
+fn supported(case: &Case, k: f64) -> (f64, f64) {
+    let zones = crude_zones(case.pair.left());
+    let found = matches::find(&case.pair, Some((&zones, 15)), Some(case.range));
+    let support = support::zonal(case.range, (&zones, 15), &found, k);
+    let bounds = support.low.data().iter().zip(support.high.data());
+    let inside =
+        case.truth.data().iter().zip(bounds).filter(|(t, (low, high))| {
+            t.is_finite() && (**low..=**high).contains(&((**t + 0.5).floor() as i32))
+        });
+    let all = case.truth.data().len() * case.range.labels();
+    (
+        100.0 * inside.count() as f64 / case.truths().count() as f64,
+        100.0 * support.labels() as f64 / all as f64,
+    )
+}
+
+#[test]
+fn supports_hold_the_truth() {
+    let mut cases = real_pairs();
+    cases.push(Case::scene("mixed"));
+    for case in cases {
+        let [one, two, three] = [1.0, 2.0, 3.0].map(|k| supported(&case, k));
+        println!("{}: inside and labels left, in %: {one:?}, {two:?}, {three:?}", case.name);
+        assert!(one.0 < two.0 && two.0 <= three.0 && one.1 < two.1 && two.1 < three.1, "{}", case.name);
+        assert!(one.1 < 50.0 && two.0 > 90.0 && three.0 > 97.0, "{}", case.name);
+    }
+}
+
+#[test]
+fn the_range_holds_the_truth() {
+    // The truth of real pairs has stray pixels: 36 of Cones and one of Dolls lie far below all others.
+    let scenes = SCENES.map(Case::scene).into_iter().map(|case| (case, 100.0, 3.0));
+    for (case, share, most) in scenes.chain(real_pairs().into_iter().map(|case| (case, 99.95, 1.3))) {
+        let range = check::range(&case.pair).unwrap();
+        let low = case.truths().fold(f32::MAX, f32::min).floor() as i32;
+        let high = case.truths().fold(f32::MIN, f32::max).ceil() as i32;
+        let inside = case.truths().filter(|t| range.min as f32 <= *t && *t <= range.max as f32).count();
+        let inside = 100.0 * inside as f64 / case.truths().count() as f64;
+        println!("{}: {range:?} for {low} to {high}, {inside:.3} % inside", case.name);
+        assert!(inside >= share, "{}: {range:?} for {low} to {high}", case.name);
+        let labels = f64::from(high - low + 1);
+        assert!((range.labels() as f64) < most * labels, "{}: {range:?} for {low} to {high}", case.name);
+    }
+}
+
+#[test]
+fn pairs_that_are_not_rectified_are_told() {
+    let mut cases = real_pairs();
+    cases.extend(SCENES.map(Case::scene));
+    for case in cases {
+        assert_eq!(check::warnings(&case.pair, None), [], "{}", case.name);
+        for rows in [2, -5] {
+            let right = moved(case.pair.right(), |x, y| (x, y - rows));
+            let pair = Pair::new(case.pair.left().clone(), right).unwrap();
+            let warnings = check::warnings(&pair, Some(case.range));
+            let [Warning::NotRectified { offset }] = warnings[..] else {
+                panic!("{}, {rows} rows: {warnings:?}", case.name)
+            };
+            assert!(offset.abs_diff(rows.unsigned_abs() * 256) < 100, "{}, {rows} rows: {offset}", case.name);
+        }
+        // A slight rotation: no common offset, and still on no common row.
+        let width = case.pair.size().0 as i32;
+        let right = moved(case.pair.right(), |x, y| (x, y - (x - width / 2) * 12 / width));
+        let pair = Pair::new(case.pair.left().clone(), right).unwrap();
+        let warnings = check::warnings(&pair, None);
+        assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{}: {warnings:?}", case.name);
+    }
+}
+
+#[test]
+fn swapped_views_are_told() {
+    for case in SCENES.map(Case::scene) {
+        let swapped = Pair::new(case.pair.right().clone(), case.pair.left().clone()).unwrap();
+        for range in [None, Some(case.range)] {
+            let warnings = check::warnings(&swapped, range);
+            assert!(matches!(warnings[..], [Warning::Swapped { .. }]), "{}: {warnings:?}", case.name);
+        }
+        // Who asks for negative disparities knows.
+        let negative = DisparityRange::new(-31, 0).unwrap();
+        assert_eq!(check::warnings(&swapped, Some(negative)), [], "{}", case.name);
+    }
+}
+
+#[test]
+fn identical_images_are_told() {
+    let case = Case::scene("mixed");
+    let left = case.pair.left();
+    let mut other = left.clone();
+    other.pixels[(9, 9)] = [1, 2, 3, 4];
+    assert_eq!(check::warnings(&Pair::new(left.clone(), left.clone()).unwrap(), None), [Warning::Identical]);
+    assert_eq!(check::warnings(&Pair::new(left.clone(), other.clone()).unwrap(), None), []);
+    // A difference that a mask hides is none.
+    other.masked[(9, 9)] = true;
+    assert_eq!(check::warnings(&Pair::new(left.clone(), other).unwrap(), None), [Warning::Identical]);
+}
+
+#[test]
+fn warnings_are_one_line_with_the_remedy() {
+    for (warning, words) in [
+        (Warning::Identical, ["the same", "right view"]),
+        (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
+        (Warning::Swapped { percent: 97 }, ["97 %", "exchange"]),
+    ] {
+        let line = warning.to_string();
+        assert!(!line.contains('\n') && words.iter().all(|w| line.contains(w)), "{line}");
+    }
+}
