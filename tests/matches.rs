@@ -298,7 +298,7 @@ fn supports_are_mu_and_k_sigma() {
     assert_eq!(interval(1.1, &found), (3, 8));
     assert_eq!(interval(5.0, &found), (-2, 13));
     assert_eq!(interval(100.0, &found), (-4, 20));
-    assert_eq!(interval(1.0, &found[..MIN_MATCHES as usize - 1]), (-4, 20));
+    assert_eq!(interval(1.0, &found[..MIN_MATCHES - 1]), (-4, 20));
     // Nothing of the range in the interval.
     assert_eq!(interval(1.0, &matches_of(&[100 * FRACTION; 10])), (-4, 20));
 }

@@ -401,6 +401,6 @@ mod tests {
         let value = view.eigenvalues(10)[10];
         // Of [[xx, xy], [xy, yy]]: the determinant of the tensor less the value on its diagonal is 0.
         let determinant = (xx - value) * (yy - value) - xy * xy;
-        assert!(value > 0.0 && determinant.abs() < 1e-9 * xx * yy && value <= (xx + yy) / 2.0);
+        assert!(value > 0.0 && determinant.abs() < 1e-9 * xx * yy && 2.0 * value <= xx + yy);
     }
 }

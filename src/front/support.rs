@@ -8,7 +8,7 @@ use crate::image::Plane;
 use crate::options::DisparityRange;
 
 /// A zone with fewer matches keeps the full range: no spread can be told from a handful (open).
-pub const MIN_MATCHES: i64 = 10;
+pub const MIN_MATCHES: usize = 10;
 
 /// An interval of labels for each pixel of one level. Labels are disparities in pixels of that level, not indices:
 /// subtract the level's smallest label for those.
@@ -26,6 +26,9 @@ pub struct Support {
 /// `zones` is a map of zone indices and their number. The full range remains to a pixel whose index is out of range,
 /// and to zones with fewer than [`MIN_MATCHES`] matches or with none of `range` in their interval. Sigma is that of
 /// the matches themselves (divided by n).
+///
+/// # Panics
+/// When a match lies outside the map of zones.
 #[must_use]
 pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match], k: f64) -> Support {
     let (map, count) = zones;
@@ -43,7 +46,7 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match
         .into_iter()
         .map(|(n, sum, squares)| {
             let full = (range.min, range.max);
-            if n < MIN_MATCHES {
+            if n < MIN_MATCHES as i64 {
                 return full;
             }
             let scale = n as f64 * f64::from(FRACTION);
