@@ -1,11 +1,13 @@
-//! Disparity maps for the eye.
+//! Maps for the eye.
 
 use super::Plane;
+use crate::maps::{flag, has_disparity};
 
 type Rgb = [u8; 3];
 
 const BLACK: Rgb = [0, 0, 0];
 const WHITE: Rgb = [255, 255, 255];
+const GREY: Rgb = [128, 128, 128];
 
 /// Stops of the colour map at equal steps, far to near: from cold to warm, with lightness rising to the middle
 /// and falling after it, and nowhere as dark as the black of invalid pixels.
@@ -19,6 +21,18 @@ const STOPS: [Rgb; 9] = [
     [251, 128, 34],
     [214, 54, 10],
     [150, 14, 6],
+];
+
+/// Stops of the colours of a signed error at equal steps: as dark on either side, and never as grey or as black as
+/// what has no error.
+const SIGNED: [Rgb; 7] = [
+    [16, 48, 120],
+    [48, 112, 196],
+    [140, 190, 232],
+    [250, 250, 250],
+    [246, 172, 136],
+    [212, 84, 64],
+    [122, 14, 36],
 ];
 
 /// Digits 0 to 9, minus and point: five rows of three pixels, the leftmost in the highest bit.
@@ -44,14 +58,108 @@ const GLYPHS: [[u8; 5]; 12] = [
 /// maps from 400 pixels wide.
 #[must_use]
 pub fn preview(map: &Plane<f32>, min: f32, max: f32) -> Plane<[u8; 3]> {
-    let (w, h) = map.size();
     let (min, max) = (min as f64, max as f64);
-    // Rows of text below a large picture grow with it, or they vanish when the picture is scaled down.
-    let s = (w / 200).clamp(1, 16);
+    let pixel = |x, y| {
+        let d: f32 = map[(x, y)];
+        if d.is_finite() { colour((d as f64 - min) / (max - min)) } else { BLACK }
+    };
+    with_scale(map.size(), pixel, min, max, colour)
+}
+
+/// The signed error `estimate` - `truth` in colours, with a scale bar below it as in [`preview`]: blue where the estimate
+/// is too small (too far), white where it is right, red where it is too large (too near).
+///
+/// Colours run from -`limit` to `limit` (pixels of disparity), and errors beyond take the colour of the nearer end. Black
+/// is a pixel with known truth and no estimate, grey one whose truth is not known. (Not finite is none in both maps.)
+///
+/// # Panics
+/// When the maps differ in size.
+#[must_use]
+pub fn error(estimate: &Plane<f32>, truth: &Plane<f32>, limit: f32) -> Plane<[u8; 3]> {
+    assert_eq!(estimate.size(), truth.size(), "two maps of one view");
+    let limit = limit as f64;
+    let pixel = |x, y| match (estimate[(x, y)], truth[(x, y)]) {
+        (_, t) if !t.is_finite() => GREY,
+        (d, _) if !d.is_finite() => BLACK,
+        (d, t) => between(&SIGNED, (d as f64 - t as f64 + limit) / (2.0 * limit)),
+    };
+    with_scale(truth.size(), pixel, -limit, limit, |t| between(&SIGNED, t))
+}
+
+/// Levels of 0 ..= 255 in grey, with a scale bar below them as in [`preview`].
+#[must_use]
+pub fn grey(levels: &Plane<u8>) -> Plane<[u8; 3]> {
+    let ramp = |t: f64| [(255.0 * t).round() as u8; 3];
+    with_scale(levels.size(), |x, y| [levels[(x, y)]; 3], 0.0, 255.0, ramp)
+}
+
+/// Classes in the colours of `palette`, which holds the number and the colour of each, with these numbers beside their
+/// colours below it, in as many lines as it takes. `class` gives the place in the palette; what is not in it is black.
+#[must_use]
+pub fn classes(class: &Plane<usize>, palette: &[(u32, [u8; 3])]) -> Plane<[u8; 3]> {
+    let (w, h) = class.size();
+    let s = unit(w);
+    let entries: Vec<_> = palette.iter().map(|&(number, colour)| (number.to_string(), colour)).collect();
+    // A swatch of 5 x 5, a gap of 2, the number, a gap of 5.
+    let widest = entries.iter().map(|(text, _)| (7 * s) + text_width(text, s) + 5 * s).max().unwrap_or(1);
+    let columns = (w / widest).clamp(1, entries.len().max(1));
+    let lines = entries.len().div_ceil(columns);
+    let mut picture = Plane::filled(w, h + (2 + 7 * lines) * s, BLACK);
+    for (out, &class) in picture.data_mut().iter_mut().zip(class.data()) {
+        *out = palette.get(class).map_or(BLACK, |entry| entry.1);
+    }
+    for (i, (text, colour)) in entries.iter().enumerate() {
+        let (left, top) = (i % columns * widest + 2 * s, h + (2 + i / columns * 7) * s);
+        // Framed, or black is no swatch on black.
+        fill(&mut picture, left, top, 5 * s, 5 * s, |_| GREY);
+        fill(&mut picture, left + 1, top + 1, 5 * s - 2, 5 * s - 2, |_| *colour);
+        write(&mut picture, left + 7 * s, top, text, s);
+    }
+    picture
+}
+
+/// The colours of [`validity`]: the bit that decides, and its colour. They stay apart for the colour-blind.
+pub const VALIDITY: [(u32, [u8; 3]); 6] = [
+    (0, [226, 226, 226]),
+    (flag::OUTSIDE as u32, [0, 114, 178]),
+    (flag::OCCLUDED as u32, [230, 159, 0]),
+    (flag::SMALL_REGION as u32, [204, 121, 167]),
+    (flag::LOW_CONFIDENCE as u32, [0, 158, 115]),
+    (flag::MASKED as u32, [0, 0, 0]),
+];
+
+/// The validity map in the colours of [`VALIDITY`], with the bits' numbers below it: of a pixel's reasons not to be
+/// trusted, the one that it was given up for first. A pixel without a disparity in the end is half as bright.
+#[must_use]
+pub fn validity(map: &Plane<u8>) -> Plane<[u8; 3]> {
+    const FIRST: [u8; 5] =
+        [flag::MASKED, flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION, flag::LOW_CONFIDENCE];
+    let decisive = |flags: u8| FIRST.into_iter().find(|bit| flags & bit != 0).unwrap_or(0);
+    let place = |flags: &u8| {
+        VALIDITY.iter().position(|entry| entry.0 == decisive(*flags) as u32).unwrap_or(VALIDITY.len())
+    };
+    let mut picture = classes(&map.map(place), &VALIDITY);
+    for (out, &flags) in picture.data_mut().iter_mut().zip(map.data()) {
+        if !has_disparity(flags) {
+            *out = out.map(|v| v / 2);
+        }
+    }
+    picture
+}
+
+/// A picture of one colour a pixel, and below it the colours from `min` to `max` by their position from 0 to 1.
+fn with_scale(
+    (w, h): (usize, usize),
+    pixel: impl Fn(usize, usize) -> Rgb,
+    min: f64,
+    max: f64,
+    ramp: impl Fn(f64) -> Rgb,
+) -> Plane<Rgb> {
+    let s = unit(w);
     let mut picture = Plane::filled(w, h + 16 * s, BLACK);
-    for (out, &d) in picture.data_mut().iter_mut().zip(map.data()) {
-        if d.is_finite() {
-            *out = colour((d as f64 - min) / (max - min));
+    for y in 0..h {
+        for x in 0..w {
+            picture[(x, y)] = pixel(x, y);
         }
     }
     if w == 0 {
@@ -59,24 +167,36 @@ pub fn preview(map: &Plane<f32>, min: f32, max: f32) -> Plane<[u8; 3]> {
     }
 
     let last = (w - 1).max(1) as f64;
-    let ramp = h + s;
-    fill(&mut picture, 0, ramp, w, 6 * s, |x| colour(x as f64 / last));
+    let top = h + s;
+    fill(&mut picture, 0, top, w, 6 * s, |x| ramp(x as f64 / last));
     for (value, text) in ticks(min, max, w, s) {
         let x = ((value - min) / (max - min) * (w - 1) as f64).round() as usize;
-        fill(&mut picture, x.saturating_sub(s / 2), ramp + 6 * s, s, 2 * s, |_| WHITE);
+        fill(&mut picture, x.saturating_sub(s / 2), top + 6 * s, s, 2 * s, |_| WHITE);
         let left = x.saturating_sub(text_width(&text, s) / 2).min(w.saturating_sub(text_width(&text, s)));
-        write(&mut picture, left, ramp + 9 * s, &text, s);
+        write(&mut picture, left, top + 9 * s, &text, s);
     }
     picture
+}
+
+/// The size of what is drawn below a picture of width `w`: it grows with it, or it vanishes when the picture is
+/// scaled down.
+fn unit(w: usize) -> usize {
+    (w / 200).clamp(1, 16)
 }
 
 /// Colour of the position `t` between far (0) and near (1); anything else goes to the nearer end, and what is
 /// no number (an empty range) to the middle.
 fn colour(t: f64) -> Rgb {
-    let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) } * (STOPS.len() - 1) as f64;
-    let i = (t as usize).min(STOPS.len() - 2);
+    between(&STOPS, t)
+}
+
+/// Colour of the position `t` from 0 to 1 between `stops` at equal steps; anything else goes to the nearer end, and
+/// what is no number to the middle.
+fn between(stops: &[Rgb], t: f64) -> Rgb {
+    let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) } * (stops.len() - 1) as f64;
+    let i = (t as usize).min(stops.len() - 2);
     let part = t - i as f64;
-    [0, 1, 2].map(|c| (STOPS[i][c] as f64 * (1.0 - part) + STOPS[i + 1][c] as f64 * part).round() as u8)
+    [0, 1, 2].map(|c| (stops[i][c] as f64 * (1.0 - part) + stops[i + 1][c] as f64 * part).round() as u8)
 }
 
 /// Values to mark on the scale and their numbers: as many round ones as fit without touching.
@@ -233,5 +353,55 @@ mod tests {
                 "....###".into()
             ]
         );
+    }
+
+    #[test]
+    fn errors_have_a_sign_and_none_has_no_colour() {
+        let (inf, nan) = (f32::INFINITY, f32::NAN);
+        let truth = Plane::new(7, 1, vec![10.0, 10.0, 10.0, 10.0, inf, inf, 10.0]);
+        let estimate = Plane::new(7, 1, vec![6.0, 10.0, 14.0, inf, 10.0, nan, 99.0]);
+        let picture = error(&estimate, &truth, 4.0);
+        let at = |x| picture[(x, 0)];
+        assert_eq!((at(0), at(1), at(2)), (SIGNED[0], SIGNED[3], SIGNED[6]));
+        assert_eq!((at(3), at(4), at(5), at(6)), (BLACK, GREY, GREY, SIGNED[6]));
+        let brightness = |c: Rgb| c.iter().map(|v| *v as i32).sum::<i32>();
+        for i in 0..3 {
+            assert!((brightness(SIGNED[i]) - brightness(SIGNED[6 - i])).abs() < 45, "{i}");
+        }
+    }
+
+    #[test]
+    fn validity_shows_the_first_reason_and_what_stays_open() {
+        let flags = [0, 1 | 16, 2 | 16, 2, 4 | 2 | 16, 8, 32, 4 | 16];
+        let picture = validity(&Plane::new(8, 1, flags.to_vec()));
+        let colours = VALIDITY.map(|entry| entry.1);
+        let [trusted, outside, occluded, small, low, masked] = colours;
+        let expected = [trusted, outside, occluded, occluded.map(|v| v / 2), occluded, low, masked, small];
+        assert_eq!([0, 1, 2, 3, 4, 5, 6, 7].map(|x| picture[(x, 0)]), expected);
+        for (i, a) in colours.iter().enumerate() {
+            for b in &colours[..i] {
+                assert!(a.iter().zip(b).map(|(a, b)| a.abs_diff(*b) as u32).sum::<u32>() > 60, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn legends_fit_every_width() {
+        for w in [0, 1, 20, 60, 240, 450, 3000] {
+            for picture in [
+                validity(&Plane::filled(w, 3, 0)),
+                grey(&Plane::filled(w, 3, 77)),
+                error(&Plane::filled(w, 3, 1.0), &Plane::filled(w, 3, 1.0), 4.0),
+                classes(&Plane::filled(w, 3, 9), &[]),
+            ] {
+                assert_eq!(picture.width(), w);
+                assert!(picture.height() > 3);
+            }
+        }
+        // Every swatch is drawn.
+        let picture = validity(&Plane::filled(240, 1, 0));
+        for (bit, colour) in VALIDITY {
+            assert!(picture.data()[240..].contains(&colour), "{bit}");
+        }
     }
 }

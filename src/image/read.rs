@@ -142,11 +142,34 @@ pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
             v.into_iter().map(|v| if v == 0 { f32::INFINITY } else { v as f32 / 256.0 }).collect()
         }
         (Some(Kind::Coded(ImageFormat::Png)), _) => {
-            return wrong("an 8-bit PNG does not tell the scale of its disparities");
+            return wrong(
+                "an 8-bit PNG does not tell the scale of its disparities (of a truth, --truth-scale does)",
+            );
         }
         _ => return wrong("holds no disparities"),
     };
     Ok(Plane::new(raster.width, raster.height, values))
+}
+
+/// Reads an 8-bit PNG that holds disparities times `scale`, as the ground truth of the older Middlebury sets; 0 is
+/// unknown and becomes +infinity.
+///
+/// # Errors
+/// [`Error::Read`] when the file is missing, damaged, or anything else than a grey 8-bit PNG.
+pub fn scaled_disparity(path: &Path, scale: f32) -> Result<Plane<f32>> {
+    let bytes = load(path)?;
+    let kind = Kind::of(&bytes);
+    let raster = decode(&bytes).map_err(|reason| Error::read(path, reason))?;
+    match (kind, raster.channels, raster.samples) {
+        (Some(Kind::Coded(ImageFormat::Png)), 1, Samples::Byte(v)) => {
+            let disparity = |v| if v == 0 { f32::INFINITY } else { f32::from(v) / scale };
+            Ok(Plane::new(raster.width, raster.height, v.into_iter().map(disparity).collect()))
+        }
+        _ => Err(Error::read(
+            path,
+            "is no grey 8-bit PNG, and only such a truth has a scale; leave --truth-scale out",
+        )),
+    }
 }
 
 /// From samples to levels, the same for both images of a pair.

@@ -98,7 +98,15 @@ pub fn grey8(path: &Path, plane: &Plane<u8>) -> Result<()> {
 /// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
 pub fn rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<()> {
     png_extension(path)?;
-    save(path, &png(path, plane.data().as_flattened(), plane.size(), ExtendedColorType::Rgb8)?)
+    save(path, &encode_rgb8(path, plane)?)
+}
+
+/// The bytes of the file that [`rgb8`] would write to `path`.
+///
+/// # Errors
+/// [`Error::Write`] when PNG holds no picture of this size.
+pub fn encode_rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<Vec<u8>> {
+    png(path, plane.data().as_flattened(), plane.size(), ExtendedColorType::Rgb8)
 }
 
 fn png_extension(path: &Path) -> Result<()> {

@@ -465,3 +465,15 @@ fn disparities_are_refused_where_their_scale_is_unknown() {
     );
     assert_eq!(read_disparity(&double).unwrap().data()[..6], [1.5, i, i, i, -2.0, 0.0]);
 }
+
+#[test]
+fn levels_become_disparities_by_their_scale() {
+    let f = Folder::new();
+    let i = f32::INFINITY;
+    let map = scaled_disparity(&f.grey8("d.png", [0, 1, 3, 255, 0, 0, 0, 0, 0, 0, 0, 6]), 3.0).unwrap();
+    assert_eq!(map.data(), [i, 1.0 / 3.0, 1.0, 85.0, i, i, i, i, i, i, i, 2.0]);
+    for path in [f.grey16("k.png", [9; N]), f.grey8("d.pgm", RAMP), f.at("none.png")] {
+        assert!(scaled_disparity(&path, 3.0).is_err(), "{}", path.display());
+    }
+    refused(scaled_disparity(&f.grey16("k.png", [9; N]), 4.0), &["k.png", "8-bit PNG", "--truth-scale"]);
+}
