@@ -2,29 +2,38 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::evaluation::{GroundTruth, Report, Row, mean, table};
-use mrfgs::image::{Pair, Plane, calib::Calibration, read, write};
-use mrfgs::options::{DisparityRange, Method};
+use mrfgs::evaluation::{Report, Row, mean, table};
+use mrfgs::image::{read, write};
+use mrfgs::maps::Maps;
+use mrfgs::options::Method;
 use mrfgs::{Error, Matcher, Result};
 use serde::Serialize;
 
-use super::{ExecutionArgs, MethodArgs, outputs};
+use super::folder::{self, Folder, Scene};
+use super::outputs::{self, Written};
+use super::report::{self, Destination, Picture};
+use super::tables::{self, Comparison};
+use super::{ExecutionArgs, MethodArgs};
 
 const EXAMPLES: &str = "\
 Examples:
   mrfgs evaluate Teddy Cones
   mrfgs evaluate Teddy --preset paper --json figures.json
+  mrfgs evaluate Teddy Cones --report report      (then open report/index.html)
+  mrfgs evaluate Teddy Cones Dolls Rocks1 Motorcycle --tables
+  mrfgs evaluate HalfSize/Art --truth-scale 2
   mrfgs evaluate --disparity mine.pfm --truth Teddy/disp0GT.pfm --mask Teddy/mask0nocc.png";
-
-/// The files of a folder in the layout of the Middlebury benchmark.
-const FILES: [&str; 4] = ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"];
 
 /// Match pairs with known truth, or take a finished map, and print its errors
 ///
-/// A DIR has the layout of the Middlebury benchmark: im0.png, im1.png, disp0GT.pfm, calib.txt with ndisp, and where there
-/// is one mask0nocc.png. The table shows the map before post-processing (raw) and the final one: average error, RMS (px),
-/// PSNR against 255 (dB), pixels wrong by more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels
-/// with known truth and over those that both views see (nonocc).
+/// A DIR has the layout of one of the Middlebury sets, told by what it holds: im0.png, im1.png, disp0GT.pfm and calib.txt
+/// with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and disp2.png (2003). Of the older
+/// ones the truth has 8 bits (see --truth-scale), and without a calib.txt the range is from 0 to its largest disparity,
+/// rounded up. Where there is one, mask0nocc.png says which pixels both views see (255).
+///
+/// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB),
+/// pixels wrong by more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with known truth and
+/// over those that both views see (nonocc).
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -34,6 +43,29 @@ pub(super) struct Args {
     /// Writes all figures as JSON; `-` prints them instead of the table
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Writes a page with all figures and pictures, index.html, and the pictures as PNG files
+    ///
+    /// Of each pair it shows the left view, disparity and truth in the same colours, the signed error (estimate minus truth),
+    /// confidence and validity. The page needs no other file and no network. A folder that is there must be empty or hold
+    /// nothing but an earlier report (its index.html names mrfgs as its generator), which is replaced.
+    #[arg(long, value_name = "FOLDER")]
+    report: Option<PathBuf>,
+    /// Prints the two tables of the paper instead, its figures beside those of the presets fgs, paper and default
+    ///
+    /// Pairs are known by the names of their folders (Teddy, Cones, Dolls, Rocks1, Motorcycle); others have dashes in the
+    /// paper's columns. As --json has it: `source`, `ran_on`, `methods` (by preset: its keys) and `tables`, the raw one and the
+    /// final one: `number`, `map`, `pairs` (each: `name`, `published`, `ours`) and `mean` (`published`, `ours`). `published`
+    /// holds `fgs` and `mr-fgs` or is null, `ours` one entry a preset; an entry is `avg`, `psnr` and `bad2.0`, over all pixels
+    /// with known truth.
+    #[arg(long, conflicts_with_all = ["preset", "config", "set", "report", "disparity"])]
+    tables: bool,
+    /// Levels of an 8-bit PNG truth that are one pixel of disparity, of which 0 is unknown [default: 3 for the layout of
+    /// 2005 and 2006, 4 for that of 2003]
+    ///
+    /// The defaults are those of the small sizes, third and quarter. Of 2005 and 2006 the full size has 1, the half size 2,
+    /// the third size 3.
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
+    truth_scale: Option<f32>,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -49,7 +81,8 @@ pub(super) struct Args {
         help_heading = "Maps that others made"
     )]
     disparity: Option<PathBuf>,
-    /// Its ground truth, in one of the same formats; what is invalid there does not count
+    /// Its ground truth, in one of the same formats, or an 8-bit .png with --truth-scale; what is invalid there does not
+    /// count
     #[arg(long, value_name = "FILE", requires = "disparity", help_heading = "Maps that others made")]
     truth: Option<PathBuf>,
     /// Its mask: 255 where both views see the pixel, anything else where not
@@ -57,34 +90,36 @@ pub(super) struct Args {
     mask: Option<PathBuf>,
 }
 
-/// The mask's name in such a folder, which may lack it.
-const MASK: &str = "mask0nocc.png";
+fn scale(text: &str) -> std::result::Result<f32, String> {
+    let scale = text.parse().ok().filter(|scale| (0.1..=255.0).contains(scale));
+    scale.ok_or_else(|| "give a number from 0.1 to 255, such as 3".into())
+}
 
 /// Everything that the evaluation found, as JSON has it.
 #[derive(Serialize)]
-struct Findings {
-    method: Option<Method>,
-    ran_on: Option<String>,
-    pairs: Vec<Figures>,
-    mean: Mean,
+pub(super) struct Findings {
+    pub(super) method: Option<Method>,
+    pub(super) ran_on: Option<String>,
+    pub(super) pairs: Vec<Figures>,
+    pub(super) mean: Mean,
 }
 
 /// The figures of one pair.
 #[derive(Serialize)]
-struct Figures {
-    name: String,
-    raw: Option<Report>,
+pub(super) struct Figures {
+    pub(super) name: String,
+    pub(super) raw: Option<Report>,
     #[serde(rename = "final")]
-    finished: Report,
-    seconds: Option<f64>,
+    pub(super) finished: Report,
+    pub(super) seconds: Option<f64>,
 }
 
 /// The means over all pairs.
 #[derive(Serialize)]
-struct Mean {
-    raw: Option<Report>,
+pub(super) struct Mean {
+    pub(super) raw: Option<Report>,
     #[serde(rename = "final")]
-    finished: Option<Report>,
+    pub(super) finished: Option<Report>,
 }
 
 impl Findings {
@@ -96,112 +131,126 @@ impl Findings {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let json_file = args.json.as_deref().filter(|path| *path != Path::new("-"));
-    if let Some(path) = json_file {
+    let destination = check_outputs(args)?;
+    if args.tables {
+        return compare(args);
+    }
+    let mut pictures = Vec::new();
+    let wanted = destination.is_some();
+    let findings = if let (Some(map), Some(truth)) = (&args.disparity, &args.truth) {
+        finished_map(map, truth, args, wanted.then_some(&mut pictures))?
+    } else {
+        let method = args.method.method()?;
+        let folders = folders(args)?;
+        let mut matcher = Matcher::new(&args.execution.execution()?)?;
+        match_all(args, &folders, &mut matcher, method, None, |scene, maps| {
+            if wanted {
+                let (truth, estimate) = (scene.ground.truth(), maps.final_map());
+                let matched = Some((&scene.pair, maps));
+                pictures.push(report::pictures(&scene.name, truth, &estimate, matched)?);
+            }
+            Ok(())
+        })?
+    };
+    let row =
+        |f: &Figures| Row { pair: f.name.clone(), raw: f.raw.clone(), finished: Some(f.finished.clone()) };
+    let text = table(&findings.pairs.iter().map(row).collect::<Vec<_>>());
+    deliver(args.json.as_deref(), &findings, &text, || match destination {
+        Some(destination) => report::write(&destination, &findings, &pictures),
+        None => Ok(()),
+    })
+}
+
+/// Finds out before any computing whether the outputs can be written.
+fn check_outputs(args: &Args) -> Result<Option<Destination<'_>>> {
+    let destination = args.report.as_deref().map(Destination::check).transpose()?;
+    if let Some(path) = json_file(args.json.as_deref()) {
         write::check_path(path)?;
-        let files = FILES.into_iter().chain([MASK]);
-        let mut inputs: Vec<PathBuf> = files.flat_map(|f| args.dirs.iter().map(move |d| d.join(f))).collect();
+        if destination.as_ref().is_some_and(|report| report.holds(path)) {
+            let reason = format!("{} lies in the folder of --report; give another name", path.display());
+            return Err(Error::option("--json", reason));
+        }
+        let mut inputs: Vec<PathBuf> = args.dirs.iter().flat_map(|dir| folder::inputs(dir)).collect();
         inputs.extend(
             [&args.disparity, &args.truth, &args.mask, &args.method.config].into_iter().flatten().cloned(),
         );
         let inputs: Vec<_> = inputs.iter().map(|path| ("an input", path.as_path())).collect();
         outputs::distinct(&inputs, &[("--json", path)])?;
     }
-    let findings = match (&args.disparity, &args.truth) {
-        (Some(map), Some(truth)) => {
-            Findings::new(None, None, vec![finished_map(map, truth, args.mask.as_deref())?])
+    Ok(destination)
+}
+
+/// The file that the JSON goes to, unless it is printed.
+fn json_file(json: Option<&Path>) -> Option<&Path> {
+    json.filter(|path| *path != Path::new("-"))
+}
+
+/// Hands out the findings: as JSON where it is asked for, what `more` writes, and for people unless the JSON is printed.
+fn deliver(
+    json: Option<&Path>,
+    findings: &impl Serialize,
+    text: &str,
+    more: impl FnOnce() -> Result<()>,
+) -> Result<()> {
+    let mut written = Written::default();
+    let mut printed = text.to_owned();
+    if let Some(path) = json {
+        let mut json = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
+        json.push('\n');
+        match json_file(Some(path)) {
+            Some(file) => written.note(file, write::save(file, json.as_bytes()))?,
+            None => printed = json,
         }
-        _ => match_all(args)?,
-    };
-    if let Some(path) = &args.json {
-        let mut text = serde_json::to_string_pretty(&findings).map_err(|e| Error::write(path, e))?;
-        text.push('\n');
-        if json_file.is_none() {
-            return super::print(&text);
-        }
-        write::save(path, text.as_bytes())?;
     }
-    let row = |f: Figures| Row { pair: f.name, raw: f.raw, finished: Some(f.finished) };
-    super::print(&table(&findings.pairs.into_iter().map(row).collect::<Vec<_>>()))
+    more()?;
+    written.keep();
+    super::print(&printed)
 }
 
 /// The figures of a map that is there already.
-fn finished_map(map: &Path, truth: &Path, mask: Option<&Path>) -> Result<Figures> {
+fn finished_map(
+    map: &Path,
+    truth: &Path,
+    args: &Args,
+    pictures: Option<&mut Vec<Vec<Picture>>>,
+) -> Result<Findings> {
     let estimate = read::read_disparity(map)?;
-    let ground = ground_truth(truth, mask, map, estimate.size())?;
+    let ground = folder::ground_truth(truth, args.truth_scale, args.mask.as_deref(), map, estimate.size())?;
     let name = map.file_stem().unwrap_or(map.as_os_str()).to_string_lossy().into_owned();
-    Ok(Figures { name, raw: None, finished: ground.evaluate(&estimate)?, seconds: None })
+    let finished = ground.evaluate(&estimate)?;
+    if let Some(pictures) = pictures {
+        pictures.push(report::pictures(&name, ground.truth(), &estimate, None)?);
+    }
+    Ok(Findings::new(None, None, vec![Figures { name, raw: None, finished, seconds: None }]))
 }
 
-/// The truth and the mask for `what`, which is of the given size.
-fn ground_truth(truth: &Path, mask: Option<&Path>, what: &Path, size: (usize, usize)) -> Result<GroundTruth> {
-    fn fits<T>(plane: Plane<T>, path: &Path, what: &Path, size: (usize, usize)) -> Result<Plane<T>> {
-        if plane.size() == size {
-            return Ok(plane);
-        }
-        let (w, h) = plane.size();
-        Err(Error::Mismatch(format!(
-            "{} is {w} x {h} and {} is {} x {}: give files of the same pair at the same size",
-            path.display(),
-            what.display(),
-            size.0,
-            size.1
-        )))
+/// The folders, all complete: what is missing in the last is said before the first is matched.
+fn folders(args: &Args) -> Result<Vec<Folder<'_>>> {
+    let folders = args.dirs.iter().map(|dir| Folder::of(dir)).collect::<Result<Vec<_>>>()?;
+    if args.truth_scale.is_some() && !folders.iter().any(Folder::is_scaled) {
+        let reason = "no folder holds a truth of 8 bits, and disp0GT.pfm is in pixels; leave it out";
+        return Err(Error::option("--truth-scale", reason));
     }
-    let plane = fits(read::read_disparity(truth)?, truth, what, size)?;
-    if !plane.data().iter().any(|d| d.is_finite()) {
-        return Err(Error::read(truth, "holds no known disparity; nothing can be compared with it"));
-    }
-    let mask = mask.map(|path| fits(read::grey8(path)?, path, what, size)).transpose()?;
-    GroundTruth::new(plane, mask)
+    Ok(folders)
 }
 
-/// One folder, read.
-struct Scene {
-    name: String,
-    pair: Pair,
-    range: DisparityRange,
-    ground: GroundTruth,
-}
-
-impl Scene {
-    fn read(dir: &Path) -> Result<Self> {
-        let at = |file: &str| dir.join(file);
-        let calib = at("calib.txt");
-        let range = super::calibrated_range(&calib, &Calibration::read(&calib)?, 0)?.ok_or_else(|| {
-            Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N")
-        })?;
-        let pair = read::pair(&at("im0.png"), &at("im1.png"), None)?;
-        let mask = Some(at(MASK)).filter(|m| m.exists());
-        let ground = ground_truth(&at("disp0GT.pfm"), mask.as_deref(), &at("im0.png"), pair.size())?;
-        let full = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
-        let name = full.file_name().unwrap_or(dir.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, pair, range, ground })
-    }
-}
-
-/// Matches every folder.
-fn match_all(args: &Args) -> Result<Findings> {
-    let method = args.method.method()?;
-    let execution = args.execution.execution()?;
-    // What is missing in the last folder is said before the first is matched.
-    for dir in &args.dirs {
-        for path in FILES.map(|file| dir.join(file)) {
-            if !path.is_file() {
-                let reason =
-                    format!("there is no such file; a folder to evaluate holds {}", FILES.join(", "));
-                return Err(Error::read(path, reason));
-            }
-        }
-    }
-    let mut matcher = Matcher::new(&execution)?;
+/// Matches every folder by `method`, called `preset` where there are several; `see` gets every pair with its maps.
+fn match_all(
+    args: &Args,
+    folders: &[Folder],
+    matcher: &mut Matcher,
+    method: Method,
+    preset: Option<&str>,
+    mut see: impl FnMut(&Scene, &Maps) -> Result<()>,
+) -> Result<Findings> {
     let mut figures = Vec::new();
     let mut ran_on = None;
-    for dir in &args.dirs {
-        let scene = Scene::read(dir)?;
-        let name = Some(scene.name.as_str());
+    for folder in folders {
+        let scene = folder.read(args.truth_scale)?;
+        let name = preset.map_or(scene.name.clone(), |preset| format!("{}, {preset}", scene.name));
         let (matched, time) =
-            super::match_and_tell(&mut matcher, &scene.pair, scene.range, &method, name, false)?;
+            super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false)?;
+        see(&scene, &matched.maps)?;
         figures.push(Figures {
             raw: Some(scene.ground.evaluate(&matched.maps.raw_map())?),
             finished: scene.ground.evaluate(&matched.maps.final_map())?,
@@ -211,4 +260,17 @@ fn match_all(args: &Args) -> Result<Findings> {
         ran_on = Some(matched.ran_on);
     }
     Ok(Findings::new(Some(method), ran_on, figures))
+}
+
+/// Prints the paper's tables beside ours.
+fn compare(args: &Args) -> Result<()> {
+    let folders = folders(args)?;
+    let mut matcher = Matcher::new(&args.execution.execution()?)?;
+    let mut found = Vec::new();
+    for preset in tables::presets() {
+        let method = Method::preset(preset)?.validated()?;
+        found.push((preset, match_all(args, &folders, &mut matcher, method, Some(preset), |_, _| Ok(()))?));
+    }
+    let comparison = Comparison::new(&found);
+    deliver(args.json.as_deref(), &comparison, &comparison.text(), || Ok(()))
 }

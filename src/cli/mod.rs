@@ -2,10 +2,13 @@
 
 mod devices;
 mod evaluate;
+mod folder;
 mod r#match;
 mod outputs;
 mod presets;
 mod progress;
+mod report;
+mod tables;
 
 use std::fmt::{self, Write as _};
 use std::io::Write;

@@ -1,0 +1,144 @@
+//! Folders with a pair and its ground truth, in the layouts of the Middlebury sets.
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::evaluation::GroundTruth;
+use mrfgs::image::{Pair, Plane, calib::Calibration, read};
+use mrfgs::options::DisparityRange;
+use mrfgs::{Error, Result};
+
+/// What a folder holds.
+struct Layout {
+    /// Left view, right view and truth of the left one.
+    files: [&'static str; 3],
+    /// How many levels of an 8-bit truth are one pixel, unless told otherwise; `None` where the truth is in pixels and
+    /// a calib.txt gives the range.
+    scale: Option<f32>,
+}
+
+/// The layout of a folder is the first of these of which it holds most.
+const LAYOUTS: [Layout; 3] = [
+    Layout { files: ["im0.png", "im1.png", "disp0GT.pfm"], scale: None },
+    // 2005 and 2006, third size.
+    Layout { files: ["view1.png", "view5.png", "disp1.png"], scale: Some(3.0) },
+    // 2003, quarter size.
+    Layout { files: ["im2.png", "im6.png", "disp2.png"], scale: Some(4.0) },
+];
+
+const CALIBRATION: &str = "calib.txt";
+
+/// The mask's name in any of them, which may lack it.
+const MASK: &str = "mask0nocc.png";
+
+impl Layout {
+    /// The files that must be there.
+    fn required(&self) -> impl Iterator<Item = &'static str> {
+        self.files.into_iter().chain(self.scale.is_none().then_some(CALIBRATION))
+    }
+
+    fn described(&self) -> String {
+        self.required().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// A folder to evaluate, with all that it must hold.
+pub(super) struct Folder<'a> {
+    dir: &'a Path,
+    layout: &'static Layout,
+}
+
+impl<'a> Folder<'a> {
+    /// Finds the layout of `dir`; the error names what is missing.
+    pub(super) fn of(dir: &'a Path) -> Result<Self> {
+        let held = |layout: &Layout| layout.files.into_iter().filter(|file| dir.join(file).is_file()).count();
+        let layout = LAYOUTS.iter().fold(&LAYOUTS[0], |a, b| if held(b) > held(a) { b } else { a });
+        if let Some(missing) = layout.required().find(|file| !dir.join(file).is_file()) {
+            let expected = match held(layout) {
+                0 => LAYOUTS.iter().map(Layout::described).collect::<Vec<_>>().join("; or "),
+                _ => layout.described(),
+            };
+            let reason = format!("there is no such file; a folder to evaluate holds {expected}");
+            return Err(Error::read(dir.join(missing), reason));
+        }
+        Ok(Self { dir, layout })
+    }
+
+    /// Whether its truth has 8 bits and a scale.
+    pub(super) fn is_scaled(&self) -> bool {
+        self.layout.scale.is_some()
+    }
+
+    /// Reads it all; `scale` replaces that of the layout.
+    pub(super) fn read(&self, scale: Option<f32>) -> Result<Scene> {
+        let [left, right, truth] = self.layout.files.map(|file| self.dir.join(file));
+        let calib = self.dir.join(CALIBRATION);
+        let calibrated = if calib.is_file() {
+            let range = super::calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
+            Some(range.ok_or_else(|| {
+                Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N")
+            })?)
+        } else {
+            None
+        };
+        let pair = read::pair(&left, &right, None)?;
+        let mask = Some(self.dir.join(MASK)).filter(|m| m.exists());
+        let scale = self.layout.scale.map(|usual| scale.unwrap_or(usual));
+        let ground = ground_truth(&truth, scale, mask.as_deref(), &left, pair.size())?;
+        let range = calibrated.map_or_else(|| range_of(&ground), Ok)?;
+        let full = self.dir.canonicalize().unwrap_or_else(|_| self.dir.to_owned());
+        let name = full.file_name().unwrap_or(self.dir.as_os_str()).to_string_lossy().into_owned();
+        Ok(Scene { name, pair, range, ground })
+    }
+}
+
+/// Every file that an evaluation of `dir` may read.
+pub(super) fn inputs(dir: &Path) -> impl Iterator<Item = PathBuf> {
+    LAYOUTS.iter().flat_map(|layout| layout.files).chain([CALIBRATION, MASK]).map(|file| dir.join(file))
+}
+
+/// One folder, read.
+pub(super) struct Scene {
+    pub(super) name: String,
+    pub(super) pair: Pair,
+    pub(super) range: DisparityRange,
+    pub(super) ground: GroundTruth,
+}
+
+/// From 0 to the largest known disparity, rounded up.
+fn range_of(ground: &GroundTruth) -> Result<DisparityRange> {
+    let known = ground.truth().data().iter().copied().filter(|d| d.is_finite());
+    DisparityRange::new(0, known.fold(0.0, f32::max).ceil() as i32)
+}
+
+/// The truth, of 8 bits where it has a `scale`, and the mask for `what`, which is of the given size.
+pub(super) fn ground_truth(
+    truth: &Path,
+    scale: Option<f32>,
+    mask: Option<&Path>,
+    what: &Path,
+    size: (usize, usize),
+) -> Result<GroundTruth> {
+    fn fits<T>(plane: Plane<T>, path: &Path, what: &Path, size: (usize, usize)) -> Result<Plane<T>> {
+        if plane.size() == size {
+            return Ok(plane);
+        }
+        let (w, h) = plane.size();
+        Err(Error::Mismatch(format!(
+            "{} is {w} x {h} and {} is {} x {}: give files of the same pair at the same size",
+            path.display(),
+            what.display(),
+            size.0,
+            size.1
+        )))
+    }
+    let plane = match scale {
+        Some(scale) => read::scaled_disparity(truth, scale)?,
+        None => read::read_disparity(truth)?,
+    };
+    let plane = fits(plane, truth, what, size)?;
+    if !plane.data().iter().any(|d| d.is_finite()) {
+        return Err(Error::read(truth, "holds no known disparity; nothing can be compared with it"));
+    }
+    let mask = mask.map(|path| fits(read::grey8(path)?, path, what, size)).transpose()?;
+    GroundTruth::new(plane, mask)
+}
