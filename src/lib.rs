@@ -27,13 +27,14 @@
 //! # The way through
 //!
 //! ```text
-//! image ──> plan ──> graph ──> solver ──> maps, evaluation
-//!                                │
-//!                             backend (the one seam): cpu, gpu
+//! images ──> plan ──> front ──> graph ──> solver ──> maps, evaluation
+//!                                            │
+//!                                         backend (the one seam): cpu, gpu
 //! ```
 //!
 //! - [`options::Method`] holds every parameter that determines the bits, [`options::Execution`] what does not.
 //! - [`plan::Plan`] works out levels, integer parameters, bounds and memory, before anything runs.
+//! - [`front`] corrects the illumination and finds texture zones, sparse matches and the labels they leave, where asked.
 //! - [`graph`] picks the members of each dependency factor.
 //! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
 //! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.

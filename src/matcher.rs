@@ -8,7 +8,7 @@ use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
-use crate::solver::{self, Observer, Solution};
+use crate::solver::{self, Inspector, Observer, Solution};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -122,14 +122,30 @@ impl Matcher {
         method: &Method,
         observer: Observer,
     ) -> Result<Matched> {
+        self.inspect(pair, range, method, observer, None)
+    }
+
+    /// As [`Matcher::run`], and `inspector` looks into the match on its way.
+    ///
+    /// # Errors
+    /// Those of [`Matcher::run`] and of `inspector`.
+    pub fn inspect(
+        &mut self,
+        pair: &Pair,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer,
+        mut inspector: Option<Inspector>,
+    ) -> Result<Matched> {
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let Self { pool, cpu, gpu, checked, falls_back, given_up, timings } = self;
         pool.install(|| {
             let mut note = given_up.clone();
             if let Some(device) = gpu {
-                let served = check(device, &plan.method, checked)
-                    .and_then(|()| timed(device, *timings, &plan, pair, &mut *observer));
+                let served = check(device, &plan.method, checked).and_then(|()| {
+                    timed(device, *timings, &plan, pair, &mut *observer, again(&mut inspector))
+                });
                 match served {
                     // The bits are the same on the CPU path, so a device that fails costs time and nothing else.
                     Err(e @ (Error::Device(_) | Error::Memory(_))) if *falls_back => {
@@ -143,7 +159,7 @@ impl Matcher {
                     served => return served,
                 }
             }
-            timed(cpu, *timings, &plan, pair, observer).map(|matched| Matched { note, ..matched })
+            timed(cpu, *timings, &plan, pair, observer, inspector).map(|matched| Matched { note, ..matched })
         })
     }
 }
@@ -168,9 +184,10 @@ fn timed(
     plan: &Plan,
     pair: &Pair,
     observer: Observer,
+    inspector: Option<Inspector>,
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
-    let solution = solver::solve(backend, plan, pair, observer)?;
+    let solution = solver::inspect(backend, plan, pair, observer, inspector)?;
     Ok(Matched {
         timings: if timings { summed(&solution, &backend.times()?) } else { Vec::new() },
         traffic: backend.traffic(),
@@ -182,12 +199,20 @@ fn timed(
     })
 }
 
+/// The same inspector once more, for a shorter time.
+fn again<'a>(inspector: &'a mut Option<Inspector>) -> Option<Inspector<'a>> {
+    match inspector {
+        Some(inspector) => Some(&mut **inspector),
+        None => None,
+    }
+}
+
 /// One entry a stage and level.
 fn summed(solution: &Solution, times: &[(Stage, Duration)]) -> Vec<Timing> {
     let mut all: Vec<Timing> = Vec::new();
-    let [graph, upload, download] = solution.around.map(|(name, time)| (name, None, time));
+    let host = solution.around.iter().map(|&(name, time)| (name, None, time));
     let stages = times.iter().map(|&(stage, time)| (stage.name(), stage.level(), time));
-    for (stage, level, time) in [graph, upload].into_iter().chain(stages).chain([download]) {
+    for (stage, level, time) in host.chain(stages) {
         match all.iter_mut().find(|t| (t.stage, t.level) == (stage, level)) {
             Some(timing) => {
                 timing.runs += 1;

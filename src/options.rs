@@ -236,7 +236,7 @@ pub fn keys() -> Vec<(String, &'static str, &'static str)> {
 /// Names of the presets, with what each is for.
 pub const PRESETS: &[(&str, &str)] = &[
     ("default", "the best this engine does"),
-    ("paper", "the paper's choices wherever it states them, from the cost volume on"),
+    ("paper", "the paper's whole method, with its choices wherever it states them"),
     ("fgs", "the paper's predecessor: one resolution, and a left-right check by a second matching"),
 ];
 
@@ -287,6 +287,8 @@ impl Method {
         match name {
             "default" => Ok(Self::default()),
             "paper" => Ok(Self {
+                illumination: Illumination::Homomorphic,
+                support: 1.0,
                 cost: Cost::Sad,
                 outside_cost: 20.0,
                 temperature: 0.5,

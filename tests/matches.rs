@@ -4,9 +4,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
 use mrfgs::front::check::{self, Warning};
-use mrfgs::front::matches::{self, FRACTION, Match};
+use mrfgs::front::matches::{self, Match};
 use mrfgs::front::support::{self, MIN_MATCHES, Support};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, pfm, read};
+use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use std::io::Write;
 use std::path::{Path, PathBuf};

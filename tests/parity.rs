@@ -171,7 +171,7 @@ fn poisoned_buffers() {
 
 /// The maps as they stand.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
-    Solution { maps: backend.maps().unwrap(), iterations: 0, around: Default::default() }
+    Solution { maps: backend.maps().unwrap(), iterations: 0, around: Vec::new() }
 }
 
 /// The image goes up once, the maps come down once, and nothing between.

@@ -1,7 +1,8 @@
 //! What sparse matches tell before a pair is matched: the range to search, and what is wrong with the pair.
 
-use super::matches::{self, FRACTION};
+use super::matches;
 use crate::image::{Image, Pair};
+use crate::maps::FRACTION;
 use crate::options::DisparityRange;
 use std::fmt;
 

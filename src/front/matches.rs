@@ -9,13 +9,12 @@
 //! matches, whatever the number of threads.
 
 use crate::image::{Image, Pair, Plane};
+use crate::maps::FRACTION;
 use crate::options::DisparityRange;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-/// Units of a pixel in a [`Match`].
-pub const FRACTION: i32 = 256;
 /// Pixels per corner, at least: dense enough for the statistics of a small zone.
 const SPACING: usize = 64;
 /// Side of the cells over which corners are spread evenly, in pixels, at a spacing of [`SPACING`].

@@ -3,9 +3,12 @@
 //! The paper takes the matches of a zone as normally distributed, N(mu, sigma), and the labels in mu +- sigma for
 //! all its pixels. That leaves out many true disparities, so the multiple of sigma is a parameter here.
 
-use super::matches::{FRACTION, Match};
+use super::matches::Match;
+use super::zones::Zones;
 use crate::image::Plane;
+use crate::maps::FRACTION;
 use crate::options::DisparityRange;
+use crate::plan::Plan;
 
 /// A zone with fewer matches keeps the full range: no spread can be told from a handful (open).
 pub const MIN_MATCHES: usize = 10;
@@ -60,6 +63,23 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match
         .collect();
     let interval = |zone: &u8| intervals.get(usize::from(*zone)).copied().unwrap_or((range.min, range.max));
     Support { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
+}
+
+/// First and last label index of each pixel, at every level of `plan`, as backends take them.
+#[must_use]
+pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 2]>> {
+    let mut support = zonal(plan.range, (&zones.map, zones.count), matches, plan.method.support);
+    let mut levels = Vec::new();
+    for level in &plan.levels {
+        if !levels.is_empty() {
+            support = support.coarser();
+        }
+        let index = |label: i32| (label - level.min).clamp(0, level.labels as i32 - 1) as u16;
+        levels.push(Plane::from_fn(level.width, level.height, |x, y| {
+            [index(support.low[(x, y)]), index(support.high[(x, y)])]
+        }));
+    }
+    levels
 }
 
 impl Support {

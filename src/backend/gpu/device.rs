@@ -178,8 +178,10 @@ pub struct Handicap {
     pub noop: bool,
 }
 
-/// How long a submission may take before the device counts as hung. Drivers that watch over it give up sooner.
+/// How long a submission may take before the device counts as hung. Drivers that watch over it give up sooner; a
+/// software driver shares a processor with whatever else runs there.
 const PATIENCE: Duration = Duration::from_secs(60);
+const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
 /// Submissions that may be under way: more keep no device busier, and a hang is noticed late.
 const SUBMISSIONS: usize = 4;
 
@@ -263,14 +265,15 @@ impl Device {
             // Dropping the device says so too, when nobody listens any more.
             lost(failed(&device_name, &format!("the device was lost ({reason:?}) {message}")));
         });
+        let software = info.device_type == wgpu::DeviceType::Cpu;
         Ok(Self {
-            software: info.device_type == wgpu::DeviceType::Cpu,
+            software,
             max_binding: limits.max_storage_buffer_binding_size,
             max_buffer: limits.max_buffer_size,
             max_groups: limits.max_compute_workgroups_per_dimension,
             memory: handicap.memory,
             tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
-            patience: handicap.patience.unwrap_or(PATIENCE),
+            patience: handicap.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
             lost_after: handicap.lost_after,
             under_way: VecDeque::new(),
             failure,

@@ -3,7 +3,7 @@
 //! Volumes are \[y\]\[x\]\[slot\]\[label\], labels padded to blocks of 16, packed four 8-bit or two 16-bit values a word. Rows start
 //! at multiples of 256 bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a
 //! shader see at once, a stage runs band by band, each band bound with the rows above and below that it reads; where
-//! it exceeds the largest buffer, it is several ([`buffers`]). The pair and its graph go up once, the maps come down
+//! it exceeds the largest buffer, it is several (`buffers`). The pair and its graph go up once, the maps come down
 //! once, and in between nothing leaves the device but the sum of [`Stage::Change`].
 
 mod buffers;
@@ -269,7 +269,7 @@ impl Gpu {
             Map::Label => (&b.peaks, 2, 0, 0, 0xffff),
             Map::Best => (&b.peaks, 2, 0, 16, 0xffff),
             Map::Rival => (&b.peaks, 2, 1, 0, 0xffff),
-            Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
+            Map::RightLabel => (&b.right_labels, 1, 0, 0, u32::MAX),
             Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),
             Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
             Map::Validity => (&b.flags, 1, 0, 0, 0xff),
