@@ -100,7 +100,9 @@ fn workshop() -> TempDir {
     fs::write(at("cut.png"), &left[..left.len() / 2]).unwrap();
     fs::write(at("empty.png"), "").unwrap();
     fs::write(at("text.png"), "a picture is worth a thousand words").unwrap();
-    fs::create_dir(at("folder")).unwrap();
+    fs::create_dir_all(at("folder/full")).unwrap();
+    fs::write(at("folder/full/of"), "something").unwrap();
+    image::GrayImage::from_pixel(60, 40, image::Luma([90])).save(at("flat.png")).unwrap();
     fs::create_dir(at("taken.pfm")).unwrap();
     fs::create_dir(at("taken.png")).unwrap();
     fs::write(at("syntax.toml"), "levels = 3\ncost sad\n").unwrap();
@@ -229,6 +231,76 @@ fn ranges_may_be_negative() {
 }
 
 #[test]
+fn a_range_is_found_where_none_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png"), ("disp0GT.pfm", "truth.pfm")] {
+        fs::copy(scene("mixed").join(from), folder.path().join(to)).unwrap();
+    }
+    let truth = read::read_disparity(&folder.path().join("truth.pfm")).unwrap();
+    let finite = || truth.data().iter().copied().filter(|d| d.is_finite());
+    let (least, most) = (finite().fold(f32::MAX, f32::min), finite().fold(f32::MIN, f32::max));
+    for extra in [&[][..], &["--max-disparity", "auto"][..]] {
+        let args = [&["match", "left.png", "right.png", "out.pfm"], extra].concat();
+        let said = run(folder.path(), &args).succeeded().stderr;
+        let line = said.lines().find(|l| l.contains("by sparse matches")).expect("said on stderr");
+        let numbers: Vec<f32> =
+            line.split_whitespace().filter_map(|w| w.trim_end_matches(',').parse().ok()).collect();
+        assert!(numbers[0] <= least && numbers[1] >= most, "{line} and the truth is {least} to {most}");
+        assert!(numbers[1] - numbers[0] < 1.5 * (most - least), "{line} and the truth is {least} to {most}");
+    }
+    // What the user says counts.
+    let args =
+        ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "auto", "--min-disparity", "2"];
+    assert!(run(folder.path(), &args).succeeded().stderr.contains("disparities 2 to "));
+}
+
+#[test]
+fn a_pair_that_is_not_rectified_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "47"];
+    for (shift, warns) in [(0, false), (2, true)] {
+        for (from, to, top) in [("im0.png", "left.png", 0), ("im1.png", "right.png", shift)] {
+            let image = image::open(scene("mixed").join(from)).unwrap();
+            image.crop_imm(0, top, 320, 230).save(folder.path().join(to)).unwrap();
+        }
+        let said = run(folder.path(), &args).succeeded().stderr;
+        assert_eq!(said.contains("not rectified"), warns, "{said}");
+    }
+}
+
+#[test]
+fn intermediates_show_every_step() {
+    let folder = workshop();
+    let args =
+        "match left.png right.png out.pfm --max-disparity 20 --quiet --intermediates steps --set levels=3";
+    let args: Vec<&str> = args.split_whitespace().collect();
+    for (preset, more) in
+        [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "support-width"][..])]
+    {
+        run(folder.path(), &[&args[..], &["--preset", preset]].concat()).succeeded();
+        let steps = folder.path().join("steps");
+        let size = |name: &str| {
+            let picture = image::open(steps.join(format!("{name}.png"))).unwrap();
+            (picture.width(), picture.height())
+        };
+        assert_eq!(size("map-level-0").0, 60);
+        for name in
+            ["graph-degree-level-2", "map-level-2", "cost-level-0-disparity-10", "belief-entropy-nats"]
+        {
+            assert!(size(name).0 > 0);
+        }
+        for name in more {
+            assert!(size(name).0 >= 60, "{name}");
+        }
+        assert_eq!(steps.join("zones.png").exists(), preset == "paper");
+        let changes = fs::read_to_string(steps.join("change-per-iteration.csv")).unwrap();
+        assert!(changes.lines().count() > 5 && changes.starts_with("iteration,rms_change_px"), "{changes}");
+        assert!(listing(folder.path()).keys().all(|p| !p.to_str().unwrap().contains(".mrfgs-")));
+        fs::remove_dir_all(steps).unwrap();
+    }
+}
+
+#[test]
 fn files_in_the_way_are_replaced_and_devices_are_not() {
     let folder = workshop();
     fs::write(folder.path().join("out.pfm"), "old").unwrap();
@@ -327,8 +399,10 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --preview folder/../right.png", 1, &["--preview", "is RIGHT already", "another name"]),
     ("M narrow.png --mask left.png --preview left.png", 1, &["--preview", "LEFT", "another name"]),
     // The range.
-    ("match left.png right.png out.pfm", 1, &["--max-disparity", "no calib.txt with ndisp beside left.png"]),
-    ("match silent/left.png right.png out.pfm", 1, &["--max-disparity", "no calib.txt with ndisp"]),
+    ("match flat.png flat.png out.pfm", 1, &["--max-disparity", "too few matches"]),
+    ("match flat.png flat.png out.pfm --max-disparity auto", 1, &["--max-disparity", "too few matches"]),
+    ("M out.pfm --intermediates folder/full", 1, &["folder/full", "not empty"]),
+    ("M out.pfm --intermediates left.png", 1, &["left.png"]),
     ("match damaged/left.png right.png out.pfm", 1, &["calib.txt", "line 1", "ndisp"]),
     ("match huge/left.png right.png out.pfm", 1, &["calib.txt", "ndisp=100000", "at most 16384"]),
     ("M out.pfm --max-disparity 9", 2, &["--max-disparity", "multiple times"]),
@@ -661,7 +735,7 @@ fn help_teaches() {
     ] {
         assert!(text.contains(&format!("{bit} {what}")), "{bit} {what}");
     }
-    for words in ["Examples:", "[default: 0]", "ndisp - 1", "in pixels"] {
+    for words in ["Examples:", "[default: 0, or", "ndisp - 1", "in pixels"] {
         assert!(text.contains(words), "{words}");
     }
     assert!(help(&["--help"]).contains("Exit status: 0"));

@@ -276,7 +276,7 @@ fn a_report_is_whole_and_stands_alone() {
     }
 
     let (files, sources) = (attributes(&page, "data-file"), attributes(&page, "src"));
-    assert_eq!((files.len(), sources.len()), (12, 12));
+    assert_eq!((files.len(), sources.len()), (14, 14));
     assert!(attributes(&page, "alt").iter().all(|alt| alt.len() > 15));
     for (file, source) in files.iter().zip(sources) {
         let bytes = BASE64.decode(source.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
@@ -285,13 +285,13 @@ fn a_report_is_whole_and_stands_alone() {
         let (w, h) = if file.starts_with("1-Teddy-") { (240, 180) } else { (320, 240) };
         // Below the map: nothing, the scale (16 rows), or one line of classes (9 rows).
         let legend = match file.rsplit('-').next().unwrap() {
-            "left.png" => 0,
+            "left.png" | "zones.png" => 0,
             "validity.png" => 9,
             _ => 16,
         };
         assert_eq!((picture.width(), picture.height()), (w, h + legend), "{file}");
     }
-    assert_eq!(fs::read_dir(at("out")).unwrap().count(), 13);
+    assert_eq!(fs::read_dir(at("out")).unwrap().count(), 15);
     // The left view is the left view.
     let left = image::open(at("out/1-Teddy-left.png")).unwrap().into_rgb8();
     assert_eq!(left, image::open(at("Teddy/im0.png")).unwrap().into_rgb8());

@@ -249,7 +249,7 @@ fn match_all(
         let scene = folder.read(args.truth_scale)?;
         let name = preset.map_or(scene.name.clone(), |preset| format!("{}, {preset}", scene.name));
         let (matched, time) =
-            super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false)?;
+            super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;
         see(&scene, &matched.maps)?;
         figures.push(Figures {
             raw: Some(scene.ground.evaluate(&matched.maps.raw_map())?),

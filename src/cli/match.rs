@@ -3,12 +3,15 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use mrfgs::front::check;
 use mrfgs::image::{Pair, calib::Calibration, colour, read, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
 use mrfgs::plan::{MessageWidth, Plan};
+use mrfgs::solver::Glimpse;
 use mrfgs::{Error, Matcher, Result};
 
+use super::intermediates::{self, Intermediates};
 use super::outputs::{self, Written};
 use super::{ExecutionArgs, MethodArgs, bytes, plural};
 
@@ -38,12 +41,13 @@ pub(super) struct Args {
     /// Disparity map to write: .pfm, .tif, .tiff or .png
     output: PathBuf,
 
-    /// Largest disparity to search, in pixels, itself included [default: ndisp - 1 of a calib.txt beside LEFT]
+    /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
+    /// - 1 of a calib.txt beside LEFT, else auto]
+    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = pixels_or_auto)]
+    max_disparity: Option<Largest>,
+    /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
-    max_disparity: Option<i32>,
-    /// Smallest disparity to search, in pixels; may be negative
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = pixels)]
-    min_disparity: i32,
+    min_disparity: Option<i32>,
     /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
@@ -73,6 +77,10 @@ pub(super) struct Args {
     /// small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted
     #[arg(long, value_name = "FILE", help_heading = "More outputs")]
     validity: Option<PathBuf>,
+    /// Writes every step as a picture or a small table into a new folder: corrected images, zones, matches, supports, costs,
+    /// graphs, a map for each level, the change of each iteration. Takes a multiple of the time
+    #[arg(long, value_name = "DIR", help_heading = "More outputs")]
+    intermediates: Option<PathBuf>,
     /// Writes the map in colours too, far cold and near warm, with a scale: PNG
     #[arg(long, value_name = "FILE", help_heading = "More outputs")]
     preview: Option<PathBuf>,
@@ -80,6 +88,17 @@ pub(super) struct Args {
 
 fn pixels(text: &str) -> std::result::Result<i32, String> {
     text.parse().map_err(|_| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
+}
+
+/// The largest disparity to search.
+#[derive(Clone, Copy)]
+enum Largest {
+    Auto,
+    Pixels(i32),
+}
+
+fn pixels_or_auto(text: &str) -> std::result::Result<Largest, String> {
+    if text == "auto" { Ok(Largest::Auto) } else { pixels(text).map(Largest::Pixels) }
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
@@ -91,26 +110,39 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let pair = read::pair(&args.left, &args.right, args.mask.as_deref())?;
     let range = range(args, &pair)?;
     check_outputs(args, range)?;
+    if !args.quiet {
+        for warning in check::warnings(&pair, Some(range)) {
+            super::say(&format!("warning: {warning}"));
+        }
+    }
     if args.dry_run {
         return super::print(&describe(&Plan::new(pair.size().0, pair.size().1, range, &method)?));
     }
     let mut matcher = Matcher::new(&execution)?;
-    let (matched, _) = super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet)?;
-    write_outputs(args, range, &matched.maps)
+    let Some(folder) = &args.intermediates else {
+        let (matched, _) =
+            super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, None)?;
+        return write_outputs(args, range, &matched.maps);
+    };
+    let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
+    let mut steps = Intermediates::new(folder, plan)?;
+    let mut look = |glimpse: &mut Glimpse| steps.look(glimpse);
+    let (matched, _) =
+        super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, Some(&mut look))?;
+    write_outputs(args, range, &matched.maps)?;
+    steps.finish()
 }
 
 /// The range to search.
 fn range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
-    let min = args.min_disparity;
+    let min = args.min_disparity.unwrap_or(0);
     let range = match args.max_disparity {
-        Some(max) => DisparityRange::new(min, max)?,
-        None => beside(&args.left, min)?.ok_or_else(|| {
-            let reason = format!(
-                "give the largest disparity to search, in pixels: there is no calib.txt with ndisp beside {}",
-                args.left.display()
-            );
-            Error::option("--max-disparity", reason)
-        })?,
+        Some(Largest::Pixels(max)) => DisparityRange::new(min, max)?,
+        Some(Largest::Auto) => found_range(args, pair)?,
+        None => match beside(&args.left, min)? {
+            Some(range) => range,
+            None => found_range(args, pair)?,
+        },
     };
     let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
     if i64::from(range.min) >= width || i64::from(range.max) <= -width {
@@ -119,6 +151,20 @@ fn range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
             range.min, range.max
         );
         return Err(Error::option("--max-disparity", reason));
+    }
+    Ok(range)
+}
+
+/// The range of the sparse matches.
+fn found_range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
+    let found = check::range(pair).ok_or_else(|| {
+        let reason = "give the largest disparity to search, in pixels: there are too few matches to find it";
+        Error::option("--max-disparity", reason)
+    })?;
+    let range = DisparityRange::new(args.min_disparity.unwrap_or(found.min), found.max)?;
+    if !args.quiet {
+        let (min, max) = (range.min, range.max);
+        super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
     }
     Ok(range)
 }
@@ -142,6 +188,7 @@ fn check_outputs(args: &Args, range: DisparityRange) -> Result<()> {
         ("--validity", args.validity.as_ref()),
         ("--preview", args.preview.as_ref()),
     ];
+    args.intermediates.as_deref().map_or(Ok(()), intermediates::check)?;
     for (_, path) in maps {
         path.map_or(Ok(()), |p| write::check_disparity_path(p, range.min, range.max))?;
     }

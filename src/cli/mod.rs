@@ -3,6 +3,7 @@
 mod devices;
 mod evaluate;
 mod folder;
+mod intermediates;
 mod r#match;
 mod outputs;
 mod presets;
@@ -21,6 +22,7 @@ use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::solver::Inspector;
 use mrfgs::{Error, Matched, Matcher, Result};
 use progress::Bar;
 
@@ -247,10 +249,11 @@ fn match_and_tell(
     method: &Method,
     name: Option<&str>,
     quiet: bool,
+    inspector: Option<Inspector>,
 ) -> Result<(Matched, Duration)> {
     let start = Instant::now();
     let mut bar = Bar::new(name, quiet);
-    let matched = matcher.run(pair, range, method, &mut |progress| bar.update(progress));
+    let matched = matcher.inspect(pair, range, method, &mut |progress| bar.update(progress), inspector);
     bar.finish();
     let (matched, time) = (matched?, start.elapsed());
     if !quiet {

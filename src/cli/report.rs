@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use mrfgs::evaluation::{Metrics, Report};
+use mrfgs::front::zones;
 use mrfgs::image::{Pair, Plane, colour, write};
 use mrfgs::maps::Maps;
 use mrfgs::{Error, Result};
@@ -70,6 +71,14 @@ pub(super) fn pictures(
         let left = pair.left().pixels.map(|[r, g, b, _]| [r, g, b].map(|v| (v >> 8) as u8));
         let alt = format!("{name}: the left view");
         all.push(Picture::new("left", "Left view", alt, "The reference view.".into(), &left)?);
+        let zones = zones::segment(pair.left(), &zones::Options::default());
+        all.push(Picture::new(
+            "zones",
+            "Texture zones",
+            format!("{name}: texture zones of the left view"),
+            format!("{} zones by Gabor filters and K-means, which the preset paper goes by.", zones.count),
+            &zones.map.map(|&zone| colour::zone(zone)),
+        )?);
     }
     all.push(Picture::new(
         "disparity",

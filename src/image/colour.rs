@@ -93,6 +93,13 @@ pub fn grey(levels: &Plane<u8>) -> Plane<[u8; 3]> {
     with_scale(levels.size(), |x, y| [levels[(x, y)]; 3], 0.0, 255.0, ramp)
 }
 
+/// A colour for texture zone `zone`, far from those of the next ones.
+#[must_use]
+pub fn zone(zone: u8) -> [u8; 3] {
+    let hash = (u32::from(zone) + 1).wrapping_mul(0x9e37_79b9);
+    [hash >> 24, hash >> 16 & 0xff, hash >> 8 & 0xff].map(|v| v as u8)
+}
+
 /// Classes in the colours of `palette`, which holds the number and the colour of each, with these numbers beside their
 /// colours below it, in as many lines as it takes. `class` gives the place in the palette; what is not in it is black.
 #[must_use]
