@@ -84,9 +84,9 @@ const MEDIAN_WEIGHT_BITS: u32 = 10;
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     radius: usize,
-    /// By |dx| and |dy|, \[dy\]\[dx\].
+    /// By |dy| and dx from -radius to radius, \[dy\]\[dx\].
     space: Vec<u32>,
-    /// By squared colour difference, in steps of 2^shift.
+    /// By squared colour difference, in steps of 2^shift, and 0 for all beyond.
     range: Vec<u32>,
     shift: u32,
 }
@@ -105,7 +105,7 @@ impl MedianWeights {
         let radius = window / 2;
         let weight = |e: f64| (f64::from(1 << MEDIAN_WEIGHT_BITS) * exp_neg(e) + 0.5).floor() as u32;
         let space = (0..=radius)
-            .flat_map(|dy| (0..=radius).map(move |dx| (dx * dx + dy * dy) as f64))
+            .flat_map(|dy| (0..=2 * radius).map(move |x| (x.abs_diff(radius).pow(2) + dy * dy) as f64))
             .map(|d| weight(d / (2.0 * sigma_space * sigma_space)))
             .collect();
         // In squared sixteenths of an 8-bit level; exp(-8) is below half a unit of weight.
@@ -116,6 +116,7 @@ impl MedianWeights {
         }
         let range = (0..MEDIAN_RANGE_ENTRIES)
             .map(|i| weight(i as f64 * f64::from(1u32 << shift) / twice_variance))
+            .chain([0])
             .collect();
         Self { radius, space, range, shift }
     }
@@ -135,14 +136,28 @@ impl MedianWeights {
     /// Spatial weights by |dy| and |dx|, then range weights, as the shader takes them.
     #[must_use]
     pub fn words(&self) -> Vec<u32> {
-        [self.space.as_slice(), &self.range].concat()
+        let rows = self.space.chunks_exact(2 * self.radius + 1).flat_map(|row| &row[self.radius..]);
+        rows.chain(&self.range[..MEDIAN_RANGE_ENTRIES]).copied().collect()
+    }
+
+    /// Spatial weights of the row |dy| away, for dx from -radius to radius.
+    #[must_use]
+    pub fn space_row(&self, dy: usize) -> &[u32] {
+        let side = 2 * self.radius + 1;
+        &self.space[dy * side..][..side]
+    }
+
+    /// Weight of a pixel of spatial weight `space` whose squared colour difference is `distance`.
+    #[must_use]
+    pub fn product(&self, space: u32, distance: u32) -> u32 {
+        let range = self.range[((distance >> self.shift) as usize).min(MEDIAN_RANGE_ENTRIES)];
+        (space * range) >> MEDIAN_WEIGHT_BITS
     }
 
     /// Weight of a pixel |dx|, |dy| away whose squared colour difference is `distance`.
     #[must_use]
     pub fn weight(&self, dx: usize, dy: usize, distance: u32) -> u32 {
-        let range = self.range.get((distance >> self.shift) as usize).copied().unwrap_or(0);
-        (self.space[dy * (self.radius + 1) + dx] * range) >> MEDIAN_WEIGHT_BITS
+        self.product(self.space_row(dy)[self.radius + dx], distance)
     }
 }
 

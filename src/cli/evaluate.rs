@@ -267,7 +267,7 @@ fn compare(args: &Args) -> Result<()> {
     let folders = folders(args)?;
     let mut matcher = Matcher::new(&args.execution.execution()?)?;
     let mut found = Vec::new();
-    for preset in tables::presets() {
+    for preset in tables::COMPARED {
         let method = Method::preset(preset)?.validated()?;
         found.push((preset, match_all(args, &folders, &mut matcher, method, Some(preset), |_, _| Ok(()))?));
     }

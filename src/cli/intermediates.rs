@@ -123,7 +123,7 @@ impl Intermediates {
         self.map(&format!("graph-degree-level-{z}"), &degrees, 0.0, 4.0 * graph.slots() as f32)
     }
 
-    /// The cost of single labels, and the width of each level's evidence.
+    /// The cost of single labels.
     fn slices(&self, backend: &mut dyn Backend, z: usize) -> Result<()> {
         let level = &self.plan.levels[z];
         let cost = backend.read(Volume::Cost(z))?;

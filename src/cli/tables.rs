@@ -4,15 +4,13 @@ use std::fmt::Write;
 
 use mrfgs::evaluation::Report;
 use mrfgs::evaluation::paper::{Figures, Published, SOURCE, published};
-use mrfgs::options::{Method, PRESETS};
+use mrfgs::options::Method;
 use serde::{Serialize, Serializer};
 
 use super::evaluate::Findings;
 
-/// The presets that stand beside the paper's methods, where there are such.
-pub(super) fn presets() -> impl Iterator<Item = &'static str> {
-    ["fgs", "paper", "default"].into_iter().filter(|name| PRESETS.iter().any(|preset| preset.0 == *name))
-}
+/// The presets that stand beside the paper's methods.
+pub(super) const COMPARED: [&str; 3] = ["fgs", "paper", "default"];
 
 /// Something of each preset, in their order.
 type Each<T> = Vec<(&'static str, T)>;
