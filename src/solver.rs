@@ -130,7 +130,7 @@ fn estimate(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work
         work.look(&mut Glimpse::Matches(pair, &zones, &matches))?;
         let supports = work.host("support", || Ok(support::levels(plan, &zones, &matches)))?;
         work.look(&mut Glimpse::Supports(&supports))?;
-        backend.restrict(&supports)?;
+        work.host("upload", || backend.restrict(&supports))?;
     }
     let levels = 0..plan.levels.len();
     let costs = levels.clone().flat_map(|z| {

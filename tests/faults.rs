@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::devices;
+use common::devices::open as device;
 use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{Gpu, Handicap};
@@ -52,11 +52,6 @@ fn run(matcher: &mut Matcher, pair: &Pair, range: DisparityRange) -> Result<Matc
 /// One line that says what to do.
 fn is_clear(message: &str) -> bool {
     message.contains("--backend cpu") && !message.contains('\n')
-}
-
-/// A device with a handicap; `None` where there is no driver.
-fn device(handicap: Handicap) -> Option<Gpu> {
-    devices::open(handicap)
 }
 
 /// What falling back gives: the maps of the CPU path, and a note with the reason.

@@ -45,8 +45,8 @@ pub(super) struct Args {
     json: Option<PathBuf>,
     /// Writes a page with all figures and pictures, index.html, and the pictures as PNG files
     ///
-    /// Of each pair it shows the left view, disparity and truth in the same colours, the signed error (estimate minus truth),
-    /// confidence and validity. The page needs no other file and no network. A folder that is there must be empty or hold
+    /// Of each pair it shows the left view, its texture zones, disparity and truth in the same colours, the signed error
+    /// (estimate minus truth), confidence and validity. The page needs no other file and no network. A folder that is there must be empty or hold
     /// nothing but an earlier report (its index.html names mrfgs as its generator), which is replaced.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,

@@ -12,13 +12,14 @@ use mrfgs::plan::{Plan, UNITS_PER_NAT};
 use mrfgs::solver::Glimpse;
 use mrfgs::{Error, Result};
 
+use super::outputs::StagedFolder;
+
 /// Quarters of the label range at which cost slices are cut.
 const SLICES: [usize; 3] = [1, 2, 3];
 
 /// Collects files in a folder of its own, which takes its place once all are there.
 pub(super) struct Intermediates {
-    target: PathBuf,
-    folder: tempfile::TempDir,
+    folder: StagedFolder,
     plan: Plan,
     changes: String,
     last: Option<Vec<usize>>,
@@ -28,16 +29,7 @@ impl Intermediates {
     /// # Errors
     /// [`Error::Write`] when `target` is there and not an empty folder, or its parent cannot be written to.
     pub(super) fn new(target: &Path, plan: Plan) -> Result<Self> {
-        check(target)?;
-        let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let folder = tempfile::Builder::new().prefix(".mrfgs-").tempdir_in(parent);
-        Ok(Self {
-            target: target.to_owned(),
-            folder: folder.map_err(|e| Error::write(target, e))?,
-            plan,
-            changes: "iteration,rms_change_px\n".into(),
-            last: None,
-        })
+        Ok(Self { folder: folder(target)?, plan, changes: String::new(), last: None })
     }
 
     /// Takes what a match shows on its way.
@@ -67,11 +59,7 @@ impl Intermediates {
     /// Puts everything where it was asked for.
     pub(super) fn finish(self) -> Result<()> {
         write::save(&self.path("change-per-iteration.csv"), self.changes.as_bytes())?;
-        let failed = |e| Error::write(&self.target, e);
-        if self.target.exists() {
-            std::fs::remove_dir(&self.target).map_err(failed)?;
-        }
-        std::fs::rename(self.folder.keep(), &self.target).map_err(|e| Error::write(&self.target, e))
+        self.folder.publish()
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -160,7 +148,10 @@ impl Intermediates {
     fn change(&mut self, backend: &mut dyn Backend, iteration: u32) -> Result<()> {
         let belief = backend.read(Volume::Belief(0))?;
         let map: Vec<usize> = belief.chunks_exact(self.plan.levels[0].labels).map(optimum).collect();
-        if let Some(last) = &self.last {
+        if iteration == 0 {
+            // The start, also of another try where the device failed.
+            self.changes = "iteration,rms_change_px\n".into();
+        } else if let Some(last) = &self.last {
             let squares: f64 = map.iter().zip(last).map(|(&a, &b)| (a.abs_diff(b) as f64).powi(2)).sum();
             let rms = (squares / map.len() as f64).sqrt();
             let _ = writeln!(self.changes, "{iteration},{rms:.6}");
@@ -170,14 +161,18 @@ impl Intermediates {
     }
 }
 
-/// Whether `target` can become a folder of intermediates.
-pub(super) fn check(target: &Path) -> Result<()> {
-    match std::fs::read_dir(target).map(|mut entries| entries.next().is_none()) {
-        Ok(true) => Ok(()),
+/// Begins the folder `target`: a new one or an empty one.
+fn folder(target: &Path) -> Result<StagedFolder> {
+    let folder = StagedFolder::new(target)?;
+    match std::fs::read_dir(folder.place()).map(|mut entries| entries.next().is_none()) {
         Ok(false) => Err(Error::write(target, "the folder is not empty; name a new one")),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(e) => Err(Error::write(target, e)),
+        _ => Ok(folder),
     }
+}
+
+/// Finds out before any computing whether `target` can become a folder of intermediates.
+pub(super) fn check(target: &Path) -> Result<()> {
+    folder(target).map(drop)
 }
 
 fn rgb(image: &Image) -> Plane<[u8; 3]> {

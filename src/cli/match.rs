@@ -122,15 +122,14 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let Some(folder) = &args.intermediates else {
         let (matched, _) =
             super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, None)?;
-        return write_outputs(args, range, &matched.maps);
+        return write_outputs(args, range, &matched.maps, None);
     };
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     let mut steps = Intermediates::new(folder, plan)?;
     let mut look = |glimpse: &mut Glimpse| steps.look(glimpse);
     let (matched, _) =
         super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, Some(&mut look))?;
-    write_outputs(args, range, &matched.maps)?;
-    steps.finish()
+    write_outputs(args, range, &matched.maps, Some(steps))
 }
 
 /// The range to search.
@@ -203,12 +202,22 @@ fn check_outputs(args: &Args, range: DisparityRange) -> Result<()> {
     ];
     outputs::distinct(
         &inputs.into_iter().filter_map(given).collect::<Vec<_>>(),
-        &maps.into_iter().chain(pictures).filter_map(given).collect::<Vec<_>>(),
+        &maps
+            .into_iter()
+            .chain(pictures)
+            .chain([("--intermediates", args.intermediates.as_ref())])
+            .filter_map(given)
+            .collect::<Vec<_>>(),
     )
 }
 
 /// Writes all outputs or leaves none of them.
-fn write_outputs(args: &Args, range: DisparityRange, maps: &Maps) -> Result<()> {
+fn write_outputs(
+    args: &Args,
+    range: DisparityRange,
+    maps: &Maps,
+    steps: Option<Intermediates>,
+) -> Result<()> {
     let map = maps.final_map();
     let mut written = Written::default();
     written.note(&args.output, write::disparity(&args.output, &map))?;
@@ -225,6 +234,7 @@ fn write_outputs(args: &Args, range: DisparityRange, maps: &Maps) -> Result<()> 
         let picture = colour::preview(&map, range.min as f32, range.max as f32);
         written.note(path, write::rgb8(path, &picture))?;
     }
+    steps.map_or(Ok(()), Intermediates::finish)?;
     written.keep();
     Ok(())
 }

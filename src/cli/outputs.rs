@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mrfgs::{Error, Result};
+use tempfile::TempDir;
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
 pub(super) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
@@ -55,5 +56,66 @@ impl Drop for Written {
         for path in &self.0 {
             let _ = fs::remove_file(path);
         }
+    }
+}
+
+/// A folder in the making, beside the place that it takes once it is whole; gone with all it holds when dropped before.
+pub(super) struct StagedFolder {
+    /// As the user wrote it.
+    name: PathBuf,
+    place: PathBuf,
+    staging: TempDir,
+}
+
+impl StagedFolder {
+    /// Begins the folder `name`, which may be there already.
+    pub(super) fn new(name: &Path) -> Result<Self> {
+        let error = |reason: String| Err(Error::write(name, reason));
+        let place = match fs::canonicalize(name) {
+            Ok(place) if !place.is_dir() => return error("is a file; give the name of a folder".into()),
+            Ok(place) => place,
+            Err(_) => {
+                let parent = name.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
+                match (fs::canonicalize(parent), name.file_name()) {
+                    (Ok(parent), Some(last)) if parent.is_dir() => parent.join(last),
+                    _ => return error(format!("there is no folder {}; create it first", parent.display())),
+                }
+            }
+        };
+        let beside = place.parent().unwrap_or(&place);
+        let staging = tempfile::Builder::new().prefix(".mrfgs-").suffix(".tmp").tempdir_in(beside);
+        let staging = staging.map_err(|e| {
+            let reason = format!("nothing can be created in {}: {}", beside.display(), e.kind());
+            Error::write(name, reason)
+        })?;
+        let staged = Self { name: name.to_owned(), place, staging };
+        fs::create_dir(staged.path()).map_err(|e| Error::write(name, e))?;
+        Ok(staged)
+    }
+
+    /// Where it will be.
+    pub(super) fn place(&self) -> &Path {
+        &self.place
+    }
+
+    /// Where it is made: inside, for the staging folder itself is private.
+    pub(super) fn path(&self) -> PathBuf {
+        self.staging.path().join("new")
+    }
+
+    /// Puts it in its place; what was there goes, and comes back when that fails.
+    pub(super) fn publish(self) -> Result<()> {
+        let error = |e: std::io::Error| Error::write(&self.name, e);
+        let old = self.staging.path().join("old");
+        let replaces = self.place.exists();
+        if replaces {
+            fs::rename(&self.place, &old).map_err(error)?;
+        }
+        fs::rename(self.path(), &self.place).map_err(|e| {
+            if replaces {
+                let _ = fs::rename(&old, &self.place);
+            }
+            error(e)
+        })
     }
 }

@@ -11,9 +11,9 @@ use mrfgs::front::zones;
 use mrfgs::image::{Pair, Plane, colour, write};
 use mrfgs::maps::Maps;
 use mrfgs::{Error, Result};
-use tempfile::TempDir;
 
 use super::evaluate::Findings;
+use super::outputs::StagedFolder;
 
 /// Errors beyond this, in pixels, take the last colour: one scale for all pairs, or they could not be compared.
 const ERROR_LIMIT: f32 = 4.0;
@@ -154,21 +154,9 @@ impl<'a> Destination<'a> {
     /// Finds out before any computing whether a report can be written to `dir`: a new folder, an empty one, or one that
     /// holds nothing but an earlier report.
     pub(super) fn check(dir: &'a Path) -> Result<Self> {
-        let error = |reason: String| Err(Error::write(dir, reason));
-        let place = match fs::canonicalize(dir) {
-            Ok(place) if !place.is_dir() => return error("is a file; give the name of a folder".into()),
-            Ok(place) => place,
-            Err(_) => {
-                let parent = dir.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
-                match (fs::canonicalize(parent), dir.file_name()) {
-                    (Ok(parent), Some(name)) if parent.is_dir() => parent.join(name),
-                    _ => return error(format!("there is no folder {}; create it first", parent.display())),
-                }
-            }
-        };
+        let place = StagedFolder::new(dir)?.place().to_owned();
         let destination = Self { dir, place };
         destination.refuse_strangers()?;
-        destination.staging()?;
         Ok(destination)
     }
 
@@ -199,36 +187,14 @@ impl<'a> Destination<'a> {
         Ok(())
     }
 
-    /// A folder beside the report's, gone with all it holds when dropped.
-    fn staging(&self) -> Result<TempDir> {
-        let folder = self.place.parent().unwrap_or(&self.place);
-        tempfile::Builder::new().prefix(".mrfgs-").suffix(".tmp").tempdir_in(folder).map_err(|e| {
-            let reason = format!("nothing can be created in {}: {}", folder.display(), e.kind());
-            Error::write(self.dir, reason)
-        })
-    }
-
     /// Writes the files, all of them or none, in the place of an earlier report.
     fn publish<'b>(&self, files: impl Iterator<Item = (String, &'b [u8])>) -> Result<()> {
-        let error = |e: std::io::Error| Error::write(self.dir, e);
-        let staging = self.staging()?;
-        // Inside, for the staging folder itself is private.
-        let (new, old) = (staging.path().join("new"), staging.path().join("old"));
-        fs::create_dir(&new).map_err(error)?;
+        let staged = StagedFolder::new(self.dir)?;
         for (name, bytes) in files {
-            write::save(&new.join(name), bytes)?;
+            write::save(&staged.path().join(name), bytes)?;
         }
         self.refuse_strangers()?;
-        let replaces = self.place.exists();
-        if replaces {
-            fs::rename(&self.place, &old).map_err(error)?;
-        }
-        fs::rename(&new, &self.place).map_err(|e| {
-            if replaces {
-                let _ = fs::rename(&old, &self.place);
-            }
-            error(e)
-        })
+        staged.publish()
     }
 }
 

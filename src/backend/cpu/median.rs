@@ -87,7 +87,7 @@ impl Window {
         let distances = &mut self.distances[..values.len()];
         let [r, g, b] = guide;
         for (i, distance) in distances.iter_mut().enumerate() {
-            // As `graph::colour_distance` has it.
+            // `graph::colour_distance`, channel by channel: a row at once is a vector.
             let squared = |a: u16, b: u16| (u32::from(a.abs_diff(b)) >> 4).pow(2);
             *distance = squared(r[i], centre[0]) + squared(g[i], centre[1]) + squared(b[i], centre[2]);
         }
