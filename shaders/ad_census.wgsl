@@ -1,14 +1,16 @@
-// Matching cost of level 0 by colour difference and census. One invocation a pixel and quad of labels.
+// Matching cost of level 0 by census and colour difference. One invocation a pixel and quad of labels.
 
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> right: array<vec4<u32>>;
 @group(0) @binding(3) var<storage, read> left_census: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read> right_census: array<vec2<u32>>;
-// The cost of a colour difference, then from AD_ENTRIES on that of a census difference.
-@group(0) @binding(5) var<storage, read> tables: array<u32>;
+// How much colour counts.
+@group(0) @binding(5) var<storage, read> weight: array<u32>;
 @group(0) @binding(6) var<storage, read_write> cost: array<u32>;
 
-const AD_ENTRIES: u32 = 768u;
+const BIT_COST: u32 = 4u;
+const MOST_BITS: u32 = 40u;
+const MOST_COLOUR: u32 = 64u;
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -22,6 +24,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let row = id.y * params.level.pixel_pitch;
     let pixel = left[row + x];
     let bits = left_census[row + x];
+    let w = weight[row + x];
     var costs = vec4<u32>();
     for (var i = 0u; i < 4u; i++) {
         let xr = i32(x) - params.level.low - i32(4u * quad + i);
@@ -30,7 +33,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let other = right[row + u32(xr)];
             if (pixel.z | other.z) == 0u {
                 let ones = countOneBits(bits ^ right_census[row + u32(xr)]);
-                c = tables[colour_difference(pixel, other) >> 8u] + tables[AD_ENTRIES + ones.x + ones.y];
+                let colour = min(colour_difference(pixel, other) >> 8u, MOST_COLOUR);
+                c = BIT_COST * min(ones.x + ones.y, MOST_BITS) + (w * colour + MOST_COLOUR / 2u) / MOST_COLOUR;
             }
         }
         costs[i] = c;

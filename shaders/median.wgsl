@@ -1,4 +1,4 @@
-// Weighted median of the disparities around every pixel. One invocation a pixel.
+// Weighted median of the disparities around every pixel, at places some steps apart. One invocation a pixel.
 //
 // The value sought is the smallest at which half of the weight is reached. An interval that holds it shrinks to an
 // eighth with every pass over the window, each of which takes the weights below eight thresholds at once: no list, no
@@ -24,7 +24,7 @@ fn colour_distance(a: vec4<u32>, b: vec4<u32>) -> u32 {
     return u32(d.x * d.x + d.y * d.y + d.z * d.z);
 }
 
-// Weight of the pixel at `at`, which is `away` from the one at the centre.
+// Weight of the pixel at `at`, which is `away` places from the one at the centre.
 fn weight(centre: vec4<u32>, at: u32, away: vec2<u32>) -> u32 {
     let range = colour_distance(centre, left[at]) >> params.median_shift;
     if range >= RANGE_ENTRIES {
@@ -34,6 +34,11 @@ fn weight(centre: vec4<u32>, at: u32, away: vec2<u32>) -> u32 {
     return (weights[away.y * side + away.x] * weights[side * side + range]) >> WEIGHT_BITS;
 }
 
+// How many places away from `b` the pixel `a` is.
+fn places(a: vec2<u32>, b: vec2<u32>, step_bits: u32) -> vec2<u32> {
+    return (max(a, b) - min(a, b)) >> vec2(step_bits);
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -41,8 +46,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let pitch = params.level.pixel_pitch;
-    let radius = params.median_radius;
-    let top = halo_start(radius);
+    let bits = params.median_step_bits;
+    let step = 1u << bits;
+    let reach = params.median_radius << bits;
+    let top = halo_start(reach);
     let y = params.first_row + id.y;
     let here = (y - top) * pitch + id.x;
     let centre = left[here];
@@ -50,36 +57,37 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var low = disparity[here];
     if has_disparity(flags_here) && (params.median_all == 1u || (flags_here & FILLED) != 0u) {
         let middle = vec2(id.x, y);
-        let first = max(middle, vec2(radius)) - vec2(radius);
-        let last = min(middle + vec2(radius + 1u), vec2(params.level.width, params.level.height));
+        // The first place may not leave the image, nor the raster of places.
+        let first = middle - min(vec2(reach), (middle >> vec2(bits)) << vec2(bits));
+        let last = min(middle + vec2(reach + 1u), vec2(params.level.width, params.level.height));
         var high = low;
         var total = 0u;
-        for (var v = first.y; v < last.y; v++) {
-            for (var u = first.x; u < last.x; u++) {
+        for (var v = first.y; v < last.y; v += step) {
+            for (var u = first.x; u < last.x; u += step) {
                 let at = (v - top) * pitch + u;
                 if has_disparity(flags[at]) {
                     let value = disparity[at];
                     low = min(low, value);
                     high = max(high, value);
-                    total += weight(centre, at, max(vec2(u, v), middle) - min(vec2(u, v), middle));
+                    total += weight(centre, at, places(vec2(u, v), middle, bits));
                 }
             }
         }
         var width = u32(high - low) + 1u;
         while width > 1u {
-            let step = (width + 7u) / 8u;
-            // Weight of values below low + k step, k = 1 to 8.
+            let share = (width + 7u) / 8u;
+            // Weight of values below low + k share, k = 1 to 8.
             var below_first = vec4<u32>();
             var below_second = vec4<u32>();
-            for (var v = first.y; v < last.y; v++) {
-                for (var u = first.x; u < last.x; u++) {
+            for (var v = first.y; v < last.y; v += step) {
+                for (var u = first.x; u < last.x; u += step) {
                     let at = (v - top) * pitch + u;
                     let value = disparity[at];
-                    if has_disparity(flags[at]) && value < low + i32(8u * step) {
-                        let w = vec4(weight(centre, at, max(vec2(u, v), middle) - min(vec2(u, v), middle)));
+                    if has_disparity(flags[at]) && value < low + i32(8u * share) {
+                        let w = vec4(weight(centre, at, places(vec2(u, v), middle, bits)));
                         let offset = vec4(value - low);
-                        below_first += select(vec4(0u), w, offset < vec4<i32>(FIRST * step));
-                        below_second += select(vec4(0u), w, offset < vec4<i32>(SECOND * step));
+                        below_first += select(vec4(0u), w, offset < vec4<i32>(FIRST * share));
+                        below_second += select(vec4(0u), w, offset < vec4<i32>(SECOND * share));
                     }
                 }
             }
@@ -88,8 +96,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let short_second = vec4<u32>(2u * below_second < vec4(total));
             let skipped = short.x + short.y + short.z + short.w
                 + short_second.x + short_second.y + short_second.z + short_second.w;
-            low += i32(skipped * step);
-            width = step;
+            low += i32(skipped * share);
+            width = share;
         }
     }
     smoothed[id.y * pitch + id.x] = low;

@@ -80,8 +80,10 @@ pub enum Illumination {
 pub enum Cost {
     /// Mean of the absolute colour difference over a square window (section 2.4), in 8-bit levels.
     Sad,
-    /// (1 - exp(-AD / 10)) + (1 - exp(-Hamming / 30)) with the colour difference AD and a 9 x 7 census
-    /// (Mei et al. 2011), between 0 and 2.
+    /// Hamming distance of 9 x 7 censuses (Zabih and Woodfill 1994), a 32nd a bit, at most 1.25.
+    Census,
+    /// That plus the colour difference, at most 0.375 and less where the left image has little contrast: on a plain
+    /// surface colour changes with the light alone, and misleads (after Mei et al. 2011, who weigh both alike).
     AdCensus,
 }
 
@@ -148,6 +150,9 @@ pub enum Fill {
     None,
     /// The smaller of the nearest valid disparities to the left and to the right on the row.
     Row,
+    /// The same, then the weighted median over a window four times as wide and high, so that what is filled follows the
+    /// colours around it and not its row alone.
+    Median,
 }
 
 /// Which pixels the weighted median touches.
@@ -183,8 +188,10 @@ method! {
          is (section 3.1: 15).";
     support: f64, "standard deviations, 0 to 100", "Labels of a pixel are limited to the mean disparity of its zone's sparse \
          matches and this many standard deviations on either side; 0 keeps all labels (section 2.4: 1).";
-    cost: Cost, "sad | ad-census", "Matching cost. The paper's is the SAD (section 2.4).";
+    cost: Cost, "sad | census | ad-census", "Matching cost. The paper's is the SAD (section 2.4).";
     sad_window: u32, "pixels, odd, 1 to 31", "Side of the SAD window (section 3.1: 7).";
+    colour_contrast: f64, "8-bit levels, 0 to 128", "Standard deviation of grey around a pixel from which on colour counts \
+         in full; below, its weight falls with the variance. Used by ad-census.";
     outside_cost: f64, "the cost's own",
         "Cost of a label that falls outside the right image or on a masked pixel: the same for each, so that \
          none is preferred (open).";
@@ -219,7 +226,7 @@ method! {
     region_size: u32, "pixels", "Regions smaller than this become invalid; 0 keeps all (open).";
     sub_pixel: bool, "true | false", "Place the disparity between the labels, by the matching cost around the optimum \
          (open).";
-    fill: Fill, "none | row", "What becomes of invalid pixels.";
+    fill: Fill, "none | row | median", "What becomes of invalid pixels.";
     median: Median, "off | filled | all", "Which pixels the weighted median touches (section 2.5).";
     median_window: u32, "pixels, odd, 3 to 31", "Side of the median's window (open).";
     median_sigma_space: f64, "pixels", "Spatial parameter of the median's weights (open).";
@@ -248,19 +255,20 @@ impl Default for Method {
             support: 0.0,
             cost: Cost::AdCensus,
             sad_window: 7,
-            outside_cost: 0.8,
-            temperature: 0.5,
+            colour_contrast: 5.0,
+            outside_cost: 0.7,
+            temperature: 0.25,
             evidence_cap: 8.0,
             evidence_gain: 4.0,
             pyramid: Pyramid::Minimum,
             levels: 6,
-            percentile: 92.0,
+            percentile: 97.0,
             sigma_space: 3.0,
-            sigma_range: 0.2,
+            sigma_range: 0.1,
             potential: Potential::Soft,
             dependency_cut: 2.0,
             resolution: Resolution::Interpolating,
-            resolution_cut: 4.0,
+            resolution_cut: 3.0,
             schedule: Schedule::CoarseFirst,
             iterations: 3,
             final_iterations: 3,
@@ -268,7 +276,7 @@ impl Default for Method {
             visibility: Visibility::RightView,
             region_size: 200,
             sub_pixel: true,
-            fill: Fill::Row,
+            fill: Fill::Median,
             median: Median::All,
             median_window: 15,
             median_sigma_space: 5.0,
@@ -295,8 +303,6 @@ impl Method {
                 evidence_cap: 63.75,
                 evidence_gain: 1.0,
                 pyramid: Pyramid::LowPass,
-                percentile: 97.0,
-                sigma_range: 0.1,
                 potential: Potential::Hard,
                 resolution: Resolution::Strict,
                 schedule: Schedule::Together,
@@ -305,6 +311,7 @@ impl Method {
                 visibility: Visibility::Off,
                 region_size: 0,
                 sub_pixel: false,
+                fill: Fill::Row,
                 ..Self::default()
             }),
             "fgs" => Ok(Self { levels: 1, visibility: Visibility::SecondMatch, ..Self::preset("paper")? }),
@@ -446,7 +453,8 @@ impl Method {
         within("support", 0.0, 100.0)?;
         within("sad-window", 1.0, 31.0)?;
         odd("sad-window", self.sad_window)?;
-        within("outside-cost", 0.0, if self.cost == Cost::Sad { 254.0 } else { 2.0 })?;
+        within("colour-contrast", 0.0, 128.0)?;
+        within("outside-cost", 0.0, if self.cost == Cost::Sad { 254.0 } else { 1.625 })?;
         within("temperature", 1e-3, 1e6)?;
         within("evidence-cap", 0.25, 63.75)?;
         within("evidence-gain", 1.0, 4.0)?;
@@ -529,14 +537,14 @@ mod tests {
             assert_eq!((method.cost, method.outside_cost), (Cost::AdCensus, 0.5));
         }
         let error = Method::preset("paper").unwrap().set("cost", "ad-census").unwrap_err().to_string();
-        assert_eq!(error, "--set outside-cost: 20 is outside 0 to 2");
+        assert_eq!(error, "--set outside-cost: 20 is outside 0 to 1.625");
     }
 
     #[test]
     fn errors_name_the_key_and_what_it_takes() {
         for (key, value, words) in [
             ("colour", "red", "--set colour: there is no such key; `mrfgs presets` lists them"),
-            ("cost", "ncc", "--set cost: expected sad | ad-census, not \"ncc\""),
+            ("cost", "ncc", "--set cost: expected sad | census | ad-census, not \"ncc\""),
             ("levels", "2.5", "--set levels: expected levels, 1 to 16, not 2.5"),
             ("levels", "-1", "--set levels: expected levels, 1 to 16, not -1"),
             ("levels", "", "--set levels: expected levels, 1 to 16, not \"\""),

@@ -9,7 +9,6 @@
 
 use crate::error::Result;
 use crate::options::{Cost, DisparityRange, Method, Potential, Pyramid, Resolution, Schedule};
-use crate::tables::AD_CENSUS_UNITS;
 
 /// Units of cost in one nat.
 pub const UNITS_PER_NAT: f64 = 4.0;
@@ -18,6 +17,18 @@ pub const UNITS_PER_NAT: f64 = 4.0;
 pub const HARD_CAP: u16 = 1023;
 /// Largest matching cost at level 0, in cost units.
 pub const COST_MAX: u8 = 254;
+/// Cost units of 1 where the cost is by census.
+pub const CENSUS_UNITS: f64 = 128.0;
+/// Cost units of a census bit that differs.
+pub const CENSUS_BIT_COST: u32 = 4;
+/// Census bits that count, at most.
+pub const CENSUS_BITS: u32 = 40;
+/// Cost units of the largest colour difference that counts, where colour counts in full.
+pub const COLOUR_WEIGHT: u32 = 48;
+/// The largest colour difference that counts, in 8-bit levels summed over the channels.
+pub const COLOUR_MOST: u32 = 64;
+/// Places of the window of census and contrast, 9 x 7.
+pub const CENSUS_PLACES: u32 = 63;
 /// Fractional bits of the costs of level 1 and coarser.
 pub const COST_FRACTION_BITS: u32 = 8;
 /// Fractional bits of [`EvidenceScale::multiplier`].
@@ -151,6 +162,10 @@ pub struct Plan {
     pub neighbours: usize,
     /// Cost of labels outside the right image, in cost units of level 0.
     pub outside_cost: u8,
+    /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
+    pub colour_weight: u32,
+    /// Squared [`CENSUS_PLACES`] times the variance of grey, in squared 8-bit levels, from which on colour counts in full.
+    pub colour_variance: u32,
     /// Cut of dependency messages.
     pub dependency: Cut,
     /// Cut of resolution messages.
@@ -170,7 +185,7 @@ impl Plan {
         let method = method.clone().validated()?;
         let cost_units = match method.cost {
             Cost::Sad => 1.0,
-            Cost::AdCensus => AD_CENSUS_UNITS,
+            Cost::Census | Cost::AdCensus => CENSUS_UNITS,
         };
         let mut levels = Vec::new();
         let mut gain = 1.0;
@@ -223,6 +238,11 @@ impl Plan {
         };
         Ok(Self {
             outside_cost: (method.outside_cost * cost_units + 0.5).floor() as u8,
+            colour_weight: if method.cost == Cost::AdCensus { COLOUR_WEIGHT } else { 0 },
+            colour_variance: (f64::from(CENSUS_PLACES * CENSUS_PLACES)
+                * (method.colour_contrast * method.colour_contrast)
+                + 0.5)
+                .floor() as u32,
             range,
             levels,
             neighbours,
@@ -297,7 +317,7 @@ impl Plan {
     /// Bytes that the images and all maps take, at most.
     #[must_use]
     pub fn map_bytes(&self) -> u64 {
-        96 * self.levels[0].pixels() as u64
+        100 * self.levels[0].pixels() as u64
     }
 
     /// Bytes that all volumes, graphs and maps take together.
@@ -357,7 +377,7 @@ mod tests {
         for temperature in [0.001, 0.15, 0.8, 40.0] {
             let method = Method { temperature, ..Method::default() };
             for gain in [1.0, 243.0] {
-                let scale = EvidenceScale::new(gain, AD_CENSUS_UNITS, &method);
+                let scale = EvidenceScale::new(gain, CENSUS_UNITS, &method);
                 let mut last = 0;
                 for difference in 0..=u16::MAX {
                     let e = scale.apply(difference.into());

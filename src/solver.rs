@@ -214,8 +214,10 @@ fn finish(method: &Method) -> Vec<Stage> {
         stages.push(Stage::RegionFilter);
     }
     stages.push(Stage::Confidence);
-    if method.fill != Fill::None {
-        stages.push(Stage::Fill);
+    match method.fill {
+        Fill::None => {}
+        Fill::Row => stages.push(Stage::Fill),
+        Fill::Median => stages.extend([Stage::Fill, Stage::FillMedian]),
     }
     if method.median != Median::Off {
         stages.push(Stage::Median);

@@ -49,29 +49,8 @@ pub fn ln(x: f64) -> f64 {
     f64::from(exponent) * LN_2 + 2.0 * sum
 }
 
-/// Cost units per unit of the AD-census cost: its range 0 to 2 takes 0 ..= 254.
-pub const AD_CENSUS_UNITS: f64 = 127.0;
-/// Entries of the colour table: |dr| + |dg| + |db| in 8-bit levels.
-pub const AD_ENTRIES: usize = 768;
-/// Entries of the census table: one more than the 62 comparisons of a 9 x 7 window.
-pub const CENSUS_ENTRIES: usize = 63;
-
-/// round(127 (1 - exp(-AD / 10))) for AD = index / 3 levels, each 0 ..= 127.
-#[must_use]
-pub fn ad_cost() -> Vec<u8> {
-    (0..AD_ENTRIES)
-        .map(|i| (AD_CENSUS_UNITS * (1.0 - exp_neg(i as f64 / 30.0)) + 0.5).floor() as u8)
-        .collect()
-}
-
-/// round(127 (1 - exp(-Hamming / 30))), each 0 ..= 127.
-#[must_use]
-pub fn census_cost() -> Vec<u8> {
-    (0..CENSUS_ENTRIES)
-        .map(|h| (AD_CENSUS_UNITS * (1.0 - exp_neg(h as f64 / 30.0)) + 0.5).floor() as u8)
-        .collect()
-}
-
+/// How far apart the places of the stretched window are, as a power of two.
+const STRETCH_BITS: u32 = 2;
 /// Entries of the range table; differences beyond it weigh nothing.
 const MEDIAN_RANGE_ENTRIES: usize = 1024;
 /// Bits of each of the two weights that are multiplied.
@@ -84,7 +63,8 @@ const MEDIAN_WEIGHT_BITS: u32 = 10;
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     radius: usize,
-    /// By |dy| and dx from -radius to radius, \[dy\]\[dx\].
+    step_bits: u32,
+    /// By |dy| and dx from -radius to radius, in places, \[dy\]\[dx\].
     space: Vec<u32>,
     /// By squared colour difference, in steps of 2^shift, and 0 for all beyond.
     range: Vec<u32>,
@@ -97,6 +77,15 @@ impl MedianWeights {
     pub fn of(method: &Method) -> Self {
         let window = method.median_window as usize;
         Self::new(window, method.median_sigma_space, method.median_sigma_range)
+    }
+
+    /// Those of the stretched window: its places four pixels apart, each with its spatial weight, and half the range
+    /// sigma.
+    #[must_use]
+    pub fn stretched(method: &Method) -> Self {
+        let window = method.median_window as usize;
+        let weights = Self::new(window, method.median_sigma_space, method.median_sigma_range / 2.0);
+        Self { step_bits: STRETCH_BITS, ..weights }
     }
 
     /// Weights for a window of `window` pixels, sigmas in pixels and in the intensity range 0 to 1.
@@ -118,13 +107,19 @@ impl MedianWeights {
             .map(|i| weight(i as f64 * f64::from(1u32 << shift) / twice_variance))
             .chain([0])
             .collect();
-        Self { radius, space, range, shift }
+        Self { radius, step_bits: 0, space, range, shift }
     }
 
-    /// Radius of the window in pixels.
+    /// Radius of the window in places.
     #[must_use]
     pub fn radius(&self) -> usize {
         self.radius
+    }
+
+    /// How far apart its places are: 2 to this many pixels.
+    #[must_use]
+    pub fn step_bits(&self) -> u32 {
+        self.step_bits
     }
 
     /// Bits by which a squared colour difference is shifted right to find its weight.
@@ -140,7 +135,7 @@ impl MedianWeights {
         rows.chain(&self.range[..MEDIAN_RANGE_ENTRIES]).copied().collect()
     }
 
-    /// Spatial weights of the row |dy| away, for dx from -radius to radius.
+    /// Spatial weights of the row |dy| places away, for dx from -radius to radius.
     #[must_use]
     pub fn space_row(&self, dy: usize) -> &[u32] {
         let side = 2 * self.radius + 1;
@@ -154,7 +149,7 @@ impl MedianWeights {
         (space * range) >> MEDIAN_WEIGHT_BITS
     }
 
-    /// Weight of a pixel |dx|, |dy| away whose squared colour difference is `distance`.
+    /// Weight of a pixel |dx|, |dy| places away whose squared colour difference is `distance`.
     #[must_use]
     pub fn weight(&self, dx: usize, dy: usize, distance: u32) -> u32 {
         self.product(self.space_row(dy)[self.radius + dx], distance)

@@ -40,12 +40,12 @@ fn rounded(matched: &Matched) -> Plane<f32> {
 fn rendered_scenes() {
     // Average error in pixels, bad2.0 and bad0.5 in percent. The plain wall is what the method is worst at.
     let floors = [
-        ("slanted", 0.20, 0.6, 7.0),
-        ("thin", 0.75, 9.5, 18.0),
-        ("wall", 2.2, 34.0, 58.0),
-        ("repetitive", 0.30, 0.5, 10.0),
-        ("exposure", 0.35, 1.8, 15.0),
-        ("mixed", 0.42, 4.0, 19.0),
+        ("slanted", 0.20, 0.9, 8.3),
+        ("thin", 0.62, 7.8, 18.5),
+        ("wall", 1.6, 27.0, 57.0),
+        ("repetitive", 0.27, 0.9, 10.4),
+        ("exposure", 0.23, 1.0, 9.0),
+        ("mixed", 0.38, 3.4, 16.5),
     ];
     for (scene, avg, bad2, bad05) in floors {
         let folder = Path::new("testdata").join(scene);
@@ -65,15 +65,16 @@ fn real_pairs() {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
         return;
     };
-    // Final: average error in pixels, bad2.0 in percent. Raw: the paper's table 1, average error, PSNR in dB, bad2.0.
+    // Final: average error in pixels, bad2.0 in percent: what the best of the fast matchers reach (AD-Census, MGM, SGBM)
+    // on each. Raw: the paper's table 1, average error and bad2.0.
     let floors = [
-        ("Teddy", (0.75, 7.0), (2.09, 32.43, 13.90)),
-        ("Cones", (0.90, 7.8), (2.29, 35.14, 16.52)),
-        ("Dolls", (0.92, 8.5), (2.63, 35.11, 18.50)),
-        ("Rocks1", (0.60, 4.1), (3.21, 33.31, 11.96)),
-        ("Motorcycle", (1.60, 9.0), (3.40, 29.90, 19.53)),
+        ("Teddy", (0.72, 6.62), (2.09, 13.90)),
+        ("Cones", (0.78, 7.44), (2.29, 16.52)),
+        ("Dolls", (0.78, 9.00), (2.63, 18.50)),
+        ("Rocks1", (0.59, 3.09), (3.21, 11.96)),
+        ("Motorcycle", (1.50, 8.32), (3.40, 19.53)),
     ];
-    for (pair, (avg, bad2), (raw_avg, raw_psnr, raw_bad2)) in floors {
+    for (pair, (avg, bad2), (raw_avg, raw_bad2)) in floors {
         let folder = Path::new(&folder).join(pair);
         let matched = matched(&folder, &Method::default());
         let all = report(&folder, &matched.maps.final_map()).all;
@@ -82,10 +83,7 @@ fn real_pairs() {
         assert!(all.avg.unwrap() <= avg && all.bad[2] <= bad2, "{pair}: {all:?}");
         assert!(all.bad[0] < report(&folder, &rounded(&matched)).all.bad[0], "{pair}");
         let raw = report(&folder, &matched.maps.raw_map()).all;
-        assert!(
-            raw.avg.unwrap() < raw_avg && raw.psnr.unwrap() > raw_psnr && raw.bad[2] < raw_bad2,
-            "{pair}: {raw:?}"
-        );
+        assert!(raw.avg.unwrap() < raw_avg && raw.bad[2] < raw_bad2, "{pair}: {raw:?}");
     }
 }
 

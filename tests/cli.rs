@@ -433,7 +433,7 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --set =4", 2, &["--set", "levels=4"]),
     ("M out.pfm --set levels=many", 1, &["--set levels", "1 to 16", "\"many\""]),
     ("M out.pfm --set levels=17", 1, &["--set levels", "17 is outside 1 to 16"]),
-    ("M out.pfm --set cost=ncc", 1, &["--set cost", "sad | ad-census", "ncc"]),
+    ("M out.pfm --set cost=ncc", 1, &["--set cost", "sad | census | ad-census", "ncc"]),
     ("M out.pfm --set temperature=nan", 1, &["--set temperature", "outside"]),
     ("M out.pfm --set sad-window=4", 1, &["--set sad-window", "odd", "3 or 5"]),
     ("M out.pfm --config none.toml", 1, &["none.toml", "no such file", "check the name"]),

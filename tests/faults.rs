@@ -130,10 +130,10 @@ fn not_there() {
 #[test]
 fn out_of_memory() {
     let (pair, range) = scene();
-    let handicap = Handicap { memory: Some(20 << 20), ..Handicap::default() };
+    let handicap = Handicap { memory: Some(12 << 20), ..Handicap::default() };
     let Some(mut gpu) = device(handicap) else { return };
     let error = on(&mut gpu, &pair, range).unwrap_err();
-    assert!(matches!(&error, Error::Memory(e) if e.contains("20") && is_clear(e)), "{error}");
+    assert!(matches!(&error, Error::Memory(e) if e.contains("12") && is_clear(e)), "{error}");
     assert_eq!(gpu.traffic().bytes_up, 0);
     let small = corner(&pair);
     assert!(on(&mut gpu, &small, range).unwrap().maps == expected(&small, range));

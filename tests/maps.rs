@@ -177,6 +177,7 @@ fn median() {
         maps
     };
     on_all(Stage::Median, 30, change, input, twin::median::median);
+    on_all(Stage::FillMedian, 30, change, input, twin::median::fill_median);
 }
 
 #[test]
@@ -213,7 +214,9 @@ fn nothing_valid() {
             for (name, mut backend) in backends() {
                 backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
                 maps.write(backend.as_mut());
-                for stage in [Stage::RegionFilter, Stage::Fill, Stage::Median, Stage::Confidence] {
+                for stage in
+                    [Stage::RegionFilter, Stage::Fill, Stage::FillMedian, Stage::Median, Stage::Confidence]
+                {
                     backend.run(stage).unwrap();
                 }
                 if let Err(e) = compare_finest(backend.as_mut(), &expected) {
@@ -260,6 +263,9 @@ fn control_changes_are_found() {
         (Stage::RegionFilter, true, region, |p| p.method.region_size += 1),
         (Stage::Fill, false, larger, |_| ()),
         (Stage::Confidence, false, confidence, |p| p.method.confidence_floor += 4),
+        (Stage::FillMedian, false, twin::median::fill_median, |p| p.method.median_window = 7),
+        (Stage::FillMedian, false, twin::median::fill_median, |p| p.method.median_sigma_range = 0.02),
+        (Stage::FillMedian, false, twin::median::median, |p| p.method.median = Median::Filled),
         (Stage::Median, false, twin::median::median, |p| p.method.median_window = 7),
         (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_space = 1.0),
         (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_range = 0.02),
@@ -286,8 +292,11 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::visibility::visibility(plan, pair, maps);
     twin::region::region_filter(plan, maps);
     twin::confidence::confidence(plan, maps);
-    if plan.method.fill == Fill::Row {
+    if plan.method.fill != Fill::None {
         twin::fill::fill(maps);
+    }
+    if plan.method.fill == Fill::Median {
+        twin::median::fill_median(plan, pair, maps);
     }
     twin::median::median(plan, pair, maps);
 }

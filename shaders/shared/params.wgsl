@@ -32,6 +32,9 @@ struct Params {
     row_groups: u32,
     grid: u32,
     outside_cost: u32,
+    // Cost of the largest colour difference that counts, and the variance from which on it counts in full.
+    colour_weight: u32,
+    colour_variance: u32,
     sad_radius: i32,
     // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
     label_offset: i32,
@@ -56,7 +59,9 @@ struct Params {
     // Rows of the map that the fill takes values from.
     source_first_row: u32,
     source_rows: u32,
+    // In places, which are 2 to median_step_bits pixels apart.
     median_radius: u32,
+    median_step_bits: u32,
     median_shift: u32,
 }
 

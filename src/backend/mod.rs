@@ -95,9 +95,12 @@ pub enum Stage {
     /// - SAD: round(S / (768 n)), at most [`crate::plan::COST_MAX`], ties up, where n counts the places (i, j) of the
     ///   window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked, and S sums
     ///   |dr| + |dg| + |db| over them.
-    /// - AD-census: [`crate::tables::ad_cost`] at (|dr| + |dg| + |db|) >> 8 plus [`crate::tables::census_cost`] at the
-    ///   number of census bits that differ. The census of a pixel has a bit for each other place of a 9 x 7
-    ///   window, set where that place, clamped to the image, is unmasked and its grey is below the centre's.
+    /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each other
+    ///   place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is below the
+    ///   centre's.
+    /// - AD-census: that plus (w min((|dr| + |dg| + |db|) >> 8, 64) + 32) >> 6, with the weight w = floor(48 min(v, t) / t)
+    ///   of the left pixel, 48 where t = [`Plan::colour_variance`] is 0. Over the same window, clamped places again,
+    ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
     Cost,
     /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
     /// 256 times).
@@ -173,6 +176,9 @@ pub enum Stage {
     /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
     /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
     Fill,
+    /// [`Stage::Median`] on filled pixels alone, its window stretched: its places are 4 pixels apart, each with the
+    /// spatial weight that it has there, and the range parameter is half as large.
+    FillMedian,
     /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::Method::median`] names and that have a
     /// disparity, over the pixels of the window that have one: the smallest value at which half of the weight is
     /// reached. Weights are [`crate::tables::MedianWeights`] of the left image.
@@ -199,6 +205,7 @@ impl Stage {
             Self::RegionFilter => "region filter",
             Self::Confidence => "confidence",
             Self::Fill => "fill",
+            Self::FillMedian => "fill median",
             Self::Median => "median",
         }
     }

@@ -8,13 +8,21 @@ pub mod read;
 pub mod write;
 
 use crate::error::{Error, Result};
+use std::fmt;
 
 /// A rectangle of values, row by row from the top left.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Plane<T> {
     width: usize,
     height: usize,
     data: Vec<T>,
+}
+
+/// Its size: the values of a map fill no log.
+impl<T> fmt::Debug for Plane<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Plane({} x {})", self.width, self.height)
+    }
 }
 
 impl<T> Plane<T> {

@@ -107,15 +107,16 @@ pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
 /// A method with every parameter that the stages read drawn anew, and `neighbours` a factor.
 pub fn method(random: &mut Random, neighbours: usize) -> Method {
     let mut m = Method::default();
-    m.cost = random.pick(&[Cost::Sad, Cost::AdCensus]);
+    m.cost = random.pick(&[Cost::Sad, Cost::Census, Cost::AdCensus, Cost::AdCensus]);
+    m.colour_contrast = random.pick(&[0.0, 0.3, 5.0, 40.0, 128.0]);
     m.sad_window = random.pick(&[1, 3, 5, 7, 9]);
     m.outside_cost = match m.cost {
         Cost::Sad => f64::from(random.within(0, 254)),
-        Cost::AdCensus => f64::from(random.within(0, 200)) / 100.0,
+        Cost::Census | Cost::AdCensus => f64::from(random.within(0, 1625)) / 1000.0,
     };
     m.temperature = match m.cost {
         Cost::Sad => random.log_within(0.1, 300.0),
-        Cost::AdCensus => random.log_within(0.01, 10.0),
+        Cost::Census | Cost::AdCensus => random.log_within(0.01, 10.0),
     };
     m.evidence_cap = random.pick(&[0.25, 3.0, 8.0, 63.75]);
     m.evidence_gain = random.pick(&[1.0, 1.7, 3.0, 4.0]);
@@ -139,7 +140,7 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     ]);
     m.region_size = random.pick(&[0, 3, 20]);
     m.sub_pixel = random.pick(&[false, true]);
-    m.fill = random.pick(&[Fill::None, Fill::Row, Fill::Row]);
+    m.fill = random.pick(&[Fill::None, Fill::Row, Fill::Median, Fill::Median]);
     m.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
     m.median_window = random.pick(&[3, 5, 15]);
     m.median_sigma_space = random.log_within(0.3, 30.0);

@@ -2,8 +2,7 @@
 
 use crate::image::{Image, Pair, Pixel};
 use crate::options::Cost;
-use crate::plan::{COST_MAX, Plan};
-use crate::tables;
+use crate::plan::{CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, COLOUR_MOST, COST_MAX, Plan};
 use rayon::prelude::*;
 
 const CENSUS_X: isize = 4;
@@ -11,7 +10,7 @@ const CENSUS_Y: isize = 3;
 
 pub(super) fn run(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     match plan.method.cost {
-        Cost::AdCensus => ad_census(plan, pair, out),
+        Cost::Census | Cost::AdCensus => census(plan, pair, out),
         Cost::Sad => sad(plan, pair, out),
     }
 }
@@ -20,10 +19,9 @@ fn difference(a: Pixel, b: Pixel) -> u32 {
     (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum()
 }
 
-fn ad_census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
+fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
     let (left, right) = (pair.left(), pair.right());
-    let (ad, census) = (tables::ad_cost(), tables::census_cost());
     let (left_census, right_census) = (census_bits(left), census_bits(right));
     let width = level.width;
     out.par_chunks_mut(width * level.stride).enumerate().for_each(|(y, row)| {
@@ -35,25 +33,52 @@ fn ad_census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
             if lm[x] {
                 continue;
             }
+            let weight = if plan.colour_weight == 0 { 0 } else { colour_weight(plan, left, x, y) };
             // x - d is inside for first <= label index < end.
             let first = (x as i64 - (width as i64 - 1) - i64::from(level.min)).max(0);
             let end = (x as i64 - i64::from(level.min) + 1).min(level.labels as i64);
             for j in first..end {
                 let xr = (x as i64 - i64::from(level.min) - j) as usize;
                 if !rm[xr] {
-                    let colour = ad[(difference(lp[x], rp[xr]) >> 8) as usize];
-                    let bits = (lc[x] ^ rc[xr]).count_ones() as usize;
-                    costs[j as usize] = colour + census[bits];
+                    let bits = (lc[x] ^ rc[xr]).count_ones().min(CENSUS_BITS);
+                    let colour = (difference(lp[x], rp[xr]) >> 8).min(COLOUR_MOST);
+                    let cost = CENSUS_BIT_COST * bits + (weight * colour + COLOUR_MOST / 2) / COLOUR_MOST;
+                    costs[j as usize] = cost as u8;
                 }
             }
         }
     });
 }
 
+/// How much colour counts at a pixel: by the variance of grey around it.
+fn colour_weight(plan: &Plan, image: &Image, x: usize, y: usize) -> u32 {
+    let most = plan.colour_variance;
+    if most == 0 {
+        return plan.colour_weight;
+    }
+    let (width, height) = image.pixels.size();
+    let grey = |x: usize, y: usize| u32::from(image.pixels[(x, y)][3] >> 8);
+    let centre = grey(x, y);
+    let (mut sum, mut squares) = (0, 0);
+    for dy in -CENSUS_Y..=CENSUS_Y {
+        let ny = clamp(y as isize + dy, height);
+        for dx in -CENSUS_X..=CENSUS_X {
+            let nx = clamp(x as isize + dx, width);
+            let g = if image.masked[(nx, ny)] { centre } else { grey(nx, ny) };
+            sum += g;
+            squares += g * g;
+        }
+    }
+    plan.colour_weight * (CENSUS_PLACES * squares - sum * sum).min(most) / most
+}
+
+fn clamp(v: isize, size: usize) -> usize {
+    v.clamp(0, size as isize - 1) as usize
+}
+
 /// The census of every pixel: a bit for each other place of the window in raster order.
 fn census_bits(image: &Image) -> Vec<u64> {
     let (width, height) = image.pixels.size();
-    let clamp = |v: isize, size: usize| v.clamp(0, size as isize - 1) as usize;
     // A masked pixel is below nobody.
     let grey = |x: usize, y: usize| if image.masked[(x, y)] { u16::MAX } else { image.pixels[(x, y)][3] };
     let mut out = vec![0; width * height];

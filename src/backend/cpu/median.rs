@@ -1,7 +1,8 @@
-//! Weighted median of the disparities: see [`crate::backend::Stage::Median`].
+//! Weighted medians of the disparities: see [`crate::backend::Stage::Median`] and
+//! [`crate::backend::Stage::FillMedian`].
 
 use super::Finest;
-use crate::image::Image;
+use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
 use crate::plan::Plan;
@@ -9,42 +10,55 @@ use crate::tables::MedianWeights;
 use rayon::prelude::*;
 
 pub(super) fn run(plan: &Plan, guide: &Image, maps: &mut Finest) {
-    let method = &plan.method;
-    let weights = MedianWeights::of(method);
-    let radius = weights.radius();
-    let touched = |f: u8| {
-        has_disparity(f)
-            && match method.median {
-                Median::Off => false,
-                Median::Filled => f & flag::FILLED != 0,
-                Median::All => true,
-            }
+    let touched = |f: u8| match plan.method.median {
+        Median::Off => false,
+        Median::Filled => f & flag::FILLED != 0,
+        Median::All => has_disparity(f),
     };
+    smooth(&MedianWeights::of(&plan.method), touched, guide, maps);
+}
+
+pub(super) fn fill(plan: &Plan, guide: &Image, maps: &mut Finest) {
+    smooth(&MedianWeights::stretched(&plan.method), |f| f & flag::FILLED != 0, guide, maps);
+}
+
+/// Replaces the disparity of every pixel whose flags are `touched`.
+fn smooth(weights: &MedianWeights, touched: impl Fn(u8) -> bool + Sync, guide: &Image, maps: &mut Finest) {
+    let (radius, step) = (weights.radius(), 1 << weights.step_bits());
     let Finest { disparity, validity: flags, .. } = maps;
     let (width, height) = disparity.size();
-    // Channel by channel, so that rows of the window are vectors.
-    let channels = [0, 1, 2].map(|c| guide.pixels.map(|pixel| pixel[c]));
-    let known = flags.map(|&f| if has_disparity(f) { u32::MAX } else { 0 });
+    // Columns a step apart side by side, and channel by channel, so that rows of the window are vectors.
+    let columns: Vec<usize> = (0..step).flat_map(|phase| (phase..width).step_by(step)).collect();
+    let channels = [0, 1, 2].map(|c| Plane::from_fn(width, height, |x, y| guide.pixels[(columns[x], y)][c]));
+    let known = Plane::from_fn(width, height, |x, y| match has_disparity(flags[(columns[x], y)]) {
+        true => u32::MAX,
+        false => 0,
+    });
+    let values = Plane::from_fn(width, height, |x, y| disparity[(columns[x], y)]);
     let mut out = disparity.clone();
     out.data_mut().par_chunks_mut(width).enumerate().for_each_init(
         || Window::new(radius),
         |window, (y, row)| {
-            for (x, out) in row.iter_mut().enumerate() {
-                if !touched(flags[(x, y)]) {
-                    continue;
+            let mut end = 0;
+            for phase in 0..step.min(width) {
+                let start = end;
+                end += (width - phase).div_ceil(step);
+                for (at, &x) in (start..end).zip(&columns[start..end]) {
+                    if !touched(flags[(x, y)]) {
+                        continue;
+                    }
+                    window.clear();
+                    let seen = at.saturating_sub(radius).max(start)..(at + radius + 1).min(end);
+                    let centre = channels.each_ref().map(|channel| channel[(at, y)]);
+                    let first = y - radius.min(y / step) * step;
+                    for ny in (first..(y + radius * step + 1).min(height)).step_by(step) {
+                        let space = &weights.space_row(ny.abs_diff(y) / step)[seen.start + radius - at..];
+                        let guide = channels.each_ref().map(|channel| &channel.row(ny)[seen.clone()]);
+                        let (values, known) = (&values.row(ny)[seen.clone()], &known.row(ny)[seen.clone()]);
+                        window.add(weights, &space[..seen.len()], centre, guide, values, known);
+                    }
+                    row[x] = window.median(row[x]);
                 }
-                window.clear();
-                let columns = x.saturating_sub(radius)..(x + radius + 1).min(width);
-                let centre = channels.each_ref().map(|channel| channel[(x, y)]);
-                for ny in y.saturating_sub(radius)..(y + radius + 1).min(height) {
-                    let space =
-                        &weights.space_row(ny.abs_diff(y))[columns.start + radius - x..][..columns.len()];
-                    let guide = channels.each_ref().map(|channel| &channel.row(ny)[columns.clone()]);
-                    let (values, known) =
-                        (&disparity.row(ny)[columns.clone()], &known.row(ny)[columns.clone()]);
-                    window.add(&weights, space, centre, guide, values, known);
-                }
-                *out = window.median(*out);
             }
         },
     );

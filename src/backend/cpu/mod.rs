@@ -241,6 +241,7 @@ impl<M: Message> Volumes<M> {
             Stage::RegionFilter => region_filter::run(plan.method.region_size as usize, maps),
             Stage::Confidence => confidence::run(plan.method.confidence_floor, maps),
             Stage::Fill => fill::run(maps),
+            Stage::FillMedian => median::fill(plan, pair.left(), maps),
             Stage::Median => median::run(plan, pair.left(), maps),
         }
     }

@@ -149,9 +149,10 @@ pub(super) struct Buffers {
     pub(super) right: Rows,
     /// Census of the left and of the right image.
     pub(super) census: [Rows; 2],
-    /// Matching costs by difference.
-    pub(super) cost_tables: wgpu::Buffer,
+    /// How much colour counts in the matching cost.
+    pub(super) contrast: Rows,
     pub(super) median_weights: wgpu::Buffer,
+    pub(super) stretched_weights: wgpu::Buffer,
     /// Label map of the last change, and its squared differences.
     pub(super) labels: Rows,
     pub(super) squares: Rows,
@@ -331,6 +332,7 @@ impl Buffers {
         let mut map = |label: &str, words: u32| a.rows(label, words * fine.pixel_pitch, &whole);
         let (left, right) = (map("left image", 4)?, map("right image", 4)?);
         let census = [map("left census", 2)?, map("right census", 2)?];
+        let contrast = map("contrast", 1)?;
         let (labels, squares) = (map("labels", 1)?, map("squares", 1)?);
         let (peaks, right_labels) = (map("peaks", 2)?, map("right labels", 1)?);
         let (raw, disparity, flags) = (map("raw", 1)?, map("disparity", 1)?, map("flags", 1)?);
@@ -338,8 +340,8 @@ impl Buffers {
         let (region_parents, region_sizes) = (map("region parents", 1)?, map("region sizes", 1)?);
         let rows = u64::from(fine.height);
         Ok(Self {
-            cost_tables: a.buffer("cost tables", 1024)?,
             median_weights: a.buffer("median weights", 2048)?,
+            stretched_weights: a.buffer("stretched weights", 2048)?,
             change_sums: a.buffer("change", 2 * rows)?,
             filled_rows: a.buffer("filled rows", rows)?,
             source_rows: a.buffer("source rows", rows)?,
@@ -347,6 +349,7 @@ impl Buffers {
             left,
             right,
             census,
+            contrast,
             labels,
             squares,
             peaks,

@@ -18,6 +18,7 @@ pub(super) const JOINED_COLUMNS: u32 = 4096;
 #[allow(missing_docs, reason = "named after the shader files")]
 pub enum Kernel {
     Census,
+    Contrast,
     AdCensus,
     Sad,
     Pyramid,
@@ -46,8 +47,9 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every shader there is.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Census,
+        Self::Contrast,
         Self::AdCensus,
         Self::Sad,
         Self::Pyramid,
@@ -79,6 +81,7 @@ impl Kernel {
     pub fn name(self) -> &'static str {
         match self {
             Self::Census => "census",
+            Self::Contrast => "contrast",
             Self::AdCensus => "ad_census",
             Self::Sad => "sad",
             Self::Pyramid => "pyramid",
@@ -109,6 +112,7 @@ impl Kernel {
     fn body(self) -> &'static str {
         match self {
             Self::Census => include_str!("../../../shaders/census.wgsl"),
+            Self::Contrast => include_str!("../../../shaders/contrast.wgsl"),
             Self::AdCensus => include_str!("../../../shaders/ad_census.wgsl"),
             Self::Sad => include_str!("../../../shaders/sad.wgsl"),
             Self::Pyramid => include_str!("../../../shaders/pyramid.wgsl"),
@@ -157,7 +161,7 @@ impl Kernel {
         let (quads, slots) = (l.stride / 4, plan.slots());
         let fine_labels = plan.levels[level.saturating_sub(1)].stride;
         match self {
-            Self::Census => 7 * 10,
+            Self::Census | Self::Contrast => 7 * 10,
             Self::AdCensus => 4,
             Self::Sad => {
                 let window = plan.method.sad_window as usize;
@@ -295,6 +299,8 @@ pub struct Params {
     pub row_groups: u32,
     pub grid: u32,
     pub outside_cost: u32,
+    pub colour_weight: u32,
+    pub colour_variance: u32,
     pub sad_radius: i32,
     pub label_offset: i32,
     pub evidence_multiplier: u32,
@@ -313,5 +319,7 @@ pub struct Params {
     pub source_first_row: u32,
     pub source_rows: u32,
     pub median_radius: u32,
+    pub median_step_bits: u32,
     pub median_shift: u32,
+    pub padding_2: u32,
 }

@@ -20,7 +20,7 @@ use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::Plan;
-use crate::tables::{self, MedianWeights};
+use crate::tables::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
 pub use device::{DeviceInfo, Handicap, devices, has_automatic};
@@ -222,11 +222,12 @@ impl Gpu {
         let pitch = buffers.levels[0].params.pixel_pitch;
         buffers.left.write(device, &image_words(pair.left(), pitch))?;
         buffers.right.write(device, &image_words(pair.right(), pitch))?;
-        let words = |bytes: Vec<u8>| bytes.into_iter().map(u32::from);
-        let costs: Vec<u32> = words(tables::ad_cost()).chain(words(tables::census_cost())).collect();
-        device.write(&buffers.cost_tables, bytemuck::cast_slice(&costs))?;
-        let weights = MedianWeights::of(&plan.method).words();
-        device.write(&buffers.median_weights, bytemuck::cast_slice(&weights))?;
+        for (weights, buffer) in [
+            (MedianWeights::of(&plan.method), &buffers.median_weights),
+            (MedianWeights::stretched(&plan.method), &buffers.stretched_weights),
+        ] {
+            device.write(buffer, bytemuck::cast_slice(&weights.words()))?;
+        }
         for (level, graph) in buffers.levels.iter_mut().zip(graphs) {
             level.members.write(device, &member_words(graph, &level.params))?;
             level.write_incoming(device, transposed(graph, &level.params))?;

@@ -46,6 +46,8 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         level: buffers.levels[level].params,
         fine: buffers.levels[level.saturating_sub(1)].params,
         outside_cost: plan.outside_cost.into(),
+        colour_weight: plan.colour_weight,
+        colour_variance: plan.colour_variance,
         sad_radius: (method.sad_window / 2) as i32,
         label_offset: if level == 0 { 0 } else { plan.label_offset(level) },
         evidence_multiplier: scale.multiplier,
@@ -53,7 +55,6 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         evidence_cap: scale.cap,
         sub_pixel: method.sub_pixel.into(),
         visibility: (method.visibility != Visibility::Off).into(),
-        median_all: (method.median == Median::All).into(),
         region_size: method.region_size,
         confidence_floor: method.confidence_floor,
         ..Params::default()
@@ -129,8 +130,14 @@ impl Gpu {
         })?;
         add(Stage::Confidence, confidence);
         add(Stage::Fill, self.fill(plan, buffers)?);
-        let off = method.median == Median::Off;
-        add(Stage::Median, if off { Vec::new() } else { self.median(plan, buffers)? });
+        let stretched = MedianWeights::stretched(method);
+        add(Stage::FillMedian, self.median(plan, buffers, &stretched, &buffers.stretched_weights, false)?);
+        let (weights, all) = (MedianWeights::of(method), method.median == Median::All);
+        let median = match method.median {
+            Median::Off => Vec::new(),
+            _ => self.median(plan, buffers, &weights, &buffers.median_weights, all)?,
+        };
+        add(Stage::Median, median);
         Ok(steps)
     }
 
@@ -151,13 +158,16 @@ impl Gpu {
                     vec![image.bind(&with_halo(rows, 3, l.height)), census.bind(rows)]
                 })?);
             }
+            steps.extend(self.stage(&job(Kernel::Contrast), Some(l.width), |rows| {
+                vec![buffers.left.bind(&with_halo(rows, 3, l.height)), buffers.contrast.bind(rows)]
+            })?);
             steps.extend(self.stage(&job(Kernel::AdCensus), Some(l.width * l.quads), |rows| {
                 vec![
                     buffers.left.bind(rows),
                     buffers.right.bind(rows),
                     buffers.census[0].bind(rows),
                     buffers.census[1].bind(rows),
-                    Binding::whole(&buffers.cost_tables),
+                    buffers.contrast.bind(rows),
                     cost.bind(rows),
                 ]
             })?);
@@ -355,19 +365,33 @@ impl Gpu {
         Ok(steps)
     }
 
-    fn median(&mut self, plan: &Plan, buffers: &Buffers) -> Result<Vec<Step>> {
-        let (weights, base) = (MedianWeights::of(&plan.method), params(plan, buffers, 0));
-        let radius = weights.radius() as u32;
-        let params = Params { median_radius: radius, median_shift: weights.shift(), ..base };
+    /// The median with `weights`, which `table` holds, of `all` pixels or of the filled ones.
+    fn median(
+        &mut self,
+        plan: &Plan,
+        buffers: &Buffers,
+        weights: &MedianWeights,
+        table: &wgpu::Buffer,
+        all: bool,
+    ) -> Result<Vec<Step>> {
+        let (radius, step_bits) = (weights.radius() as u32, weights.step_bits());
+        let base = params(plan, buffers, 0);
+        let params = Params {
+            median_radius: radius,
+            median_step_bits: step_bits,
+            median_shift: weights.shift(),
+            median_all: all.into(),
+            ..base
+        };
         let l = base.level;
         let job = Job { kernel: Kernel::Median, plan, level: 0, params, cuts: &[0, l.height] };
         let mut steps = self.stage(&job, Some(l.width), |rows| {
-            let seen = with_halo(rows, radius, l.height);
+            let seen = with_halo(rows, radius << step_bits, l.height);
             vec![
                 buffers.left.bind(&seen),
                 buffers.disparity.bind(&seen),
                 buffers.flags.bind(&seen),
-                Binding::whole(&buffers.median_weights),
+                Binding::whole(table),
                 buffers.spare_disparity.bind(rows),
             ]
         })?;

@@ -19,11 +19,16 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
                 }
                 let cost = match plan.method.cost {
                     Cost::Sad => sad(left, right, x, y, d, i64::from(plan.method.sad_window)),
-                    Cost::AdCensus => {
+                    Cost::Census | Cost::AdCensus => {
                         let at = |x: i64| (y * level.width as i64 + x) as usize;
                         let (l, r) = (&left_census[at(x)], &right_census[at(x - d)]);
                         let hamming = l.iter().zip(r).filter(|(l, r)| l != r).count();
-                        exponential(difference(left, x, right, x - d, y) / 256) + exponential(hamming as i64)
+                        let census = 4 * (hamming as i64).min(40);
+                        let colour = (difference(left, x, right, x - d, y) / 256).min(64);
+                        match plan.method.cost {
+                            Cost::AdCensus => census + (weight(plan, left, x, y) * colour + 32) / 64,
+                            _ => census,
+                        }
                     }
                 };
                 out.push(u32::try_from(cost).unwrap());
@@ -33,10 +38,23 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
     out
 }
 
-/// round(127 (1 - exp(-v / 30))): of the colour difference of three channels, as AD / 10 is a third of it over 10,
-/// and of the Hamming distance alike.
-fn exponential(v: i64) -> i64 {
-    (127.0 * (1.0 - (-(v as f64) / 30.0).exp())).round() as i64
+/// How much colour counts, 0 to 48: by the variance of grey, in 8-bit levels, in the window of the census.
+fn weight(plan: &Plan, image: &Image, x: i64, y: i64) -> i64 {
+    let enough = (3969.0 * plan.method.colour_contrast * plan.method.colour_contrast).round() as i64;
+    let grey = |x: i64, y: i64| i64::from(image.pixels[(x as usize, y as usize)][3]) / 256;
+    let mut greys = Vec::new();
+    for dy in -3..=3 {
+        for dx in -4..=4 {
+            let nx = (x + dx).clamp(0, image.width() as i64 - 1);
+            let ny = (y + dy).clamp(0, image.height() as i64 - 1);
+            let masked = image.masked[(nx as usize, ny as usize)];
+            greys.push(if masked { grey(x, y) } else { grey(nx, ny) });
+        }
+    }
+    let sum: i64 = greys.iter().sum();
+    let squares: i64 = greys.iter().map(|g| g * g).sum();
+    let variance = 63 * squares - sum * sum;
+    if variance >= enough { 48 } else { 48 * variance / enough }
 }
 
 /// Mean over the valid places of the window and the three channels, in 8-bit levels, ties up.

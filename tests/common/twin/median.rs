@@ -22,34 +22,56 @@ pub fn weight(dx: i64, dy: i64, distance: i64, sigma_space: f64, sigma_range: f6
 
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
+    let sigma_range = plan.method.median_sigma_range;
+    smooth(plan, pair, maps, 1, sigma_range, |validity| match plan.method.median {
+        Median::Off => false,
+        Median::Filled => filled(validity),
+        Median::All => known(validity),
+    });
+}
+
+/// The same of filled pixels, the window's places four pixels apart.
+pub fn fill_median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
+    smooth(plan, pair, maps, 4, plan.method.median_sigma_range / 2.0, filled);
+}
+
+fn filled(validity: i32) -> bool {
+    validity & i32::from(flag::FILLED) != 0
+}
+
+fn known(validity: i32) -> bool {
+    !invalid(validity) || filled(validity)
+}
+
+fn smooth(
+    plan: &Plan,
+    pair: &Pair,
+    maps: &mut Finest,
+    step: i64,
+    sigma_range: f64,
+    touched: impl Fn(i32) -> bool,
+) {
     let (width, height) = plan.size();
     let method = &plan.method;
-    let (sigma_space, sigma_range) = (method.median_sigma_space, method.median_sigma_range);
+    let sigma_space = method.median_sigma_space;
     let radius = i64::from(method.median_window / 2);
     let guide = pair.left();
     let Finest { disparity, validity, .. } = &*maps;
-    let filled = |x: usize, y: usize| validity[(x, y)] & i32::from(flag::FILLED) != 0;
-    let known = |x: usize, y: usize| !invalid(validity[(x, y)]) || filled(x, y);
-    let touched = |x: usize, y: usize| match method.median {
-        Median::Off => false,
-        Median::Filled => filled(x, y),
-        Median::All => known(x, y),
-    };
     maps.disparity = Plane::from_fn(width, height, |x, y| {
-        if !touched(x, y) {
+        if !touched(validity[(x, y)]) {
             return disparity[(x, y)];
         }
         let mut values = Vec::new();
-        for dy in -radius..=radius {
-            for dx in -radius..=radius {
-                let (nx, ny) = (x as i64 + dx, y as i64 + dy);
+        for j in -radius..=radius {
+            for i in -radius..=radius {
+                let (nx, ny) = (x as i64 + step * i, y as i64 + step * j);
                 if nx < 0 || ny < 0 || nx >= width as i64 || ny >= height as i64 {
                     continue;
                 }
                 let at = (nx as usize, ny as usize);
-                if known(at.0, at.1) {
+                if known(validity[at]) {
                     let distance = colour_distance(guide.pixels[(x, y)], guide.pixels[at]);
-                    values.push((disparity[at], weight(dx, dy, distance, sigma_space, sigma_range)));
+                    values.push((disparity[at], weight(i, j, distance, sigma_space, sigma_range)));
                 }
             }
         }
