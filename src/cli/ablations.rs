@@ -93,7 +93,9 @@ impl Ablations {
         };
         let width = |text: &dyn Fn(&Outcome) -> usize| self.rows.iter().map(text).max().unwrap_or(0);
         let (first, second) = (width(&|row| row.name.len()), width(&|row| changes(row).len()));
-        let mut out = format!("Final maps of {}, all pixels with known truth\n\n", self.pairs.join(", "));
+        let pairs = self.pairs.len();
+        let over = format!("{pairs} pair{}", super::plural(pairs));
+        let mut out = format!("Final maps, all pixels with known truth, means over {over}\n\n");
         let mut line = |name: &str, changes: &str, cells: [String; 5]| {
             let [avg, b05, b2, change, time] = cells;
             let _ = writeln!(
