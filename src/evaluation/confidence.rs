@@ -176,8 +176,9 @@ mod tests {
         let state = &mut 1;
         for case in 0..200 {
             let pixels = 1 + noise(state) as usize % 24;
-            let mut all: Vec<(u8, bool)> =
-                (0..pixels).map(|_| ((noise(state) % (1 + case % 9)) as u8, noise(state) % 3 == 0)).collect();
+            let mut all: Vec<(u8, bool)> = (0..pixels)
+                .map(|_| ((noise(state) % (1 + case % 9)) as u8, noise(state).is_multiple_of(3)))
+                .collect();
             let of = |all: &[(u8, bool)]| {
                 let (confidence, bad): (Vec<u8>, Vec<bool>) = all.iter().copied().unzip();
                 sparsified(&bad, &confidence)
