@@ -1,4 +1,5 @@
-//! `mrfgs evaluate` through the built program: older layouts, the paper's tables, the report.
+//! `mrfgs evaluate` through the built program: older layouts, the paper's tables, breakdown, ablations,
+//! the report.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
 
@@ -9,6 +10,7 @@ use std::process::Command;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use image::{GrayImage, Luma};
+use mrfgs::evaluation::confidence::sparsify;
 use mrfgs::image::{Plane, read, write};
 use mrfgs::options;
 use serde_json::Value;
@@ -246,6 +248,145 @@ fn tables_stand_beside_the_papers() {
     }
 }
 
+/// What JSON holds of each entry of an object, added up.
+fn total(of: &Value, field: &str) -> f64 {
+    of.as_object().unwrap().values().map(|entry| entry[field].as_f64().unwrap()).sum()
+}
+
+#[test]
+fn a_breakdown_adds_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    copy("slanted", &at("Teddy"));
+    copy("thin", &at("thin"));
+    fs::remove_file(at("thin/mask0nocc.png")).unwrap();
+    let text = evaluated(folder.path(), &["Teddy", "thin", "--breakdown", "--json", "out.json"]);
+    let figures = json(&fs::read_to_string(at("out.json")).unwrap());
+
+    let [teddy, thin] = &figures["pairs"].as_array().unwrap()[..] else { panic!("two pairs") };
+    for (name, of) in [("Teddy", teddy), ("thin", thin), ("mean", &figures["mean"])] {
+        let (breakdown, bad) = (&of["breakdown"], of["final"]["all"]["bad2.0"].as_f64().unwrap());
+        assert_eq!(breakdown.as_object().unwrap().len(), 6);
+        assert!((total(breakdown, "share") - 100.0).abs() < 1e-9, "{breakdown}");
+        assert!((total(breakdown, "points") - bad).abs() < 1e-9, "{breakdown}");
+        let confidence = &of["confidence"];
+        assert!((confidence["random"].as_f64().unwrap() - bad).abs() < 1e-9);
+        assert!((confidence["curve"][19].as_f64().unwrap() - bad).abs() < 1e-9);
+        assert_eq!(confidence["curve"].as_array().unwrap().len(), 20);
+        let [optimal, auc] = ["optimal", "auc"].map(|key| confidence[key].as_f64().unwrap());
+        assert!(optimal < auc && auc < bad, "{confidence}");
+
+        // The text has the same.
+        let found: Vec<&str> = text.lines().filter(|line| line.starts_with(&format!("{name:12}|"))).collect();
+        let [errors, worth] = found[..] else { panic!("two lines of {name}:\n{text}") };
+        let classes = ["border", "occluded", "edge", "plain", "slanted", "other"].map(|class| {
+            let [share, points] = ["share", "points"].map(|key| breakdown[class][key].as_f64().unwrap());
+            format!("{share:>6.2} {points:>6.2}")
+        });
+        assert_eq!(errors, format!("{name:12}|{}|{bad:>6.2}", classes.join("|")));
+        let figure = |value: &Value| value.as_f64().map_or_else(|| "-".into(), |v| format!("{v:.2}"));
+        let [precision, recall] = ["precision", "recall"].map(|key| figure(&of["validity"][key]));
+        let expected = format!("{name:12}|{auc:>6.2} {optimal:>7.2} {bad:>7.2}|{precision:>10} {recall:>7}");
+        assert_eq!(worth, expected);
+    }
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    // Without a mask nothing is known of occlusion; no mean stands for fewer pairs.
+    assert_eq!(thin["breakdown"]["occluded"]["share"], 0.0);
+    assert!(thin["validity"].is_null() && figures["mean"]["validity"].is_null());
+
+    // Of the maps that the program writes.
+    let args = ["match", "Teddy/im0.png", "Teddy/im1.png", "map.pfm", "--confidence", "c.png", "--validity"];
+    assert_eq!(run(folder.path(), &[&args[..], &["v.png"]].concat()).0, Some(0));
+    let truth = read::read_disparity(&at("Teddy/disp0GT.pfm")).unwrap();
+    let (map, grey) = (read::read_disparity(&at("map.pfm")).unwrap(), |file: &str| read::grey8(&at(file)));
+    let expected = sparsify(&map, &truth, &grey("c.png").unwrap()).unwrap();
+    assert_eq!(teddy["confidence"]["auc"].as_f64(), Some(expected.auc));
+    let (validity, mask) = (grey("v.png").unwrap(), grey("Teddy/mask0nocc.png").unwrap());
+    let of = |flagged: bool, unseen: bool| {
+        let pixels = validity.data().iter().zip(mask.data());
+        pixels.filter(|&(v, m)| (v & 7 != 0) == flagged && (*m != 255) == unseen).count() as f64
+    };
+    let [hits, alarms, missed] = [of(true, true), of(true, false), of(false, true)];
+    assert_eq!(teddy["validity"]["precision"].as_f64(), Some(100.0 * hits / (hits + alarms)));
+    assert_eq!(teddy["validity"]["recall"].as_f64(), Some(100.0 * hits / (hits + missed)));
+
+    // The figures are there without the flag, the tables are not; a map that others made has neither.
+    let plain = evaluated(folder.path(), &["Teddy", "thin"]);
+    assert!(text.starts_with(&plain) && text.len() > plain.len());
+    let again = json(&evaluated(folder.path(), &["Teddy", "thin", "--json", "-"]));
+    assert_eq!(again["mean"], figures["mean"]);
+    let args = ["--disparity", "map.pfm", "--truth", "Teddy/disp0GT.pfm", "--json", "-"];
+    let others = json(&evaluated(folder.path(), &args));
+    for key in ["breakdown", "confidence", "validity"] {
+        assert!(others["pairs"][0][key].is_null() && others["mean"][key].is_null());
+    }
+    refused(folder.path(), &[&args[..4], &["--breakdown"]].concat(), 2, &["--breakdown", "cannot be used"]);
+    refused(folder.path(), &["Teddy", "--breakdown", "--tables"], 2, &["--breakdown", "--tables"]);
+}
+
+#[test]
+fn ablations_are_held_against_the_default() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // A part of a scene, to be quick.
+    let (x, y, width, height) = (60, 40, 120, 90);
+    fs::create_dir(at("part")).unwrap();
+    for file in ["im0.png", "im1.png"] {
+        let view = image::open(scene("thin").join(file)).unwrap();
+        view.crop_imm(x, y, width, height).save(at("part").join(file)).unwrap();
+    }
+    let truth = read::read_disparity(&scene("thin").join("disp0GT.pfm")).unwrap();
+    let part =
+        Plane::from_fn(width as usize, height as usize, |i, j| truth[(i + x as usize, j + y as usize)]);
+    write::disparity(&at("part/disp0GT.pfm"), &part).unwrap();
+    fs::write(at("part/calib.txt"), "ndisp=32\n").unwrap();
+
+    let text = evaluated(folder.path(), &["part", "--ablations", "--json", "out.json"]);
+    let all = json(&fs::read_to_string(at("out.json")).unwrap());
+    assert_eq!(all["pairs"], serde_json::json!(["part"]));
+    let rows = all["rows"].as_array().unwrap();
+    assert!(rows.len() > 10);
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    let number = |row: &Value, key: &str| row[key].as_f64().unwrap();
+    let default = &rows[0];
+    assert_eq!((default["name"].as_str(), number(default, "time")), (Some("default"), 1.0));
+    for row in rows {
+        let change = 100.0 * (number(row, "bad2.0") / number(default, "bad2.0") - 1.0);
+        assert!((number(row, "change") - change).abs() < 1e-9 && number(row, "time") > 0.0, "{row}");
+        let start = format!("{:24} | ", row["name"].as_str().unwrap());
+        let line = text.lines().find(|line| line.starts_with(start.trim_end())).unwrap();
+        for (key, value) in row["changes"].as_object().unwrap() {
+            assert!(line.contains(&format!("{key}={}", value.as_str().unwrap())), "{line}");
+        }
+        assert!(line.contains(&format!(" {:.2} {change:>+9.1} ", number(row, "bad2.0"))), "{line}");
+    }
+
+    // A row is what --set gives by itself.
+    let changed = rows.iter().find(|row| row["changes"]["sub-pixel"] == "false").unwrap();
+    for (row, flags) in [(default, &[][..]), (changed, &["--set", "sub-pixel=false"])] {
+        let alone = json(&evaluated(folder.path(), &[&["part", "--json", "-"], flags].concat()));
+        for key in ["avg", "bad0.5", "bad2.0"] {
+            assert_eq!(row[key], alone["mean"]["final"]["all"][key], "{flags:?}, {key}");
+        }
+    }
+    assert!(number(changed, "bad0.5") > number(default, "bad0.5"));
+
+    for flags in [
+        &["--preset", "paper"][..],
+        &["--set", "levels=2"],
+        &["--config", "x"],
+        &["--report", "r"],
+        &["--tables"],
+        &["--breakdown"],
+    ] {
+        let args = [&["part", "--ablations"], flags].concat();
+        refused(folder.path(), &args, 2, &["--ablations", flags[0], "cannot be used"]);
+    }
+    let args = ["--ablations", "--disparity", "part/disp0GT.pfm", "--truth", "part/disp0GT.pfm"];
+    refused(folder.path(), &args, 2, &["--ablations", "--disparity"]);
+    refused(folder.path(), &["--ablations"], 2, &["DIR"]);
+}
+
 /// The values of an attribute in a page, in order.
 fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
     let start = format!(" {name}=\"");
@@ -273,6 +414,11 @@ fn a_report_is_whole_and_stands_alone() {
     for pair in figures["pairs"].as_array().unwrap() {
         let avg = pair["final"]["all"]["avg"].as_f64().unwrap();
         assert!(page.matches(&format!("<td>{avg:.3}</td>")).count() >= 2, "{avg}");
+        let occluded = pair["breakdown"]["occluded"]["share"].as_f64().unwrap();
+        let auc = pair["confidence"]["auc"].as_f64().unwrap();
+        for words in [format!("occluded</th><td>{occluded:.2}</td>"), format!("AUC {auc:.2} %")] {
+            assert!(page.contains(&words), "{words}");
+        }
     }
 
     let (files, sources) = (attributes(&page, "data-file"), attributes(&page, "src"));

@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::evaluation::{Report, Row, mean, table};
+use mrfgs::evaluation::{Breakdown, Detection, Report, Row, Sparsification, mean, table};
 use mrfgs::image::{read, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::Method;
 use mrfgs::{Error, Matcher, Result};
 use serde::Serialize;
 
+use super::ablations::{self, Ablations};
+use super::breakdown;
 use super::folder::{self, Folder, Scene};
 use super::outputs::{self, Written};
 use super::report::{self, Destination, Picture};
@@ -22,6 +24,8 @@ Examples:
   mrfgs evaluate Teddy Cones --report report      (then open report/index.html)
   mrfgs evaluate Teddy Cones Dolls Rocks1 Motorcycle --tables
   mrfgs evaluate HalfSize/Art --truth-scale 2
+  mrfgs evaluate Teddy Cones --breakdown
+  mrfgs evaluate Teddy Cones --ablations --json ablations.json
   mrfgs evaluate --disparity mine.pfm --truth Teddy/disp0GT.pfm --mask Teddy/mask0nocc.png";
 
 /// Match pairs with known truth, or take a finished map, and print its errors
@@ -59,6 +63,36 @@ pub(super) struct Args {
     /// with known truth.
     #[arg(long, conflicts_with_all = ["preset", "config", "set", "report", "disparity"])]
     tables: bool,
+    /// Prints two tables more: where the errors of the final map are, and what confidence and validity are worth
+    ///
+    /// The first puts every pixel with known truth into the first class that applies: border (its match, x - truth, lies
+    /// outside the right image), occluded (the mask says that one view does not see it), edge (the known truths in the
+    /// 7 x 7 window around it span more than 4 px), plain (the grey in this window has a standard deviation below 4
+    /// eight-bit levels), slanted (the truth changes by at least 0.2 px per pixel), other. Of each class: `share`, its pixels,
+    /// and `bad`, those of them wrong by more than 2 px or invalid, both in percent of all pixels with known truth, so that the
+    /// bad ones add up to b2%.
+    ///
+    /// The second orders the pixels by confidence, the surest first (Hu and Mordohai 2012). `AUC` is the mean over all k of
+    /// the share of bad pixels among the k surest (%), small where the confidence knows the bad ones; `optimal` is what it
+    /// were if all bad ones came last, `random` what it is of a confidence that knows nothing. `precision` is the share of the
+    /// pixels flagged as outside, occluded or in a small region that one view indeed does not see, by the mask; `recall` the
+    /// share of the latter that are flagged.
+    ///
+    /// --json has it of each pair and of the mean in any case: `breakdown` by class (`share`; `bad2.0` and `avg` of its own
+    /// pixels; `points`, the `bad` above; `of_bad` and `of_squares`, its share of all bad pixels and of the summed squared
+    /// error), `confidence` (`auc`, `optimal`, `random`, and `curve`, the share of bad pixels among the surest 5, 10, ... 100 %)
+    /// and `validity` (`precision`, `recall`; null without a mask).
+    #[arg(long, conflicts_with_all = ["tables", "disparity"])]
+    breakdown: bool,
+    /// Prints what each part of the preset default is good for instead: a line each with the part switched off or replaced
+    ///
+    /// Of each line: its changes as --set takes them; means over the pairs, of the final map and over all pixels with known
+    /// truth, of the average error (`avg`, px, over valid pixels) and of the pixels wrong by more than 0.5 and 2 px or invalid
+    /// (`b0.5%`, `b2%`); `change%`, the change of the last against the default, in percent of it; and `time`, that of all
+    /// matches against the default's in this run. As --json has it: `ran_on`, `method` (the default's keys), `pairs` and
+    /// `rows` (each: `name`, `changes`, `avg`, `bad0.5`, `bad2.0`, `change`, `time`).
+    #[arg(long, conflicts_with_all = ["preset", "config", "set", "report", "disparity", "tables", "breakdown"])]
+    ablations: bool,
     /// Levels of an 8-bit PNG truth that are one pixel of disparity, of which 0 is unknown [default: 3 for the layout of
     /// 2005 and 2006, 4 for that of 2003]
     ///
@@ -111,6 +145,9 @@ pub(super) struct Figures {
     pub(super) raw: Option<Report>,
     #[serde(rename = "final")]
     pub(super) finished: Report,
+    pub(super) breakdown: Option<Breakdown>,
+    pub(super) confidence: Option<Sparsification>,
+    pub(super) validity: Option<Detection>,
     pub(super) seconds: Option<f64>,
 }
 
@@ -120,20 +157,38 @@ pub(super) struct Mean {
     pub(super) raw: Option<Report>,
     #[serde(rename = "final")]
     pub(super) finished: Option<Report>,
+    pub(super) breakdown: Option<Breakdown>,
+    pub(super) confidence: Option<Sparsification>,
+    pub(super) validity: Option<Detection>,
 }
 
 impl Findings {
     fn new(method: Option<Method>, ran_on: Option<String>, pairs: Vec<Figures>) -> Self {
         let raw = pairs.iter().map(|f| f.raw.as_ref()).collect::<Option<Vec<_>>>().and_then(mean);
         let finished = mean(pairs.iter().map(|f| &f.finished));
-        Self { method, ran_on, pairs, mean: Mean { raw, finished } }
+        let mean = Mean {
+            raw,
+            finished,
+            breakdown: over(&pairs, |f| f.breakdown.as_ref(), Breakdown::mean),
+            confidence: over(&pairs, |f| f.confidence.as_ref(), Sparsification::mean),
+            validity: over(&pairs, |f| f.validity.as_ref(), Detection::mean),
+        };
+        Self { method, ran_on, pairs, mean }
     }
+}
+
+/// The mean over all pairs; none where one of them lacks what it is of.
+fn over<T>(pairs: &[Figures], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) -> Option<T>) -> Option<T> {
+    mean(&pairs.iter().map(of).collect::<Option<Vec<_>>>()?)
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
     let destination = check_outputs(args)?;
     if args.tables {
         return compare(args);
+    }
+    if args.ablations {
+        return ablate(args);
     }
     let mut pictures = Vec::new();
     let wanted = destination.is_some();
@@ -154,7 +209,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let row =
         |f: &Figures| Row { pair: f.name.clone(), raw: f.raw.clone(), finished: Some(f.finished.clone()) };
-    let text = table(&findings.pairs.iter().map(row).collect::<Vec<_>>());
+    let mut text = table(&findings.pairs.iter().map(row).collect::<Vec<_>>());
+    if args.breakdown {
+        text.push_str(&breakdown::text(&findings));
+    }
     deliver(args.json.as_deref(), &findings, &text, || match destination {
         Some(destination) => report::write(&destination, &findings, &pictures),
         None => Ok(()),
@@ -221,7 +279,16 @@ fn finished_map(
     if let Some(pictures) = pictures {
         pictures.push(report::pictures(&name, ground.truth(), &estimate, None)?);
     }
-    Ok(Findings::new(None, None, vec![Figures { name, raw: None, finished, seconds: None }]))
+    let figures = Figures {
+        name,
+        raw: None,
+        finished,
+        breakdown: None,
+        confidence: None,
+        validity: None,
+        seconds: None,
+    };
+    Ok(Findings::new(None, None, vec![figures]))
 }
 
 /// The folders, all complete: what is missing in the last is said before the first is matched.
@@ -234,26 +301,30 @@ fn folders(args: &Args) -> Result<Vec<Folder<'_>>> {
     Ok(folders)
 }
 
-/// Matches every folder by `method`, called `preset` where there are several; `see` gets every pair with its maps.
+/// Matches every folder by `method`, called `called` where there are several; `see` gets every pair with its maps.
 fn match_all(
     args: &Args,
     folders: &[Folder],
     matcher: &mut Matcher,
     method: Method,
-    preset: Option<&str>,
+    called: Option<&str>,
     mut see: impl FnMut(&Scene, &Maps) -> Result<()>,
 ) -> Result<Findings> {
     let mut figures = Vec::new();
     let mut ran_on = None;
     for folder in folders {
         let scene = folder.read(args.truth_scale)?;
-        let name = preset.map_or(scene.name.clone(), |preset| format!("{}, {preset}", scene.name));
+        let name = called.map_or(scene.name.clone(), |called| format!("{}, {called}", scene.name));
         let (matched, time) =
             super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;
         see(&scene, &matched.maps)?;
+        let (ground, maps, estimate) = (&scene.ground, &matched.maps, matched.maps.final_map());
         figures.push(Figures {
-            raw: Some(scene.ground.evaluate(&matched.maps.raw_map())?),
-            finished: scene.ground.evaluate(&matched.maps.final_map())?,
+            raw: Some(ground.evaluate(&maps.raw_map())?),
+            finished: ground.evaluate(&estimate)?,
+            breakdown: Some(ground.breakdown(&estimate, scene.pair.left())?),
+            confidence: Some(ground.sparsify(&estimate, &maps.confidence)?),
+            validity: ground.detect(&maps.validity)?,
             name: scene.name,
             seconds: Some(time.as_secs_f64()),
         });
@@ -273,4 +344,21 @@ fn compare(args: &Args) -> Result<()> {
     }
     let comparison = Comparison::new(&found);
     deliver(args.json.as_deref(), &comparison, &comparison.text(), || Ok(()))
+}
+
+/// Prints what the default is without each of its parts.
+fn ablate(args: &Args) -> Result<()> {
+    let folders = folders(args)?;
+    let mut matcher = Matcher::new(&args.execution.execution()?)?;
+    let mut run = |row: &ablations::Row, called: &str| {
+        match_all(args, &folders, &mut matcher, ablations::method(row)?, Some(called), |_, _| Ok(()))
+    };
+    // The first run of all prepares what the others find prepared, so its time is not the default's.
+    run(&ablations::DEFAULT, "warm-up")?;
+    let mut found = Vec::new();
+    for row in std::iter::once(&ablations::DEFAULT).chain(ablations::ROWS) {
+        found.push((*row, run(row, row.0)?));
+    }
+    let ablations = Ablations::new(&found);
+    deliver(args.json.as_deref(), &ablations, &ablations.text(), || Ok(()))
 }

@@ -1,5 +1,7 @@
 //! The command line: one file a subcommand, and here what they share. Nothing else in the crate prints.
 
+mod ablations;
+mod breakdown;
 mod devices;
 mod evaluate;
 mod folder;

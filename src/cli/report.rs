@@ -12,7 +12,7 @@ use mrfgs::image::{Pair, Plane, colour, write};
 use mrfgs::maps::Maps;
 use mrfgs::{Error, Result};
 
-use super::evaluate::Findings;
+use super::evaluate::{Figures, Findings};
 use super::outputs::StagedFolder;
 
 /// Errors beyond this, in pixels, take the last colour: one scale for all pairs, or they could not be compared.
@@ -289,6 +289,7 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
             rows.extend(nonocc.as_ref().map(|m| ("", map, "seen in both views", m)));
         }
         table(&mut out, ["map", "pixels"], rows.into_iter());
+        breakdown(&mut out, pair);
         out.push_str("<div class=\"pictures\">\n");
         for picture in pictures {
             let (width, height) = picture.size;
@@ -343,6 +344,35 @@ fn table<'a>(
         out.push_str("</tr>\n");
     }
     out.push_str("</table></div>\n");
+}
+
+/// Where the errors of a pair's final map are, and what its confidence and validity are worth; nothing of a map that
+/// others made.
+fn breakdown(out: &mut String, pair: &Figures) {
+    let number = |value: Option<f64>| value.map_or_else(|| "-".into(), |v| format!("{v:.2}"));
+    if let Some(breakdown) = &pair.breakdown {
+        out.push_str(
+            "<div class=\"wide\"><table>\n<tr><th class=\"text\">class</th><th>share</th><th>bad 2</th>\
+             <th>avg. error</th><th>bad 2 of all</th><th>of bad 2</th><th>of squares</th></tr>\n",
+        );
+        for (class, p) in breakdown.iter() {
+            let _ = write!(out, "<tr><th scope=\"row\">{}</th>", class.name());
+            for value in [Some(p.share), p.bad, p.avg, Some(p.points), p.of_bad, p.of_squares] {
+                let _ = write!(out, "<td>{}</td>", number(value));
+            }
+            out.push_str("</tr>\n");
+        }
+        out.push_str("</table></div>\n");
+    }
+    if let Some(c) = &pair.confidence {
+        let [auc, optimal, random] = [c.auc, c.optimal, c.random].map(|v| number(Some(v)));
+        let _ = write!(out, "<p>Confidence: AUC {auc} % (optimal {optimal}, random {random}).");
+        if let Some(v) = &pair.validity {
+            let (precision, recall) = (number(v.precision), number(v.recall));
+            let _ = write!(out, " Flags of unseen pixels: precision {precision} %, recall {recall} %.");
+        }
+        out.push_str("</p>\n");
+    }
 }
 
 /// A text that stands for itself in HTML, within an attribute too.

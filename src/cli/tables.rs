@@ -13,7 +13,7 @@ use super::evaluate::Findings;
 pub(super) const COMPARED: [&str; 3] = ["fgs", "paper", "default"];
 
 /// Something of each preset, in their order.
-type Each<T> = Vec<(&'static str, T)>;
+pub(super) type Each<T> = Vec<(&'static str, T)>;
 
 /// Both tables. What the fields hold is told by the help of `--tables`.
 #[derive(Serialize)]
@@ -50,7 +50,7 @@ struct Line {
 }
 
 /// As an object.
-fn entries<T: Serialize, S: Serializer>(each: &Each<T>, serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn entries<T: Serialize, S: Serializer>(each: &Each<T>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(each.iter().map(|(name, value)| (name, value)))
 }
 
@@ -136,7 +136,7 @@ impl Line {
 }
 
 /// One line: a name, cut where it is too long, and the groups of columns.
-fn push(out: &mut String, name: &str, groups: impl Iterator<Item = String>) {
+pub(super) fn push(out: &mut String, name: &str, groups: impl Iterator<Item = String>) {
     let name: String = name.chars().take(11).collect();
     let groups: Vec<_> = groups.collect();
     out.push_str(format!("{name:12}|{}", groups.join("|")).trim_end());

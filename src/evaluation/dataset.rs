@@ -1,8 +1,11 @@
 //! What a map is compared with.
 
+use super::breakdown::{Breakdown, breakdown};
+use super::confidence::{Sparsification, sparsify};
 use super::metrics::{Report, evaluate, same_size};
+use super::validity::{Detection, detect};
 use crate::error::Result;
-use crate::image::Plane;
+use crate::image::{Image, Plane};
 
 /// The true disparities of a pair's reference view.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +45,30 @@ impl GroundTruth {
     /// [`Error::Mismatch`](crate::Error::Mismatch) when its size is another or no truth is known.
     pub fn evaluate(&self, estimate: &Plane<f32>) -> Result<Report> {
         evaluate(estimate, &self.truth, self.mask.as_ref())
+    }
+
+    /// Where the errors of `estimate` (not finite = invalid) are; `reference` is the image of the reference view.
+    ///
+    /// # Errors
+    /// As [`GroundTruth::evaluate`].
+    pub fn breakdown(&self, estimate: &Plane<f32>, reference: &Image) -> Result<Breakdown> {
+        breakdown(estimate, &self.truth, self.mask.as_ref(), reference)
+    }
+
+    /// How well `confidence` tells the bad pixels of `estimate` (not finite = invalid) from the good ones.
+    ///
+    /// # Errors
+    /// As [`GroundTruth::evaluate`].
+    pub fn sparsify(&self, estimate: &Plane<f32>, confidence: &Plane<u8>) -> Result<Sparsification> {
+        sparsify(estimate, &self.truth, confidence)
+    }
+
+    /// How well the flags of a `validity` map tell the pixels that one view does not see; `None` without a mask.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when its size is another.
+    pub fn detect(&self, validity: &Plane<u8>) -> Result<Option<Detection>> {
+        self.mask.as_ref().map(|mask| detect(validity, &self.truth, mask)).transpose()
     }
 }
 

@@ -13,7 +13,7 @@ use crate::image::Plane;
 pub const THRESHOLDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// The mask's value for a pixel that both views see.
-const VISIBLE: u8 = 255;
+pub(super) const VISIBLE: u8 = 255;
 
 /// The errors of one map over one region.
 ///
@@ -84,9 +84,7 @@ pub fn evaluate(estimate: &Plane<f32>, truth: &Plane<f32>, mask: Option<&Plane<u
     if let Some(mask) = mask {
         same_size("mask", mask.size(), truth.size())?;
     }
-    let all = measure(estimate, truth, |_, _| true)?.ok_or_else(|| {
-        Error::Mismatch("the ground truth holds no known (finite) pixel: nothing to compare with".into())
-    })?;
+    let all = measure(estimate, truth, |_, _| true)?.ok_or_else(nothing_known)?;
     let nonocc = match mask {
         Some(mask) => measure(estimate, truth, |x, y| mask[(x, y)] == VISIBLE)?,
         None => None,
@@ -161,13 +159,7 @@ pub fn mean<'a>(reports: impl IntoIterator<Item = &'a Report>) -> Option<Report>
 }
 
 fn mean_metrics(metrics: &[&Metrics]) -> Option<Metrics> {
-    let every = |field: fn(&Metrics) -> Option<f64>| -> Option<f64> {
-        let mut sum = Sum::default();
-        for m in metrics {
-            sum.add(field(m)?);
-        }
-        (!metrics.is_empty()).then(|| sum.value() / metrics.len() as f64)
-    };
+    let every = |field: fn(&Metrics) -> Option<f64>| average(metrics.iter().map(|m| field(m)));
     Some(Metrics {
         pixels: every(|m| Some(m.pixels as f64))?.round() as u64,
         density: every(|m| Some(m.density))?,
@@ -185,6 +177,31 @@ fn mean_metrics(metrics: &[&Metrics]) -> Option<Metrics> {
         a95: every(|m| m.a95),
         a99: every(|m| m.a99),
     })
+}
+
+/// The average of all values; `None` when one is missing or there are none.
+pub(super) fn average(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
+    let mut sum = Sum::default();
+    let mut count = 0_u64;
+    for value in values {
+        sum.add(value?);
+        count += 1;
+    }
+    (count > 0).then(|| sum.value() / count as f64)
+}
+
+/// Whether a pixel with known truth counts in `bad2.0`.
+pub(super) fn is_bad(estimate: f32, truth: f32) -> bool {
+    !estimate.is_finite() || (f64::from(estimate) - f64::from(truth)).abs() > THRESHOLDS[2]
+}
+
+/// `part` of `whole` in percent; `None` of nothing.
+pub(super) fn percent(part: f64, whole: f64) -> Option<f64> {
+    (whole > 0.0).then(|| 100.0 * part / whole)
+}
+
+pub(super) fn nothing_known() -> Error {
+    Error::Mismatch("the ground truth holds no known (finite) pixel: nothing to compare with".into())
 }
 
 /// The planes of one comparison have one size.
@@ -215,13 +232,13 @@ fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
 
 /// A sum whose rounding errors are summed apart (Neumaier), so that it does not lose digits with length.
 #[derive(Clone, Copy, Default)]
-struct Sum {
+pub(super) struct Sum {
     total: f64,
     lost: f64,
 }
 
 impl Sum {
-    fn add(&mut self, value: f64) {
+    pub(super) fn add(&mut self, value: f64) {
         let total = self.total + value;
         self.lost += if self.total.abs() >= value.abs() {
             (self.total - total) + value
@@ -231,7 +248,7 @@ impl Sum {
         self.total = total;
     }
 
-    fn value(self) -> f64 {
+    pub(super) fn value(self) -> f64 {
         self.total + self.lost
     }
 }

@@ -1,0 +1,162 @@
+//! What each part of the default preset is good for, for `mrfgs evaluate --ablations`.
+
+use std::fmt::Write;
+
+use mrfgs::Result;
+use mrfgs::evaluation::Metrics;
+use mrfgs::options::Method;
+use serde::Serialize;
+
+use super::evaluate::Findings;
+use super::tables::{Each, entries};
+
+/// A change to the default preset: its name, and the keys with their values.
+pub(super) type Row = (&'static str, &'static [(&'static str, &'static str)]);
+
+/// What the others are compared with.
+pub(super) const DEFAULT: Row = ("default", &[]);
+
+/// One part switched off, or replaced by the paper's choice or another. What is added here needs nothing else.
+pub(super) const ROWS: &[Row] = &[
+    ("homomorphic illumination", &[("illumination", "homomorphic")]),
+    ("texture zones, k = 1", &[("support", "1")]),
+    ("texture zones, k = 2", &[("support", "2")]),
+    ("texture zones, k = 3", &[("support", "3")]),
+    ("SAD cost", &[("cost", "sad"), ("outside-cost", "20"), ("temperature", "10")]),
+    ("no pyramid minimum", &[("pyramid", "low-pass")]),
+    ("one level", &[("levels", "1")]),
+    ("4 levels", &[("levels", "4")]),
+    ("strict resolution", &[("resolution", "strict")]),
+    ("2 neighbours", &[("percentile", "97")]),
+    ("8 neighbours", &[("percentile", "84")]),
+    ("hard potential", &[("potential", "hard")]),
+    ("exact potential", &[("potential", "exact")]),
+    ("all levels together", &[("schedule", "together"), ("iterations", "12")]),
+    ("1 final iteration", &[("final-iterations", "1")]),
+    ("5 final iterations", &[("final-iterations", "5")]),
+    ("no visibility check", &[("visibility", "off")]),
+    ("second matching", &[("visibility", "second-match")]),
+    ("no region filter", &[("region-size", "0")]),
+    ("no sub-pixel", &[("sub-pixel", "false")]),
+    ("no fill", &[("fill", "none")]),
+    ("no median", &[("median", "off")]),
+    ("median on filled only", &[("median", "filled")]),
+];
+
+/// The default preset with the change of a row.
+pub(super) fn method(row: &Row) -> Result<Method> {
+    let mut method = Method::preset("default")?;
+    method.set_all(row.1.iter().copied())?;
+    method.validated()
+}
+
+/// The table. What the fields hold is told by the help of `--ablations`.
+#[derive(Serialize)]
+pub(super) struct Ablations {
+    ran_on: Option<String>,
+    method: Option<Method>,
+    pairs: Vec<String>,
+    rows: Vec<Outcome>,
+}
+
+/// What became of one change: means over the pairs.
+#[derive(Serialize)]
+struct Outcome {
+    name: &'static str,
+    #[serde(serialize_with = "entries")]
+    changes: Each<&'static str>,
+    avg: Option<f64>,
+    #[serde(rename = "bad0.5")]
+    bad05: Option<f64>,
+    #[serde(rename = "bad2.0")]
+    bad2: Option<f64>,
+    change: Option<f64>,
+    time: Option<f64>,
+}
+
+impl Ablations {
+    /// From what the rows, the default first, have found on the same pairs.
+    pub(super) fn new(found: &[(Row, Findings)]) -> Self {
+        let first = found.first().map(|(_, findings)| findings);
+        Self {
+            ran_on: first.and_then(|f| f.ran_on.clone()),
+            method: first.and_then(|f| f.method.clone()),
+            pairs: first.iter().flat_map(|f| &f.pairs).map(|pair| pair.name.clone()).collect(),
+            rows: found.iter().map(|(row, f)| Outcome::new(row, f, first.unwrap_or(f))).collect(),
+        }
+    }
+
+    /// The table for a terminal, as wide as its longest changes.
+    pub(super) fn text(&self) -> String {
+        let changes = |row: &Outcome| {
+            row.changes.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
+        };
+        let width = |text: &dyn Fn(&Outcome) -> usize| self.rows.iter().map(text).max().unwrap_or(0);
+        let (first, second) = (width(&|row| row.name.len()), width(&|row| changes(row).len()));
+        let pairs = self.pairs.len();
+        let over = format!("{pairs} pair{}", super::plural(pairs));
+        let mut out = format!("Final maps, all pixels with known truth, means over {over}\n\n");
+        let mut line = |name: &str, changes: &str, cells: [String; 5]| {
+            let [avg, b05, b2, change, time] = cells;
+            let _ = writeln!(
+                out,
+                "{name:first$} | {changes:second$} | {avg:>6} {b05:>6} {b2:>6} {change:>9} {time:>5}"
+            );
+        };
+        line("", "changes", ["avg", "b0.5%", "b2%", "change%", "time"].map(String::from));
+        for row in &self.rows {
+            let number = |value: Option<f64>, decimals: usize| {
+                value.map_or_else(|| "-".into(), |v| format!("{v:.decimals$}"))
+            };
+            let change = row.change.map_or_else(|| "-".into(), |v| format!("{v:+.1}"));
+            let figures =
+                [number(row.avg, 3), number(row.bad05, 2), number(row.bad2, 2), change, number(row.time, 2)];
+            line(row.name, &changes(row), figures);
+        }
+        out
+    }
+}
+
+impl Outcome {
+    fn new(row: &Row, findings: &Findings, default: &Findings) -> Self {
+        let figure = |of: &Findings, value: fn(&Metrics) -> Option<f64>| {
+            of.mean.finished.as_ref().and_then(|report| value(&report.all))
+        };
+        let ratio = |part: Option<f64>, whole: Option<f64>| Some(part? / whole.filter(|&w| w > 0.0)?);
+        let seconds = |of: &Findings| of.pairs.iter().map(|pair| pair.seconds).sum::<Option<f64>>();
+        let bad2 = figure(findings, |m| Some(m.bad[2]));
+        let to_default = ratio(bad2, figure(default, |m| Some(m.bad[2])));
+        Self {
+            name: row.0,
+            changes: row.1.to_vec(),
+            avg: figure(findings, |m| m.avg),
+            bad05: figure(findings, |m| Some(m.bad[0])),
+            bad2,
+            change: to_default.map(|r| 100.0 * (r - 1.0)),
+            time: ratio(seconds(findings), seconds(default)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_is_a_method_of_its_own() {
+        let mut seen = vec![method(&DEFAULT).unwrap()];
+        for row in ROWS {
+            let changed = method(row).unwrap_or_else(|e| panic!("{}: {e}", row.0));
+            assert!(!seen.contains(&changed), "{} is another row or the default", row.0);
+            assert!(ROWS.iter().filter(|other| other.0 == row.0).count() == 1, "{}", row.0);
+            seen.push(changed);
+        }
+    }
+
+    #[test]
+    fn rows_fit_a_line() {
+        let longest = |text: fn(&Row) -> usize| ROWS.iter().map(text).max().unwrap_or(0);
+        let changes = |row: &Row| row.1.iter().map(|(key, value)| key.len() + value.len() + 2).sum::<usize>();
+        assert!(longest(|row| row.0.len()) + longest(changes) + 41 <= 120);
+    }
+}

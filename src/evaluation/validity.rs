@@ -1,0 +1,95 @@
+//! What the validity map is worth: whether it finds the pixels that one view does not see.
+
+use serde::Serialize;
+
+use super::metrics::{VISIBLE, average, percent, same_size};
+use crate::error::Result;
+use crate::image::Plane;
+use crate::maps::flag;
+
+/// The flags that say that a pixel has no match of its own.
+const FLAGGED: u8 = flag::OUTSIDE | flag::OCCLUDED | flag::SMALL_REGION;
+
+/// How well the flags for pixels outside, occluded or in a small region find the pixels that one view does not see.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Detection {
+    /// Share of the flagged pixels that one view does not see, in percent; `None` when none is flagged.
+    pub precision: Option<f64>,
+    /// Share of the pixels that one view does not see that are flagged, in percent; `None` when both views see all.
+    pub recall: Option<f64>,
+}
+
+impl Detection {
+    /// The average of each field over several pairs, every pair with the same weight, as in [`mean`](super::mean);
+    /// `None` of no pairs.
+    #[must_use]
+    pub fn mean(all: &[&Self]) -> Option<Self> {
+        (!all.is_empty()).then(|| Self {
+            precision: average(all.iter().map(|d| d.precision)),
+            recall: average(all.iter().map(|d| d.recall)),
+        })
+    }
+}
+
+/// Compares the flags of `validity` (bits of [`flag`]) with what `mask` says (not 255 = one view does not see it), over
+/// the pixels whose `truth` is known (finite).
+///
+/// # Errors
+/// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
+pub fn detect(validity: &Plane<u8>, truth: &Plane<f32>, mask: &Plane<u8>) -> Result<Detection> {
+    same_size("validity map", validity.size(), truth.size())?;
+    same_size("mask", mask.size(), truth.size())?;
+    let (mut flagged, mut unseen, mut both) = (0_u32, 0_u32, 0_u32);
+    for ((&bits, &t), &m) in validity.data().iter().zip(truth.data()).zip(mask.data()) {
+        if t.is_finite() {
+            let (is_flagged, is_unseen) = (bits & FLAGGED != 0, m != VISIBLE);
+            flagged += u32::from(is_flagged);
+            unseen += u32::from(is_unseen);
+            both += u32::from(is_flagged && is_unseen);
+        }
+    }
+    let share = |whole: u32| percent(f64::from(both), f64::from(whole));
+    Ok(Detection { precision: share(flagged), recall: share(unseen) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_case_computed_by_hand() {
+        let flags = [
+            flag::OUTSIDE,
+            flag::OCCLUDED | flag::FILLED,
+            flag::SMALL_REGION | flag::LOW_CONFIDENCE,
+            flag::LOW_CONFIDENCE | flag::FILLED,
+            flag::MASKED,
+            0,
+            0,
+            flag::OUTSIDE,
+        ];
+        let mut truth = Plane::filled(8, 1, 3.0);
+        truth[(7, 0)] = f32::INFINITY;
+        let mask = Plane::new(8, 1, vec![128, 0, 255, 128, 255, 255, 128, 128]);
+        // Flagged: 0, 1, 2. Not seen: 0, 1, 3, 6.
+        let found = detect(&Plane::new(8, 1, flags.to_vec()), &truth, &mask).unwrap();
+        assert_eq!(found, Detection { precision: Some(200.0 / 3.0), recall: Some(50.0) });
+
+        let nothing = Plane::filled(8, 1, 0);
+        let found = detect(&nothing, &truth, &mask).unwrap();
+        assert_eq!(found, Detection { precision: None, recall: Some(0.0) });
+        let found = detect(&Plane::filled(8, 1, flag::OCCLUDED), &truth, &Plane::filled(8, 1, 255)).unwrap();
+        assert_eq!(found, Detection { precision: Some(0.0), recall: None });
+
+        let error = detect(&Plane::filled(7, 1, 0), &truth, &mask).unwrap_err().to_string();
+        assert!(error.contains("validity map is 7 x 1"), "{error}");
+    }
+
+    #[test]
+    fn means_are_over_all_pairs_or_none() {
+        let one = Detection { precision: Some(20.0), recall: Some(50.0) };
+        let two = Detection { precision: Some(40.0), recall: None };
+        assert_eq!(Detection::mean(&[&one, &two]), Some(Detection { precision: Some(30.0), recall: None }));
+        assert_eq!(Detection::mean(&[]), None);
+    }
+}
