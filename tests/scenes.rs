@@ -11,7 +11,7 @@ use mrfgs::image::Plane;
 use scenes::Scene;
 
 static SCENES: LazyLock<Vec<Scene>> =
-    LazyLock::new(|| scenes::all().iter().map(scenes::Recipe::render).collect());
+    LazyLock::new(|| scenes::ALL.iter().map(scenes::Recipe::render).collect());
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
@@ -28,7 +28,13 @@ fn pfm(plane: &Plane<f32>) -> Vec<u8> {
 
 #[test]
 fn the_files_are_a_fresh_rendering() {
-    assert_eq!(SCENES.len(), 6);
+    let mut names: Vec<_> = SCENES.iter().map(|scene| scene.name.to_owned()).collect();
+    names.sort();
+    let mut folders: Vec<_> = fs::read_dir(folder("")).unwrap().map(Result::unwrap).collect();
+    folders.retain(|entry| entry.file_type().unwrap().is_dir());
+    let mut folders: Vec<_> = folders.iter().map(|entry| entry.file_name().into_string().unwrap()).collect();
+    folders.sort();
+    assert_eq!(names, folders, "every folder is a scene's, and every scene has one");
     for scene in SCENES.iter() {
         let (name, folder) = (scene.name, folder(scene.name));
         let (width, height) = scene.left.size();
@@ -75,7 +81,7 @@ fn the_truth_is_inside_the_labels() {
 
 #[test]
 fn any_size_will_do() {
-    for recipe in scenes::all() {
+    for recipe in scenes::ALL {
         for (width, height, labels) in [(1, 1, 2), (61, 47, 9), (7, 90, 64), (90, 30, 60), (24, 18, 36)] {
             let scene = scenes::render(recipe.name, width, height, labels);
             assert_eq!(scene.left.size(), (width, height));
