@@ -32,6 +32,8 @@ pub struct Scene {
     pub mask: Plane<u8>,
     /// Number of labels 0 ..= labels - 1 that is enough to search (`ndisp`).
     pub labels: u32,
+    /// What recorded the left and the right view.
+    pub sensors: [Sensor; 2],
 }
 
 // ---------------------------------------------------------------------------------------------- the two cameras
@@ -86,6 +88,7 @@ impl Rig<'_> {
             truth_right: self.plane(|x, y| self.disparity(Side::Right, x as f64, y as f64) as f32),
             mask: self.plane(|x, y| if self.seen_twice(x as f64, y as f64) { 255 } else { 128 }),
             labels,
+            sensors: self.world.sensors,
         }
     }
 
@@ -101,8 +104,7 @@ impl Rig<'_> {
         let scale = self.height as f64;
         let half_base = 0.5 * self.unit_disparity / scale;
         let eye = if side == Side::Left { -half_base } else { half_base };
-        let u = (x - 0.5 * (self.width - 1) as f64) / scale;
-        let v = (y - 0.5 * (self.height - 1) as f64) / scale;
+        let [u, v] = place((self.width, self.height), x, y);
         Ray { from: [eye, 0.0, 0.0], along: [u, v, 1.0] }
     }
 
@@ -132,14 +134,26 @@ impl Rig<'_> {
                 let lamp = [part(i, samples), part(7 * i % samples, samples)];
                 sum = add(sum, self.world.colour(&ray, lamp, 1.0 / self.height as f64));
             }
-            sensor.record(scale(sum, 1.0 / samples as f64), x, y)
+            sensor.record(scale(sum, 1.0 / samples as f64), (self.width, self.height), x, y)
         })
     }
 }
 
+/// Where the point (x, y) of an image is, from its middle, when the image is one unit high.
+fn place((width, height): (usize, usize), x: f64, y: f64) -> [f64; 2] {
+    let scale = height as f64;
+    [(x - 0.5 * (width - 1) as f64) / scale, (y - 0.5 * (height - 1) as f64) / scale]
+}
+
 /// What turns light (1 is white) into bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
     pub gain: f64,
+    /// The part of the light that is lost one image height away from `brightest`; it grows with the square of the
+    /// distance.
+    pub fall_off: f64,
+    /// The place in the image that gets all light, in image heights from its middle.
+    pub brightest: [f64; 2],
     /// Added after the gain, in grey levels.
     pub offset: f64,
     /// Standard deviation in grey levels.
@@ -148,12 +162,29 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    fn record(&self, light: Vec3, x: usize, y: usize) -> [u8; 3] {
+    /// The grey level that light makes at (x, y) of an image of this size, but for the noise.
+    pub fn level(&self, light: f64, size: (usize, usize), x: f64, y: f64) -> f64 {
+        255.0 * self.gain * light * self.passes(size, x, y) + self.offset
+    }
+
+    /// The light that makes this grey level at (x, y): [`Self::level`] the other way round.
+    pub fn light(&self, level: f64, size: (usize, usize), x: f64, y: f64) -> f64 {
+        (level - self.offset) / (255.0 * self.gain * self.passes(size, x, y))
+    }
+
+    /// The part of the light that reaches (x, y).
+    fn passes(&self, size: (usize, usize), x: f64, y: f64) -> f64 {
+        let [u, v] = place(size, x, y);
+        let [u, v] = [u - self.brightest[0], v - self.brightest[1]];
+        1.0 - self.fall_off * (u * u + v * v)
+    }
+
+    fn record(&self, light: Vec3, size: (usize, usize), x: usize, y: usize) -> [u8; 3] {
         [0, 1, 2].map(|c| {
             let bytes = hash([x as u32, y as u32, c as u32, self.seed]).to_le_bytes();
             // The sum of four uniform bytes is close to normal: mean 510, standard deviation 147.8.
             let normal = (bytes.map(f64::from).iter().sum::<f64>() - 510.0) / 147.8;
-            let level = 255.0 * self.gain * light[c] + self.offset + self.noise * normal;
+            let level = self.level(light[c], size, x as f64, y as f64) + self.noise * normal;
             (level + 0.5).clamp(0.0, 255.0) as u8
         })
     }
@@ -331,7 +362,8 @@ const LAMP_SIZE: f64 = 0.16;
 
 impl World {
     pub fn new(seed: u32) -> Self {
-        let sensor = |seed| Sensor { gain: 1.0, offset: 0.0, noise: 1.0, seed };
+        let sensor =
+            |seed| Sensor { gain: 1.0, fall_off: 0.0, brightest: [0.0; 2], offset: 0.0, noise: 1.0, seed };
         Self { bodies: Vec::new(), sensors: [sensor(2 * seed), sensor(2 * seed + 1)], seed }
     }
 
