@@ -26,12 +26,14 @@ pub struct Recipe {
 }
 
 /// Every scene, as `testdata/` holds it.
-pub const ALL: [Recipe; 6] = [
+pub const ALL: [Recipe; 8] = [
     Recipe::small("slanted", slanted),
     Recipe::small("thin", thin),
     Recipe::small("wall", wall),
     Recipe::small("repetitive", repetitive),
     Recipe::small("exposure", exposure),
+    Recipe::small("light", light),
+    Recipe::small("steep", steep),
     Recipe { name: "mixed", width: 320, height: 240, labels: 48, world: mixed },
 ];
 
@@ -177,6 +179,59 @@ fn repetitive() -> World {
     world.card([0.66, -0.12, 2.4], VIEWER, UP, [0.6, 0.78], faint(Checker(0.08), [0xcfc9bd, 0x7a3d35]));
     world.plane([0.0, 0.6, 1.2], [0.0, -1.0, -0.1], paint(Plain, [0x8a7255, 0]).stretch([0.3, 1.0, 1.0]));
     world.ball([-0.1, 0.34, 1.6], 0.22, [0.2, -1.0, 0.3], paint(Blotches(0.16), [0x4f784a, 0xd2c27a]));
+    world
+}
+
+/// A wall with next to no texture behind a few textured things; towards their borders the two cameras lose light
+/// about different places.
+fn light() -> World {
+    use Pattern::{Blotches, Checker, Plain, Rings};
+    let mut world = World::new(17);
+    for (sensor, x) in world.sensors.iter_mut().zip([0.14, -0.12]) {
+        sensor.fall_off = 0.12;
+        sensor.brightest = [x, -0.05];
+    }
+    world.plane([0.0, 0.0, 2.7], [-0.2, -0.08, -1.0], paint(Plain, [0xf2ece0, 0]).grain(0.0034, 0.14));
+    world.ball([0.1, 0.18, 1.42], 0.22, [0.3, -1.0, 0.2], paint(Checker(0.11), [0x9c3f36, 0xdfcfae]));
+    world.block(
+        [-0.66, 0.6, 1.75],
+        [0.45, 0.0, -1.0],
+        UP,
+        [0.17, 0.42, 0.17],
+        paint(Blotches(0.1), [0x35566b, 0xa3b8ae]),
+    );
+    world.bar([0.86, 1.3, 2.1], [0.86, -0.32, 2.1], 0.13, paint(Rings(0.17), [0x5b6f3e, 0xb5ae76]));
+    world
+}
+
+/// A floor seen at a grazing angle, a plain wall that runs past the viewer, and pillars at the left border, of which
+/// the right view has but a part.
+fn steep() -> World {
+    use Pattern::{Blotches, Plain, Rings};
+    let mut world = World::new(18);
+    world.plane(
+        [0.0, 0.0, 5.0],
+        [0.75, 0.0, -1.0],
+        paint(Blotches(0.6), [0x8b7f98, 0xa9a389]).grain(0.16, 0.2),
+    );
+    let plaster = paint(Plain, [0xc9bfae, 0]).grain(0.006, 0.12);
+    world.plane([0.0, 0.0, 5.0], [-1.6, 0.0, -1.0], plaster);
+    // Its disparity grows by 0.75 pixels a row, as far as the labels go.
+    world.plane([0.0, 0.507, 1.02], [0.0, -1.0, 0.284], paint(Plain, [0x94805f, 0]).grain(0.2, 0.12));
+    world.bar(
+        [-0.99, 0.72, 1.55],
+        [-0.99, 0.22, 1.55],
+        0.086,
+        paint(Rings(0.19), [0xa8503c, 0xd8c4a0]).grain(0.14, 0.06),
+    );
+    world.bar([-0.95, 0.95, 2.2], [-1.23, -1.2, 2.0], 0.07, paint(Plain, [0x4f6b85, 0]).grain(0.14, 0.06));
+    world.bar([-0.42, 0.85, 1.9], [-0.42, -1.2, 1.9], 0.05, paint(Plain, [0x6d7a46, 0]).grain(0.14, 0.06));
+    world.bar(
+        [0.55, 0.85, 1.75],
+        [0.55, -0.3, 1.75],
+        0.09,
+        paint(Blotches(0.12), [0x3f4a6b, 0xc2a067]).grain(0.14, 0.06),
+    );
     world
 }
 
