@@ -177,7 +177,7 @@ fn sensors_that_differ_leave_their_mark() {
     }
 }
 
-/// What `light` is for: points of the wall differ by up to about eight levels, by more of them towards the sides.
+/// What `light` is for: points of the wall differ by some levels towards the sides, and by next to none between.
 #[test]
 fn the_fall_off_of_light_differs_by_some_levels() {
     let scene = SCENES.iter().find(|scene| scene.name == "light").unwrap();
