@@ -19,7 +19,7 @@ fn main() -> Result<()> {
     let folder =
         args.first().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata"), PathBuf::from);
     match args.get(1..).unwrap_or_default() {
-        [] => scenes::all().iter().try_for_each(|recipe| save(&recipe.render(), &folder)),
+        [] => scenes::ALL.iter().try_for_each(|recipe| save(&recipe.render(), &folder)),
         [name, size @ ..] if size.len() == 3 => {
             let numbers: std::result::Result<Vec<u32>, _> = size.iter().map(|n| n.parse()).collect();
             let Ok(&[width, height, labels]) = numbers.as_deref() else { return Err(usage()) };

@@ -11,7 +11,7 @@ use mrfgs::image::Plane;
 use scenes::Scene;
 
 static SCENES: LazyLock<Vec<Scene>> =
-    LazyLock::new(|| scenes::all().iter().map(scenes::Recipe::render).collect());
+    LazyLock::new(|| scenes::ALL.iter().map(scenes::Recipe::render).collect());
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
@@ -28,7 +28,13 @@ fn pfm(plane: &Plane<f32>) -> Vec<u8> {
 
 #[test]
 fn the_files_are_a_fresh_rendering() {
-    assert_eq!(SCENES.len(), 6);
+    let mut names: Vec<_> = SCENES.iter().map(|scene| scene.name.to_owned()).collect();
+    names.sort();
+    let mut folders: Vec<_> = fs::read_dir(folder("")).unwrap().map(Result::unwrap).collect();
+    folders.retain(|entry| entry.file_type().unwrap().is_dir());
+    let mut folders: Vec<_> = folders.iter().map(|entry| entry.file_name().into_string().unwrap()).collect();
+    folders.sort();
+    assert_eq!(names, folders, "every folder is a scene's, and every scene has one");
     for scene in SCENES.iter() {
         let (name, folder) = (scene.name, folder(scene.name));
         let (width, height) = scene.left.size();
@@ -75,7 +81,7 @@ fn the_truth_is_inside_the_labels() {
 
 #[test]
 fn any_size_will_do() {
-    for recipe in scenes::all() {
+    for recipe in scenes::ALL {
         for (width, height, labels) in [(1, 1, 2), (61, 47, 9), (7, 90, 64), (90, 30, 60), (24, 18, 36)] {
             let scene = scenes::render(recipe.name, width, height, labels);
             assert_eq!(scene.left.size(), (width, height));
@@ -91,9 +97,21 @@ fn share(marks: impl Iterator<Item = bool>) -> f64 {
     f64::from(marked as u32) / f64::from(all)
 }
 
+/// The level that the right sensor makes of the light which is `level` in the left view at (x, y), if it sees the
+/// point at `at`.
+fn as_right(scene: &Scene, level: u8, [x, at]: [f64; 2], y: usize) -> f32 {
+    let (size, y) = (scene.left.size(), y as f64);
+    let light = scene.sensors[0].light(f64::from(level), size, x, y);
+    scene.sensors[1].level(light, size, at, y) as f32
+}
+
 /// Mean absolute colour difference in grey levels between what is visible at the left and the right view `d`
-/// further left, the left view first sent through `exposure`.
-fn difference(scene: &Scene, d: impl Fn(usize, usize) -> f32, exposure: impl Fn(f32) -> f32) -> f32 {
+/// further left, the left view first sent through `expose` (level, columns of both views, row).
+fn difference(
+    scene: &Scene,
+    d: impl Fn(usize, usize) -> f32,
+    expose: impl Fn(u8, [f64; 2], usize) -> f32,
+) -> f32 {
     let (width, height) = scene.left.size();
     let (mut sum, mut count) = (0.0, 0);
     for y in 0..height {
@@ -103,7 +121,7 @@ fn difference(scene: &Scene, d: impl Fn(usize, usize) -> f32, exposure: impl Fn(
             let [near, far] = [x0, (x0 + 1).min(width - 1)].map(|x| scene.right[(x, y)]);
             for c in 0..3 {
                 let right = f32::from(near[c]) * (1.0 - part) + f32::from(far[c]) * part;
-                sum += f64::from((exposure(f32::from(scene.left[(x, y)][c])) - right).abs());
+                sum += f64::from((expose(scene.left[(x, y)][c], [x as f64, f64::from(at)], y) - right).abs());
             }
             count += 3;
         }
@@ -114,7 +132,7 @@ fn difference(scene: &Scene, d: impl Fn(usize, usize) -> f32, exposure: impl Fn(
 #[test]
 fn visible_points_look_alike_in_both_views() {
     for scene in SCENES.iter() {
-        let exposure = |level: f32| if scene.name == "exposure" { 0.72 * level + 14.0 } else { level };
+        let exposure = |level, columns, y| as_right(scene, level, columns, y);
         let (width, height) = scene.left.size();
         let truth = difference(scene, |x, y| scene.truth[(x, y)], exposure);
         // The controls: one and a half labels off, mirrored, and the other sign.
@@ -138,6 +156,40 @@ fn only_the_scene_of_that_name_differs_in_exposure() {
         });
         assert_eq!((means[0] - means[1]).abs() > 8.0, scene.name == "exposure", "{}: {means:?}", scene.name);
     }
+}
+
+#[test]
+fn sensors_that_differ_leave_their_mark() {
+    for scene in SCENES.iter() {
+        let truth = |x: usize, y: usize| scene.truth[(x, y)];
+        let as_seen = difference(scene, truth, |level, _, _| f32::from(level));
+        let undone = difference(scene, truth, |level, columns, y| as_right(scene, level, columns, y));
+        println!("{}: {as_seen:.2} as seen, {undone:.2} with the sensors' difference undone", scene.name);
+        let [left, right] = scene.sensors;
+        let same = (left.gain, left.offset, left.fall_off, left.brightest)
+            == (right.gain, right.offset, right.fall_off, right.brightest);
+        assert_eq!(same, !["exposure", "light"].contains(&scene.name), "{}", scene.name);
+        if same {
+            assert!((as_seen - undone).abs() < 1e-3, "{}: {as_seen} and {undone}", scene.name);
+        } else {
+            assert!(as_seen > 2.0 * undone, "{}: {as_seen} and {undone}", scene.name);
+        }
+    }
+}
+
+/// What `light` is for: points of the wall differ by some levels towards the sides, and by next to none between.
+#[test]
+fn the_fall_off_of_light_differs_by_some_levels() {
+    let scene = SCENES.iter().find(|scene| scene.name == "light").unwrap();
+    let (width, height) = scene.left.size();
+    let at = |x: usize, y: usize| {
+        let level = scene.left[(x, y)][1];
+        let d = f64::from(scene.truth[(x, y)]);
+        as_right(scene, level, [x as f64, x as f64 - d], y) - f32::from(level)
+    };
+    let [left, middle, right] = [20, width / 2, width - 5].map(|x| at(x, height / 4));
+    println!("{left:.1}, {middle:.1}, {right:.1} levels from left to right");
+    assert!((4.0..10.0).contains(&left) && middle.abs() < 3.0 && (-10.0..-4.0).contains(&right));
 }
 
 #[test]
