@@ -9,6 +9,7 @@
 use crate::image::{Image, Pixel, Plane};
 use crate::plan::{GRAPH_WINDOW, Plan};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The code of a slot that no pixel fills: a neighbour outside the image, masked, or simply not there.
 pub const NO_MEMBER: u8 = u8::MAX;
@@ -180,45 +181,109 @@ pub fn colour_distance(a: &Pixel, b: &Pixel) -> u32 {
 
 fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let (width, height) = image.pixels.size();
-    // By distance, then in raster order: a stable choice of the smallest keys breaks ties as promised.
+    // By distance, then in raster order: of equal keys the first one found stays, which breaks ties as promised.
     let mut window: Vec<(i32, i32)> =
         (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8).map(offset).filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
+    // Channel by channel, and row by row below: a row at once is a vector.
+    let channels = [0, 1, 2].map(|c| image.pixels.map(|pixel| pixel[c]));
+    let masked = image.masked.map(|&masked| if masked { NO_KEY } else { 0 });
     let mut codes = vec![NO_MEMBER; width * height * neighbours];
     if neighbours > 0 {
-        codes.par_chunks_mut(width * neighbours).enumerate().for_each(|(y, row)| {
-            let mut candidates: Vec<(u64, u8)> = Vec::with_capacity(window.len());
-            for (x, out) in row.chunks_exact_mut(neighbours).enumerate() {
-                if image.masked[(x, y)] {
-                    continue;
-                }
-                let centre = &image.pixels[(x, y)];
-                candidates.clear();
-                for (order, &(dx, dy)) in window.iter().enumerate() {
-                    let (nx, ny) = (x as i32 + dx, y as i32 + dy);
-                    if nx < 0 || ny < 0 || nx >= width as i32 || ny >= height as i32 {
+        codes.par_chunks_mut(width * neighbours).enumerate().for_each_init(
+            || Chosen::new(width, neighbours),
+            |chosen, (y, row)| {
+                chosen.clear();
+                let centre = channels.each_ref().map(|channel| channel.row(y));
+                for &(dx, dy) in &window {
+                    let ny = y as i32 + dy;
+                    let (first, end) = ((-dx).max(0) as usize, width as i32 - dx.max(0));
+                    if ny < 0 || ny >= height as i32 || first as i32 >= end {
                         continue;
                     }
-                    let at = (nx as usize, ny as usize);
-                    if image.masked[at] {
-                        continue;
+                    let (seen, to) = (first..end as usize, (first as i32 + dx) as usize);
+                    let there = to..to + seen.len();
+                    let other = channels.each_ref().map(|channel| &channel.row(ny as usize)[there.clone()]);
+                    let distance = (weight * (dx * dx + dy * dy) as u32) as i32;
+                    let keys = &mut chosen.key[seen.clone()];
+                    keys.fill(distance);
+                    for (here, other) in centre.iter().zip(other) {
+                        for (key, (&a, &b)) in keys.iter_mut().zip(here[seen.clone()].iter().zip(other)) {
+                            let difference = i32::from(a.abs_diff(b) >> 4);
+                            *key += difference * difference;
+                        }
                     }
-                    let key =
-                        colour_distance(centre, &image.pixels[at]) + weight * (dx * dx + dy * dy) as u32;
-                    candidates.push((u64::from(key) << 8 | order as u64, code(dx, dy)));
+                    for (key, masked) in keys.iter_mut().zip(&masked.row(ny as usize)[there]) {
+                        *key |= masked;
+                    }
+                    chosen.offer(seen, code(dx, dy));
                 }
-                if candidates.len() > neighbours {
-                    candidates.select_nth_unstable(neighbours - 1);
-                    candidates.truncate(neighbours);
+                for (x, out) in row.chunks_exact_mut(neighbours).enumerate() {
+                    if !image.masked[(x, y)] {
+                        for (slot, out) in out.iter_mut().enumerate() {
+                            *out = chosen.codes[slot * width + x] as u8;
+                        }
+                    }
                 }
-                candidates.sort_unstable();
-                for (slot, &(_, code)) in out.iter_mut().zip(&candidates) {
-                    *slot = code;
-                }
-            }
-        });
+            },
+        );
     }
     LevelGraph::new(width, height, neighbours, codes)
+}
+
+/// The key of what is no neighbour; every other one is below it.
+const NO_KEY: i32 = i32::MAX;
+
+/// The neighbours with the smallest keys so far of all pixels of a row, \[slot\]\[x\], ascending.
+struct Chosen {
+    keys: Vec<i32>,
+    codes: Vec<i32>,
+    /// Key and code on offer to each pixel.
+    key: Vec<i32>,
+    code: Vec<i32>,
+    /// 1 where what is on offer has been in the slot before: then it goes before an equal key.
+    moved: Vec<i32>,
+}
+
+impl Chosen {
+    fn new(width: usize, neighbours: usize) -> Self {
+        Self {
+            keys: vec![NO_KEY; width * neighbours],
+            codes: vec![NO_MEMBER.into(); width * neighbours],
+            key: vec![0; width],
+            code: vec![0; width],
+            moved: vec![0; width],
+        }
+    }
+
+    fn clear(&mut self) {
+        self.keys.fill(NO_KEY);
+        self.codes.fill(NO_MEMBER.into());
+    }
+
+    /// Offers the neighbour `code`, by the keys on offer, to the pixels `seen`: it takes the place of the first one with a
+    /// larger key, that one the place of the next, and so on.
+    fn offer(&mut self, seen: Range<usize>, code: u8) {
+        let width = self.key.len();
+        let (offered, carried) = (&mut self.key[seen.clone()], &mut self.code[seen.clone()]);
+        let moved = &mut self.moved[seen.clone()];
+        carried.fill(code.into());
+        moved.fill(0);
+        let slots = self.keys.chunks_exact_mut(width).zip(self.codes.chunks_exact_mut(width));
+        for (keys, codes) in slots {
+            let held = keys[seen.clone()].iter_mut().zip(&mut codes[seen.clone()]);
+            let offer = offered.iter_mut().zip(carried.iter_mut()).zip(moved.iter_mut());
+            for ((held, held_code), ((key, code), moved)) in held.zip(offer) {
+                let smaller = *key - *moved < *held;
+                let (old, old_code) = (*held, *held_code);
+                *held = if smaller { *key } else { old };
+                *held_code = if smaller { *code } else { old_code };
+                *key = if smaller { old } else { *key };
+                *code = if smaller { old_code } else { *code };
+                *moved = i32::from(smaller);
+            }
+        }
+    }
 }
 
 /// The next coarser image: 5 x 5 binomial low-pass over the unmasked pixels, every second pixel. A coarse pixel

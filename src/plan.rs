@@ -33,6 +33,8 @@ pub const CENSUS_PLACES: u32 = 63;
 pub const COST_FRACTION_BITS: u32 = 8;
 /// Fractional bits of [`EvidenceScale::multiplier`].
 pub const EVIDENCE_BITS: u32 = 22;
+/// Stands for infinity in 16-bit sums over a resolution factor, which has five members at most.
+pub const NARROW_INFINITE: u32 = u16::MAX as u32 / 5;
 /// Side of the window that holds a dependency factor's members.
 pub const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
@@ -223,7 +225,9 @@ impl Plan {
             + 2 * u32::from(resolution.tau);
         // A pixel's padding labels count as labels with evidence 255.
         let sum_bound = (neighbours + 1) as u32 * (belief_bound + 255);
-        let narrow = dependency.tau.max(resolution.tau) <= 255 && u16::try_from(sum_bound).is_ok();
+        let narrow = dependency.tau.max(resolution.tau) <= 255
+            && u16::try_from(sum_bound).is_ok()
+            && 5 * belief_bound + u32::from(resolution.tau) < NARROW_INFINITE;
 
         let last = levels.len() - 1;
         let phases = match method.schedule {

@@ -19,35 +19,94 @@ fn difference(a: Pixel, b: Pixel) -> u32 {
     (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum()
 }
 
+/// A row of the right image from right to left, so that ascending labels are side by side.
+struct Reversed {
+    channels: [Vec<u16>; 3],
+    census: Vec<u64>,
+    masked: Vec<bool>,
+    /// Census bits that differ, by label.
+    bits: Vec<u8>,
+}
+
+impl Reversed {
+    fn new(width: usize, labels: usize) -> Self {
+        Self {
+            channels: [0, 1, 2].map(|_| vec![0; width]),
+            census: vec![0; width],
+            masked: vec![false; width],
+            bits: vec![0; labels],
+        }
+    }
+
+    fn fill(&mut self, pixels: &[Pixel], census: &[u64], masked: &[bool]) {
+        for (c, channel) in self.channels.iter_mut().enumerate() {
+            for (out, pixel) in channel.iter_mut().zip(pixels.iter().rev()) {
+                *out = pixel[c];
+            }
+        }
+        self.census.iter_mut().zip(census.iter().rev()).for_each(|(out, &c)| *out = c);
+        self.masked.iter_mut().zip(masked.iter().rev()).for_each(|(out, &m)| *out = m);
+    }
+}
+
 fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
     let (left, right) = (pair.left(), pair.right());
     let (left_census, right_census) = (census_bits(left), census_bits(right));
     let width = level.width;
-    out.par_chunks_mut(width * level.stride).enumerate().for_each(|(y, row)| {
-        let (lp, rp) = (left.pixels.row(y), right.pixels.row(y));
-        let (lm, rm) = (left.masked.row(y), right.masked.row(y));
-        let (lc, rc) = (&left_census[y * width..][..width], &right_census[y * width..][..width]);
-        for (x, costs) in row.chunks_exact_mut(level.stride).enumerate() {
-            costs.fill(plan.outside_cost);
-            if lm[x] {
-                continue;
-            }
-            let weight = if plan.colour_weight == 0 { 0 } else { colour_weight(plan, left, x, y) };
-            // x - d is inside for first <= label index < end.
-            let first = (x as i64 - (width as i64 - 1) - i64::from(level.min)).max(0);
-            let end = (x as i64 - i64::from(level.min) + 1).min(level.labels as i64);
-            for j in first..end {
-                let xr = (x as i64 - i64::from(level.min) - j) as usize;
-                if !rm[xr] {
-                    let bits = (lc[x] ^ rc[xr]).count_ones().min(CENSUS_BITS);
-                    let colour = (difference(lp[x], rp[xr]) >> 8).min(COLOUR_MOST);
-                    let cost = CENSUS_BIT_COST * bits + (weight * colour + COLOUR_MOST / 2) / COLOUR_MOST;
-                    costs[j as usize] = cost as u8;
+    out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
+        || Reversed::new(width, level.labels),
+        |reversed, (y, row)| {
+            let of_row = y * width..(y + 1) * width;
+            reversed.fill(right.pixels.row(y), &right_census[of_row.clone()], right.masked.row(y));
+            let (pixels, census) = (left.pixels.row(y), &left_census[of_row]);
+            for (x, costs) in row.chunks_exact_mut(level.stride).enumerate() {
+                costs.fill(plan.outside_cost);
+                // x - d is inside for first <= label index < end.
+                let first = (x as i64 - (width as i64 - 1) - i64::from(level.min)).max(0);
+                let end = (x as i64 - i64::from(level.min) + 1).min(level.labels as i64);
+                if left.masked[(x, y)] || first >= end {
+                    continue;
                 }
+                let weight = if plan.colour_weight == 0 { 0 } else { colour_weight(plan, left, x, y) };
+                let start = (width as i64 - 1 - x as i64 + i64::from(level.min) + first) as usize;
+                let costs = &mut costs[first as usize..end as usize];
+                pixel_costs(pixels[x], census[x], weight, reversed, start, plan.outside_cost, costs);
             }
+        },
+    );
+}
+
+/// The costs of a left pixel against those of the right row from `start` on.
+fn pixel_costs(
+    pixel: Pixel,
+    census: u64,
+    weight: u32,
+    right: &mut Reversed,
+    start: usize,
+    outside: u8,
+    costs: &mut [u8],
+) {
+    let seen = start..start + costs.len();
+    let bits = &mut right.bits[..costs.len()];
+    for (bits, other) in bits.iter_mut().zip(&right.census[seen.clone()]) {
+        *bits = (census ^ other).count_ones() as u8;
+    }
+    for (cost, bits) in costs.iter_mut().zip(bits.iter()) {
+        *cost = CENSUS_BIT_COST as u8 * (*bits).min(CENSUS_BITS as u8);
+    }
+    if weight > 0 {
+        let [r, g, b] = right.channels.each_ref().map(|channel| &channel[seen.clone()]);
+        for (cost, ((&r, &g), &b)) in costs.iter_mut().zip(r.iter().zip(g).zip(b)) {
+            let apart = |a: u16, b: u16| u32::from(a.abs_diff(b));
+            let sum = apart(pixel[0], r) + apart(pixel[1], g) + apart(pixel[2], b);
+            let colour = (sum >> 8).min(COLOUR_MOST);
+            *cost += ((weight * colour + COLOUR_MOST / 2) / COLOUR_MOST) as u8;
         }
-    });
+    }
+    for (cost, &masked) in costs.iter_mut().zip(&right.masked[seen]) {
+        *cost = if masked { outside } else { *cost };
+    }
 }
 
 /// How much colour counts at a pixel: by the variance of grey around it.

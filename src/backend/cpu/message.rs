@@ -1,5 +1,6 @@
 //! The two storage widths of messages.
 
+use crate::plan::NARROW_INFINITE;
 use std::ops::{Add, Sub};
 
 /// A stored message value.
@@ -15,6 +16,9 @@ pub(super) trait Message: Copy + Default + Send + Sync + Into<u32> + Into<u16> {
         + Add<Output = Self::Sum>
         + Sub<Output = Self::Sum>;
 
+    /// Stands for "agrees with no label" in resolution factors: above every finite sum, and five of them fit a sum.
+    const INFINITE: Self::Sum;
+
     /// A value that is known to fit.
     fn from_sum(sum: Self::Sum) -> Self;
 
@@ -27,6 +31,8 @@ pub(super) trait Message: Copy + Default + Send + Sync + Into<u32> + Into<u16> {
 
 impl Message for u8 {
     type Sum = u16;
+
+    const INFINITE: u16 = NARROW_INFINITE as u16;
 
     fn from_sum(sum: u16) -> Self {
         sum as Self
@@ -43,6 +49,8 @@ impl Message for u8 {
 
 impl Message for u16 {
     type Sum = u32;
+
+    const INFINITE: u32 = 1 << 20;
 
     fn from_sum(sum: u32) -> Self {
         sum as Self
