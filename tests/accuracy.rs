@@ -46,6 +46,8 @@ fn rendered_scenes() {
         ("repetitive", 0.27, 0.9, 10.4),
         ("exposure", 0.23, 1.0, 9.0),
         ("mixed", 0.38, 3.4, 16.5),
+        ("light", 0.55, 4.0, 21.0),
+        ("steep", 0.45, 3.6, 17.5),
     ];
     for (scene, avg, bad2, bad05) in floors {
         let folder = Path::new("testdata").join(scene);
@@ -57,6 +59,19 @@ fn rendered_scenes() {
         let whole = report(&folder, &rounded(&matched)).all;
         assert!(all.bad[0] < whole.bad[0], "{scene}: {} against {}", all.bad[0], whole.bad[0]);
     }
+}
+
+/// On a plain wall in uneven light, colour misleads unless it counts by contrast.
+#[test]
+fn colour_counts_where_there_is_contrast() {
+    let folder = Path::new("testdata/light");
+    let bad2 = |colour_contrast| {
+        let mut method = Method::default();
+        method.colour_contrast = colour_contrast;
+        report(folder, &matched(folder, &method).maps.final_map()).all.bad[2]
+    };
+    let (weighed, in_full) = (bad2(Method::default().colour_contrast), bad2(0.0));
+    assert!(in_full > 1.5 * weighed, "{in_full} against {weighed}");
 }
 
 #[test]
