@@ -36,7 +36,7 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
         ("belief", vec![Stage::Belief(0)]),
         ("estimate", vec![Stage::Estimate, Stage::RightView, Stage::SubPixel]),
         ("region filter", vec![Stage::Visibility, Stage::RegionFilter]),
-        ("fill", vec![Stage::Fill]),
+        ("fill", vec![Stage::Fill, Stage::FillMedian]),
         ("median", vec![Stage::Median]),
     ]
 }

@@ -22,7 +22,7 @@ fn difference(a: Pixel, b: Pixel) -> u32 {
 /// A row of the right image from right to left, so that ascending labels are side by side.
 struct Reversed {
     channels: [Vec<u16>; 3],
-    census: Vec<u64>,
+    census: Vec<[u32; 2]>,
     masked: Vec<bool>,
     /// Census bits that differ, by label.
     bits: Vec<u8>,
@@ -32,13 +32,13 @@ impl Reversed {
     fn new(width: usize, labels: usize) -> Self {
         Self {
             channels: [0, 1, 2].map(|_| vec![0; width]),
-            census: vec![0; width],
+            census: vec![[0; 2]; width],
             masked: vec![false; width],
             bits: vec![0; labels],
         }
     }
 
-    fn fill(&mut self, pixels: &[Pixel], census: &[u64], masked: &[bool]) {
+    fn fill(&mut self, pixels: &[Pixel], census: &[[u32; 2]], masked: &[bool]) {
         for (c, channel) in self.channels.iter_mut().enumerate() {
             for (out, pixel) in channel.iter_mut().zip(pixels.iter().rev()) {
                 *out = pixel[c];
@@ -55,8 +55,9 @@ fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let (left_census, right_census) = (census_bits(left), census_bits(right));
     let width = level.width;
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
-        || Reversed::new(width, level.labels),
-        |reversed, (y, row)| {
+        || (Reversed::new(width, level.labels), vec![0; width]),
+        |(reversed, weights), (y, row)| {
+            colour_weights(plan, left, y, weights);
             let of_row = y * width..(y + 1) * width;
             reversed.fill(right.pixels.row(y), &right_census[of_row.clone()], right.masked.row(y));
             let (pixels, census) = (left.pixels.row(y), &left_census[of_row]);
@@ -68,10 +69,9 @@ fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
                 if left.masked[(x, y)] || first >= end {
                     continue;
                 }
-                let weight = if plan.colour_weight == 0 { 0 } else { colour_weight(plan, left, x, y) };
                 let start = (width as i64 - 1 - x as i64 + i64::from(level.min) + first) as usize;
                 let costs = &mut costs[first as usize..end as usize];
-                pixel_costs(pixels[x], census[x], weight, reversed, start, plan.outside_cost, costs);
+                pixel_costs(pixels[x], census[x], weights[x], reversed, start, plan.outside_cost, costs);
             }
         },
     );
@@ -80,7 +80,7 @@ fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
 /// The costs of a left pixel against those of the right row from `start` on.
 fn pixel_costs(
     pixel: Pixel,
-    census: u64,
+    census: [u32; 2],
     weight: u32,
     right: &mut Reversed,
     start: usize,
@@ -90,7 +90,7 @@ fn pixel_costs(
     let seen = start..start + costs.len();
     let bits = &mut right.bits[..costs.len()];
     for (bits, other) in bits.iter_mut().zip(&right.census[seen.clone()]) {
-        *bits = (census ^ other).count_ones() as u8;
+        *bits = ((census[0] ^ other[0]).count_ones() + (census[1] ^ other[1]).count_ones()) as u8;
     }
     for (cost, bits) in costs.iter_mut().zip(bits.iter()) {
         *cost = CENSUS_BIT_COST as u8 * (*bits).min(CENSUS_BITS as u8);
@@ -109,53 +109,82 @@ fn pixel_costs(
     }
 }
 
-/// How much colour counts at a pixel: by the variance of grey around it.
-fn colour_weight(plan: &Plan, image: &Image, x: usize, y: usize) -> u32 {
-    let most = plan.colour_variance;
-    if most == 0 {
-        return plan.colour_weight;
-    }
-    let (width, height) = image.pixels.size();
-    let grey = |x: usize, y: usize| u32::from(image.pixels[(x, y)][3] >> 8);
-    let centre = grey(x, y);
-    let (mut sum, mut squares) = (0, 0);
+/// Calls `see` with every place (dx, dy) of the window around the pixels of row `y`, and what `value` is there for each of
+/// them, places clamped to the image: a row at once is a vector.
+fn around<T: Copy>(
+    (width, height): (usize, usize),
+    y: usize,
+    value: impl Fn(usize, usize) -> T,
+    mut see: impl FnMut(isize, isize, &[T]),
+) {
+    let clamp = |v: isize, size: usize| v.clamp(0, size as isize - 1) as usize;
+    let mut padded = Vec::with_capacity(width + 2 * CENSUS_X as usize);
     for dy in -CENSUS_Y..=CENSUS_Y {
         let ny = clamp(y as isize + dy, height);
+        padded.clear();
+        padded.extend((-CENSUS_X..width as isize + CENSUS_X).map(|x| value(clamp(x, width), ny)));
         for dx in -CENSUS_X..=CENSUS_X {
-            let nx = clamp(x as isize + dx, width);
-            let g = if image.masked[(nx, ny)] { centre } else { grey(nx, ny) };
-            sum += g;
-            squares += g * g;
+            see(dx, dy, &padded[(dx + CENSUS_X) as usize..][..width]);
         }
     }
-    plan.colour_weight * (CENSUS_PLACES * squares - sum * sum).min(most) / most
 }
 
-fn clamp(v: isize, size: usize) -> usize {
-    v.clamp(0, size as isize - 1) as usize
-}
-
-/// The census of every pixel: a bit for each other place of the window in raster order.
-fn census_bits(image: &Image) -> Vec<u64> {
+/// The census of every pixel: a bit for each other place of the window, those before the pixel and those after it in
+/// halves of their own.
+fn census_bits(image: &Image) -> Vec<[u32; 2]> {
     let (width, height) = image.pixels.size();
     // A masked pixel is below nobody.
     let grey = |x: usize, y: usize| if image.masked[(x, y)] { u16::MAX } else { image.pixels[(x, y)][3] };
-    let mut out = vec![0; width * height];
-    out.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        for (x, bits) in row.iter_mut().enumerate() {
-            let centre = image.pixels[(x, y)][3];
-            for dy in -CENSUS_Y..=CENSUS_Y {
-                let ny = clamp(y as isize + dy, height);
-                for dx in -CENSUS_X..=CENSUS_X {
-                    if (dx, dy) != (0, 0) {
-                        let below = grey(clamp(x as isize + dx, width), ny) < centre;
-                        *bits = *bits << 1 | u64::from(below);
+    let mut out = vec![[0; 2]; width * height];
+    out.par_chunks_mut(width).enumerate().for_each_init(
+        || [vec![0u32; width], vec![0u32; width], vec![0u32; width]],
+        |[centre, before, after], (y, row)| {
+            for ((centre, pixel), sums) in
+                centre.iter_mut().zip(image.pixels.row(y)).zip(before.iter_mut().zip(after.iter_mut()))
+            {
+                *centre = pixel[3].into();
+                (*sums.0, *sums.1) = (0, 0);
+            }
+            around((width, height), y, grey, |dx, dy, greys| {
+                let bits = if (dy, dx) < (0, 0) { &mut *before } else { &mut *after };
+                if (dy, dx) != (0, 0) {
+                    for ((bits, &grey), &centre) in bits.iter_mut().zip(greys).zip(centre.iter()) {
+                        *bits = *bits << 1 | u32::from(u32::from(grey) < centre);
                     }
                 }
+            });
+            for (bits, (&before, &after)) in row.iter_mut().zip(before.iter().zip(after.iter())) {
+                *bits = [before, after];
             }
+        },
+    );
+    out
+}
+
+/// How much colour counts at each pixel of row `y`: by the variance of grey around it.
+fn colour_weights(plan: &Plan, image: &Image, y: usize, weights: &mut [u32]) {
+    let most = plan.colour_variance;
+    if plan.colour_weight == 0 || most == 0 {
+        weights.fill(plan.colour_weight);
+        return;
+    }
+    let width = weights.len();
+    let masked_grey = |x: usize, y: usize| {
+        (u32::from(image.pixels[(x, y)][3] >> 8), if image.masked[(x, y)] { u32::MAX } else { 0 })
+    };
+    let (mut sums, mut squares) = (vec![0; width], vec![0; width]);
+    let centre: Vec<u32> = image.pixels.row(y).iter().map(|pixel| u32::from(pixel[3] >> 8)).collect();
+    around(image.pixels.size(), y, masked_grey, |_, _, greys| {
+        let here = sums.iter_mut().zip(squares.iter_mut()).zip(&centre);
+        for (((sum, square), &centre), &(grey, masked)) in here.zip(greys) {
+            let grey = grey & !masked | centre & masked;
+            *sum += grey;
+            *square += grey * grey;
         }
     });
-    out
+    for (weight, (sum, square)) in weights.iter_mut().zip(sums.into_iter().zip(squares)) {
+        *weight = plan.colour_weight * (CENSUS_PLACES * square - sum * sum).min(most) / most;
+    }
 }
 
 fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {

@@ -69,6 +69,9 @@ fn smooth(weights: &MedianWeights, touched: impl Fn(u8) -> bool + Sync, guide: &
     *disparity = out;
 }
 
+/// How near to what it replaces a median mostly is, in 1/256 px.
+const NEAR: i32 = 64;
+
 /// Values and weights of a window. What has no disparity has no weight.
 struct Window {
     values: Vec<i32>,
@@ -119,13 +122,21 @@ impl Window {
         );
     }
 
-    /// The smallest value at which half of the weight is reached, `centre` being one of them.
-    fn median(&self, centre: i32) -> i32 {
+    /// The smallest value at which half of the weight is reached. It is sought near `guess` first.
+    fn median(&self, guess: i32) -> i32 {
         let weighted = || self.values.iter().zip(&self.weights);
         let total: u32 = self.weights.iter().sum();
-        let of = |value: i32, weight: u32| if weight > 0 { value } else { centre };
-        let mut low = weighted().map(|(&v, &w)| of(v, w)).min().unwrap_or(centre);
-        let mut high = weighted().map(|(&v, &w)| of(v, w)).max().unwrap_or(centre);
+        let [mut low, mut high] = [guess - NEAR, guess + NEAR];
+        let [below_low, below_high] = weighted().fold([0, 0], |[first, second], (&v, &w)| {
+            [first + if v <= low { w } else { 0 }, second + if v <= high { w } else { 0 }]
+        });
+        if 2 * below_low >= total {
+            (low, high) = (self.values.iter().copied().min().unwrap_or(guess), low);
+        } else if 2 * below_high >= total {
+            low += 1;
+        } else {
+            (low, high) = (high + 1, self.values.iter().copied().max().unwrap_or(guess));
+        }
         // Bisection needs no sort.
         while low < high {
             let middle = low + (high - low) / 2;
