@@ -24,17 +24,14 @@ struct Reversed {
     channels: [Vec<u16>; 3],
     census: Vec<[u32; 2]>,
     masked: Vec<bool>,
-    /// Census bits that differ, by label.
-    bits: Vec<u8>,
 }
 
 impl Reversed {
-    fn new(width: usize, labels: usize) -> Self {
+    fn new(width: usize) -> Self {
         Self {
             channels: [0, 1, 2].map(|_| vec![0; width]),
             census: vec![[0; 2]; width],
             masked: vec![false; width],
-            bits: vec![0; labels],
         }
     }
 
@@ -55,7 +52,7 @@ fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let (left_census, right_census) = (census_bits(left), census_bits(right));
     let width = level.width;
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
-        || (Reversed::new(width, level.labels), vec![0; width]),
+        || (Reversed::new(width), vec![0; width]),
         |(reversed, weights), (y, row)| {
             colour_weights(plan, left, y, weights);
             let of_row = y * width..(y + 1) * width;
@@ -82,18 +79,15 @@ fn pixel_costs(
     pixel: Pixel,
     census: [u32; 2],
     weight: u32,
-    right: &mut Reversed,
+    right: &Reversed,
     start: usize,
     outside: u8,
     costs: &mut [u8],
 ) {
     let seen = start..start + costs.len();
-    let bits = &mut right.bits[..costs.len()];
-    for (bits, other) in bits.iter_mut().zip(&right.census[seen.clone()]) {
-        *bits = ((census[0] ^ other[0]).count_ones() + (census[1] ^ other[1]).count_ones()) as u8;
-    }
-    for (cost, bits) in costs.iter_mut().zip(bits.iter()) {
-        *cost = CENSUS_BIT_COST as u8 * (*bits).min(CENSUS_BITS as u8);
+    for (cost, other) in costs.iter_mut().zip(&right.census[seen.clone()]) {
+        let bits = (census[0] ^ other[0]).count_ones() + (census[1] ^ other[1]).count_ones();
+        *cost = (CENSUS_BIT_COST * bits.min(CENSUS_BITS)) as u8;
     }
     if weight > 0 {
         let [r, g, b] = right.channels.each_ref().map(|channel| &channel[seen.clone()]);
