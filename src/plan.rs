@@ -164,10 +164,6 @@ pub struct Plan {
     pub neighbours: usize,
     /// Cost of labels outside the right image, in cost units of level 0.
     pub outside_cost: u8,
-    /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
-    pub colour_weight: u32,
-    /// Squared [`CENSUS_PLACES`] times the variance of grey, in squared 8-bit levels, from which on colour counts in full.
-    pub colour_variance: u32,
     /// Cut of dependency messages.
     pub dependency: Cut,
     /// Cut of resolution messages.
@@ -242,11 +238,6 @@ impl Plan {
         };
         Ok(Self {
             outside_cost: (method.outside_cost * cost_units + 0.5).floor() as u8,
-            colour_weight: if method.cost == Cost::AdCensus { COLOUR_WEIGHT } else { 0 },
-            colour_variance: (f64::from(CENSUS_PLACES * CENSUS_PLACES)
-                * (method.colour_contrast * method.colour_contrast)
-                + 0.5)
-                .floor() as u32,
             range,
             levels,
             neighbours,
@@ -283,6 +274,19 @@ impl Plan {
     #[must_use]
     pub fn restricted(&self) -> bool {
         self.method.support > 0.0
+    }
+
+    /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
+    #[must_use]
+    pub fn colour_weight(&self) -> u32 {
+        if self.method.cost == Cost::AdCensus { COLOUR_WEIGHT } else { 0 }
+    }
+
+    /// Squared [`CENSUS_PLACES`] times the variance of grey, in squared 8-bit levels, from which on colour counts in full.
+    #[must_use]
+    pub fn colour_variance(&self) -> u32 {
+        let contrast = self.method.colour_contrast;
+        (f64::from(CENSUS_PLACES * CENSUS_PLACES) * (contrast * contrast) + 0.5).floor() as u32
     }
 
     /// Whether the pyramid takes the minimum over d instead of the low-pass.

@@ -115,10 +115,10 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
     }
     let level = fields!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch,
         pixel_pitch, starts_pitch);
-    let params = fields!(Params: level, fine, first_row, rows, row_groups, grid, outside_cost, colour_weight, colour_variance, sad_radius,
-        label_offset, evidence_multiplier, evidence_limit, evidence_cap, tau, sub_pixel, visibility, median_all,
-        region_size, confidence_floor, halo, span, first_column, columns, source_first_row, source_rows,
-        median_radius, median_step_bits, median_shift);
+    let params = fields!(Params: level, fine, first_row, rows, row_groups, grid, outside_cost, colour_weight,
+        colour_variance, sad_radius, label_offset, evidence_multiplier, evidence_limit, evidence_cap, tau, sub_pixel,
+        visibility, median_all, region_size, confidence_floor, halo, span, first_column, columns, source_first_row,
+        source_rows, median_radius, median_step_bits, median_shift);
     for_every_shader(|_, module, _| {
         let expected =
             [("Level", &level, size_of::<LevelParams>()), ("Params", &params, size_of::<Params>())];

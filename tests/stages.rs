@@ -14,7 +14,7 @@ use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::{Pair, Plane};
 use mrfgs::options::{Cost, Method, PRESETS, Potential, Pyramid, Resolution, Schedule};
-use mrfgs::plan::{COLOUR_WEIGHT, COST_MAX, CutRule, MessageWidth, Plan};
+use mrfgs::plan::{COST_MAX, CutRule, MessageWidth, Plan};
 use mrfgs::solver;
 use std::collections::HashSet;
 
@@ -156,7 +156,6 @@ fn cost() {
         for cost in [Cost::Sad, Cost::Census, Cost::AdCensus] {
             let mut plan = case.plan.clone();
             plan.method.cost = cost;
-            plan.colour_weight = if cost == Cost::AdCensus { COLOUR_WEIGHT } else { 0 };
             backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();
             let poison: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, 255)).collect();
             backend.write(Volume::Cost(0), &poison).unwrap();

@@ -8,7 +8,7 @@ use mrfgs::options::Method;
 use serde::Serialize;
 
 use super::evaluate::Findings;
-use super::tables::{Each, entries};
+use super::tables::{Each, entries, figure};
 
 /// A change to the default preset: its name, and the keys with their values.
 pub(super) type Row = (&'static str, &'static [(&'static str, &'static str)]);
@@ -108,12 +108,9 @@ impl Ablations {
         };
         line("", "changes", ["avg", "b0.5%", "b2%", "change%", "time"].map(String::from));
         for row in &self.rows {
-            let number = |value: Option<f64>, decimals: usize| {
-                value.map_or_else(|| "-".into(), |v| format!("{v:.decimals$}"))
-            };
             let change = row.change.map_or_else(|| "-".into(), |v| format!("{v:+.1}"));
             let figures =
-                [number(row.avg, 3), number(row.bad05, 2), number(row.bad2, 2), change, number(row.time, 2)];
+                [figure(row.avg, 3), figure(row.bad05, 2), figure(row.bad2, 2), change, figure(row.time, 2)];
             line(row.name, &changes(row), figures);
         }
         out
@@ -122,18 +119,18 @@ impl Ablations {
 
 impl Outcome {
     fn new(row: &Row, findings: &Findings, default: &Findings) -> Self {
-        let figure = |of: &Findings, value: fn(&Metrics) -> Option<f64>| {
+        let mean = |of: &Findings, value: fn(&Metrics) -> Option<f64>| {
             of.mean.finished.as_ref().and_then(|report| value(&report.all))
         };
         let ratio = |part: Option<f64>, whole: Option<f64>| Some(part? / whole.filter(|&w| w > 0.0)?);
         let seconds = |of: &Findings| of.pairs.iter().map(|pair| pair.seconds).sum::<Option<f64>>();
-        let bad2 = figure(findings, |m| Some(m.bad[2]));
-        let to_default = ratio(bad2, figure(default, |m| Some(m.bad[2])));
+        let bad2 = mean(findings, |m| Some(m.bad[2]));
+        let to_default = ratio(bad2, mean(default, |m| Some(m.bad[2])));
         Self {
             name: row.0,
             changes: row.1.to_vec(),
-            avg: figure(findings, |m| m.avg),
-            bad05: figure(findings, |m| Some(m.bad[0])),
+            avg: mean(findings, |m| m.avg),
+            bad05: mean(findings, |m| Some(m.bad[0])),
             bad2,
             change: to_default.map(|r| 100.0 * (r - 1.0)),
             time: ratio(seconds(findings), seconds(default)),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use mrfgs::evaluation::{Breakdown, Detection, Report, Sparsification, breakdown::Class};
 
 use super::evaluate::Findings;
-use super::tables::push;
+use super::tables::{figure, push};
 
 /// What the tables show of a pair, or of all.
 type Line<'a> =
@@ -74,6 +74,5 @@ fn lines(
 
 /// A figure with two decimals, or a dash.
 fn cell(value: Option<f64>, width: usize) -> String {
-    let text = value.map_or_else(|| "-".into(), |v| format!("{v:.2}"));
-    format!("{text:>width$}")
+    format!("{:>width$}", figure(value, 2))
 }

@@ -14,6 +14,7 @@ use mrfgs::{Error, Result};
 
 use super::evaluate::{Figures, Findings};
 use super::outputs::StagedFolder;
+use super::tables::figure;
 
 /// Errors beyond this, in pixels, take the last colour: one scale for all pairs, or they could not be compared.
 const ERROR_LIMIT: f32 = 4.0;
@@ -338,8 +339,7 @@ fn table<'a>(
         for (value, decimals) in
             [(m.avg, 3), (m.psnr, 2), (b0, 2), (b1, 2), (b2, 2), (b4, 2), (m.rms, 2), (Some(m.density), 2)]
         {
-            let text = value.map_or_else(|| "-".into(), |v| format!("{v:.decimals$}"));
-            let _ = write!(out, "<td>{text}</td>");
+            let _ = write!(out, "<td>{}</td>", figure(value, decimals));
         }
         out.push_str("</tr>\n");
     }
@@ -349,7 +349,6 @@ fn table<'a>(
 /// Where the errors of a pair's final map are, and what its confidence and validity are worth; nothing of a map that
 /// others made.
 fn breakdown(out: &mut String, pair: &Figures) {
-    let number = |value: Option<f64>| value.map_or_else(|| "-".into(), |v| format!("{v:.2}"));
     if let Some(breakdown) = &pair.breakdown {
         out.push_str(
             "<div class=\"wide\"><table>\n<tr><th class=\"text\">class</th><th>share</th><th>bad 2</th>\
@@ -358,17 +357,17 @@ fn breakdown(out: &mut String, pair: &Figures) {
         for (class, p) in breakdown.iter() {
             let _ = write!(out, "<tr><th scope=\"row\">{}</th>", class.name());
             for value in [Some(p.share), p.bad, p.avg, Some(p.points), p.of_bad, p.of_squares] {
-                let _ = write!(out, "<td>{}</td>", number(value));
+                let _ = write!(out, "<td>{}</td>", figure(value, 2));
             }
             out.push_str("</tr>\n");
         }
         out.push_str("</table></div>\n");
     }
     if let Some(c) = &pair.confidence {
-        let [auc, optimal, random] = [c.auc, c.optimal, c.random].map(|v| number(Some(v)));
+        let [auc, optimal, random] = [c.auc, c.optimal, c.random].map(|v| figure(Some(v), 2));
         let _ = write!(out, "<p>Confidence: AUC {auc} % (optimal {optimal}, random {random}).");
         if let Some(v) = &pair.validity {
-            let (precision, recall) = (number(v.precision), number(v.recall));
+            let (precision, recall) = (figure(v.precision, 2), figure(v.recall, 2));
             let _ = write!(out, " Flags of unseen pixels: precision {precision} %, recall {recall} %.");
         }
         out.push_str("</p>\n");

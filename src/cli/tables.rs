@@ -124,15 +124,19 @@ impl Line {
     fn cells(&self) -> impl Iterator<Item = String> {
         let paper = [self.published.map(|p| p.fgs), self.published.map(|p| p.mr_fgs)];
         paper.into_iter().chain(self.ours.iter().map(|(_, figures)| *figures)).map(|figures| {
-            let number = |value: Option<f64>| value.map_or_else(|| "-".into(), |v| format!("{v:.2}"));
             let [avg, psnr, bad2] = match figures {
                 Some(f) => [f.avg, f.psnr, Some(f.bad2)],
                 None => [None; 3],
             }
-            .map(number);
+            .map(|value| figure(value, 2));
             format!("{avg:>6} {psnr:>6} {bad2:>6}")
         })
     }
+}
+
+/// A figure with so many decimals, or a dash.
+pub(super) fn figure(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".into(), |v| format!("{v:.decimals$}"))
 }
 
 /// One line: a name, cut where it is too long, and the groups of columns.

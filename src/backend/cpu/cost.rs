@@ -157,9 +157,9 @@ fn census_bits(image: &Image) -> Vec<[u32; 2]> {
 
 /// How much colour counts at each pixel of row `y`: by the variance of grey around it.
 fn colour_weights(plan: &Plan, image: &Image, y: usize, weights: &mut [u32]) {
-    let most = plan.colour_variance;
-    if plan.colour_weight == 0 || most == 0 {
-        weights.fill(plan.colour_weight);
+    let (full, most) = (plan.colour_weight(), plan.colour_variance());
+    if full == 0 || most == 0 {
+        weights.fill(full);
         return;
     }
     let width = weights.len();
@@ -177,7 +177,7 @@ fn colour_weights(plan: &Plan, image: &Image, y: usize, weights: &mut [u32]) {
         }
     });
     for (weight, (sum, square)) in weights.iter_mut().zip(sums.into_iter().zip(squares)) {
-        *weight = plan.colour_weight * (CENSUS_PLACES * square - sum * sum).min(most) / most;
+        *weight = full * (CENSUS_PLACES * square - sum * sum).min(most) / most;
     }
 }
 

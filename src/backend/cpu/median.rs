@@ -30,14 +30,8 @@ fn smooth(weights: &MedianWeights, touched: impl Fn(u8) -> bool + Sync, guide: &
     // Columns a step apart side by side, and channel by channel, so that rows of the window are vectors.
     let columns: Vec<usize> = (0..step).flat_map(|phase| (phase..width).step_by(step)).collect();
     let channels = [0, 1, 2].map(|c| Plane::from_fn(width, height, |x, y| guide.pixels[(columns[x], y)][c]));
-    let known =
-        Plane::from_fn(
-            width,
-            height,
-            |x, y| {
-                if has_disparity(flags[(columns[x], y)]) { u32::MAX } else { 0 }
-            },
-        );
+    let mask = |f: u8| if has_disparity(f) { u32::MAX } else { 0 };
+    let known = Plane::from_fn(width, height, |x, y| mask(flags[(columns[x], y)]));
     let values = Plane::from_fn(width, height, |x, y| disparity[(columns[x], y)]);
     let mut out = disparity.clone();
     out.data_mut().par_chunks_mut(width).enumerate().for_each_init(

@@ -1,5 +1,6 @@
-//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/mod.rs` and from nothing else: one cell at a time, wide integers, no padding, no table, nothing clever. It
-//! shares data types and documented constants with the library, and no function that computes.
+//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/mod.rs` and from nothing
+//! else: one cell at a time, wide integers, no padding, no table, nothing clever. It shares data types and documented
+//! constants with the library, and no function that computes.
 //!
 //! Volumes are `Vec<u32>` in the layout of [`mrfgs::backend::Volume`]: \[y\]\[x\]\[slot\]\[label\].
 
