@@ -37,6 +37,7 @@
 //! - [`front`] corrects the illumination and finds texture zones, sparse matches and the labels they leave, where asked.
 //! - [`graph`] picks the members of each dependency factor.
 //! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
+//! - [`roofline`] counts what the messages cost at least, to hold a machine against.
 //! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.
 //! - [`evaluation`] compares maps with ground truth.
 //!
@@ -54,6 +55,7 @@ mod matcher;
 mod memory;
 pub mod options;
 pub mod plan;
+pub mod roofline;
 pub mod solver;
 pub mod tables;
 

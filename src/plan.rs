@@ -270,6 +270,12 @@ impl Plan {
         }
     }
 
+    /// Bytes of one stored belief.
+    #[must_use]
+    pub fn belief_bytes(&self) -> usize {
+        2
+    }
+
     /// Whether the texture zones limit the labels of their pixels.
     #[must_use]
     pub fn restricted(&self) -> bool {
@@ -316,7 +322,7 @@ impl Plan {
         let cost = if level == 0 { 1 } else { 2 };
         let up = if level == 0 { 0 } else { self.message_bytes() };
         let down = if level + 1 == self.levels.len() { 0 } else { self.message_bytes() };
-        let volumes = cost + 1 + 2 + up + down + self.slots() * self.message_bytes();
+        let volumes = cost + 1 + self.belief_bytes() + up + down + self.slots() * self.message_bytes();
         // The member codes, and the transposed table with its row starts.
         let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
         cells * volumes as u64 + graph as u64

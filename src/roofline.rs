@@ -1,0 +1,108 @@
+//! What the flooding costs at least, counted from the plan: the roof under which every machine computes it.
+//!
+//! The message stages, [`Stage::Dependency`], [`Stage::Resolution`] and [`Stage::Belief`], do little with every value that
+//! they touch, so memory bounds them. [`bytes`] is what one run of a stage must move where no cache outlives it: every
+//! volume that it reads is read once, every one that it writes is written once, in their widths as stored and padding
+//! included, for padding goes through the same arithmetic. The graph, a few bytes a pixel, is left out. Divided by
+//! the rate at which the machine copies, it is the shortest time that the stage can take; where the volumes of a level fit
+//! a cache, it can be beaten.
+
+use crate::backend::{Stage, Volume, volume_shape};
+use crate::plan::Plan;
+
+/// The stages of the flooding of `plan`, level by level: what an iteration of all levels runs.
+pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
+    let levels = 0..plan.levels.len();
+    levels.flat_map(|z| {
+        let resolution = (z > 0).then_some(Stage::Resolution(z));
+        [Some(Stage::Dependency(z)), resolution, Some(Stage::Belief(z))].into_iter().flatten()
+    })
+}
+
+/// Label updates of one run of `stage`: the values of dependency messages that it computes, pixels times labels (without
+/// padding) times members of a factor. Those of all other stages count as none.
+#[must_use]
+pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
+    let Stage::Dependency(z) = stage else { return 0 };
+    let (rows, labels, _) = volume_shape(plan, Volume::Dependency(z));
+    rows as u64 * labels as u64
+}
+
+/// Bytes that one run of `stage` moves at least; 0 for what is no message stage.
+#[must_use]
+pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
+    let stored = |volume: Volume| {
+        let (rows, _, stride) = volume_shape(plan, volume);
+        let width = match volume {
+            Volume::Evidence(_) | Volume::Cost(0) => 1,
+            Volume::Cost(_) => 2,
+            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => plan.message_bytes(),
+            Volume::Belief(_) => plan.belief_bytes(),
+        };
+        (rows * stride * width) as u64
+    };
+    match stage {
+        Stage::Dependency(z) => stored(Volume::Belief(z)) + 2 * stored(Volume::Dependency(z)),
+        Stage::Resolution(z) => {
+            let beliefs = stored(Volume::Belief(z - 1)) + stored(Volume::Belief(z));
+            beliefs + 2 * (stored(Volume::Down(z - 1)) + stored(Volume::Up(z)))
+        }
+        Stage::Belief(z) => {
+            let down = if z + 1 < plan.levels.len() { stored(Volume::Down(z)) } else { 0 };
+            let up = if z > 0 { stored(Volume::Up(z)) } else { 0 };
+            let summands = stored(Volume::Evidence(z)) + stored(Volume::Dependency(z)) + down + up;
+            summands + stored(Volume::Belief(z))
+        }
+        _ => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::{DisparityRange, Method};
+
+    fn plan(preset: &str) -> Plan {
+        let mut method = Method::preset(preset).unwrap();
+        method.set("levels", "2").unwrap();
+        method.set("percentile", "92").unwrap();
+        Plan::new(5, 3, DisparityRange::new(0, 19).unwrap(), &method).unwrap()
+    }
+
+    #[test]
+    fn every_volume_counts_once() {
+        // 15 pixels of 20 labels in 32 places, and 6 of 11 in 16; 5 members.
+        for (preset, m) in [("default", 1), ("paper", 2)] {
+            let plan = plan(preset);
+            let b = plan.belief_bytes() as u64;
+            let (fine, coarse) = (15 * 32, 6 * 16);
+            for (stage, expected) in [
+                (Stage::Dependency(0), fine * (b + 2 * 5 * m)),
+                (Stage::Dependency(1), coarse * (b + 2 * 5 * m)),
+                (Stage::Resolution(1), (fine + coarse) * (b + 2 * m)),
+                (Stage::Belief(0), fine * (1 + 5 * m + m + b)),
+                (Stage::Belief(1), coarse * (1 + 5 * m + m + b)),
+                (Stage::Cost, 0),
+                (Stage::Median, 0),
+            ] {
+                assert_eq!(bytes(&plan, stage), expected, "{preset}, {stage:?}");
+            }
+            assert_eq!(label_updates(&plan, Stage::Dependency(0)), 15 * 20 * 5);
+            assert_eq!(label_updates(&plan, Stage::Dependency(1)), 6 * 11 * 5);
+            assert_eq!(label_updates(&plan, Stage::Belief(0)), 0);
+        }
+    }
+
+    #[test]
+    fn an_iteration_runs_every_message_stage_once() {
+        let stages: Vec<_> = message_stages(&plan("default")).collect();
+        let expected = [
+            Stage::Dependency(0),
+            Stage::Belief(0),
+            Stage::Dependency(1),
+            Stage::Resolution(1),
+            Stage::Belief(1),
+        ];
+        assert_eq!(stages, expected);
+    }
+}
