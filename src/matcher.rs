@@ -110,6 +110,11 @@ impl Matcher {
         })
     }
 
+    /// From now on takes the time of every stage, or does not, whatever [`Execution::timings`] said.
+    pub fn keep_time(&mut self, on: bool) {
+        self.timings = on;
+    }
+
     /// Matches `pair` over `range` by `method`; `observer` hears of progress and can stop it.
     ///
     /// # Errors

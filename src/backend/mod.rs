@@ -236,6 +236,8 @@ pub struct Traffic {
     pub bytes_up: u64,
     /// Bytes read from it.
     pub bytes_down: u64,
+    /// Bytes of the buffers that it holds for the match.
+    pub bytes_held: u64,
 }
 
 /// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.

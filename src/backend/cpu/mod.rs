@@ -25,13 +25,39 @@ use crate::memory;
 use crate::plan::{COST_FRACTION_BITS, COST_MAX, MessageWidth, Plan};
 use message::Message;
 use rayon::prelude::*;
+use std::hint::black_box;
 use std::time::{Duration, Instant};
+
+/// What [`Cpu::copy_rate`] copies, and how often.
+const COPIED_BYTES: usize = 1 << 28;
+const COPY_TRIES: usize = 8;
 
 /// The CPU path.
 #[derive(Default)]
 pub struct Cpu {
     state: Option<State>,
     times: Option<Vec<(Stage, Duration)>>,
+}
+
+impl Cpu {
+    /// The rate at which the threads of the current pool copy from one buffer to another, both larger than caches are:
+    /// bytes read and written a second, the best of a few tries.
+    #[must_use]
+    pub fn copy_rate() -> f64 {
+        let from = vec![1u8; COPIED_BYTES];
+        let mut to = vec![0u8; COPIED_BYTES];
+        // A piece a thread: what copies long runs goes past the caches.
+        let piece = COPIED_BYTES.div_ceil(rayon::current_num_threads());
+        let mut rate = || {
+            let start = Instant::now();
+            to.par_chunks_mut(piece)
+                .zip(from.par_chunks(piece))
+                .for_each(|(to, from)| to.copy_from_slice(from));
+            black_box(&mut to);
+            (2 * COPIED_BYTES) as f64 / start.elapsed().as_secs_f64()
+        };
+        (0..COPY_TRIES).map(|_| rate()).fold(0.0, f64::max)
+    }
 }
 
 /// Volumes in the message width that the plan asks for.

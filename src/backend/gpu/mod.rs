@@ -40,6 +40,10 @@ const PASSES_PER_SUBMIT: usize = 16;
 /// long jobs, and for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 30;
 const WORKGROUP: u32 = 64;
+/// What [`Gpu::copy_rate`] copies at once, how often it doubles the number of copies at most, and how long is enough.
+const COPIED_BYTES: u64 = 1 << 28;
+const COPY_DOUBLINGS: u32 = 10;
+const LONG_COPY: Duration = Duration::from_millis(100);
 
 /// The GPU path on one device.
 pub struct Gpu {
@@ -83,6 +87,39 @@ impl Gpu {
             timer: None,
             state: None,
         })
+    }
+
+    /// The rate at which the device copies from one large buffer to another: bytes read and written a second.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when there is no room for two such buffers, [`Error::Device`] when the device fails.
+    pub fn copy_rate(&mut self) -> Result<f64> {
+        let size = COPIED_BYTES.min(self.device.max_buffer) & !3;
+        let buffer = || {
+            let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some("copy"), size, usage, mapped_at_creation: false };
+            Ok::<_, Error>(self.device.inner()?.create_buffer(&descriptor))
+        };
+        let (from, to) = (buffer()?, buffer()?);
+        self.encoder()?.clear_buffer(&from, 0, None);
+        self.wait()?;
+        let (mut best, mut copies) = (0.0, 1);
+        // So many at once that what a submission takes of itself no longer counts.
+        for _ in 0..COPY_DOUBLINGS {
+            let start = Instant::now();
+            for _ in 0..copies {
+                self.encoder()?.copy_buffer_to_buffer(&from, 0, &to, 0, size);
+            }
+            self.wait()?;
+            let time = start.elapsed();
+            best = f64::max(best, (2 * copies * size) as f64 / time.as_secs_f64());
+            if time > LONG_COPY {
+                break;
+            }
+            copies *= 2;
+        }
+        Ok(best)
     }
 
     /// The pipeline of `kernel` at `level`, compiled on first use.
@@ -308,6 +345,7 @@ impl Backend for Gpu {
             }
         };
         self.load(&mut state, pair, &graphs)?;
+        self.device.traffic.bytes_held = state.buffers.all().iter().map(wgpu::Buffer::size).sum();
         self.state = Some(state);
         Ok(())
     }
