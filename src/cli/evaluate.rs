@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::ablations::{self, Ablations};
 use super::breakdown;
 use super::folder::{self, Folder, Scene};
-use super::outputs::{self, Written};
+use super::outputs;
 use super::report::{self, Destination, Picture};
 use super::tables::{self, Comparison};
 use super::{ExecutionArgs, MethodArgs};
@@ -213,7 +213,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.breakdown {
         text.push_str(&breakdown::text(&findings));
     }
-    deliver(args.json.as_deref(), &findings, &text, || match destination {
+    outputs::deliver(args.json.as_deref(), &findings, &text, || match destination {
         Some(destination) => report::write(&destination, &findings, &pictures),
         None => Ok(()),
     })
@@ -222,7 +222,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
 /// Finds out before any computing whether the outputs can be written.
 fn check_outputs(args: &Args) -> Result<Option<Destination<'_>>> {
     let destination = args.report.as_deref().map(Destination::check).transpose()?;
-    if let Some(path) = json_file(args.json.as_deref()) {
+    if let Some(path) = outputs::json_file(args.json.as_deref()) {
         write::check_path(path)?;
         if destination.as_ref().is_some_and(|report| report.holds(path)) {
             let reason = format!("{} lies in the folder of --report; give another name", path.display());
@@ -236,33 +236,6 @@ fn check_outputs(args: &Args) -> Result<Option<Destination<'_>>> {
         outputs::distinct(&inputs, &[("--json", path)])?;
     }
     Ok(destination)
-}
-
-/// The file that the JSON goes to, unless it is printed.
-fn json_file(json: Option<&Path>) -> Option<&Path> {
-    json.filter(|path| *path != Path::new("-"))
-}
-
-/// Hands out the findings: as JSON where it is asked for, what `more` writes, and for people unless the JSON is printed.
-fn deliver(
-    json: Option<&Path>,
-    findings: &impl Serialize,
-    text: &str,
-    more: impl FnOnce() -> Result<()>,
-) -> Result<()> {
-    let mut written = Written::default();
-    let mut printed = text.to_owned();
-    if let Some(path) = json {
-        let mut json = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
-        json.push('\n');
-        match json_file(Some(path)) {
-            Some(file) => written.note(file, write::save(file, json.as_bytes()))?,
-            None => printed = json,
-        }
-    }
-    more()?;
-    written.keep();
-    super::print(&printed)
 }
 
 /// The figures of a map that is there already.
@@ -343,7 +316,7 @@ fn compare(args: &Args) -> Result<()> {
         found.push((preset, match_all(args, &folders, &mut matcher, method, Some(preset), |_, _| Ok(()))?));
     }
     let comparison = Comparison::new(&found);
-    deliver(args.json.as_deref(), &comparison, &comparison.text(), || Ok(()))
+    outputs::deliver(args.json.as_deref(), &comparison, &comparison.text(), || Ok(()))
 }
 
 /// Prints what the default is without each of its parts.
@@ -360,5 +333,5 @@ fn ablate(args: &Args) -> Result<()> {
         found.push((*row, run(row, row.0)?));
     }
     let ablations = Ablations::new(&found);
-    deliver(args.json.as_deref(), &ablations, &ablations.text(), || Ok(()))
+    outputs::deliver(args.json.as_deref(), &ablations, &ablations.text(), || Ok(()))
 }

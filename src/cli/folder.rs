@@ -31,33 +31,42 @@ const CALIBRATION: &str = "calib.txt";
 const MASK: &str = "mask0nocc.png";
 
 impl Layout {
-    /// The files that must be there.
-    fn required(&self) -> impl Iterator<Item = &'static str> {
-        self.files.into_iter().chain(self.scale.is_none().then_some(CALIBRATION))
-    }
-
-    fn described(&self) -> String {
-        self.required().collect::<Vec<_>>().join(", ")
+    /// The files that must be there, with the truth or without.
+    fn required(&self, truth: bool) -> impl Iterator<Item = &'static str> {
+        let [left, right, known] = self.files;
+        let known = truth.then_some(known);
+        [left, right].into_iter().chain(known).chain(self.scale.is_none().then_some(CALIBRATION))
     }
 }
 
-/// A folder to evaluate, with all that it must hold.
+/// A folder to match, with all that it must hold.
 pub(super) struct Folder<'a> {
     dir: &'a Path,
     layout: &'static Layout,
 }
 
 impl<'a> Folder<'a> {
-    /// Finds the layout of `dir`; the error names what is missing.
+    /// Finds the layout of `dir`, which is to be evaluated; the error names what is missing.
     pub(super) fn of(dir: &'a Path) -> Result<Self> {
+        Self::holding(dir, "to evaluate", |_| true)
+    }
+
+    /// As [`Folder::of`], where it is only to be matched: with a calib.txt, which gives the range, it may lack the truth.
+    pub(super) fn to_match(dir: &'a Path) -> Result<Self> {
+        let calibrated = dir.join(CALIBRATION).is_file();
+        Self::holding(dir, "to match", |layout| layout.scale.is_some() && !calibrated)
+    }
+
+    fn holding(dir: &'a Path, purpose: &str, truth: impl Fn(&Layout) -> bool) -> Result<Self> {
         let held = |layout: &Layout| layout.files.into_iter().filter(|file| dir.join(file).is_file()).count();
         let layout = LAYOUTS.iter().fold(&LAYOUTS[0], |a, b| if held(b) > held(a) { b } else { a });
-        if let Some(missing) = layout.required().find(|file| !dir.join(file).is_file()) {
+        let described = |layout: &Layout| layout.required(truth(layout)).collect::<Vec<_>>().join(", ");
+        if let Some(missing) = layout.required(truth(layout)).find(|file| !dir.join(file).is_file()) {
             let expected = match held(layout) {
-                0 => LAYOUTS.iter().map(Layout::described).collect::<Vec<_>>().join("; or "),
-                _ => layout.described(),
+                0 => LAYOUTS.iter().map(described).collect::<Vec<_>>().join("; or "),
+                _ => described(layout),
             };
-            let reason = format!("there is no such file; a folder to evaluate holds {expected}");
+            let reason = format!("there is no such file; a folder {purpose} holds {expected}");
             return Err(Error::read(dir.join(missing), reason));
         }
         Ok(Self { dir, layout })
@@ -70,28 +79,53 @@ impl<'a> Folder<'a> {
 
     /// Reads it all; `scale` replaces that of the layout.
     pub(super) fn read(&self, scale: Option<f32>) -> Result<Scene> {
-        let [left, right, truth] = self.layout.files.map(|file| self.dir.join(file));
+        let calibrated = self.calibrated()?;
+        let pair = self.views()?;
+        let ground = self.ground(scale, pair.size())?;
+        let range = calibrated.map_or_else(|| range_of(&ground), Ok)?;
+        Ok(Scene { name: name(self.dir), pair, range, ground })
+    }
+
+    /// Reads the pair and the range, and of the truth no more than the range takes.
+    pub(super) fn read_pair(&self) -> Result<(Pair, DisparityRange)> {
+        let calibrated = self.calibrated()?;
+        let pair = self.views()?;
+        let range =
+            calibrated.map_or_else(|| self.ground(None, pair.size()).and_then(|g| range_of(&g)), Ok)?;
+        Ok((pair, range))
+    }
+
+    /// The range that a calib.txt gives, where there is one.
+    fn calibrated(&self) -> Result<Option<DisparityRange>> {
         let calib = self.dir.join(CALIBRATION);
-        let calibrated = if calib.is_file() {
-            let range = super::calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
-            Some(range.ok_or_else(|| {
-                Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N")
-            })?)
-        } else {
-            None
-        };
-        let pair = read::pair(&left, &right, None)?;
+        if !calib.is_file() {
+            return Ok(None);
+        }
+        let range = super::calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
+        let silent = || Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N");
+        range.ok_or_else(silent).map(Some)
+    }
+
+    fn views(&self) -> Result<Pair> {
+        let [left, right, _] = self.layout.files.map(|file| self.dir.join(file));
+        read::pair(&left, &right, None)
+    }
+
+    fn ground(&self, scale: Option<f32>, size: (usize, usize)) -> Result<GroundTruth> {
+        let [left, _, truth] = self.layout.files.map(|file| self.dir.join(file));
         let mask = Some(self.dir.join(MASK)).filter(|m| m.exists());
         let scale = self.layout.scale.map(|usual| scale.unwrap_or(usual));
-        let ground = ground_truth(&truth, scale, mask.as_deref(), &left, pair.size())?;
-        let range = calibrated.map_or_else(|| range_of(&ground), Ok)?;
-        let full = self.dir.canonicalize().unwrap_or_else(|_| self.dir.to_owned());
-        let name = full.file_name().unwrap_or(self.dir.as_os_str()).to_string_lossy().into_owned();
-        Ok(Scene { name, pair, range, ground })
+        ground_truth(&truth, scale, mask.as_deref(), &left, size)
     }
 }
 
-/// Every file that an evaluation of `dir` may read.
+/// What `dir` is called, however its path is spelt.
+pub(super) fn name(dir: &Path) -> String {
+    let full = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    full.file_name().unwrap_or(dir.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Every file that may be read of `dir`.
 pub(super) fn inputs(dir: &Path) -> impl Iterator<Item = PathBuf> {
     LAYOUTS.iter().flat_map(|layout| layout.files).chain([CALIBRATION, MASK]).map(|file| dir.join(file))
 }

@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mrfgs::image::write;
 use mrfgs::{Error, Result};
+use serde::Serialize;
 use tempfile::TempDir;
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
@@ -57,6 +59,33 @@ impl Drop for Written {
             let _ = fs::remove_file(path);
         }
     }
+}
+
+/// The file that the JSON goes to, unless it is printed.
+pub(super) fn json_file(json: Option<&Path>) -> Option<&Path> {
+    json.filter(|path| *path != Path::new("-"))
+}
+
+/// Hands out findings: as JSON where it is asked for, what `more` writes, and for people unless the JSON is printed.
+pub(super) fn deliver(
+    json: Option<&Path>,
+    findings: &impl Serialize,
+    text: &str,
+    more: impl FnOnce() -> Result<()>,
+) -> Result<()> {
+    let mut written = Written::default();
+    let mut printed = text.to_owned();
+    if let Some(path) = json {
+        let mut json = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
+        json.push('\n');
+        match json_file(Some(path)) {
+            Some(file) => written.note(file, write::save(file, json.as_bytes()))?,
+            None => printed = json,
+        }
+    }
+    more()?;
+    written.keep();
+    super::print(&printed)
 }
 
 /// A folder in the making, beside the place that it takes once it is whole; gone with all it holds when dropped before.
