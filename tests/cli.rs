@@ -4,9 +4,11 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use mrfgs::backend::gpu;
 use mrfgs::image::read;
 use mrfgs::maps::flag;
 use mrfgs::options::{self, Method};
@@ -127,6 +129,10 @@ fn workshop() -> TempDir {
     }
     for file in ["disp0GT.pfm", "calib.txt"] {
         fs::copy(scene("slanted").join(file), at("misfit").join(file)).unwrap();
+    }
+    fs::create_dir(at("broken")).unwrap();
+    for (from, to) in [("left.png", "im0.png"), ("text.png", "im1.png"), ("misfit/calib.txt", "calib.txt")] {
+        fs::copy(at(from), at("broken").join(to)).unwrap();
     }
     fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
     folder
@@ -481,6 +487,25 @@ const FAILURES: &[Failure] = &[
         1,
         &["left.png is 60 x 40", "240 x 180"],
     ),
+    // Benches.
+    ("bench none", 1, &["none/im0.png", "a folder to match holds im0.png, im1.png, calib.txt; or"]),
+    ("bench left.png", 1, &["left.png/im0.png", "a folder to match holds"]),
+    ("bench misfit without-im1.png", 1, &["without-im1.png/im1.png", "a folder to match holds im0.png"]),
+    ("bench misfit without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to match holds"]),
+    ("bench broken --backend cpu", 1, &["broken/im1.png", "not an image", "give PNG"]),
+    ("bench broken --backend cpu --preset fgs --json a.json", 1, &["broken/im1.png", "not an image"]),
+    ("bench misfit --repeats 0", 2, &["--repeats", "1..=1000"]),
+    ("bench misfit --repeats some", 2, &["--repeats", "some"]),
+    ("bench misfit --large", 2, &["--large", "DIR"]),
+    ("bench misfit --backend auto", 2, &["--backend", "cpu, gpu, both"]),
+    ("bench misfit --backend cpu --device 0", 1, &["--device", "--backend cpu"]),
+    ("bench misfit --backend both --threads 0", 2, &["--threads", "1..=1024"]),
+    ("bench misfit --preset best", 1, &["--preset", "default, paper"]),
+    ("bench misfit --set levels=17", 1, &["--set levels", "17 is outside 1 to 16"]),
+    ("bench misfit --config key.toml", 1, &["key.toml", "line 2", "mrfgs presets"]),
+    ("bench misfit --json none/a.json", 1, &["none/a.json", "create it"]),
+    ("bench misfit --json folder", 1, &["folder", "is a folder"]),
+    ("bench misfit --json misfit/im1.png", 1, &["--json", "misfit/im1.png", "another name"]),
     ("presets best", 1, &["`best`", "default, paper"]),
 ];
 
@@ -558,6 +583,11 @@ fn without_a_driver_gpu_says_what_to_do() {
     told.failed(1, &["driver", "install", "--backend cpu"], "--backend gpu without a driver");
     let told = run_with(folder.path(), &[&args[..], &["--device", "0"]].concat(), NO_DRIVER);
     told.failed(1, &["driver", "install", "--backend cpu"], "--device 0 without a driver");
+    for backend in ["gpu", "both"] {
+        let args = ["bench", "misfit", "--json", "a.json", "--backend", backend];
+        let told = run_with(folder.path(), &args, NO_DRIVER);
+        told.failed(1, &["driver", "install", "--backend cpu"], "bench without a driver");
+    }
     assert!(listing(folder.path()) == before);
 }
 
@@ -588,11 +618,138 @@ fn timings_name_every_stage() {
     told.failed(2, &["--timings", "--quiet"], "--quiet and --timings");
 }
 
+/// Whether there is a driver to run on; a panic where there is none and `MRFGS_REQUIRE_GPU` is set and not 0.
+fn has_gpu() -> bool {
+    let found = !gpu::devices().is_empty();
+    let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
+    assert!(found || !required, "MRFGS_REQUIRE_GPU is set and there is no driver");
+    if !found {
+        // Past the capture of the test harness: a test without its GPU must not look like one that passed.
+        let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: there is no driver");
+    }
+    found
+}
+
+#[test]
+fn a_bench_gives_every_figure_of_both_backends() {
+    let folder = workshop();
+    let (backends, which) = if has_gpu() { (&["cpu", "gpu"][..], "both") } else { (&["cpu"][..], "cpu") };
+    let args = ["bench", "misfit", "without-disp0GT.pfm", "--repeats", "2", "--json", "out.json"];
+    let more = ["--backend", which, "--threads", "2", "--set", "levels=1", "--set", "percentile=92"];
+    let told = run(folder.path(), &[&args[..], &more].concat()).succeeded();
+    let json = fs::read_to_string(folder.path().join("out.json")).unwrap();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!((&json["threads"], &json["repeats"]), (&2.into(), &2.into()));
+
+    let pairs = json["pairs"].as_array().unwrap();
+    let expected = [("misfit", 60, 40), ("without-disp0GT.pfm", 240, 180)];
+    let expected = expected.iter().flat_map(|pair| ["default", "paper"].map(|preset| (pair, preset)));
+    assert_eq!(pairs.len(), 4);
+    for (pair, (&(name, width, height), preset)) in pairs.iter().zip(expected) {
+        let what = format!("{name}, preset {preset}");
+        assert_eq!((&pair["name"], &pair["preset"]), (&name.into(), &preset.into()));
+        assert_eq!((&pair["width"], &pair["height"]), (&width.into(), &height.into()), "{what}");
+        assert_eq!(pair["labels"], 32, "{what}");
+        assert!(
+            told.stdout.contains(&format!("{what}: {width} x {height} pixels, 32 labels")),
+            "{}",
+            told.stdout
+        );
+        let method = &json["methods"][preset];
+        assert_eq!(method["levels"], 1, "--set counts for every preset");
+        assert_eq!(pair["backends"].as_object().unwrap().len(), backends.len());
+
+        for &backend in backends {
+            let found = &pair["backends"][backend];
+            let value = |key: &str| {
+                let value = found[key].as_f64().unwrap_or_else(|| panic!("{what}, {backend}: no {key}"));
+                assert!(value > 0.0 && value.is_finite(), "{what}, {backend}: {key} is {value}");
+                value
+            };
+            assert!(told.stderr.contains(&format!("{what}, {backend}: ")), "{}", told.stderr);
+            assert_eq!(found["ran_on"].as_str().unwrap().starts_with("the CPU path"), backend == "cpu");
+            let runs: Vec<f64> =
+                found["runs_ms"].as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+            assert_eq!(runs.len(), 2);
+            assert!(runs.contains(&value("min_ms")) && runs.contains(&value("max_ms")));
+            let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+            assert!(close(value("median_ms"), (runs[0] + runs[1]) / 2.0));
+
+            // One level, 5 members, and messages of 1 or 2 bytes.
+            let (iterations, cells) = (value("iterations"), f64::from(width * height * 32));
+            let wide = if preset == "paper" { 2.0 } else { 1.0 };
+            assert_eq!(value("label_updates"), iterations * 5.0 * cells, "{what}, {backend}");
+            let message_values = value("message_bytes") / (iterations * cells);
+            assert!((15.0 * wide + 1.0..=15.0 * wide + 5.0).contains(&message_values), "{message_values}");
+            for (key, count, time) in [
+                ("message_gupdates_per_s", "label_updates", "message_ms"),
+                ("match_gupdates_per_s", "label_updates", "median_ms"),
+                ("message_gb_per_s", "message_bytes", "message_ms"),
+            ] {
+                assert!(close(value(key), value(count) / value(time) / 1e6), "{what}, {backend}: {key}");
+            }
+            assert!(close(value("copy_share"), 100.0 * value("message_gb_per_s") / value("copy_gb_per_s")));
+
+            let stages = found["stages"].as_object().unwrap();
+            assert!(stages.values().all(|ms| ms.as_f64().is_some_and(|ms| ms >= 0.0)), "{stages:?}");
+            for stage in ["graph", "cost", "dependency, level 0", "belief, level 0", "median"] {
+                assert!(stages.contains_key(stage), "no {stage} in {stages:?}");
+            }
+            assert_eq!(stages.contains_key("zones"), preset == "paper");
+            assert_eq!(found["device_bytes"].is_null(), backend == "cpu");
+            if backend == "gpu" {
+                assert!(value("device_bytes") >= value("plan_bytes") / 2.0, "{what}");
+            }
+            if cfg!(target_os = "linux") {
+                assert!(value("processor_ms") > 0.0);
+                assert!(value("peak_bytes") > cells, "{what}, {backend}");
+            }
+        }
+        // The same bits take the same work.
+        for key in ["iterations", "label_updates", "message_bytes", "plan_bytes"] {
+            let of = |backend: &&str| &pair["backends"][*backend][key];
+            assert!(backends.iter().all(|backend| of(backend) == of(&"cpu")), "{what}: {key}");
+        }
+    }
+
+    // A single case, printed.
+    let args = ["bench", "misfit", "--preset", "fgs", "--backend", "cpu", "--repeats", "1", "--json", "-"];
+    let pairs = &run(folder.path(), &args).succeeded().json()["pairs"];
+    assert_eq!((pairs.as_array().unwrap().len(), &pairs[0]["preset"]), (1, &"fgs".into()));
+    assert_eq!(pairs[0]["backends"]["gpu"], Value::Null);
+}
+
+#[test]
+fn a_bench_without_folders_makes_up_its_pair() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["bench", "--preset", "default", "--backend", "cpu", "--repeats", "1", "--set", "levels=1"];
+    let told = run(folder.path(), &args).succeeded();
+    assert!(told.stdout.contains("small, preset default: 450 x 375 pixels, 60 labels"), "{}", told.stdout);
+    assert!(listing(folder.path()).is_empty());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_bench_that_cannot_be_written_fails() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["bench", "misfit", "--preset", "default", "--backend", "cpu", "--repeats", "1"];
+    let told = run(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat());
+    assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""), "{told:?}");
+    assert!(told.stderr.lines().last().unwrap().contains("/dev/full"), "{told:?}");
+    assert!(listing(folder.path()) == before);
+}
+
 #[test]
 fn an_unknown_device_is_named() {
     let folder = workshop();
     let before = listing(folder.path());
     for device in ["no-such-device", "999"] {
+        if has_gpu() {
+            let args = ["bench", "misfit", "--device", device, "--json", "a.json"];
+            run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
+        }
         let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", device];
         run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
     }
@@ -743,6 +900,7 @@ fn help_teaches() {
     assert!(help(&["--help"]).contains("Exit status: 0"));
     assert!(help(&["evaluate", "--help"]).contains("mask0nocc.png"));
     assert!(help(&["presets", "--help"]).contains("Examples:"));
+    assert!(help(&["bench", "--help"]).contains("[default: default and paper,"));
     assert_eq!(help(&["--version"]), format!("mrfgs {}", env!("CARGO_PKG_VERSION")));
 }
 

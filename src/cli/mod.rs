@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand, and here what they share. Nothing else in the crate prints.
 
 mod ablations;
+mod bench;
 mod breakdown;
 mod devices;
 mod evaluate;
@@ -9,8 +10,10 @@ mod intermediates;
 mod r#match;
 mod outputs;
 mod presets;
+mod process;
 mod progress;
 mod report;
+mod synthetic;
 mod tables;
 
 use std::fmt::{self, Write as _};
@@ -25,7 +28,7 @@ use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
 use mrfgs::solver::Inspector;
-use mrfgs::{Error, Matched, Matcher, Result};
+use mrfgs::{Error, Matched, Matcher, Result, Timing};
 use progress::Bar;
 
 const ABOUT: &str = "\
@@ -55,6 +58,7 @@ struct Cli {
 enum Command {
     Match(r#match::Args),
     Evaluate(evaluate::Args),
+    Bench(bench::Args),
     /// List the devices of this machine, their limits, and which one `auto` takes
     Devices,
     Presets(presets::Args),
@@ -104,6 +108,7 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,
+        Command::Bench(args) => bench::run(&args)?,
         Command::Devices => devices::run()?,
         Command::Presets(args) => presets::run(&args)?,
     }
@@ -113,7 +118,8 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
 /// The parser's complaint without its headings and the usage.
 fn one_line(error: &clap::Error) -> String {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "give a subcommand: match, evaluate, devices or presets; `mrfgs --help` explains".into();
+        return "give a subcommand: match, evaluate, bench, devices or presets; `mrfgs --help` explains"
+            .into();
     }
     let text = error.render().to_string();
     let lines: Vec<&str> = text
@@ -154,9 +160,9 @@ fn say(text: &str) {
 #[derive(clap::Args)]
 #[command(next_help_heading = "Method")]
 struct MethodArgs {
-    /// Preset to start from; `mrfgs presets` lists them, with every key
-    #[arg(long, value_name = "NAME", default_value = "default")]
-    preset: String,
+    /// Preset to start from; `mrfgs presets` lists them, with every key [default: default]
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
     /// TOML file of keys that replace the preset's, such as `mrfgs presets NAME` prints
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -175,7 +181,12 @@ fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
 impl MethodArgs {
     /// The method: the preset, then the config file, then each `--set`.
     fn method(&self) -> Result<Method> {
-        let mut method = Method::preset(&self.preset)?;
+        self.on(self.preset.as_deref().unwrap_or("default"))
+    }
+
+    /// The same on another preset.
+    fn on(&self, preset: &str) -> Result<Method> {
+        let mut method = Method::preset(preset)?;
         if let Some(path) = &self.config {
             method.load(path)?;
         }
@@ -202,22 +213,29 @@ struct ExecutionArgs {
     /// What runs the stages
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     backend: Backend,
+    #[command(flatten)]
+    resources: ResourceArgs,
+    /// Prints the time of every stage to standard error, by the device's own clock where it has one
+    #[arg(long)]
+    timings: bool,
+}
+
+/// What each backend may use.
+#[derive(clap::Args)]
+struct ResourceArgs {
     /// A device by its index in `mrfgs devices` or a part of its name [default: the fastest kind there is]
     #[arg(long, value_name = "NAME|INDEX")]
     device: Option<String>,
     /// Threads of the CPU path, 1 to 1024 [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Prints the time of every stage to standard error, by the device's own clock where it has one
-    #[arg(long)]
-    timings: bool,
 }
 
 impl ExecutionArgs {
     fn execution(&self) -> Result<Execution> {
-        if self.backend == Backend::Cpu && self.device.is_some() {
-            let reason = "`--backend cpu` runs on no device; leave one of the two away";
-            return Err(Error::option("--device", reason));
+        let ResourceArgs { device, threads } = &self.resources;
+        if self.backend == Backend::Cpu && device.is_some() {
+            return Err(no_device());
         }
         Ok(Execution {
             backend: match self.backend {
@@ -225,11 +243,16 @@ impl ExecutionArgs {
                 Backend::Gpu => Choice::Gpu,
                 Backend::Cpu => Choice::Cpu,
             },
-            device: self.device.clone(),
-            threads: self.threads.map(usize::from),
+            device: device.clone(),
+            threads: threads.map(usize::from),
             timings: self.timings,
         })
     }
+}
+
+/// `--device` beside `--backend cpu`.
+fn no_device() -> Error {
+    Error::option("--device", "`--backend cpu` runs on no device; leave one of the two away")
 }
 
 /// The range that `path`, a calib.txt, has read as `calibration`, gives from `min` on; `None` where it gives none.
@@ -279,6 +302,12 @@ fn match_and_tell(
     Ok((matched, time))
 }
 
+/// The name of what was timed: "dependency, level 0".
+fn stage_and_level(timing: &Timing) -> String {
+    let level = timing.level.map_or(String::new(), |z| format!(", level {z}"));
+    format!("{}{level}", timing.stage)
+}
+
 /// Stages and their times for people; `whole` is the time of it all.
 fn timing_table(matched: &Matched, whole: Duration) -> String {
     let Matched { timings, traffic, .. } = matched;
@@ -288,8 +317,7 @@ fn timing_table(matched: &Matched, whole: Duration) -> String {
         let _ = writeln!(out, "{name:<24}{runs:>6}{:>12.2}{share:>7.1} %", 1000.0 * time.as_secs_f64());
     };
     for timing in timings {
-        let level = timing.level.map_or(String::new(), |z| format!(", level {z}"));
-        row(&format!("{}{level}", timing.stage), &timing.runs.to_string(), timing.time);
+        row(&stage_and_level(timing), &timing.runs.to_string(), timing.time);
     }
     row("rest", "", whole.saturating_sub(timings.iter().map(|t| t.time).sum()));
     row("all", "", whole);
