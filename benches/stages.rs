@@ -1,27 +1,29 @@
 //! Every stage and the whole match, the same cases on every backend: `cargo bench`.
 //!
-//! `cargo bench -- dependency` runs one stage. The GPU rows are missing where there is no driver, and say so.
+//! The cases are the pairs that `mrfgs bench` makes up: the small one, and with `MRFGS_BENCH_LARGE=1` the large one too,
+//! which takes long and about 20 GB a backend. `cargo bench -- dependency` runs one stage. The GPU rows are missing where there is no
+//! driver, and say so.
 
-#[path = "../testdata/scenes.rs"]
-mod scenes;
+#[path = "../src/cli/synthetic.rs"]
+mod synthetic;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::Gpu;
 use mrfgs::backend::{Backend, Stage};
-use mrfgs::image::{Image, Pair};
-use mrfgs::options::{DisparityRange, Method};
+use mrfgs::options::Method;
 use mrfgs::plan::Plan;
 use mrfgs::{graph, solver};
 use std::ops::ControlFlow;
 use std::time::Duration;
+use synthetic::{LARGE, SMALL, Synthetic};
 
-/// Name, width, height and labels of the cases.
-const CASES: [(&str, usize, usize, u32); 2] = [("small", 160, 120, 24), ("quarter", 450, 375, 60)];
-
-fn pair_of(width: usize, height: usize, labels: u32) -> Pair {
-    let scene = scenes::render("mixed", width, height, labels);
-    Pair::new(Image::from_rgb8(&scene.left), Image::from_rgb8(&scene.right)).expect("one size")
+/// The pairs, and the presets that each is matched by: what the paper's asks of the large one fills most memories.
+fn cases() -> Vec<(Synthetic, &'static [&'static str])> {
+    let large = std::env::var("MRFGS_BENCH_LARGE").is_ok_and(|v| v != "0" && !v.is_empty());
+    let mut cases = vec![(SMALL, &["default", "paper"][..])];
+    cases.extend(large.then_some((LARGE, &["default"][..])));
+    cases
 }
 
 /// What is timed: a name, and the stages that belong to it.
@@ -42,13 +44,12 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
 }
 
 fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backend) {
-    for (case, width, height, labels) in CASES {
-        let pair = pair_of(width, height, labels);
-        let range = DisparityRange::new(0, labels as i32 - 1).expect("a range");
-        for preset in ["default", "paper"] {
+    for (case, presets) in cases() {
+        let (pair, range) = (case.pair().expect("one size"), case.range().expect("a range"));
+        for preset in presets {
             let method = Method::preset(preset).expect("a preset");
-            let plan = Plan::new(width, height, range, &method).expect("a plan");
-            let mut group = criterion.benchmark_group(format!("{case}/{preset}"));
+            let plan = Plan::new(case.width, case.height, range, &method).expect("a plan");
+            let mut group = criterion.benchmark_group(format!("{}/{preset}", case.name));
             group
                 .sample_size(10)
                 .measurement_time(Duration::from_secs(2))

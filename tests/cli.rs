@@ -674,12 +674,12 @@ fn a_bench_gives_every_figure_of_both_backends() {
             assert_eq!(runs.len(), 2);
             assert!(runs.contains(&value("min_ms")) && runs.contains(&value("max_ms")));
             let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
-            assert!(close(value("median_ms"), (runs[0] + runs[1]) / 2.0));
+            assert!(close(value("median_ms"), f64::midpoint(runs[0], runs[1])));
 
             // One level, 5 members, and messages of 1 or 2 bytes.
             let (iterations, cells) = (value("iterations"), f64::from(width * height * 32));
             let wide = if preset == "paper" { 2.0 } else { 1.0 };
-            assert_eq!(value("label_updates"), iterations * 5.0 * cells, "{what}, {backend}");
+            assert!(close(value("label_updates"), iterations * 5.0 * cells), "{what}, {backend}");
             let message_values = value("message_bytes") / (iterations * cells);
             assert!((15.0 * wide + 1.0..=15.0 * wide + 5.0).contains(&message_values), "{message_values}");
             for (key, count, time) in [
