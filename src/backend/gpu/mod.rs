@@ -40,9 +40,10 @@ const PASSES_PER_SUBMIT: usize = 16;
 /// long jobs, and for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 30;
 const WORKGROUP: u32 = 64;
-/// What [`Gpu::copy_rate`] copies at once, how often it doubles the number of copies at most, and how long is enough.
+/// What [`Gpu::copy_rate`] copies, how often it tries, and how long the copies of a try must take together, so that what a
+/// submission takes of itself no longer counts.
 const COPIED_BYTES: u64 = 1 << 28;
-const COPY_DOUBLINGS: u32 = 10;
+const COPY_TRIES: u32 = 12;
 const LONG_COPY: Duration = Duration::from_millis(100);
 
 /// The GPU path on one device.
@@ -102,22 +103,23 @@ impl Gpu {
             Ok::<_, Error>(self.device.inner()?.create_buffer(&descriptor))
         };
         let (from, to) = (buffer()?, buffer()?);
-        self.encoder()?.clear_buffer(&from, 0, None);
-        self.wait()?;
-        let (mut best, mut copies) = (0.0, 1);
-        // So many at once that what a submission takes of itself no longer counts.
-        for _ in 0..COPY_DOUBLINGS {
+        let mut time = |copies: u64| {
             let start = Instant::now();
             for _ in 0..copies {
                 self.encoder()?.copy_buffer_to_buffer(&from, 0, &to, 0, size);
             }
             self.wait()?;
-            let time = start.elapsed();
+            Ok::<_, Error>(start.elapsed())
+        };
+        // Memory is given at first touch.
+        time(1)?;
+        let (mut best, mut copies) = (0.0, 1);
+        for _ in 0..COPY_TRIES {
+            let time = time(copies)?;
             best = f64::max(best, (2 * copies * size) as f64 / time.as_secs_f64());
-            if time > LONG_COPY {
-                break;
+            if time < LONG_COPY {
+                copies *= 2;
             }
-            copies *= 2;
         }
         Ok(best)
     }
