@@ -1,7 +1,7 @@
 //! The project's own stereo scenes, each a world of bodies that `caster.rs` renders.
 //!
-//! These files are no part of the library. Tests, benches and the example `render-scenes` include this one by
-//! `#[path]`, and it the other.
+//! These files are no part of the library. Tests and the example `render-scenes` include this one by `#[path]`, and it
+//! the other.
 
 #![allow(dead_code, unreachable_pub, reason = "each target that includes this module uses a part of it")]
 #![allow(clippy::unreadable_literal, reason = "colours are 0xRRGGBB")]

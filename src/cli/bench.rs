@@ -435,8 +435,10 @@ impl Findings {
                 let ran_on = figures.as_ref().map_or("left out: too little memory", |f| &f.ran_on);
                 let _ = writeln!(out, "{backend}: {ran_on}");
             }
-            out.push('\n');
-            row.write(&mut out);
+            if row.backends.values().any(Option::is_some) {
+                out.push('\n');
+                row.write(&mut out);
+            }
         }
         out
     }
