@@ -9,6 +9,44 @@ pub mod write;
 
 use crate::error::{Error, Result};
 use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A part of an image: its columns and rows, in pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rect {
+    /// Columns.
+    pub x: Range<usize>,
+    /// Rows.
+    pub y: Range<usize>,
+}
+
+impl Rect {
+    /// All of an image of this (width, height).
+    #[must_use]
+    pub fn whole((width, height): (usize, usize)) -> Self {
+        Self { x: 0..width, y: 0..height }
+    }
+
+    /// (width, height) in pixels.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        (self.x.len(), self.y.len())
+    }
+
+    /// The same pixels, counted from the first column and row of `outer`, which holds them.
+    #[must_use]
+    pub fn within(&self, outer: &Self) -> Self {
+        let (dx, dy) = (outer.x.start, outer.y.start);
+        Self { x: self.x.start - dx..self.x.end - dx, y: self.y.start - dy..self.y.end - dy }
+    }
+
+    /// Where it is in an image `width` pixels wide that has left and right exchanged.
+    #[must_use]
+    pub fn mirrored(&self, width: usize) -> Self {
+        Self { x: width - self.x.end..width - self.x.start, y: self.y.clone() }
+    }
+}
 
 /// A rectangle of values, row by row from the top left.
 #[derive(Clone, PartialEq, Eq)]
@@ -88,6 +126,11 @@ impl<T> Plane<T> {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
+    /// Row `y`, to change.
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        &mut self.data[y * self.width..(y + 1) * self.width]
+    }
+
     /// A plane of the same size with `f` applied to each value.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Plane<U> {
         Plane { width: self.width, height: self.height, data: self.data.iter().map(f).collect() }
@@ -100,6 +143,17 @@ impl<T: Clone> Plane<T> {
     pub fn mirrored(&self) -> Self {
         let data = self.data.chunks(self.width.max(1)).flat_map(|row| row.iter().rev().cloned());
         Self { width: self.width, height: self.height, data: data.collect() }
+    }
+
+    /// The values in `part`.
+    #[must_use]
+    pub fn crop(&self, part: &Rect) -> Self {
+        let (width, height) = part.size();
+        let mut data = Vec::with_capacity(width * height);
+        for y in part.y.clone() {
+            data.extend_from_slice(&self.row(y)[part.x.clone()]);
+        }
+        Self { width, height, data }
     }
 
     /// A plane that holds `value` everywhere.
@@ -156,6 +210,18 @@ impl Image {
         Self { pixels, masked }
     }
 
+    /// The image with left and right exchanged.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        Self { pixels: self.pixels.mirrored(), masked: self.masked.mirrored() }
+    }
+
+    /// What is in `part`.
+    #[must_use]
+    pub fn crop(&self, part: &Rect) -> Self {
+        Self { pixels: self.pixels.crop(part), masked: self.masked.crop(part) }
+    }
+
     /// Width in pixels.
     #[must_use]
     pub fn width(&self) -> usize {
@@ -170,11 +236,11 @@ impl Image {
 }
 
 /// A rectified pair. The left image is the reference: its pixel (x, y) with disparity d is seen at (x - d, y)
-/// in the right image.
+/// in the right image. Clones share the images.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pair {
-    left: Image,
-    right: Image,
+    left: Arc<Image>,
+    right: Arc<Image>,
 }
 
 impl Pair {
@@ -193,13 +259,18 @@ impl Pair {
         if l.0 == 0 || l.1 == 0 {
             return Err(Error::Mismatch("the images hold no pixel".into()));
         }
-        Ok(Self { left, right })
+        Ok(Self { left: Arc::new(left), right: Arc::new(right) })
     }
 
     /// The reference view.
     #[must_use]
     pub fn left(&self) -> &Image {
         &self.left
+    }
+
+    /// The reference view, to share.
+    pub(crate) fn shared_left(&self) -> Arc<Image> {
+        Arc::clone(&self.left)
     }
 
     /// The other view.
@@ -211,9 +282,13 @@ impl Pair {
     /// The pair as in a mirror: the right view, mirrored, takes the left one's place, and disparities stay what they are.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        let mirror =
-            |image: &Image| Image { pixels: image.pixels.mirrored(), masked: image.masked.mirrored() };
-        Self { left: mirror(&self.right), right: mirror(&self.left) }
+        Self { left: Arc::new(self.right.mirrored()), right: Arc::new(self.left.mirrored()) }
+    }
+
+    /// What is in `part` of both views.
+    #[must_use]
+    pub fn crop(&self, part: &Rect) -> Self {
+        Self { left: Arc::new(self.left.crop(part)), right: Arc::new(self.right.crop(part)) }
     }
 
     /// (width, height) of both views.
