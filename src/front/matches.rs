@@ -119,28 +119,30 @@ fn cell(spacing: usize) -> usize {
 struct View {
     /// In 1/16 of an 8-bit level.
     grey: Plane<i16>,
-    /// Row by row, the sum over the window around each pixel.
-    sum: Vec<Vec<i32>>,
-    /// Row by row, n sigma of the n values of each window; 0 where it is uniform, masked or beyond the border.
-    norm: Vec<Vec<f64>>,
+    /// The sum over the window around each pixel.
+    sum: Plane<i32>,
+    /// n sigma of the n values of each window; 0 where it is uniform, masked or beyond the border.
+    norm: Plane<f64>,
 }
 
 impl View {
     fn new(image: &Image) -> Self {
         let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
-        let rows = (0..grey.height()).into_par_iter().map(|y| {
+        let (width, height) = grey.size();
+        // One block each: freed rows of a large image may stay with the process.
+        let (mut sums, mut norms) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0.0));
+        let rows = sums.data_mut().par_chunks_mut(width).zip(norms.data_mut().par_chunks_mut(width));
+        rows.enumerate().for_each(|(y, (sums, norms))| {
             let sum = box_sums(&grey, y, RADIUS, |x, y| grey[(x, y)] as i32);
             let squares = box_sums(&grey, y, RADIUS, |x, y| (grey[(x, y)] as i32).pow(2));
             let masked = box_sums(&grey, y, RADIUS, |x, y| image.masked[(x, y)] as i32);
-            let norm = (0..grey.width()).map(|x| {
+            for (x, norm) in norms.iter_mut().enumerate() {
                 let variance = WINDOW_PIXELS * squares[x] as i64 - (sum[x] as i64).pow(2);
-                if masked[x] == 0 { (variance as f64).sqrt() } else { 0.0 }
-            });
-            let norm = norm.collect();
-            (sum, norm)
+                *norm = if masked[x] == 0 { (variance as f64).sqrt() } else { 0.0 };
+            }
+            sums.copy_from_slice(&sum);
         });
-        let (sum, norm) = rows.unzip();
-        Self { grey, sum, norm }
+        Self { grey, sum: sums, norm: norms }
     }
 
     /// The smaller eigenvalue of the structure tensor at each pixel of row `y`; 0 where no window fits.
@@ -160,7 +162,7 @@ impl View {
         let eigenvalue = |x: usize| {
             let [xx, xy, yy] = [&xx, &xy, &yy].map(|sums| sums[x] as f64);
             let root = ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt();
-            if self.norm[y][x] > 0.0 { (xx + yy - root) / 2.0 } else { 0.0 }
+            if self.norm[(x, y)] > 0.0 { (xx + yy - root) / 2.0 } else { 0.0 }
         };
         (0..g.width()).map(eigenvalue).collect()
     }
@@ -190,14 +192,16 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
     if let Some((map, _)) = zones {
         assert_eq!(map.size(), (width, height), "the map of zones has the size of the images");
     }
-    let values: Vec<Vec<f64>> = (0..height).into_par_iter().map(|y| view.eigenvalues(y)).collect();
+    let mut values = Plane::filled(width, height, 0.0);
+    let rows = values.data_mut().par_chunks_mut(width).enumerate();
+    rows.for_each(|(y, row)| row.copy_from_slice(&view.eigenvalues(y)));
     // The earlier one in raster order wins a tie.
     let is_peak = |x: usize, y: usize| {
-        let value = values[y][x];
+        let value = values[(x, y)];
         value > 0.0
             && (y - PEAK_RADIUS..=y + PEAK_RADIUS).all(|v| {
                 (x - PEAK_RADIUS..=x + PEAK_RADIUS)
-                    .all(|u| value.total_cmp(&values[v][u]).then((v, u).cmp(&(y, x))).is_ge())
+                    .all(|u| value.total_cmp(&values[(u, v)]).then((v, u).cmp(&(y, x))).is_ge())
             })
     };
     let side = cell(spacing);
@@ -220,7 +224,7 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
                 }
             }
             of_zone.into_values().flat_map(|(pixels, mut peaks)| {
-                peaks.sort_by(|a, b| values[b.1][b.0].total_cmp(&values[a.1][a.0]));
+                peaks.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
                 peaks.truncate(pixels.div_ceil(spacing));
                 peaks
             })
@@ -302,10 +306,10 @@ fn correlation(
             }
         }
     }
-    let (sum, norm) = (of.sum[y][x] as i64, of.norm[y][x]);
+    let (sum, norm) = (of.sum[(x, y)] as i64, of.norm[(x, y)]);
     (0..count)
         .map(|i| {
-            let (there, norms) = (within.sum[v][first + i] as i64, norm * within.norm[v][first + i]);
+            let (there, norms) = (within.sum[(first + i, v)] as i64, norm * within.norm[(first + i, v)]);
             if norms > 0.0 { (WINDOW_PIXELS * products[i] as i64 - sum * there) as f64 / norms } else { 0.0 }
         })
         .collect()
