@@ -1,9 +1,8 @@
-// The map of the right view, read off the same beliefs. One invocation a right pixel.
+// The map of the right view, read off the same beliefs of the columns that count. One invocation a right pixel.
 
 @group(0) @binding(1) var<storage, read> belief: array<u32>;
+// label | belief << 16, all bits set where no left pixel projects.
 @group(0) @binding(2) var<storage, read_write> labels: array<u32>;
-
-const NO_LABEL: u32 = 0xffffu;
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -14,8 +13,9 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let row = 2u * id.y * params.level.pitch;
     // Label j is seen from left pixel x + low + j.
     let shift = i32(id.x) + params.level.low;
-    let start = max(-shift, 0);
-    let end = min(i32(params.level.width) - shift, i32(params.level.labels));
+    let first = i32(params.first_column);
+    let start = max(first - shift, 0);
+    let end = min(first + i32(params.columns) - shift, i32(params.level.labels));
     var least = 0xffffffffu;
     for (var j = start; j < end; j++) {
         let label = u32(j);
@@ -23,5 +23,5 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let b = (word >> (16u * (label % 2u))) & 0xffffu;
         least = min(least, (b << 16u) | label);
     }
-    labels[id.y * params.level.pixel_pitch + id.x] = select(least & 0xffffu, NO_LABEL, start >= end);
+    labels[id.y * params.level.pixel_pitch + id.x] = least;
 }

@@ -2,6 +2,7 @@
 
 // label | best << 16, rival.
 @group(0) @binding(1) var<storage, read> peaks: array<vec2<u32>>;
+// label | belief << 16.
 @group(0) @binding(2) var<storage, read> right_labels: array<u32>;
 @group(0) @binding(3) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read_write> flags: array<u32>;
@@ -21,7 +22,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let x = i32(id.x) - params.level.low - label;
         if x < 0 || x >= i32(params.level.width) {
             reason = OUTSIDE;
-        } else if abs(i32(right_labels[row + u32(x)]) - label) > 1 {
+        } else if abs(i32(right_labels[row + u32(x)] & 0xffffu) - label) > 1 {
             reason = OCCLUDED;
         }
     }

@@ -1,7 +1,6 @@
 //! How much memory there is to ask for.
 
 use crate::error::{Error, Result};
-use crate::plan::Plan;
 
 /// Bytes that can be had without swapping, where the system says so.
 fn available() -> Option<u64> {
@@ -10,18 +9,18 @@ fn available() -> Option<u64> {
     line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
 }
 
-/// Declines a plan that this machine cannot hold: the system would end the process without a word.
+/// Declines to take `bytes` that this machine cannot give: the system would end the process without a word.
 ///
 /// # Errors
 /// [`Error::Memory`] with both figures.
-pub(crate) fn check(plan: &Plan) -> Result<()> {
+pub(crate) fn check(bytes: u64) -> Result<()> {
     match available() {
-        Some(free) if plan.bytes() > free => {
+        Some(free) if bytes > free => {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
             Err(Error::Memory(format!(
-                "the match needs {:.1} GiB of memory and {:.1} GiB are free: use a smaller image, a smaller range \
-                 (--min-disparity, --max-disparity) or fewer neighbours (--set percentile)",
-                gib(plan.bytes()),
+                "the match needs {:.1} GiB of memory and {:.1} GiB are free: let it take less (--memory), or use a smaller \
+                 image, a smaller range (--min-disparity, --max-disparity) or fewer neighbours (--set percentile)",
+                gib(bytes),
                 gib(free)
             )))
         }

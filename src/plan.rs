@@ -9,6 +9,7 @@
 
 use crate::error::Result;
 use crate::options::{Cost, DisparityRange, Method, Potential, Pyramid, Resolution, Schedule};
+use std::ops::Range;
 
 /// Units of cost in one nat.
 pub const UNITS_PER_NAT: f64 = 4.0;
@@ -172,6 +173,9 @@ pub struct Plan {
     pub message_width: MessageWidth,
     /// The flooding, in order.
     pub phases: Vec<Phase>,
+    /// Columns of the left view that [`Stage::RightView`](crate::backend::Stage::RightView) takes in: all of them, but for
+    /// a tile, whose core alone counts.
+    pub core: Range<usize>,
 }
 
 impl Plan {
@@ -245,8 +249,15 @@ impl Plan {
             resolution,
             message_width: if narrow { MessageWidth::Narrow } else { MessageWidth::Wide },
             phases,
+            core: 0..width,
             method,
         })
+    }
+
+    /// Whether a match by this plan goes into the buffers of `other`: they differ in [`Plan::core`] at most.
+    #[must_use]
+    pub fn fits(&self, other: &Self) -> bool {
+        *self == Self { core: self.core.clone(), ..other.clone() }
     }
 
     /// (width, height) of the finest level.

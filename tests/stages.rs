@@ -16,6 +16,7 @@ use mrfgs::image::{Pair, Plane};
 use mrfgs::options::{Cost, Method, PRESETS, Potential, Pyramid, Resolution, Schedule};
 use mrfgs::plan::{COST_MAX, CutRule, MessageWidth, Plan};
 use mrfgs::solver;
+use std::cell::Cell;
 use std::collections::HashSet;
 
 /// One pixel, one column, one row, odd, divisible by no power of two, and wider than a block of anything.
@@ -366,22 +367,34 @@ fn change() {
 
 #[test]
 fn estimate() {
+    let narrower = Cell::new(0);
     on_all(|case, backend, random| {
+        let mut plan = case.plan.clone();
+        let width = plan.levels[0].width;
         for most in [0, 2, 50_000] {
-            let belief: Vec<u32> = (0..cells(&case.plan, 0)).map(|_| random.within(0, most)).collect();
+            let belief: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, most)).collect();
             backend.write(Volume::Belief(0), &belief).unwrap();
-            let cost = random_cost(random, &case.plan, 0);
+            let cost = random_cost(random, &plan, 0);
             backend.write(Volume::Cost(0), &cost).unwrap();
-            let mut maps = random::finest(random, &case.plan, false);
+            let mut maps = random::finest(random, &plan, false);
             maps.write(backend);
             for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
                 backend.run(stage).unwrap();
             }
-            twin_estimate(&case.plan, &cost, &belief, &mut maps);
+            twin_estimate(&plan, &cost, &belief, &mut maps);
             compare_finest(backend, &maps)?;
+            // Control: with all columns it is another right view.
+            let mut all = maps.clone();
+            twin::estimate::right_view(&case.plan, &belief, &mut all);
+            narrower.set(narrower.get() + usize::from(all != maps));
+            // Then a tile with a core of its own, in the same buffers.
+            let start = random.within(0, width as u32 - 1) as usize;
+            plan.core = start..random.within(start as u32 + 1, width as u32) as usize;
+            backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();
         }
         Ok(())
     });
+    assert!(narrower.get() > 50, "{}", narrower.get());
 }
 
 fn twin_estimate(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {

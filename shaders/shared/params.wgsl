@@ -52,7 +52,8 @@ struct Params {
     confidence_floor: u32,
     // Rows around the band that the stage sees.
     halo: u32,
-    // Rows of the blocks that are joined, 0 to join the segments of each row, and the columns to do it in.
+    // Rows of the blocks that are joined, 0 to join the segments of each row, and the columns to do it in; for the right
+    // view the left columns that count.
     span: u32,
     first_column: u32,
     columns: u32,

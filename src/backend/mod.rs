@@ -61,6 +61,8 @@ pub enum Map {
     Rival,
     /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
     RightLabel,
+    /// Its belief, in units; [`u16::MAX`] where no left pixel projects.
+    RightBest,
     /// Disparity before post-processing, in 1/256 px.
     Raw,
     /// Disparity as far as post-processing is done, in 1/256 px.
@@ -73,11 +75,12 @@ pub enum Map {
 
 impl Map {
     /// Every map there is.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Label,
         Self::Best,
         Self::Rival,
         Self::RightLabel,
+        Self::RightBest,
         Self::Raw,
         Self::Disparity,
         Self::Validity,
@@ -142,8 +145,8 @@ pub enum Stage {
     Change,
     /// [`Map::Label`], [`Map::Best`] and [`Map::Rival`] of level 0.
     Estimate,
-    /// [`Map::RightLabel`]: at (x, y) the label with the smallest belief of left pixel (x + d, y) among those inside, the
-    /// lowest on ties.
+    /// [`Map::RightLabel`] and [`Map::RightBest`]: at (x, y) the label with the smallest belief of left pixel (x + d, y) among
+    /// those in the columns [`Plan::core`], the lowest on ties, and that belief.
     RightView,
     /// [`Map::Raw`], and [`Map::Disparity`] equal to it: the label and, where [`crate::options::Method::sub_pixel`] asks
     /// for it, its offset.
@@ -240,6 +243,15 @@ pub struct Traffic {
     pub bytes_held: u64,
 }
 
+impl std::ops::AddAssign for Traffic {
+    fn add_assign(&mut self, more: Self) {
+        self.dispatches += more.dispatches;
+        self.submissions += more.submissions;
+        self.bytes_up += more.bytes_up;
+        self.bytes_down += more.bytes_down;
+    }
+}
+
 /// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Backend {
@@ -248,7 +260,7 @@ pub trait Backend {
 
     /// Takes the pair and the graphs of all levels of `plan`, and sets all messages, and the map that
     /// [`Stage::Change`] compares with, to 0. All that the stages need is allocated here, from the plan alone; a second
-    /// pair of the same plan goes into the same buffers.
+    /// pair whose plan [fits](Plan::fits) goes into the same buffers.
     ///
     /// # Errors
     /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.

@@ -369,6 +369,7 @@ pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
             };
             maps.right_label[at] =
                 if random.one_in(5) { NO_LABEL.into() } else { random.within(0, labels - 1) as i32 };
+            maps.right_best[at] = random.within(0, 65_535) as i32;
             maps.confidence[at] = random.within(0, 255) as i32;
         }
     }

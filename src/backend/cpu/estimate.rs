@@ -17,27 +17,26 @@ pub(super) fn run(plan: &Plan, belief: &[u16], maps: &mut Finest) {
 pub(super) fn right_view(plan: &Plan, belief: &[u16], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, labels, stride) = (level.width, level.labels, level.stride);
-    maps.right.data_mut().par_chunks_mut(width).zip(belief.par_chunks(width * stride)).for_each_init(
-        || vec![u16::MAX; width],
-        |smallest, (right, row)| {
-            smallest.fill(u16::MAX);
-            right.fill(NO_LABEL);
-            for (x, belief) in row.chunks_exact(stride).enumerate() {
-                // Label j of left pixel x is seen at right pixel x - min - j. For one right pixel x falls as j does, so
-                // labels arrive in ascending order and the first of equals stays.
-                let seen = x as i64 - i64::from(level.min);
-                for (j, &b) in belief[..labels].iter().enumerate() {
-                    let xr = seen - j as i64;
-                    if xr >= 0
-                        && xr < width as i64
-                        && (right[xr as usize] == NO_LABEL || b < smallest[xr as usize])
-                    {
-                        (right[xr as usize], smallest[xr as usize]) = (j as u16, b);
-                    }
+    let rows =
+        maps.right.data_mut().par_chunks_mut(width).zip(maps.right_best.data_mut().par_chunks_mut(width));
+    rows.zip(belief.par_chunks(width * stride)).for_each(|((right, smallest), row)| {
+        smallest.fill(u16::MAX);
+        right.fill(NO_LABEL);
+        for (x, belief) in row.chunks_exact(stride).enumerate().take(plan.core.end).skip(plan.core.start) {
+            // Label j of left pixel x is seen at right pixel x - min - j. For one right pixel x falls as j does, so
+            // labels arrive in ascending order and the first of equals stays.
+            let seen = x as i64 - i64::from(level.min);
+            for (j, &b) in belief[..labels].iter().enumerate() {
+                let xr = seen - j as i64;
+                if xr >= 0
+                    && xr < width as i64
+                    && (right[xr as usize] == NO_LABEL || b < smallest[xr as usize])
+                {
+                    (right[xr as usize], smallest[xr as usize]) = (j as u16, b);
                 }
             }
-        },
-    );
+        }
+    });
 }
 
 fn peak_of(belief: &[u16]) -> Peak {

@@ -19,7 +19,7 @@ mod visibility;
 use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
 use crate::error::Result;
 use crate::graph::LevelGraph;
-use crate::image::{Pair, Plane};
+use crate::image::{Image, Pair, Plane, Rect};
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{COST_FRACTION_BITS, COST_MAX, MessageWidth, Plan};
@@ -85,6 +85,8 @@ struct Volumes<M> {
 struct Finest {
     peaks: Plane<Peak>,
     right: Plane<u16>,
+    /// Belief of the right labels.
+    right_best: Plane<u16>,
     raw: Plane<i32>,
     disparity: Plane<i32>,
     validity: Plane<u8>,
@@ -104,6 +106,7 @@ impl Finest {
         Self {
             peaks: Plane::filled(width, height, Peak::default()),
             right: Plane::filled(width, height, 0),
+            right_best: Plane::filled(width, height, 0),
             raw: Plane::filled(width, height, 0),
             disparity: Plane::filled(width, height, 0),
             validity: Plane::filled(width, height, 0),
@@ -117,6 +120,7 @@ impl Finest {
             Map::Best => self.peaks.map(|p| p.best.into()),
             Map::Rival => self.peaks.map(|p| p.rival.into()),
             Map::RightLabel => self.right.map(|&v| v.into()),
+            Map::RightBest => self.right_best.map(|&v| v.into()),
             Map::Raw => self.raw.clone(),
             Map::Disparity => self.disparity.clone(),
             Map::Validity => self.validity.map(|&v| v.into()),
@@ -125,19 +129,46 @@ impl Finest {
     }
 
     fn write(&mut self, map: Map, values: &Plane<i32>) {
-        fn put<T>(plane: &mut Plane<T>, values: &Plane<i32>, set: impl Fn(&mut T, i32)) {
-            assert_eq!(plane.size(), values.size(), "a map of the size of the images");
-            plane.data_mut().iter_mut().zip(values.data()).for_each(|(old, &new)| set(old, new));
+        assert_eq!(self.peaks.size(), values.size(), "a map of the size of the images");
+        self.write_part(map, values, &Rect::whole(values.size()), (0, 0));
+    }
+
+    /// Replaces the values of `map` from `corner` on by `part` of `values`.
+    fn write_part(&mut self, map: Map, values: &Plane<i32>, part: &Rect, corner: (usize, usize)) {
+        fn put<T>(
+            plane: &mut Plane<T>,
+            (values, part, (x, y)): (&Plane<i32>, &Rect, (usize, usize)),
+            set: impl Fn(&mut T, i32),
+        ) {
+            for (row, y) in part.y.clone().zip(y..) {
+                let old = plane.row_mut(y)[x..].iter_mut();
+                old.zip(&values.row(row)[part.x.clone()]).for_each(|(old, &new)| set(old, new));
+            }
         }
+        let from = (values, part, corner);
         match map {
-            Map::Label => put(&mut self.peaks, values, |p, v| p.label = v as u16),
-            Map::Best => put(&mut self.peaks, values, |p, v| p.best = v as u16),
-            Map::Rival => put(&mut self.peaks, values, |p, v| p.rival = v as u16),
-            Map::RightLabel => put(&mut self.right, values, |old, v| *old = v as u16),
-            Map::Raw => put(&mut self.raw, values, |old, v| *old = v),
-            Map::Disparity => put(&mut self.disparity, values, |old, v| *old = v),
-            Map::Validity => put(&mut self.validity, values, |old, v| *old = v as u8),
-            Map::Confidence => put(&mut self.confidence, values, |old, v| *old = v as u8),
+            Map::Label => put(&mut self.peaks, from, |p, v| p.label = v as u16),
+            Map::Best => put(&mut self.peaks, from, |p, v| p.best = v as u16),
+            Map::Rival => put(&mut self.peaks, from, |p, v| p.rival = v as u16),
+            Map::RightLabel => put(&mut self.right, from, |old, v| *old = v as u16),
+            Map::RightBest => put(&mut self.right_best, from, |old, v| *old = v as u16),
+            Map::Raw => put(&mut self.raw, from, |old, v| *old = v),
+            Map::Disparity => put(&mut self.disparity, from, |old, v| *old = v),
+            Map::Validity => put(&mut self.validity, from, |old, v| *old = v as u8),
+            Map::Confidence => put(&mut self.confidence, from, |old, v| *old = v as u8),
+        }
+    }
+
+    /// Runs a stage that needs maps and the left view alone: those after [`Stage::SubPixel`].
+    fn run(&mut self, plan: &Plan, left: &Image, stage: Stage) {
+        match stage {
+            Stage::Visibility => visibility::run(plan, left, self),
+            Stage::RegionFilter => region_filter::run(plan.method.region_size as usize, self),
+            Stage::Confidence => confidence::run(plan.method.confidence_floor, self),
+            Stage::Fill => fill::run(self),
+            Stage::FillMedian => median::fill(plan, left, self),
+            Stage::Median => median::run(plan, left, self),
+            _ => unreachable!("{stage:?} needs volumes"),
         }
     }
 }
@@ -189,8 +220,9 @@ impl<M: Message> Volumes<M> {
         }
     }
 
-    /// Ready for another pair of the same plan, as [`Self::new`] would be.
-    fn reset(&mut self, pair: &Pair, graphs: Vec<LevelGraph>) {
+    /// Ready for another pair whose plan fits, as [`Self::new`] would be.
+    fn reset(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) {
+        self.plan = plan.clone();
         self.pair = pair.clone();
         self.labels.fill(0);
         for (level, graph) in self.levels.iter_mut().zip(graphs) {
@@ -263,12 +295,12 @@ impl<M: Message> Volumes<M> {
             Stage::Estimate => estimate::run(plan, &levels[0].belief, maps),
             Stage::RightView => estimate::right_view(plan, &levels[0].belief, maps),
             Stage::SubPixel => sub_pixel::run(plan, fine_cost, maps),
-            Stage::Visibility => visibility::run(plan, pair.left(), maps),
-            Stage::RegionFilter => region_filter::run(plan.method.region_size as usize, maps),
-            Stage::Confidence => confidence::run(plan.method.confidence_floor, maps),
-            Stage::Fill => fill::run(maps),
-            Stage::FillMedian => median::fill(plan, pair.left(), maps),
-            Stage::Median => median::run(plan, pair.left(), maps),
+            Stage::Visibility
+            | Stage::RegionFilter
+            | Stage::Confidence
+            | Stage::Fill
+            | Stage::FillMedian
+            | Stage::Median => maps.run(plan, pair.left(), stage),
         }
     }
 
@@ -318,12 +350,12 @@ impl Backend for Cpu {
 
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
         match self.state.as_mut() {
-            Some(State::Narrow(volumes)) if volumes.plan == *plan => volumes.reset(pair, graphs),
-            Some(State::Wide(volumes)) if volumes.plan == *plan => volumes.reset(pair, graphs),
+            Some(State::Narrow(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, pair, graphs),
+            Some(State::Wide(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, pair, graphs),
             _ => {
                 // What the last match holds goes before the next one asks for more.
                 self.state = None;
-                memory::check(plan)?;
+                memory::check(plan.bytes())?;
                 self.state = Some(match plan.message_width {
                     MessageWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
                     MessageWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)),

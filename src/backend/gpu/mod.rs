@@ -309,7 +309,8 @@ impl Gpu {
             Map::Label => (&b.peaks, 2, 0, 0, 0xffff),
             Map::Best => (&b.peaks, 2, 0, 16, 0xffff),
             Map::Rival => (&b.peaks, 2, 1, 0, 0xffff),
-            Map::RightLabel => (&b.right_labels, 1, 0, 0, u32::MAX),
+            Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
+            Map::RightBest => (&b.right_labels, 1, 0, 16, 0xffff),
             Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),
             Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
             Map::Validity => (&b.flags, 1, 0, 0, 0xff),
@@ -334,12 +335,18 @@ impl Backend for Gpu {
         (self.encoder, self.passes, self.work) = (None, 0, 0);
         self.device.traffic = Traffic::default();
         let mut state = match self.state.take() {
-            Some(state) if state.plan == *plan => state,
+            Some(mut state) if plan.fits(&state.plan) => {
+                if state.plan.core != plan.core {
+                    state.plan = plan.clone();
+                    state.steps.insert(Stage::RightView, self.right_view(plan, &state.buffers)?.into());
+                }
+                state
+            }
             other => {
                 // What the last match holds goes before the next one asks for more.
                 drop(other);
                 if self.device.software {
-                    memory::check(plan)?;
+                    memory::check(plan.bytes())?;
                 }
                 let buffers = Buffers::new(&self.device, plan)?;
                 let steps = self.steps(plan, &buffers)?;

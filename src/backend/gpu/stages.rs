@@ -101,10 +101,7 @@ impl Gpu {
         let estimate = self
             .stage(&job(Kernel::Estimate), Some(l.width), |r| vec![belief.bind(r), buffers.peaks.bind(r)])?;
         add(Stage::Estimate, estimate);
-        let right = self.stage(&job(Kernel::RightView), Some(l.width), |r| {
-            vec![belief.bind(r), buffers.right_labels.bind(r)]
-        })?;
-        add(Stage::RightView, right);
+        add(Stage::RightView, self.right_view(plan, buffers)?);
         let sub_pixel = self.stage(&job(Kernel::SubPixel), Some(l.width), |rows| {
             let seen = with_halo(rows, 1, l.height);
             vec![
@@ -263,6 +260,17 @@ impl Gpu {
         })?;
         steps.extend(renewed(&b.belief));
         Ok(steps)
+    }
+
+    /// The steps of [`Stage::RightView`]: the tile decides which columns count.
+    pub(super) fn right_view(&mut self, plan: &Plan, buffers: &Buffers) -> Result<Vec<Step>> {
+        let (first_column, columns) = (plan.core.start as u32, plan.core.len() as u32);
+        let params = Params { first_column, columns, ..params(plan, buffers, 0) };
+        let cuts = cuts(buffers, 0);
+        let job = Job { kernel: Kernel::RightView, plan, level: 0, params, cuts: &cuts };
+        self.stage(&job, Some(params.level.width), |rows| {
+            vec![buffers.levels[0].belief.bind(rows), buffers.right_labels.bind(rows)]
+        })
     }
 
     fn change_steps(&mut self, plan: &Plan, buffers: &Buffers, cuts: &[u32]) -> Result<Vec<Step>> {

@@ -34,6 +34,7 @@ pub struct Finest {
     pub best: Plane<i32>,
     pub rival: Plane<i32>,
     pub right_label: Plane<i32>,
+    pub right_best: Plane<i32>,
     pub raw: Plane<i32>,
     pub disparity: Plane<i32>,
     pub validity: Plane<i32>,
@@ -49,6 +50,7 @@ impl Finest {
             best: zero(),
             rival: zero(),
             right_label: zero(),
+            right_best: zero(),
             raw: zero(),
             disparity: zero(),
             validity: zero(),
@@ -57,12 +59,13 @@ impl Finest {
     }
 
     /// Every map with its plane.
-    pub fn planes(&self) -> [(Map, &Plane<i32>); 8] {
+    pub fn planes(&self) -> [(Map, &Plane<i32>); 9] {
         [
             (Map::Label, &self.label),
             (Map::Best, &self.best),
             (Map::Rival, &self.rival),
             (Map::RightLabel, &self.right_label),
+            (Map::RightBest, &self.right_best),
             (Map::Raw, &self.raw),
             (Map::Disparity, &self.disparity),
             (Map::Validity, &self.validity),
