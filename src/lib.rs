@@ -33,7 +33,8 @@
 //! ```
 //!
 //! - [`options::Method`] holds every parameter that determines the bits, [`options::Execution`] what does not.
-//! - [`plan::Plan`] works out levels, integer parameters, bounds and memory, before anything runs.
+//! - [`plan::Plan`] works out levels, integer parameters, bounds and memory, before anything runs, and [`tiles::Tiles`] how
+//!   to cut what is too large.
 //! - [`front`] corrects the illumination and finds texture zones, sparse matches and the labels they leave, where asked.
 //! - [`graph`] picks the members of each dependency factor.
 //! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
@@ -58,6 +59,7 @@ pub mod plan;
 pub mod roofline;
 pub mod solver;
 pub mod tables;
+pub mod tiles;
 
 pub use error::{Error, Result};
 pub use matcher::{Matched, Matcher, Timing, match_pair};

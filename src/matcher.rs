@@ -9,6 +9,7 @@ use crate::maps::Maps;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::{self, Inspector, Observer, Solution};
+use crate::tiles::Tiles;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -18,10 +19,12 @@ use std::time::Duration;
 pub struct Matched {
     /// The maps.
     pub maps: Maps,
-    /// Iterations done, of all phases together.
+    /// Iterations done, of all phases together; the most of any tile.
     pub iterations: u32,
-    /// The plan that was followed.
+    /// The plan that was followed, for the whole image.
     pub plan: Plan,
+    /// How the image was cut for it: one tile where it was not.
+    pub tiles: Tiles,
     /// What ran the stages, for people.
     pub ran_on: String,
     /// Why it is not the device that was hoped for, where that is so.
@@ -118,7 +121,8 @@ impl Matcher {
     /// Matches `pair` over `range` by `method`; `observer` hears of progress and can stop it.
     ///
     /// # Errors
-    /// [`Error::Option`] for options out of range, [`Error::Device`] where the wanted device fails, [`Error::Memory`] when
+    /// [`Error::Option`] for options out of range, and where no tile is small enough for the method's memory; [`Error::Device`]
+    /// where the wanted device fails, [`Error::Memory`] when
     /// the machine or the device cannot hold it, [`Error::Interrupted`] when `observer` breaks.
     pub fn run(
         &mut self,
@@ -144,12 +148,20 @@ impl Matcher {
     ) -> Result<Matched> {
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
+        let tiles = Tiles::new(&plan)?;
+        if inspector.is_some() && tiles.count() > 1 {
+            let (count, needed) = (tiles.count(), plan.bytes().div_ceil(1 << 20));
+            let reason = format!(
+                "shows the steps of a match in one piece, and this one has {count} tiles: give --memory {needed}MiB"
+            );
+            return Err(Error::option("--intermediates", reason));
+        }
         let Self { pool, cpu, gpu, checked, falls_back, given_up, timings } = self;
         pool.install(|| {
             let mut note = given_up.clone();
             if let Some(device) = gpu {
                 let served = check(device, &plan.method, checked).and_then(|()| {
-                    timed(device, *timings, &plan, pair, &mut *observer, again(&mut inspector))
+                    timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector))
                 });
                 match served {
                     // The bits are the same on the CPU path, so a device that fails costs time and nothing else.
@@ -164,7 +176,7 @@ impl Matcher {
                     served => return served,
                 }
             }
-            timed(cpu, *timings, &plan, pair, observer, inspector).map(|matched| Matched { note, ..matched })
+            timed(cpu, *timings, &tiles, pair, observer, inspector).map(|matched| Matched { note, ..matched })
         })
     }
 }
@@ -186,19 +198,24 @@ pub fn match_pair(
 fn timed(
     backend: &mut dyn Backend,
     timings: bool,
-    plan: &Plan,
+    tiles: &Tiles,
     pair: &Pair,
     observer: Observer,
     inspector: Option<Inspector>,
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
-    let solution = solver::inspect(backend, plan, pair, observer, inspector)?;
+    let solution = if tiles.count() == 1 {
+        solver::inspect(backend, tiles.whole(), pair, observer, inspector)?
+    } else {
+        solver::solve_tiles(backend, tiles, pair, observer)?
+    };
     Ok(Matched {
         timings: if timings { summed(&solution, &backend.times()?) } else { Vec::new() },
-        traffic: backend.traffic(),
+        traffic: solution.traffic,
         maps: solution.maps,
         iterations: solution.iterations,
-        plan: plan.clone(),
+        plan: tiles.whole().clone(),
+        tiles: tiles.clone(),
         ran_on: backend.describe(),
         note: None,
     })
@@ -216,7 +233,8 @@ fn again<'a>(inspector: &'a mut Option<Inspector>) -> Option<Inspector<'a>> {
 fn summed(solution: &Solution, times: &[(Stage, Duration)]) -> Vec<Timing> {
     let mut all: Vec<Timing> = Vec::new();
     let host = solution.around.iter().map(|&(name, time)| (name, None, time));
-    let stages = times.iter().map(|&(stage, time)| (stage.name(), stage.level(), time));
+    let stages =
+        times.iter().chain(&solution.finish).map(|&(stage, time)| (stage.name(), stage.level(), time));
     for (stage, level, time) in host.chain(stages) {
         match all.iter_mut().find(|t| (t.stage, t.level) == (stage, level)) {
             Some(timing) => {

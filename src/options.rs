@@ -22,6 +22,8 @@ pub struct DisparityRange {
 
 /// Most labels of a range: what 16-bit label indices and every device's limits allow.
 pub const MAX_LABELS: usize = 16_384;
+/// Most memory that a match may be given, in MiB: 16 TiB.
+pub const MAX_MEMORY: u32 = 1 << 24;
 /// A config file is a few dozen lines; no more than this is read of one.
 const MAX_CONFIG_BYTES: u64 = 1 << 20;
 /// Largest absolute disparity: the fixed-point maps hold 1/256 px in 32 bits with room for differences.
@@ -232,6 +234,9 @@ method! {
     median_sigma_space: f64, "pixels", "Spatial parameter of the median's weights (open).";
     median_sigma_range: f64, "of the intensity range 0 to 1", "Range parameter of the median's weights (open).";
     confidence_floor: u32, "0 to 255", "Confidence below this sets the validity flag for low confidence.";
+    memory: u32, "MiB, 1 to 16777216", "Memory that a match may take. A pair that needs more is matched tile by tile, and \
+         the maps differ a little from those of a match in one piece; where it is cut follows from size, range and method \
+         alone.";
 }
 
 /// Every key of [`Method`], in order.
@@ -282,6 +287,7 @@ impl Default for Method {
             median_sigma_space: 5.0,
             median_sigma_range: 0.1,
             confidence_floor: 16,
+            memory: 4096,
         }
     }
 }
@@ -472,6 +478,7 @@ impl Method {
         within("median-sigma-space", 0.1, 100.0)?;
         within("median-sigma-range", 1e-3, 10.0)?;
         within("confidence-floor", 0.0, 255.0)?;
+        within("memory", 1.0, f64::from(MAX_MEMORY))?;
         Ok(self)
     }
 }

@@ -8,7 +8,7 @@
 //! All are non-negative integers; every message has minimum 0 over the labels.
 
 use crate::error::Result;
-use crate::options::{Cost, DisparityRange, Method, Potential, Pyramid, Resolution, Schedule};
+use crate::options::{Cost, DisparityRange, Illumination, Method, Potential, Pyramid, Resolution, Schedule};
 use std::ops::Range;
 
 /// Units of cost in one nat.
@@ -254,6 +254,17 @@ impl Plan {
         })
     }
 
+    /// The plan of the same range and method for another size, with as many levels.
+    pub(crate) fn resized(&self, width: usize, height: usize) -> Self {
+        let mut plan = Self { core: 0..width, ..self.clone() };
+        let mut size = (width, height);
+        for level in &mut plan.levels {
+            (level.width, level.height) = size;
+            size = (size.0.div_ceil(2), size.1.div_ceil(2));
+        }
+        plan
+    }
+
     /// Whether a match by this plan goes into the buffers of `other`: they differ in [`Plan::core`] at most.
     #[must_use]
     pub fn fits(&self, other: &Self) -> bool {
@@ -343,6 +354,21 @@ impl Plan {
     #[must_use]
     pub fn map_bytes(&self) -> u64 {
         100 * self.levels[0].pixels() as u64
+    }
+
+    /// Bytes of the pair: 18 a pixel, two views of 8 and their masks.
+    #[must_use]
+    pub fn pair_bytes(&self) -> u64 {
+        18 * self.levels[0].pixels() as u64
+    }
+
+    /// Bytes that the maps of an image take which is matched tile by tile, at most. A pixel has 20 in the maps that its tiles
+    /// leave and those that are made of them (label, best, rival, right label and its belief 2 each, raw and final disparity
+    /// 4 each, validity and confidence 1 each), and 12 while they are made; 9 more where the left view is corrected.
+    #[must_use]
+    pub fn mosaic_bytes(&self) -> u64 {
+        let corrected = if self.method.illumination == Illumination::None { 0 } else { 9 };
+        (20 + 12 + corrected) * self.levels[0].pixels() as u64
     }
 
     /// Bytes that all volumes, graphs and maps take together.

@@ -1,6 +1,7 @@
 //! The only place that knows levels, iterations, convergence and the order of what follows.
 
-use crate::backend::{Backend, Map, Stage};
+use crate::backend::cpu::Mosaic;
+use crate::backend::{Backend, Map, Stage, Traffic};
 use crate::error::{Error, Result};
 use crate::front::illumination::homomorphic;
 use crate::front::matches::{self, Match};
@@ -11,6 +12,7 @@ use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::options::{Fill, Illumination, Median, Method, Visibility};
 use crate::plan::Plan;
+use crate::tiles::Tiles;
 use std::iter;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -20,10 +22,14 @@ use std::time::{Duration, Instant};
 pub struct Solution {
     /// The maps.
     pub maps: Maps,
-    /// Iterations done, of all phases together.
+    /// Iterations done, of all phases together; the most of any tile.
     pub iterations: u32,
     /// What the host did around the stages, and how long it took.
     pub around: Vec<(&'static str, Duration)>,
+    /// The time of every stage that ran on the maps of all tiles.
+    pub finish: Vec<(Stage, Duration)>,
+    /// What went through the device.
+    pub traffic: Traffic,
 }
 
 /// Told how far a match is; answers whether to go on.
@@ -36,6 +42,8 @@ pub struct Progress {
     pub stage: &'static str,
     /// Share of the work that is done, 0 to 1.
     pub done: f64,
+    /// The tile at hand, from 1 on, and how many there are: twice those of the image where it is matched twice.
+    pub tile: Option<(usize, usize)>,
 }
 
 /// What an inspector sees of a match on its way.
@@ -77,48 +85,111 @@ pub fn inspect(
     observer: Observer,
     inspector: Option<Inspector>,
 ) -> Result<Solution> {
-    if plan.size() != pair.size() {
-        return Err(Error::Mismatch(format!("a plan for {:?} and a pair of {:?}", plan.size(), pair.size())));
-    }
-    let second = plan.method.visibility == Visibility::SecondMatch;
-    let matchings = if second { 2.0 } else { 1.0 };
-    let mut work =
-        Work { observer, inspector, done: 0.0, total: matchings * total_work(plan), around: Vec::new() };
-    let right_labels = if second {
+    check_size(plan, pair)?;
+    let mut work = Work::new(observer, inspector, matchings(plan) as f64 * total_work(plan));
+    let right_labels = if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
-        let mirrored = pair.mirrored();
         let inspector = work.inspector.take();
+        let mirrored = corrected(plan, pair.mirrored(), &mut work)?;
         estimate(backend, plan, &mirrored, &mut work)?;
         work.inspector = inspector;
         Some(backend.read_map(Map::Label)?.mirrored())
     } else {
         None
     };
-    let iterations = estimate(backend, plan, pair, &mut work)?;
+    let pair = corrected(plan, pair.clone(), &mut work)?;
+    let iterations = estimate(backend, plan, &pair, &mut work)?;
     if let Some(labels) = right_labels {
         backend.write_map(Map::RightLabel, &labels)?;
     }
-    for stage in finish(&plan.method) {
+    for stage in read_out(&plan.method).into_iter().chain(finish(&plan.method)) {
         work.run(backend, plan, stage)?;
     }
     backend.wait()?;
     let maps = work.host("download", || backend.maps())?;
-    Ok(Solution { maps, iterations, around: work.around })
+    let traffic = backend.traffic();
+    Ok(Solution { maps, iterations, around: work.around, finish: Vec::new(), traffic })
 }
 
-/// From the pair to the optimum of every pixel; the number of iterations.
-fn estimate(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work) -> Result<u32> {
-    let method = &plan.method;
-    let corrected = match method.illumination {
-        Illumination::None => None,
+/// Matches `pair` tile by tile on `backend`, and finishes the maps of all tiles together on the CPU path; `observer` hears
+/// of progress.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_tiles(
+    backend: &mut dyn Backend,
+    tiles: &Tiles,
+    pair: &Pair,
+    observer: Observer,
+) -> Result<Solution> {
+    let whole = tiles.whole();
+    check_size(whole, pair)?;
+    let all: f64 = tiles.list().iter().map(|tile| total_work(&tile.plan)).sum();
+    let mut work = Work::new(observer, None, matchings(whole) as f64 * all);
+    work.tile = Some((0, matchings(whole) * tiles.count()));
+    let mut mosaic = Mosaic::new(whole, pair)?;
+    let (mut iterations, mut traffic) = (0, Traffic::default());
+    if matchings(whole) == 2 {
+        for tile in tiles.list() {
+            work.next_tile();
+            let mirrored = pair.crop(&tile.crop.mirrored(pair.size().0)).mirrored();
+            let mirrored = corrected(whole, mirrored, &mut work)?;
+            estimate(backend, &tile.plan, &mirrored, &mut work)?;
+            backend.wait()?;
+            work.host("download", || mosaic.place_mirrored(tile, backend))?;
+            traffic += backend.traffic();
+        }
+    }
+    for tile in tiles.list() {
+        work.next_tile();
+        let pair = corrected(whole, pair.crop(&tile.crop), &mut work)?;
+        iterations = iterations.max(estimate(backend, &tile.plan, &pair, &mut work)?);
+        for stage in read_out(&whole.method) {
+            work.run(backend, &tile.plan, stage)?;
+        }
+        backend.wait()?;
+        work.host("download", || mosaic.place(tile, &pair, backend))?;
+        traffic += backend.traffic();
+    }
+    work.tile = None;
+    let mut times = Vec::new();
+    for stage in finish(&whole.method) {
+        work.begin(stage.name(), 0.0)?;
+        let clock = Instant::now();
+        mosaic.run(stage);
+        times.push((stage, clock.elapsed()));
+    }
+    Ok(Solution { maps: mosaic.into_maps(), iterations, around: work.around, finish: times, traffic })
+}
+
+fn check_size(plan: &Plan, pair: &Pair) -> Result<()> {
+    if plan.size() == pair.size() {
+        return Ok(());
+    }
+    Err(Error::Mismatch(format!("a plan for {:?} and a pair of {:?}", plan.size(), pair.size())))
+}
+
+/// How often a pair is matched: once more, mirrored, where that is how its right view is found.
+fn matchings(plan: &Plan) -> usize {
+    if plan.method.visibility == Visibility::SecondMatch { 2 } else { 1 }
+}
+
+/// The pair with its illumination corrected, where that is asked for.
+fn corrected(plan: &Plan, pair: Pair, work: &mut Work) -> Result<Pair> {
+    match plan.method.illumination {
+        Illumination::None => Ok(pair),
         Illumination::Homomorphic => {
             let both = || Pair::new(homomorphic(pair.left()), homomorphic(pair.right()));
             let corrected = work.host("illumination", both)?;
             work.look(&mut Glimpse::Corrected(&corrected))?;
-            Some(corrected)
+            Ok(corrected)
         }
-    };
-    let pair = corrected.as_ref().unwrap_or(pair);
+    }
+}
+
+/// From the corrected pair to the optimum of every pixel; the number of iterations.
+fn estimate(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work) -> Result<u32> {
+    let method = &plan.method;
     let graphs = work.host("graph", || Ok(graph::build(pair.left(), plan)))?;
     work.look(&mut Glimpse::Graphs(&graphs))?;
     work.host("upload", || backend.prepare(plan, pair, graphs))?;
@@ -150,17 +221,7 @@ fn estimate(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work
 /// # Errors
 /// Whatever the backend reports.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> Result<u32> {
-    propagate(
-        backend,
-        plan,
-        &mut Work {
-            observer: &mut |_| ControlFlow::Continue(()),
-            inspector: None,
-            done: 0.0,
-            total: 1.0,
-            around: Vec::new(),
-        },
-    )
+    propagate(backend, plan, &mut Work::new(&mut |_| ControlFlow::Continue(()), None, 1.0))
 }
 
 fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<u32> {
@@ -203,13 +264,15 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
     Ok(iterations)
 }
 
-/// What follows the estimate.
+/// What follows the estimate and looks at volumes still.
+fn read_out(method: &Method) -> Vec<Stage> {
+    let right = (method.visibility == Visibility::RightView).then_some(Stage::RightView);
+    right.into_iter().chain([Stage::SubPixel]).collect()
+}
+
+/// What follows that, and looks at maps alone.
 fn finish(method: &Method) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    if method.visibility == Visibility::RightView {
-        stages.push(Stage::RightView);
-    }
-    stages.extend([Stage::SubPixel, Stage::Visibility]);
+    let mut stages = vec![Stage::Visibility];
     if method.region_size > 1 {
         stages.push(Stage::RegionFilter);
     }
@@ -231,11 +294,21 @@ struct Work<'a, 'b> {
     inspector: Option<Inspector<'b>>,
     done: f64,
     total: f64,
+    /// The tile at hand, and how many there are.
+    tile: Option<(usize, usize)>,
     /// Time of what the host does.
     around: Vec<(&'static str, Duration)>,
 }
 
-impl Work<'_, '_> {
+impl<'a, 'b> Work<'a, 'b> {
+    fn new(observer: Observer<'a>, inspector: Option<Inspector<'b>>, total: f64) -> Self {
+        Self { observer, inspector, done: 0.0, total, tile: None, around: Vec::new() }
+    }
+
+    fn next_tile(&mut self) {
+        self.tile = self.tile.map(|(tile, all)| (tile + 1, all));
+    }
+
     fn run(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
         let cells = match stage {
             Stage::Cost => cells(plan, 0),
@@ -261,7 +334,7 @@ impl Work<'_, '_> {
     }
 
     fn begin(&mut self, stage: &'static str, cells: f64) -> Result<()> {
-        let progress = Progress { stage, done: (self.done / self.total).min(1.0) };
+        let progress = Progress { stage, done: (self.done / self.total).min(1.0), tile: self.tile };
         self.done += cells;
         match (self.observer)(progress) {
             ControlFlow::Continue(()) => Ok(()),

@@ -9,8 +9,9 @@ use common::compare::{compare_finest, compare_maps};
 use common::devices::backends;
 use common::random::{self, Random};
 use common::twin::{self, Finest};
-use mrfgs::backend::{Map, NO_LABEL, Stage};
-use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::backend::cpu::Cpu;
+use mrfgs::backend::{Backend, Map, NO_LABEL, Stage};
+use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::maps::{Maps, flag};
 use mrfgs::options::{
     Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule, Visibility,
@@ -18,6 +19,7 @@ use mrfgs::options::{
 use mrfgs::plan::Plan;
 use mrfgs::solver::{self, Solution};
 use mrfgs::tables::MedianWeights;
+use mrfgs::tiles::Tiles;
 use mrfgs::{graph, match_pair};
 use std::ops::ControlFlow;
 
@@ -339,18 +341,7 @@ fn the_stages_run_in_order() {
         let pair = random::pair(&mut random, size.0, size.1);
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
-            backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
-            backend.run(Stage::Cost).unwrap();
-            for z in 1..plan.levels.len() {
-                backend.run(Stage::Pyramid(z)).unwrap();
-            }
-            for z in 0..plan.levels.len() {
-                backend.run(Stage::Evidence(z)).unwrap();
-            }
-            let iterations = solver::flood(backend, &plan).unwrap();
-            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
-                backend.run(stage).unwrap();
-            }
+            let iterations = estimated(backend, &pair, &plan);
             let mut finest = Finest::zero(size);
             finest.label = backend.read_map(Map::Label).unwrap();
             finest.best = backend.read_map(Map::Best).unwrap();
@@ -379,8 +370,133 @@ fn the_stages_run_in_order() {
     }
 }
 
+/// A tiled match is a match of each crop, of which the core stays, and the stages after that on what stays of all.
+#[test]
+fn tiles_are_matched_by_themselves_and_finished_together() {
+    let (mut tiled, mut twice, mut other) = (0, 0, 0);
+    for seed in 0..60 {
+        let mut random = Random::new(seed);
+        let (width, height) = random.pick(&[(100, 80), (60, 130), (131, 61)]);
+        let mut method = random::method(&mut random, [0, 2, 8][seed as usize % 3]);
+        (method.levels, method.memory) = (method.levels.min(3), 1);
+        let plan =
+            random::plan((width, height), random.pick(&[-12, -3, 0]), random.pick(&[2, 9, 17]), &method);
+        let Ok(tiles) = Tiles::with_collar(&plan, random.pick(&[0, 2, 5])) else { continue };
+        if tiles.count() == 1 {
+            continue;
+        }
+        let pair = random::pair(&mut random, width, height);
+        let mut finest = Finest::zero((width, height));
+        finest.right_label = Plane::filled(width, height, NO_LABEL.into());
+        finest.right_best = Plane::filled(width, height, 65_535);
+        let mut iterations = 0;
+        for tile in tiles.list() {
+            let (core, crop) = (&tile.core, &tile.crop);
+            let part = |pair: &Pair| {
+                let cut = |image: &Image| Image {
+                    pixels: Plane::from_fn(crop.x.len(), crop.y.len(), |x, y| {
+                        image.pixels[(crop.x.start + x, crop.y.start + y)]
+                    }),
+                    masked: Plane::from_fn(crop.x.len(), crop.y.len(), |x, y| {
+                        image.masked[(crop.x.start + x, crop.y.start + y)]
+                    }),
+                };
+                Pair::new(cut(pair.left()), cut(pair.right())).unwrap()
+            };
+            let mut cpu = Cpu::default();
+            if method.visibility == Visibility::SecondMatch {
+                estimated(&mut cpu, &part(&mirrored(&pair)), &tile.plan);
+                let labels = cpu.read_map(Map::Label).unwrap();
+                for (x, y) in places(core) {
+                    finest.right_label[(width - 1 - x, y)] = labels[(x - crop.x.start, y - crop.y.start)];
+                }
+            }
+            iterations = iterations.max(estimated(&mut cpu, &part(&pair), &tile.plan));
+            let maps = [Map::Label, Map::Best, Map::Rival, Map::Raw, Map::RightLabel, Map::RightBest]
+                .map(|map| cpu.read_map(map).unwrap());
+            for (x, y) in places(core) {
+                let at = (x - crop.x.start, y - crop.y.start);
+                (finest.label[(x, y)], finest.best[(x, y)]) = (maps[0][at], maps[1][at]);
+                (finest.rival[(x, y)], finest.raw[(x, y)]) = (maps[2][at], maps[3][at]);
+            }
+            if method.visibility != Visibility::SecondMatch {
+                for (x, y) in places(&Rect { x: crop.x.clone(), y: core.y.clone() }) {
+                    let at = (x - crop.x.start, y - crop.y.start);
+                    let (label, best) = (&mut finest.right_label[(x, y)], &mut finest.right_best[(x, y)]);
+                    if maps[5][at] < *best || maps[5][at] == *best && maps[4][at] < *label {
+                        (*label, *best) = (maps[4][at], maps[5][at]);
+                    }
+                }
+            }
+        }
+        finest.disparity = finest.raw.clone();
+        twin_maps(&mut finest, &plan, &pair);
+        let bytes = |plane: &Plane<i32>| plane.map(|&v| u8::try_from(v).unwrap());
+        let expected = Maps {
+            disparity: finest.disparity.clone(),
+            raw: finest.raw.clone(),
+            confidence: bytes(&finest.confidence),
+            validity: bytes(&finest.validity),
+        };
+        for (name, mut backend) in backends() {
+            let observer = &mut |_| ControlFlow::Continue(());
+            let actual = solver::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();
+            if let Err(e) = compare_all(&actual.maps, &expected) {
+                panic!("{name}, seed {seed}: {e}\n{:?}", plan.method);
+            }
+            assert_eq!(actual.iterations, iterations, "{name}, seed {seed}");
+        }
+        tiled += 1;
+        twice += usize::from(method.visibility == Visibility::SecondMatch);
+        // Control: one piece is something else.
+        other += usize::from(matched_whole(&pair, &plan) != expected);
+    }
+    assert!(
+        tiled > 15 && twice > 2 && other > 10,
+        "{tiled} tiled, {twice} matched twice, {other} unlike one piece"
+    );
+}
+
+fn places(part: &Rect) -> impl Iterator<Item = (usize, usize)> {
+    let columns = part.x.clone();
+    part.y.clone().flat_map(move |y| columns.clone().map(move |x| (x, y)))
+}
+
+fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
+    let observer = &mut |_| ControlFlow::Continue(());
+    solver::solve(&mut Cpu::default(), plan, pair, observer).unwrap().maps
+}
+
+/// Runs all stages up to [`Stage::SubPixel`]; the number of iterations.
+fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
+    backend.prepare(plan, pair, graph::build(pair.left(), plan)).unwrap();
+    backend.run(Stage::Cost).unwrap();
+    for z in 1..plan.levels.len() {
+        backend.run(Stage::Pyramid(z)).unwrap();
+    }
+    for z in 0..plan.levels.len() {
+        backend.run(Stage::Evidence(z)).unwrap();
+    }
+    let iterations = solver::flood(backend, plan).unwrap();
+    for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+        backend.run(stage).unwrap();
+    }
+    iterations
+}
+
 /// Labels of the right view by a matching of its own: right x is left width - 1 - x of the mirrored pair.
 fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
+    let mirrored = mirrored(pair);
+    let mut method = plan.method.clone();
+    (method.visibility, method.sub_pixel) = (Visibility::Off, false);
+    let (width, height) = pair.size();
+    let plan = Plan::new(width, height, plan.range, &method).unwrap();
+    let raw = matched(&mirrored, &plan, 1).raw;
+    Plane::from_fn(width, height, |x, y| raw[(width - 1 - x, y)] / 256 - plan.range.min)
+}
+
+/// Both views exchanged, left and right too.
+fn mirrored(pair: &Pair) -> Pair {
     let mirror = |image: &Image| {
         let (width, height) = image.pixels.size();
         Image {
@@ -388,13 +504,7 @@ fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
             masked: Plane::from_fn(width, height, |x, y| image.masked[(width - 1 - x, y)]),
         }
     };
-    let mirrored = Pair::new(mirror(pair.right()), mirror(pair.left())).unwrap();
-    let mut method = plan.method.clone();
-    (method.visibility, method.sub_pixel) = (Visibility::Off, false);
-    let (width, height) = pair.size();
-    let plan = Plan::new(width, height, plan.range, &method).unwrap();
-    let raw = matched(&mirrored, &plan, 1).raw;
-    Plane::from_fn(width, height, |x, y| raw[(width - 1 - x, y)] / 256 - plan.range.min)
+    Pair::new(mirror(pair.right()), mirror(pair.left())).unwrap()
 }
 
 /// Noise in every pixel.

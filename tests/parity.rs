@@ -171,7 +171,8 @@ fn poisoned_buffers() {
 
 /// The maps as they stand.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
-    Solution { maps: backend.maps().unwrap(), iterations: 0, around: Vec::new() }
+    let (maps, traffic) = (backend.maps().unwrap(), backend.traffic());
+    Solution { maps, iterations: 0, around: Vec::new(), finish: Vec::new(), traffic }
 }
 
 /// The image goes up once, the maps come down once, and nothing between.

@@ -289,7 +289,7 @@ impl Buffers {
     pub(super) fn new(device: &Device, plan: &Plan) -> Result<Self> {
         if let Some(memory) = device.memory.filter(|&m| m < plan.bytes()) {
             return Err(Error::Memory(format!(
-                "the match needs {} MiB and {} has {}: use --backend cpu, or a smaller image or range",
+                "the match needs {} MiB and {} has {}: use --backend cpu, or a smaller --memory, image or range",
                 plan.bytes() >> 20,
                 device.name,
                 memory >> 20

@@ -1,0 +1,267 @@
+//! Matches in tiles: how an image is cut, and what comes of it.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
+mod common;
+
+use common::devices;
+use common::random::Random;
+use mrfgs::backend::Backend;
+use mrfgs::backend::cpu::Cpu;
+use mrfgs::image::{Pair, Plane, calib::Calibration, read};
+use mrfgs::maps::{Maps, has_disparity};
+use mrfgs::options::{Choice, DisparityRange, Execution, Method, PRESETS, Visibility};
+use mrfgs::plan::Plan;
+use mrfgs::solver::{Progress, Solution, solve, solve_tiles};
+use mrfgs::tiles::{COLLAR, Tiles};
+use mrfgs::{Error, Matcher};
+use std::ops::{ControlFlow, Range};
+use std::path::Path;
+
+fn quiet(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// The plan of `method` with so many MiB.
+fn plan((width, height): (usize, usize), range: DisparityRange, method: &Method, memory: u32) -> Plan {
+    let mut method = method.clone();
+    method.memory = memory;
+    Plan::new(width, height, range, &method).unwrap()
+}
+
+/// Whether the tiles of `plan` are what they should be; they have a collar of `collar`.
+fn check(tiles: &Tiles, collar: usize) -> Result<(), String> {
+    let whole = tiles.whole();
+    let ((width, height), range) = (whole.size(), whole.range);
+    let memory = u64::from(whole.method.memory) << 20;
+    let ensure = |holds: bool, what: &str| if holds { Ok(()) } else { Err(what.to_owned()) };
+    ensure(tiles.bytes() <= memory, "within the memory")?;
+    let grid = 1 << (whole.levels.len() - 1);
+    let mut covered = Plane::filled(width, height, 0u8);
+    for tile in tiles.list() {
+        let (core, crop) = (&tile.core, &tile.crop);
+        ensure(core.x.end <= width && core.y.end <= height, "cores inside the image")?;
+        for y in core.y.clone() {
+            covered.row_mut(y)[core.x.clone()].iter_mut().for_each(|n| *n += 1);
+        }
+        ensure(crop.x.end <= width && crop.y.end <= height, "crops inside the image")?;
+        ensure(crop.x.start % grid == 0 && crop.y.start % grid == 0, "crops on the pyramid's grid")?;
+        // As far as the image goes.
+        let holds = |crop: &Range<usize>, core: &Range<usize>, before: i64, after: i64, length: usize| {
+            let (first, last) = (core.start as i64 - before, core.end as i64 + after);
+            crop.start as i64 <= first.max(0) && crop.end as i64 >= last.min(length as i64)
+        };
+        let collar = collar as i64;
+        let (left, right) = (i64::from(range.max.max(0)), i64::from(-range.min.min(0)));
+        ensure(holds(&crop.y, &core.y, collar, collar, height), "the collar above and below")?;
+        ensure(holds(&crop.x, &core.x, collar + left, collar + right, width), "collar and matches")?;
+        ensure(tile.plan.bytes() <= memory, "each tile within the memory")?;
+        let (w, h) = crop.size();
+        let expected = Plan {
+            core: core.x.start - crop.x.start..core.x.end - crop.x.start,
+            ..Plan::new(w, h, range, &whole.method).unwrap()
+        };
+        // Without a collar a crop may be too small for all levels.
+        ensure(collar == 0 || tile.plan == expected, "the plan of the crop")?;
+    }
+    ensure(covered.data().iter().all(|&n| n == 1), "every pixel in one core")?;
+    let one = whole.bytes() <= memory;
+    ensure(one == (tiles.count() == 1), "in one piece if and only if that fits")
+}
+
+#[test]
+fn cores_share_out_the_image_and_crops_hold_what_they_need() {
+    let mut random = Random::new(1);
+    let (mut cut, mut refused, mut wide) = (0, 0, 0);
+    for seed in 0..3000 {
+        let mut side = || random.log_within(1.0, 3000.0) as usize;
+        let size = (side(), side());
+        let (most, lowest) =
+            (random.pick(&[3.0, 100.0, 4000.0]), random.pick(&[-4000.0, -100.0, 0.0, 100.0]));
+        let labels = random.log_within(1.0, most) as i32;
+        let min = (lowest * f64::from(random.within(0, 100)) / 100.0) as i32;
+        let range = DisparityRange::new(min, min + labels - 1).unwrap();
+        let (preset, _) = random.pick(PRESETS);
+        let mut method = Method::preset(preset).unwrap();
+        method.levels = random.pick(&[1, 2, 3, 6, 6, 6, 9, 16]);
+        method.memory = random.log_within(1.0, 4096.0) as u32;
+        let plan = Plan::new(size.0, size.1, range, &method).unwrap();
+        let collar = random.pick(&[0, COLLAR, COLLAR, 100]);
+        match Tiles::with_collar(&plan, collar) {
+            Ok(tiles) => {
+                cut += usize::from(tiles.count() > 1);
+                wide += usize::from(tiles.count() > 1 && range.max > size.0 as i32);
+                if let Err(what) = check(&tiles, collar) {
+                    panic!("seed {seed}, {size:?}, {range:?}, collar {collar}: {what}\n{method:?}");
+                }
+            }
+            Err(error) => {
+                refused += 1;
+                let error = error.to_string();
+                // What it asks for is enough, and the least that is.
+                let needed: u32 =
+                    error.split("at least ").nth(1).unwrap().split("MiB").next().unwrap().parse().unwrap();
+                assert!(error.starts_with("--memory: ") && needed > method.memory, "{error}");
+                for (memory, enough) in [(needed, true), (needed - 1, false)] {
+                    let plan = self::plan(size, range, &method, memory);
+                    assert_eq!(Tiles::with_collar(&plan, collar).is_ok(), enough, "{memory} MiB: {error}");
+                }
+            }
+        }
+    }
+    assert!(
+        cut > 150 && refused > 100 && wide > 10,
+        "{cut} cut, {refused} refused, {wide} with a wide range"
+    );
+}
+
+/// Controls: the check sees a crop that lacks its collar or its matches, and cores that overlap or are off the grid.
+#[test]
+fn wrong_tiles_are_seen() {
+    let range = DisparityRange::new(-20, 63).unwrap();
+    let plan = plan((900, 700), range, &Method::default(), 128);
+    let tiles = Tiles::new(&plan).unwrap();
+    assert!(tiles.count() >= 6, "{}", tiles.count());
+    check(&tiles, COLLAR).unwrap();
+    assert_eq!(check(&tiles, COLLAR + 40).unwrap_err(), "the collar above and below");
+    let bare = Tiles::with_collar(&plan, 0).unwrap();
+    assert_eq!(check(&bare, COLLAR).unwrap_err(), "the collar above and below");
+}
+
+#[test]
+fn the_shape_with_the_fewest_cropped_pixels_is_taken() {
+    // No labels to speak of to the left: as square as the image allows. Many: full rows.
+    for (max, rows) in [(0, false), (1500, true)] {
+        let plan = plan((2000, 2000), DisparityRange::new(max - 15, max).unwrap(), &Method::default(), 400);
+        let tiles = Tiles::new(&plan).unwrap();
+        let full = tiles.list().iter().all(|tile| tile.crop.x == (0..2000));
+        assert!(tiles.count() > 1 && full == rows, "{max}: {:?}", tiles.list()[0].crop);
+    }
+}
+
+fn load(folder: &Path) -> (Pair, DisparityRange) {
+    let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
+    let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
+    (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
+}
+
+fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {
+    solve_tiles(backend, tiles, pair, &mut quiet).unwrap()
+}
+
+/// Share of the pixels that have a disparity in one map alone, or disparities more than a pixel apart, in percent.
+fn difference(a: &Maps, b: &Maps) -> f64 {
+    let pixels = a.disparity.data().iter().zip(b.disparity.data());
+    let flags = a.validity.data().iter().zip(b.validity.data());
+    let differ = pixels.zip(flags).filter(|((a, b), (fa, fb))| {
+        has_disparity(**fa) != has_disparity(**fb) || has_disparity(**fa) && a.abs_diff(**b) > 256
+    });
+    100.0 * differ.count() as f64 / a.disparity.data().len() as f64
+}
+
+#[test]
+fn every_backend_leaves_the_same_maps() {
+    let Some(mut gpu) = devices::gpu() else { return };
+    let (pair, range) = load(Path::new("testdata/thin"));
+    for (preset, _) in PRESETS {
+        let method = Method::preset(preset).unwrap();
+        let whole = plan(pair.size(), range, &method, 4096);
+        let plan = plan(pair.size(), range, &method, (whole.bytes() >> 20) as u32 * 3 / 4);
+        let tiles = Tiles::new(&plan).unwrap();
+        assert!(tiles.count() > 1, "{preset}");
+        let expected = in_tiles(&mut Cpu::default(), &tiles, &pair);
+        // Twice: the second time into the buffers of the first.
+        for _ in 0..2 {
+            let actual = in_tiles(&mut gpu, &tiles, &pair);
+            assert!(actual.maps == expected.maps && actual.iterations == expected.iterations, "{preset}");
+        }
+        // Control: without a collar there are other maps.
+        let bare = Tiles::with_collar(&plan, 0).unwrap();
+        assert!(in_tiles(&mut Cpu::default(), &bare, &pair).maps != expected.maps, "{preset}");
+    }
+}
+
+/// Scenes and real pairs in tiles: hardly anything shows, which without a collar it does.
+#[test]
+fn hardly_anything_differs_from_one_piece() {
+    let mut folders: Vec<_> = std::fs::read_dir("testdata").unwrap().map(|e| e.unwrap().path()).collect();
+    if let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") {
+        folders.extend(std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()));
+    }
+    folders.retain(|folder| folder.join("im0.png").is_file());
+    folders.sort();
+    let mut bare = Vec::new();
+    for folder in folders {
+        let (pair, range) = load(&folder);
+        let mut cpu = Cpu::default();
+        let whole = plan(pair.size(), range, &Method::default(), 4096);
+        let expected = solve(&mut cpu, &whole, &pair, &mut quiet).unwrap();
+        // A plain wall is found from its borders, wherever they are.
+        let most = if folder.ends_with("wall") { 0.5 } else { 0.01 };
+        for (quarters, collar) in [(3, COLLAR), (2, COLLAR), (2, 0)] {
+            let memory = (whole.bytes() >> 20) as u32 * quarters / 4;
+            let tiles =
+                Tiles::with_collar(&plan(pair.size(), range, &Method::default(), memory), collar).unwrap();
+            let differ = difference(&in_tiles(&mut cpu, &tiles, &pair).maps, &expected.maps);
+            let name = folder.file_name().unwrap().display();
+            println!("{name}, collar {collar}: {differ:.3} % differ in {} tiles", tiles.count());
+            assert!(tiles.count() > 1);
+            if collar == 0 {
+                bare.push(differ);
+            } else {
+                assert!(differ <= most, "{name}: {differ} %");
+            }
+        }
+    }
+    bare.sort_by(f64::total_cmp);
+    assert!(bare[bare.len() / 2] > 0.03, "{bare:?}");
+}
+
+#[test]
+fn progress_names_the_tiles_and_goes_over_all_of_them() {
+    let (pair, range) = load(Path::new("testdata/slanted"));
+    for visibility in [Visibility::RightView, Visibility::SecondMatch] {
+        let mut method = Method::default();
+        (method.visibility, method.iterations) = (visibility, 1);
+        let tiles = Tiles::new(&plan(pair.size(), range, &method, 12)).unwrap();
+        let count = tiles.count() * if visibility == Visibility::SecondMatch { 2 } else { 1 };
+        let mut seen = Vec::new();
+        let mut observer = |progress: Progress| {
+            seen.push(progress);
+            ControlFlow::Continue(())
+        };
+        solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut observer).unwrap();
+        assert!(seen.is_sorted_by(|a, b| a.done <= b.done) && seen.iter().all(|p| p.done <= 1.0));
+        let (first, last) = (seen[0], seen[seen.len() - 1]);
+        assert!(first.done == 0.0 && last.done > 0.999 && last.tile.is_none(), "{last:?}");
+        let mut named: Vec<_> = seen.iter().filter_map(|p| p.tile).collect();
+        named.dedup();
+        assert_eq!(named, (1..=count).map(|tile| (tile, count)).collect::<Vec<_>>());
+        // It stops wherever it is told to.
+        let stop = |p: Progress| if p.tile == Some((2, count)) { ControlFlow::Break(()) } else { quiet(p) };
+        let stopped = solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop });
+        assert!(matches!(stopped, Err(Error::Interrupted)));
+    }
+}
+
+#[test]
+fn the_matcher_cuts_what_its_method_says() {
+    let (pair, range) = load(Path::new("testdata/thin"));
+    let mut matcher =
+        Matcher::new(&Execution { backend: Choice::Cpu, timings: true, ..Execution::default() }).unwrap();
+    for (memory, tiled) in [(4096, false), (12, true)] {
+        let mut method = Method::default();
+        method.memory = memory;
+        let matched = matcher.run(&pair, range, &method, &mut quiet).unwrap();
+        let tiles = Tiles::new(&plan(pair.size(), range, &method, memory)).unwrap();
+        assert!(matched.tiles == tiles && (tiles.count() > 1) == tiled);
+        assert_eq!(&matched.plan, tiles.whole());
+        if tiled {
+            assert!(matched.maps == in_tiles(&mut Cpu::default(), &tiles, &pair).maps);
+        }
+        for (stage, runs) in [("cost", tiles.count()), ("graph", tiles.count()), ("median", 1)] {
+            let timing = matched.timings.iter().find(|timing| timing.stage == stage).unwrap();
+            assert_eq!(timing.runs as usize, runs, "{stage}");
+        }
+    }
+}
