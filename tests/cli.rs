@@ -348,6 +348,37 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     assert!(listing(folder.path()) == before);
 }
 
+/// What `--memory` lets a match take decides on tiles, which are told.
+#[test]
+fn little_memory_makes_tiles() {
+    let folder = workshop();
+    let (left, right) = (scene_file("thin", "im0.png"), scene_file("thin", "im1.png"));
+    let args = ["match", &left, &right, "out.pfm", "--backend", "cpu"];
+    let with = |more: &[&str]| run(folder.path(), &[&args[..], more].concat());
+    let one = with(&["--dry-run"]).succeeded();
+    assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
+    let tiled = with(&["--dry-run", "--memory", "12MiB"]).succeeded();
+    for words in
+        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 6 tiles of up to", "whole image", "  all"]
+    {
+        assert!(tiled.stdout.contains(words), "no `{words}` in:\n{}", tiled.stdout);
+    }
+    let told = with(&[]).succeeded();
+    assert!(told.stderr.contains("32 labels, 18 iterations"), "{told:?}");
+    let told = with(&["--memory", "12MiB", "--timings"]).succeeded();
+    assert!(told.stderr.contains("32 labels, 6 tiles, 18 iterations"), "{told:?}");
+    for (stage, runs) in [("cost", 6), ("right view", 6), ("visibility", 1), ("median", 1)] {
+        let row = told.stderr.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
+        assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
+    }
+    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (240, 180));
+    // Steps of one piece are what the folder shows.
+    let before = listing(folder.path());
+    let refused = with(&["--memory", "12MiB", "--intermediates", "steps"]);
+    refused.failed(1, &["--intermediates", "6 tiles", "give --memory"], "intermediates of tiles");
+    assert!(listing(folder.path()) == before);
+}
+
 /// Arguments, separated by spaces; exit status; what the message must say: the thing and the remedy.
 type Failure = (&'static str, i32, &'static [&'static str]);
 
@@ -407,6 +438,17 @@ const FAILURES: &[Failure] = &[
     // The range.
     ("match flat.png flat.png out.pfm", 1, &["--max-disparity", "too few matches"]),
     ("match flat.png flat.png out.pfm --max-disparity auto", 1, &["--max-disparity", "too few matches"]),
+    ("M out.pfm --memory 2", 2, &["--memory <SIZE>", "'2'", "2GiB", "--help"]),
+    ("M out.pfm --memory 1.5GiB", 2, &["--memory <SIZE>", "'1.5GiB'", "whole number"]),
+    ("M out.pfm --memory 0MiB", 2, &["--memory <SIZE>", "from 1MiB to 16TiB"]),
+    ("M out.pfm --memory 17TiB", 2, &["--memory <SIZE>", "from 1MiB to 16TiB"]),
+    ("M out.pfm --memory 99999999999999999999TiB", 2, &["--memory <SIZE>", "from 1MiB to 16TiB"]),
+    ("M out.pfm --set memory=0", 1, &["--set memory", "0 is outside 1 to 16777216"]),
+    (
+        "match left.png right.png out.pfm --max-disparity 900 --memory 1MiB",
+        1,
+        &["--memory", "1 MiB", "60 x 40", "at least", "smaller"],
+    ),
     ("M out.pfm --intermediates folder/full", 1, &["folder/full", "not empty"]),
     ("M out.pfm --intermediates left.png", 1, &["left.png", "is a file"]),
     ("M out.pfm --intermediates none/steps", 1, &["none/steps", "no folder none", "create it"]),

@@ -242,7 +242,13 @@ fn tables_stand_beside_the_papers() {
     let printed = json(&evaluated(folder.path(), &["thin", "--tables", "--json", "-"]));
     assert!(printed["tables"][0]["pairs"][0]["published"].is_null());
 
-    for flags in [["--preset", "paper"], ["--set", "levels=2"], ["--config", "x"], ["--report", "r"]] {
+    for flags in [
+        ["--preset", "paper"],
+        ["--set", "levels=2"],
+        ["--memory", "1GiB"],
+        ["--config", "x"],
+        ["--report", "r"],
+    ] {
         let args = [&["Teddy", "--tables"], &flags[..]].concat();
         refused(folder.path(), &args, 2, &["--tables", flags[0], "cannot be used"]);
     }
@@ -375,6 +381,7 @@ fn ablations_are_held_against_the_default() {
         &["--preset", "paper"][..],
         &["--set", "levels=2"],
         &["--config", "x"],
+        &["--memory", "1GiB"],
         &["--report", "r"],
         &["--tables"],
         &["--breakdown"],

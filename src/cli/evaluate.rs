@@ -61,7 +61,7 @@ pub(super) struct Args {
     /// final one: `number`, `map`, `pairs` (each: `name`, `published`, `ours`) and `mean` (`published`, `ours`). `published`
     /// holds `fgs` and `mr-fgs` or is null, `ours` one entry a preset; an entry is `avg`, `psnr` and `bad2.0`, over all pixels
     /// with known truth.
-    #[arg(long, conflicts_with_all = ["preset", "config", "set", "report", "disparity"])]
+    #[arg(long, conflicts_with_all = ["preset", "config", "set", "memory", "report", "disparity"])]
     tables: bool,
     /// Prints two tables more: where the errors of the final map are, and what confidence and validity are worth
     ///
@@ -91,7 +91,7 @@ pub(super) struct Args {
     /// (`b0.5%`, `b2%`); `change%`, the change of the last against the default, in percent of it; and `time`, that of all
     /// matches against the default's in this run. As --json has it: `ran_on`, `method` (the default's keys), `pairs` and
     /// `rows` (each: `name`, `changes`, `avg`, `bad0.5`, `bad2.0`, `change`, `time`).
-    #[arg(long, conflicts_with_all = ["preset", "config", "set", "report", "disparity", "tables", "breakdown"])]
+    #[arg(long, conflicts_with_all = ["preset", "config", "set", "memory", "report", "disparity", "tables", "breakdown"])]
     ablations: bool,
     /// Levels of an 8-bit PNG truth that are one pixel of disparity, of which 0 is unknown [default: 3 for the layout of
     /// 2005 and 2006, 4 for that of 2003]
@@ -111,7 +111,7 @@ pub(super) struct Args {
         long,
         value_name = "FILE",
         requires = "truth",
-        conflicts_with_all = ["dirs", "preset", "config", "set", "backend", "device", "threads"],
+        conflicts_with_all = ["dirs", "preset", "config", "set", "memory", "backend", "device", "threads"],
         help_heading = "Maps that others made"
     )]
     disparity: Option<PathBuf>,

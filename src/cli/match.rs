@@ -9,6 +9,7 @@ use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
 use mrfgs::plan::{MessageWidth, Plan};
 use mrfgs::solver::Glimpse;
+use mrfgs::tiles::Tiles;
 use mrfgs::{Error, Matcher, Result};
 
 use super::intermediates::{self, Intermediates};
@@ -116,12 +117,15 @@ pub(super) fn run(args: &Args) -> Result<()> {
         }
     }
     if args.dry_run {
-        return super::print(&describe(&Plan::new(pair.size().0, pair.size().1, range, &method)?));
+        let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
+        return super::print(&describe(&Tiles::new(&plan)?));
     }
     let mut matcher = Matcher::new(&execution)?;
     let Some(folder) = &args.intermediates else {
         let (matched, _) =
             super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, None)?;
+        // Outputs take memory too.
+        drop((matcher, pair));
         return write_outputs(args, range, &matched.maps, None);
     };
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
@@ -240,17 +244,25 @@ fn write_outputs(
 }
 
 /// The plan for people.
-fn describe(plan: &Plan) -> String {
+fn describe(tiles: &Tiles) -> String {
     let mut out = String::new();
-    let ((width, height), range) = (plan.size(), plan.range);
+    let plan = tiles.largest();
+    let ((width, height), range) = (tiles.whole().size(), plan.range);
     let _ = writeln!(
         out,
-        "{width} x {height} pixels, disparities {} to {} ({} label{})\n",
+        "{width} x {height} pixels, disparities {} to {} ({} label{})",
         range.min,
         range.max,
         range.labels(),
         plural(range.labels())
     );
+    let tiled = tiles.count() > 1;
+    if tiled {
+        let (width, height) = plan.size();
+        let _ =
+            writeln!(out, "in {} tiles of up to {width} x {height} pixels, each in its turn", tiles.count());
+    }
+    out.push('\n');
     let _ = writeln!(out, "level      width x height    labels                  memory");
     for (z, level) in plan.levels.iter().enumerate() {
         let size = format!("{} x {}", level.width, level.height);
@@ -258,7 +270,10 @@ fn describe(plan: &Plan) -> String {
         let _ = writeln!(out, "{z:>5}  {size:>18}    {labels:20} {:>9}", bytes(plan.level_bytes(z)));
     }
     let _ = writeln!(out, " maps{:>52}", bytes(plan.map_bytes()));
-    let _ = writeln!(out, "  all{:>52}\n", bytes(plan.bytes()));
+    if tiled {
+        let _ = writeln!(out, "whole image{:>46}", bytes(tiles.bytes() - plan.bytes()));
+    }
+    let _ = writeln!(out, "  all{:>52}\n", bytes(tiles.bytes()));
     let width = match plan.message_width {
         MessageWidth::Narrow => 8,
         MessageWidth::Wide => 16,

@@ -26,7 +26,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{Choice, DisparityRange, Execution, MAX_MEMORY, Method};
 use mrfgs::solver::Inspector;
 use mrfgs::{Error, Matched, Matcher, Result, Timing};
 use progress::Bar;
@@ -169,6 +169,21 @@ struct MethodArgs {
     /// Sets one key, after preset and config file: `--set levels=4 --set cost=sad`
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     set: Vec<(String, String)>,
+    /// Memory that a match may take, such as 2GiB or 512MiB; a pair that needs more is matched tile by tile, which changes
+    /// some bits of the result [default: 4GiB, the preset's]
+    #[arg(long, value_name = "SIZE", value_parser = mebibytes)]
+    memory: Option<u32>,
+}
+
+/// A size of memory, in MiB.
+fn mebibytes(text: &str) -> std::result::Result<u32, String> {
+    let units = [("MiB", 0), ("GiB", 10), ("TiB", 20)];
+    let size = units.into_iter().find_map(|(unit, shift)| {
+        let count: u64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
+        u32::try_from(count.checked_mul(1 << shift)?).ok()
+    });
+    let size = size.filter(|size| (1..=MAX_MEMORY).contains(size));
+    size.ok_or_else(|| "give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB".into())
 }
 
 fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
@@ -179,7 +194,7 @@ fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl MethodArgs {
-    /// The method: the preset, then the config file, then each `--set`.
+    /// The method: the preset, then the config file, then each `--set`, then the memory.
     fn method(&self) -> Result<Method> {
         self.on(self.preset.as_deref().unwrap_or("default"))
     }
@@ -191,6 +206,7 @@ impl MethodArgs {
             method.load(path)?;
         }
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
+        method.memory = self.memory.unwrap_or(method.memory);
         method.validated()
     }
 }
@@ -288,8 +304,12 @@ fn match_and_tell(
         let (width, height) = matched.plan.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
         let (labels, iterations) = (range.labels(), matched.iterations);
+        let tiles = match matched.tiles.count() {
+            1 => String::new(),
+            count => format!(", {count} tiles"),
+        };
         say(&format!(
-            "{name}{width} x {height}, {labels} label{}, {iterations} iteration{} in {:.2} s on {}",
+            "{name}{width} x {height}, {labels} label{}{tiles}, {iterations} iteration{} in {:.2} s on {}",
             plural(labels),
             plural(iterations as usize),
             time.as_secs_f64(),

@@ -33,7 +33,10 @@ impl Bar {
                     .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
                     .with_prefix(self.name.clone())
             });
-            bar.set_message(progress.stage);
+            bar.set_message(match progress.tile {
+                Some((tile, all)) => format!("tile {tile} of {all}: {}", progress.stage),
+                None => progress.stage.into(),
+            });
             bar.set_position((progress.done * STEPS as f64) as u64);
         }
         ControlFlow::Continue(())
