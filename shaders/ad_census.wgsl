@@ -23,6 +23,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let row = id.y * params.level.pixel_pitch;
     let pixel = left[row + x];
+    let levels = channels(pixel) >> vec3(8u);
     let bits = left_census[row + x];
     let w = weight[row + x];
     var costs = vec4<u32>();
@@ -33,7 +34,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let other = right[row + u32(xr)];
             if (pixel.z | other.z) == 0u {
                 let ones = countOneBits(bits ^ right_census[row + u32(xr)]);
-                let colour = min(colour_difference(pixel, other) >> 8u, MOST_COLOUR);
+                let colour = min(difference(levels, channels(other) >> vec3(8u)), MOST_COLOUR);
                 c = BIT_COST * min(ones.x + ones.y, MOST_BITS) + (w * colour + MOST_COLOUR / 2u) / MOST_COLOUR;
             }
         }

@@ -1,14 +1,14 @@
 // Beliefs: evidence plus all messages. One invocation a pixel and block of 16 labels.
 
 @group(0) @binding(1) var<storage, read> evidence: array<u32>;
-@group(0) @binding(2) var<storage, read> dependency: array<u32>;
+@group(0) @binding(2) var<storage, read> dependency: array<Quad>;
 // Where each pixel's entries start in the transposed table, and one more a row.
 @group(0) @binding(3) var<storage, read> starts: array<u32>;
 // The slots that hold a pixel: dx + 3 | (dy + 3) << 3 | slot << 6 of the factor at (dx, dy) from it.
 @group(0) @binding(4) var<storage, read> incoming: array<u32>;
-@group(0) @binding(5) var<storage, read> down: array<u32>;
-@group(0) @binding(6) var<storage, read> up: array<u32>;
-@group(0) @binding(7) var<storage, read_write> belief: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> down: array<Quad>;
+@group(0) @binding(6) var<storage, read> up: array<Quad>;
+@group(0) @binding(7) var<storage, read_write> belief: array<Quad>;
 
 const RADIUS: u32 = 3u;
 const QUADS: u32 = 4u;
@@ -28,18 +28,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var i = 0u; i < QUADS; i++) {
         sums[i] = unpack_narrow(evidence[at + i]);
         if HAS_DOWN {
-            if NARROW {
-                sums[i] += unpack_narrow(down[at + i]);
-            } else {
-                sums[i] += unpack_wide(vec2(down[2u * (at + i)], down[2u * (at + i) + 1u]));
-            }
+            sums[i] += unpack(down[at + i]);
         }
         if HAS_UP {
-            if NARROW {
-                sums[i] += unpack_narrow(up[at + i]);
-            } else {
-                sums[i] += unpack_wide(vec2(up[2u * (at + i)], up[2u * (at + i) + 1u]));
-            }
+            sums[i] += unpack(up[at + i]);
         }
     }
     let y = params.first_row + id.y;
@@ -51,17 +43,13 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let entry = incoming[e];
         let fx = x + (entry & 7u) - RADIUS;
         let fy = y + ((entry >> 3u) & 7u) - RADIUS - top;
-        let quad = (fx * SLOTS + (entry >> 6u)) * quads + first;
+        let message = fy * params.level.dependency_pitch + (fx * SLOTS + (entry >> 6u)) * quads + first;
         for (var i = 0u; i < QUADS; i++) {
-            if NARROW {
-                sums[i] += unpack_narrow(dependency[fy * params.level.dependency_pitch + quad + i]);
-            } else {
-                let word = fy * params.level.dependency_pitch + 2u * (quad + i);
-                sums[i] += unpack_wide(vec2(dependency[word], dependency[word + 1u]));
-            }
+            sums[i] += unpack(dependency[message + i]);
         }
     }
     for (var i = 0u; i < QUADS; i++) {
-        belief[at + i] = pack_wide(sums[i]);
+        let sum = min(sums[i], vec4(params.belief_most));
+        belief[at + i] = pack(select(vec4(MOST), sum, are_labels(first + i)));
     }
 }

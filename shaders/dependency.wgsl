@@ -3,34 +3,17 @@
 
 // Codes of the neighbours, four a word.
 @group(0) @binding(1) var<storage, read> members: array<u32>;
-@group(0) @binding(2) var<storage, read> belief: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> messages: array<u32>;
+@group(0) @binding(2) var<storage, read> belief: array<Quad>;
+@group(0) @binding(3) var<storage, read_write> messages: array<Quad>;
 
 const NO_MEMBER: u32 = 0xffu;
 const ABSENT: u32 = 0xffffffffu;
 const WINDOW: u32 = 7u;
 const RADIUS: u32 = 3u;
 
-fn load_message(index: u32) -> vec4<u32> {
-    if NARROW {
-        return unpack_narrow(messages[index]);
-    }
-    return unpack_wide(vec2(messages[2u * index], messages[2u * index + 1u]));
-}
-
-fn store_message(index: u32, value: vec4<u32>) {
-    if NARROW {
-        messages[index] = pack_narrow(value);
-    } else {
-        let words = pack_wide(value);
-        messages[2u * index] = words.x;
-        messages[2u * index + 1u] = words.y;
-    }
-}
-
 // A member's message to the factor: its belief less the factor's old message, less its minimum where the cut wants that.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
-    let q = unpack_wide(belief[member]) - load_message(message);
+    let q = unpack(belief[member]) - unpack(messages[message]);
     if ABSOLUTE {
         return q - vec4(least);
     }
@@ -47,7 +30,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let y = params.first_row + id.y;
     let top = halo_start(RADIUS);
     // First quad of the factor's messages, and of each member's belief.
-    let own = id.y * (params.level.dependency_pitch / select(2u, 1u, NARROW)) + id.x * SLOTS * quads;
+    let own = id.y * params.level.dependency_pitch + id.x * SLOTS * quads;
     var bases: array<u32, SLOTS>;
     bases[0] = (y - top) * params.level.pitch + id.x * quads;
     var present = 1u;
@@ -72,7 +55,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         for (var slot = 0u; slot < SLOTS; slot++) {
             floors[slot] = 0u;
             if bases[slot] != ABSENT {
-                var least = vec4(0xffffu);
+                var least = vec4(MOST);
                 for (var quad = 0u; quad < quads; quad++) {
                     least = min(least, to_factor(bases[slot] + quad, own + slot * quads + quad, 0u));
                 }
@@ -84,7 +67,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     // The smallest sum over the other members, for each member.
     var least: array<vec4<u32>, SLOTS>;
     for (var slot = 0u; slot < SLOTS; slot++) {
-        least[slot] = vec4(ABSENT);
+        least[slot] = vec4(MOST);
     }
     var q: array<vec4<u32>, SLOTS>;
     for (var quad = 0u; quad < quads; quad++) {
@@ -106,7 +89,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var low: array<u32, SLOTS>;
     for (var slot = 0u; slot < SLOTS; slot++) {
         let m = smallest(least[slot]);
-        high[slot] = select(m + params.tau, params.tau, ABSOLUTE);
+        high[slot] = select(min(m + params.tau, MOST), params.tau, ABSOLUTE);
         low[slot] = select(m, min(m, params.tau), ABSOLUTE);
     }
 
@@ -120,7 +103,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                store_message(own + slot * quads + quad, min(total - q[slot], vec4(high[slot])) - vec4(low[slot]));
+                let sum = min(total - q[slot], vec4(high[slot]));
+                messages[own + slot * quads + quad] = pack(sum - vec4(low[slot]));
             }
         }
     }

@@ -1,15 +1,13 @@
 // The optimum of every pixel and its best rival. One invocation a pixel.
 
-@group(0) @binding(1) var<storage, read> belief: array<vec2<u32>>;
+@group(0) @binding(1) var<storage, read> belief: array<Quad>;
 // label | best << 16, rival.
 @group(0) @binding(2) var<storage, read_write> peaks: array<vec2<u32>>;
 
 const NONE: u32 = 0xffffu;
-const LANES: vec4<u32> = vec4(0u, 1u, 2u, 3u);
 
 fn load(first: u32, quad: u32) -> vec4<u32> {
-    let labels = vec4(4u * quad) + LANES;
-    return select(vec4(NONE), unpack_wide(belief[first + quad]), labels < vec4(params.level.labels));
+    return select(vec4(NONE), unpack(belief[first + quad]), are_labels(quad));
 }
 
 @compute @workgroup_size(64)
@@ -22,13 +20,13 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     // Belief and label in one key: the smallest key is the smallest belief at its lowest label.
     var least = vec4(0xffffffffu);
     for (var quad = 0u; quad < params.level.quads; quad++) {
-        least = min(least, (load(first, quad) << vec4(16u)) | (vec4(4u * quad) + LANES));
+        least = min(least, (load(first, quad) << vec4(16u)) | labels_of(quad));
     }
     let key = smallest(least);
     let label = i32(key & 0xffffu);
     var rival = vec4(NONE);
     for (var quad = 0u; quad < params.level.quads; quad++) {
-        let away = abs(vec4<i32>(vec4(4u * quad) + LANES) - vec4(label)) > vec4(1);
+        let away = abs(vec4<i32>(labels_of(quad)) - vec4(label)) > vec4(1);
         rival = min(rival, select(vec4(NONE), load(first, quad), away));
     }
     peaks[id.y * params.level.pixel_pitch + id.x] = vec2(u32(label) | (key & 0xffff0000u), smallest(rival));

@@ -3,7 +3,7 @@
 // 8-bit at level 0, 16-bit at coarser ones.
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> evidence: array<u32>;
-@group(0) @binding(3) var<storage, read_write> belief: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> belief: array<Quad>;
 
 const PADDING: u32 = 255u;
 
@@ -15,11 +15,7 @@ fn load_cost(row: u32, index: u32, quad: u32) -> vec4<u32> {
     } else {
         c = unpack_wide(vec2(cost[row + 2u * index], cost[row + 2u * index + 1u]));
     }
-    return select(vec4(1u << 16u), c, is_label(quad));
-}
-
-fn is_label(quad: u32) -> vec4<bool> {
-    return (vec4(4u * quad) + vec4(0u, 1u, 2u, 3u)) < vec4(params.level.labels);
+    return select(vec4(1u << 16u), c, are_labels(quad));
 }
 
 @compute @workgroup_size(64)
@@ -39,9 +35,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let base = vec4(smallest(least));
     for (var quad = 0u; quad < quads; quad++) {
         let difference = min(load_cost(row, first + quad, quad) - base, vec4(params.evidence_limit));
-        let scaled = (difference * params.evidence_multiplier + vec4(1u << 21u)) >> vec4(22u);
-        let e = select(vec4(PADDING), min(scaled, vec4(params.evidence_cap)), is_label(quad));
-        evidence[id.y * pitch + first + quad] = pack_narrow(e);
-        belief[id.y * pitch + first + quad] = pack_wide(e);
+        let product = ((difference << vec4(params.evidence_up)) * params.evidence_multiplier) >> vec4(16u);
+        let scaled = (product + vec4((1u << params.evidence_down) >> 1u)) >> vec4(params.evidence_down);
+        let e = min(scaled, vec4(params.evidence_cap));
+        evidence[id.y * pitch + first + quad] = pack_narrow(select(vec4(PADDING), e, are_labels(quad)));
+        belief[id.y * pitch + first + quad] = pack(select(vec4(MOST), e, are_labels(quad)));
     }
 }

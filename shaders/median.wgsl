@@ -7,31 +7,23 @@
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> disparity: array<i32>;
 @group(0) @binding(3) var<storage, read> flags: array<u32>;
-// Spatial weights by |dy| and |dx|, then range weights.
-@group(0) @binding(4) var<storage, read> weights: array<u32>;
+// What distance takes off the weight, by |dy| and |dx|.
+@group(0) @binding(4) var<storage, read> space: array<u32>;
 @group(0) @binding(5) var<storage, read_write> smoothed: array<i32>;
 
-const RANGE_ENTRIES: u32 = 1024u;
-const WEIGHT_BITS: u32 = 10u;
+const MOST_WEIGHT: u32 = 127u;
 const FIRST: vec4<u32> = vec4(1u, 2u, 3u, 4u);
 const SECOND: vec4<u32> = vec4(5u, 6u, 7u, 8u);
 
-// In squared sixteenths of an 8-bit level.
-fn colour_distance(a: vec4<u32>, b: vec4<u32>) -> u32 {
-    let p = vec3<i32>(vec3(a.x & 0xffffu, a.x >> 16u, a.y & 0xffffu));
-    let q = vec3<i32>(vec3(b.x & 0xffffu, b.x >> 16u, b.y & 0xffffu));
-    let d = abs(p - q) >> vec3(4u);
-    return u32(d.x * d.x + d.y * d.y + d.z * d.z);
+// Of what colours differ in.
+fn guide(at: u32) -> vec3<u32> {
+    return (channels(left[at]) * params.median_scale) >> vec3(16u);
 }
 
-// Weight of the pixel at `at`, which is `away` places from the one at the centre.
-fn weight(centre: vec4<u32>, at: u32, away: vec2<u32>) -> u32 {
-    let range = colour_distance(centre, left[at]) >> params.median_shift;
-    if range >= RANGE_ENTRIES {
-        return 0u;
-    }
-    let side = params.median_radius + 1u;
-    return (weights[away.y * side + away.x] * weights[side * side + range]) >> WEIGHT_BITS;
+// Weight of the pixel at `at`, which is `away` places from the one whose guide is `centre`.
+fn weight(centre: vec3<u32>, at: u32, away: vec2<u32>) -> u32 {
+    let colour = difference(centre, guide(at)) << params.median_doublings;
+    return MOST_WEIGHT - min(colour + space[away.y * (params.median_radius + 1u) + away.x], MOST_WEIGHT);
 }
 
 // How many places away from `b` the pixel `a` is.
@@ -47,23 +39,25 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let pitch = params.level.pixel_pitch;
     let bits = params.median_step_bits;
-    let step = 1u << bits;
-    let reach = params.median_radius << bits;
-    let top = halo_start(reach);
+    let row_bits = bits + params.median_row_bits;
+    let step = vec2(1u << bits, 1u << row_bits);
+    let reach = vec2(params.median_radius << bits, (params.median_radius >> params.median_row_bits) << row_bits);
+    let top = halo_start(params.median_radius << bits);
     let y = params.first_row + id.y;
     let here = (y - top) * pitch + id.x;
-    let centre = left[here];
+    let centre = guide(here);
     let flags_here = flags[here];
     var low = disparity[here];
     if has_disparity(flags_here) && (params.median_all == 1u || (flags_here & FILLED) != 0u) {
         let middle = vec2(id.x, y);
         // The first place may not leave the image, nor the raster of places.
-        let first = middle - min(vec2(reach), (middle >> vec2(bits)) << vec2(bits));
-        let last = min(middle + vec2(reach + 1u), vec2(params.level.width, params.level.height));
+        let raster = vec2(bits, row_bits);
+        let first = middle - min(reach, (middle >> raster) << raster);
+        let last = min(middle + reach + vec2(1u), vec2(params.level.width, params.level.height));
         var high = low;
         var total = 0u;
-        for (var v = first.y; v < last.y; v += step) {
-            for (var u = first.x; u < last.x; u += step) {
+        for (var v = first.y; v < last.y; v += step.y) {
+            for (var u = first.x; u < last.x; u += step.x) {
                 let at = (v - top) * pitch + u;
                 if has_disparity(flags[at]) {
                     let value = disparity[at];
@@ -79,8 +73,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             // Weight of values below low + k share, k = 1 to 8.
             var below_first = vec4<u32>();
             var below_second = vec4<u32>();
-            for (var v = first.y; v < last.y; v += step) {
-                for (var u = first.x; u < last.x; u += step) {
+            for (var v = first.y; v < last.y; v += step.y) {
+                for (var u = first.x; u < last.x; u += step.x) {
                     let at = (v - top) * pitch + u;
                     let value = disparity[at];
                     if has_disparity(flags[at]) && value < low + i32(8u * share) {

@@ -1,52 +1,38 @@
 // Messages of the resolution factors between a level and the next finer one, in both directions. One invocation a
 // coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster order.
+// Where no label agrees, sums are infinite: the largest value, at which they saturate.
 
 @group(0) @binding(1) var<storage, read> fine_belief: array<u32>;
 @group(0) @binding(2) var<storage, read> coarse_belief: array<u32>;
 @group(0) @binding(3) var<storage, read_write> down: array<u32>;
 @group(0) @binding(4) var<storage, read_write> up: array<u32>;
 
-// Stands for "agrees with no label"; sums saturate here.
-const INFINITE: u32 = 1u << 20u;
-// Labels a message word holds.
-const PER_WORD: u32 = select(2u, 4u, NARROW);
-const MESSAGE_BITS: u32 = 32u / PER_WORD;
-const MESSAGE_MASK: u32 = 0xffffffffu >> (32u - MESSAGE_BITS);
-
-// First word of each child's belief and message; children outside the image share the first one's.
-var<private> fine_belief_at: vec4<u32>;
-var<private> down_at: vec4<u32>;
+// First word of each child; those outside the image share the first one's.
+var<private> children_at: vec4<u32>;
 var<private> exists: vec4<bool>;
-var<private> coarse_belief_at: u32;
-var<private> up_at: u32;
+var<private> parent_at: u32;
 // Where the cut is absolute, the minimum of each message to the factor.
 var<private> child_floor: vec4<u32>;
 var<private> parent_floor: u32;
 
-fn pick(word: u32, label: u32, bits: u32) -> u32 {
-    return (word >> (bits * (label % (32u / bits)))) & (0xffffffffu >> (32u - bits));
-}
-
 // The children's messages to the factor for the fine label with this index.
 fn from_children(index: i32) -> vec4<u32> {
     if index < 0 || index >= i32(params.fine.labels) {
-        return vec4(INFINITE);
+        return vec4(MOST);
     }
     let label = u32(index);
-    let b = fine_belief_at + vec4(label / 2u);
-    let m = down_at + vec4(label / PER_WORD);
+    let at = children_at + vec4(label / PER_WORD);
     let beliefs = vec4(
-        pick(fine_belief[b.x], label, 16u), pick(fine_belief[b.y], label, 16u),
-        pick(fine_belief[b.z], label, 16u), pick(fine_belief[b.w], label, 16u));
+        pick(fine_belief[at.x], label), pick(fine_belief[at.y], label),
+        pick(fine_belief[at.z], label), pick(fine_belief[at.w], label));
     let messages = vec4(
-        pick(down[m.x], label, MESSAGE_BITS), pick(down[m.y], label, MESSAGE_BITS),
-        pick(down[m.z], label, MESSAGE_BITS), pick(down[m.w], label, MESSAGE_BITS));
+        pick(down[at.x], label), pick(down[at.y], label), pick(down[at.z], label), pick(down[at.w], label));
     return beliefs - messages - child_floor;
 }
 
 fn from_parent(label: u32) -> u32 {
-    let b = pick(coarse_belief[coarse_belief_at + label / 2u], label, 16u);
-    return b - pick(up[up_at + label / PER_WORD], label, MESSAGE_BITS) - parent_floor;
+    let at = parent_at + label / PER_WORD;
+    return pick(coarse_belief[at], label) - pick(up[at], label) - parent_floor;
 }
 
 // One step over the coarse labels: sums to the parent and to the children for the label with index z.
@@ -69,14 +55,11 @@ fn advance(z: u32) -> Sums {
     best = select(vec4<u32>(), best, exists);
     let q = from_parent(z);
     let sum = best.x + best.y + best.z + best.w;
-    return Sums(min(sum, INFINITE), min(vec4(q + sum) - best, vec4(INFINITE)));
+    return Sums(min(sum, MOST), min(vec4(q + sum) - best, vec4(MOST)));
 }
 
 // The cut of a sum whose smallest is `least`.
 fn cut_message(sum: u32, least: u32) -> u32 {
-    if least == INFINITE {
-        return 0u;
-    }
     if ABSOLUTE {
         return min(sum, params.tau) - min(least, params.tau);
     }
@@ -87,9 +70,9 @@ var<private> up_word: u32;
 var<private> down_words: vec4<u32>;
 
 fn emit_up(label: u32, message: u32) {
-    up_word |= message << (MESSAGE_BITS * (label % PER_WORD));
+    up_word |= message << (BITS * (label % PER_WORD));
     if label % PER_WORD == PER_WORD - 1u {
-        up[up_at + label / PER_WORD] = up_word;
+        up[parent_at + label / PER_WORD] = up_word;
         up_word = 0u;
     }
 }
@@ -105,9 +88,9 @@ fn emit_down(index: i32, sums: vec4<u32>, least: vec4<u32>) {
             cut_message(sums.x, least.x), cut_message(sums.y, least.y),
             cut_message(sums.z, least.z), cut_message(sums.w, least.w));
     }
-    down_words |= message << vec4(MESSAGE_BITS * (label % PER_WORD));
+    down_words |= message << vec4(BITS * (label % PER_WORD));
     if label % PER_WORD == PER_WORD - 1u {
-        let at = down_at + vec4(label / PER_WORD);
+        let at = children_at + vec4(label / PER_WORD);
         // The first child last: those outside the image wrote to its place.
         if exists.w {
             down[at.w] = down_words.w;
@@ -129,7 +112,6 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }
-    let per_message = select(2u, 1u, NARROW);
     let fine = params.fine;
     let x = 2u * id.x;
     // The bound rows of the finer level start at twice the band's first row.
@@ -139,22 +121,18 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     exists = vec4(true, right, below, right && below);
     let rows = vec4(y) + select(vec4<u32>(), vec4(0u, 0u, 1u, 1u), exists);
     let columns = vec4(x) + select(vec4<u32>(), vec4(0u, 1u, 0u, 1u), exists);
-    let places = rows * fine.pitch + columns * fine.quads;
-    fine_belief_at = 2u * places;
-    down_at = per_message * places;
-    let place = id.y * params.level.pitch + id.x * params.level.quads;
-    coarse_belief_at = 2u * place;
-    up_at = per_message * place;
+    children_at = QUAD_WORDS * (rows * fine.pitch + columns * fine.quads);
+    parent_at = QUAD_WORDS * (id.y * params.level.pitch + id.x * params.level.quads);
     child_floor = vec4<u32>();
     parent_floor = 0u;
     let labels = params.level.labels;
 
     if ABSOLUTE {
-        var least = vec4(INFINITE);
+        var least = vec4(MOST);
         for (var d = 0; d < i32(fine.labels); d++) {
             least = min(least, from_children(d));
         }
-        var parent = INFINITE;
+        var parent = MOST;
         for (var z = 0u; z < labels; z++) {
             parent = min(parent, from_parent(z));
         }
@@ -163,8 +141,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
 
     // The smallest sums over the labels that agree with any.
-    var least_up = INFINITE;
-    var least_down = vec4(INFINITE);
+    var least_up = MOST;
+    var least_down = vec4(MOST);
     between = from_children(params.label_offset - 1);
     for (var z = 0u; z < labels; z++) {
         let sums = advance(z);
@@ -178,11 +156,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     up_word = 0u;
     down_words = vec4<u32>();
     between = from_children(params.label_offset - 1);
-    var last = vec4(INFINITE);
+    var last = vec4(MOST);
     // Two fine labels a coarse one, until the padding of both is written.
     let steps = max(4u * params.level.quads, 2u * fine.quads + 1u);
     for (var z = 0u; z < steps; z++) {
-        var sums = Sums(INFINITE, vec4(INFINITE));
+        var sums = Sums(MOST, vec4(MOST));
         if z < labels {
             sums = advance(z);
         }
@@ -190,7 +168,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             emit_up(z, select(params.tau, cut_message(sums.parent, least_up), z < labels));
         }
         let centre = 2 * i32(z) + params.label_offset;
-        emit_down(centre - 1, select(vec4(INFINITE), min(last, sums.children), INTERPOLATING), least_down);
+        emit_down(centre - 1, select(vec4(MOST), min(last, sums.children), INTERPOLATING), least_down);
         emit_down(centre, sums.children, least_down);
         last = sums.children;
     }

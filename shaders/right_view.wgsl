@@ -10,7 +10,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }
-    let row = 2u * id.y * params.level.pitch;
+    let words = params.level.quads * QUAD_WORDS;
+    let row = id.y * params.level.pitch * QUAD_WORDS;
     // Label j is seen from left pixel x + low + j.
     let shift = i32(id.x) + params.level.low;
     let first = i32(params.first_column);
@@ -19,8 +20,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var least = 0xffffffffu;
     for (var j = start; j < end; j++) {
         let label = u32(j);
-        let word = belief[row + 2u * u32(shift + j) * params.level.quads + label / 2u];
-        let b = (word >> (16u * (label % 2u))) & 0xffffu;
+        let b = pick(belief[row + u32(shift + j) * words + label / PER_WORD], label);
         least = min(least, (b << 16u) | label);
     }
     labels[id.y * params.level.pixel_pitch + id.x] = least;

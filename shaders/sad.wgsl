@@ -38,7 +38,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
                 if xr >= 0 && xr < width {
                     let other = right[row + xr];
                     if (pixel.z | other.z) == 0u {
-                        sum[i] += colour_difference(pixel, other);
+                        sum[i] += difference(channels(pixel), channels(other));
                         count[i] += 1u;
                     }
                 }

@@ -6,10 +6,9 @@
 //! then in raster order: every machine picks the same graph. The centre's own coefficient is always the
 //! largest; the percentile is taken over the 48 others (open in the paper).
 
-use crate::image::{Image, Pixel, Plane};
+use crate::image::{Image, Plane};
 use crate::plan::{GRAPH_WINDOW, Plan};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The code of a slot that no pixel fills: a neighbour outside the image, masked, or simply not there.
 pub const NO_MEMBER: u8 = u8::MAX;
@@ -22,6 +21,8 @@ pub struct LevelGraph {
     height: usize,
     neighbours: usize,
     codes: Vec<u8>,
+    /// How far a member is from its factor, in raster indices, by code.
+    steps: Vec<isize>,
     starts: Vec<u32>,
     incoming: Vec<u32>,
 }
@@ -54,12 +55,26 @@ impl LevelGraph {
             pixels * neighbours,
             "{neighbours} codes for each of {width} x {height} pixels"
         );
-        let slots = neighbours + 1;
-        let mut graph =
-            Self { width, height, neighbours, codes, starts: vec![0; pixels + 1], incoming: Vec::new() };
+        let steps = (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8)
+            .map(|code| {
+                let (dx, dy) = offset(code);
+                dy as isize * width as isize + dx as isize
+            })
+            .collect();
+        let mut graph = Self {
+            width,
+            height,
+            neighbours,
+            codes,
+            steps,
+            starts: vec![0; pixels + 1],
+            incoming: Vec::new(),
+        };
+        graph.check();
         for factor in 0..pixels {
-            for slot in 0..slots {
-                if let Some(pixel) = graph.member(factor, slot) {
+            graph.starts[factor + 1] += 1;
+            for i in factor * neighbours..(factor + 1) * neighbours {
+                if let Some(pixel) = graph.pixel(factor, graph.codes[i]) {
                     graph.starts[pixel + 1] += 1;
                 }
             }
@@ -69,15 +84,50 @@ impl LevelGraph {
         }
         let mut next = graph.starts.clone();
         graph.incoming = vec![0; graph.starts[pixels] as usize];
+        let mut enter = |incoming: &mut [u32], pixel: usize, entry: usize| {
+            incoming[next[pixel] as usize] = entry as u32;
+            next[pixel] += 1;
+        };
         for factor in 0..pixels {
-            for slot in 0..slots {
-                if let Some(pixel) = graph.member(factor, slot) {
-                    graph.incoming[next[pixel] as usize] = (factor * slots + slot) as u32;
-                    next[pixel] += 1;
+            let entry = factor * graph.slots();
+            enter(&mut graph.incoming, factor, entry);
+            for slot in 1..graph.slots() {
+                if let Some(pixel) = graph.pixel(factor, graph.codes[factor * neighbours + slot - 1]) {
+                    enter(&mut graph.incoming, pixel, entry + slot);
                 }
             }
         }
         graph
+    }
+
+    /// Panics when a code leads out of the image or the window.
+    fn check(&self) {
+        if self.neighbours == 0 {
+            return;
+        }
+        let rows = self.codes.chunks_exact(self.width * self.neighbours);
+        for (y, row) in rows.enumerate() {
+            for (x, codes) in row.chunks_exact(self.neighbours).enumerate() {
+                for &code in codes.iter().filter(|&&code| code != NO_MEMBER) {
+                    let (dx, dy) = offset(code);
+                    let (px, py) = (x as i32 + dx, y as i32 + dy);
+                    assert!(
+                        px >= 0
+                            && py >= 0
+                            && px < self.width as i32
+                            && py < self.height as i32
+                            && dy <= RADIUS,
+                        "factor ({x}, {y}): member code {code} leads out of the image"
+                    );
+                }
+            }
+        }
+    }
+
+    /// The member `code` of `factor`, both as raster indices.
+    #[inline]
+    fn pixel(&self, factor: usize, code: u8) -> Option<usize> {
+        self.steps.get(usize::from(code)).map(|&step| factor.wrapping_add_signed(step))
     }
 
     /// Width of the level in pixels.
@@ -99,26 +149,19 @@ impl LevelGraph {
     }
 
     /// The pixel in `slot` of `factor`, both pixels as raster indices; `None` where no pixel fills it.
-    ///
-    /// # Panics
-    /// When the member is outside the image, which [`LevelGraph::new`] has ruled out.
     #[must_use]
     pub fn member(&self, factor: usize, slot: usize) -> Option<usize> {
-        if slot == 0 {
-            return Some(factor);
+        match slot {
+            0 => Some(factor),
+            _ => self.pixel(factor, self.codes[factor * self.neighbours + slot - 1]),
         }
-        let code = self.codes[factor * self.neighbours + slot - 1];
-        if code == NO_MEMBER {
-            return None;
-        }
-        let (dx, dy) = offset(code);
-        let x = (factor % self.width) as i32 + dx;
-        let y = (factor / self.width) as i32 + dy;
-        assert!(
-            x >= 0 && y >= 0 && x < self.width as i32 && y < self.height as i32 && dy <= RADIUS,
-            "factor {factor}: member code {code} leads out of the image"
-        );
-        Some(y as usize * self.width + x as usize)
+    }
+
+    /// Codes of the neighbours of the factor at (x, y).
+    #[must_use]
+    #[inline]
+    pub fn neighbours_of(&self, x: usize, y: usize) -> &[u8] {
+        &self.codes[(y * self.width + x) * self.neighbours..][..self.neighbours]
     }
 
     /// Codes of all factors' neighbours, `slots() - 1` a pixel.
@@ -161,67 +204,43 @@ pub fn build(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
     graphs
 }
 
-/// What a squared pixel of distance weighs against a squared 1/16 level of colour difference.
+/// What a squared pixel of distance weighs against a squared quarter level of colour difference.
 fn spatial_weight(sigma_space: f64, sigma_range: f64) -> u32 {
-    // Intensities 0 ..= 1 are 0 ..= 4080 sixteenths of an 8-bit level.
-    let ratio = sigma_range * 4080.0 / sigma_space;
-    (ratio * ratio + 0.5).floor().min(f64::from(1u32 << 26)) as u32
+    // Intensities 0 ..= 1 are 0 ..= 1020 quarters of an 8-bit level.
+    let ratio = sigma_range * 1020.0 / sigma_space;
+    (ratio * ratio + 0.5).floor().min(f64::from(1u32 << 20)) as u32
 }
 
-/// Squared colour difference in sixteenths of an 8-bit level; below 2^26.
-#[must_use]
-pub fn colour_distance(a: &Pixel, b: &Pixel) -> u32 {
-    (0..3)
-        .map(|c| {
-            let difference = u32::from(a[c].abs_diff(b[c])) >> 4;
-            difference * difference
-        })
-        .sum()
-}
+/// Bits of a key that hold the neighbour's rank; the rest is its distance, below 2^25.
+const RANK_BITS: u32 = 6;
+/// The key of what is no neighbour; every other one is below it.
+const NO_KEY: i32 = i32::MAX;
 
 fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let (width, height) = image.pixels.size();
-    // By distance, then in raster order: of equal keys the first one found stays, which breaks ties as promised.
+    // By distance, then in raster order: the rank that breaks ties as promised.
     let mut window: Vec<(i32, i32)> =
         (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8).map(offset).filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
-    // Channel by channel, and row by row below: a row at once is a vector.
-    let channels = [0, 1, 2].map(|c| image.pixels.map(|pixel| pixel[c]));
-    let masked = image.masked.map(|&masked| if masked { NO_KEY } else { 0 });
+    let guide = Guide {
+        window,
+        weight,
+        channels: [0, 1, 2].map(|c| image.pixels.map(|pixel| pixel[c])),
+        masked: image.masked.map(|&masked| if masked { NO_KEY } else { 0 }),
+    };
     let mut codes = vec![NO_MEMBER; width * height * neighbours];
     if neighbours > 0 {
         codes.par_chunks_mut(width * neighbours).enumerate().for_each_init(
-            || Chosen::new(width, neighbours),
-            |chosen, (y, row)| {
-                chosen.clear();
-                let centre = channels.each_ref().map(|channel| channel.row(y));
-                for &(dx, dy) in &window {
-                    let ny = y as i32 + dy;
-                    let (first, end) = ((-dx).max(0) as usize, width as i32 - dx.max(0));
-                    if ny < 0 || ny >= height as i32 || first as i32 >= end {
-                        continue;
-                    }
-                    let (seen, to) = (first..end as usize, (first as i32 + dx) as usize);
-                    let there = to..to + seen.len();
-                    let other = channels.each_ref().map(|channel| &channel.row(ny as usize)[there.clone()]);
-                    let distance = (weight * (dx * dx + dy * dy) as u32) as i32;
-                    let keys = &mut chosen.key[seen.clone()];
-                    keys.fill(distance);
-                    for (here, other) in centre.iter().zip(other) {
-                        for (key, (&a, &b)) in keys.iter_mut().zip(here[seen.clone()].iter().zip(other)) {
-                            let difference = i32::from(a.abs_diff(b) >> 4);
-                            *key += difference * difference;
-                        }
-                    }
-                    for (key, masked) in keys.iter_mut().zip(&masked.row(ny as usize)[there]) {
-                        *key |= masked;
-                    }
-                    chosen.offer(seen, code(dx, dy));
-                }
+            || (vec![0; width], vec![0; width * neighbours]),
+            |(keys, chosen), (y, row)| {
+                chosen.fill(NO_KEY);
+                choose_row(&guide, y, keys, chosen);
                 for (x, out) in row.chunks_exact_mut(neighbours).enumerate() {
+                    let found = chosen[x..].iter().step_by(width).filter(|&&key| key != NO_KEY);
                     if !image.masked[(x, y)] {
-                        for (slot, out) in out.iter_mut().enumerate() {
-                            *out = chosen.codes[slot * width + x] as u8;
+                        for (out, &key) in out.iter_mut().zip(found) {
+                            let (dx, dy) = guide.window[(key & ((1 << RANK_BITS) - 1)) as usize];
+                            *out = code(dx, dy);
                         }
                     }
                 }
@@ -231,58 +250,68 @@ fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     LevelGraph::new(width, height, neighbours, codes)
 }
 
-/// The key of what is no neighbour; every other one is below it.
-const NO_KEY: i32 = i32::MAX;
-
-/// The neighbours with the smallest keys so far of all pixels of a row, \[slot\]\[x\], ascending.
-struct Chosen {
-    keys: Vec<i32>,
-    codes: Vec<i32>,
-    /// Key and code on offer to each pixel.
-    key: Vec<i32>,
-    code: Vec<i32>,
-    /// 1 where what is on offer has been in the slot before: then it goes before an equal key.
-    moved: Vec<i32>,
+/// What neighbours are chosen by: channel by channel and row by row, for a row at once is a vector.
+struct Guide {
+    /// The places around a pixel, nearest first.
+    window: Vec<(i32, i32)>,
+    /// What a squared pixel of distance weighs.
+    weight: u32,
+    channels: [Plane<u16>; 3],
+    /// [`NO_KEY`] where masked, else 0.
+    masked: Plane<i32>,
 }
 
-impl Chosen {
-    fn new(width: usize, neighbours: usize) -> Self {
-        Self {
-            keys: vec![NO_KEY; width * neighbours],
-            codes: vec![NO_MEMBER.into(); width * neighbours],
-            key: vec![0; width],
-            code: vec![0; width],
-            moved: vec![0; width],
+/// Offers every place of the window to the pixels of row `y`; the smallest keys stay in `chosen`, by slot.
+#[pulp::with_simd(choose_row = pulp::Arch::new())]
+#[inline(always)]
+fn choose_row_on<'a, S: pulp::Simd>(
+    _: S,
+    guide: &'a Guide,
+    y: usize,
+    keys: &'a mut [i32],
+    chosen: &'a mut [i32],
+) {
+    let Guide { window, weight, channels, masked } = guide;
+    let (width, height) = masked.size();
+    let centre = channels.each_ref().map(|channel| channel.row(y));
+    for (rank, &(dx, dy)) in window.iter().enumerate() {
+        let ny = y as i32 + dy;
+        let (first, end) = ((-dx).max(0) as usize, width as i32 - dx.max(0));
+        if ny < 0 || ny >= height as i32 || first as i32 >= end {
+            continue;
+        }
+        let (seen, to) = (first..end as usize, (first as i32 + dx) as usize);
+        let there = to..to + seen.len();
+        let distance = weight * (dx * dx + dy * dy) as u32;
+        let base = (distance << RANK_BITS | rank as u32) as i32;
+        let keys = &mut keys[seen.clone()];
+        let here = centre.map(|channel| &channel[seen.clone()]);
+        let others = channels.each_ref().map(|channel| &channel.row(ny as usize)[there.clone()]);
+        offer(base, here, others, &masked.row(ny as usize)[there], keys);
+        for chosen in chosen.chunks_exact_mut(width) {
+            keep_smaller(&mut chosen[seen.clone()], keys);
         }
     }
+}
 
-    fn clear(&mut self) {
-        self.keys.fill(NO_KEY);
-        self.codes.fill(NO_MEMBER.into());
+/// The keys of a neighbour of all pixels of a row: `base`, with the squared colour difference on top.
+#[inline(always)]
+fn offer(base: i32, here: [&[u16]; 3], others: [&[u16]; 3], masked: &[i32], keys: &mut [i32]) {
+    let (here, others) = (here.map(|c| &c[..keys.len()]), others.map(|c| &c[..keys.len()]));
+    for ((i, key), &masked) in keys.iter_mut().enumerate().zip(masked) {
+        let squared = |c: usize| {
+            let difference = i32::from((here[c][i].abs_diff(others[c][i]) >> 6) as i16);
+            difference * difference
+        };
+        *key = (base + ((squared(0) + squared(1) + squared(2)) << RANK_BITS)) | masked;
     }
+}
 
-    /// Offers the neighbour `code`, by the keys on offer, to the pixels `seen`: it takes the place of the first one with a
-    /// larger key, that one the place of the next, and so on.
-    fn offer(&mut self, seen: Range<usize>, code: u8) {
-        let width = self.key.len();
-        let (offered, carried) = (&mut self.key[seen.clone()], &mut self.code[seen.clone()]);
-        let moved = &mut self.moved[seen.clone()];
-        carried.fill(code.into());
-        moved.fill(0);
-        let slots = self.keys.chunks_exact_mut(width).zip(self.codes.chunks_exact_mut(width));
-        for (keys, codes) in slots {
-            let held = keys[seen.clone()].iter_mut().zip(&mut codes[seen.clone()]);
-            let offer = offered.iter_mut().zip(carried.iter_mut()).zip(moved.iter_mut());
-            for ((held, held_code), ((key, code), moved)) in held.zip(offer) {
-                let smaller = *key - *moved < *held;
-                let (old, old_code) = (*held, *held_code);
-                *held = if smaller { *key } else { old };
-                *held_code = if smaller { *code } else { old_code };
-                *key = if smaller { old } else { *key };
-                *code = if smaller { old_code } else { *code };
-                *moved = i32::from(smaller);
-            }
-        }
+/// Keeps the smaller of each two in `chosen` and the larger in `keys`.
+#[inline(always)]
+fn keep_smaller(chosen: &mut [i32], keys: &mut [i32]) {
+    for (chosen, key) in chosen.iter_mut().zip(keys) {
+        (*chosen, *key) = ((*chosen).min(*key), (*chosen).max(*key));
     }
 }
 
@@ -297,31 +326,34 @@ pub fn downsample(image: &Image) -> Image {
         (2 * y..height.min(2 * y + 2))
             .all(|fy| (2 * x..width.min(2 * x + 2)).all(|fx| image.masked[(fx, fy)]))
     });
-    let rows: Vec<Vec<Pixel>> = (0..h)
-        .into_par_iter()
-        .map(|y| {
-            (0..w)
-                .map(|x| {
-                    if masked[(x, y)] {
-                        return [0; 4];
-                    }
-                    let (mut sums, mut total) = ([0u32; 4], 0);
-                    for (j, wy) in WEIGHTS.iter().enumerate() {
-                        let fy = (2 * y + j).saturating_sub(2).min(height - 1);
-                        for (i, wx) in WEIGHTS.iter().enumerate() {
-                            let fx = (2 * x + i).saturating_sub(2).min(width - 1);
-                            if !image.masked[(fx, fy)] {
-                                total += wx * wy;
-                                for (sum, &v) in sums.iter_mut().zip(&image.pixels[(fx, fy)]) {
-                                    *sum += wx * wy * u32::from(v);
-                                }
-                            }
-                        }
-                    }
-                    sums.map(|sum| ((2 * sum + total) / (2 * total)) as u16)
-                })
-                .collect()
-        })
-        .collect();
-    Image { pixels: Plane::new(w, h, rows.concat()), masked }
+    let mut pixels = vec![[0; 4]; w * h];
+    pixels.par_chunks_mut(w).enumerate().for_each_init(
+        // Sums over y of each column, and of the weights in it.
+        || vec![([0u32; 4], 0u32); width],
+        |columns, (y, row)| {
+            columns.fill(([0; 4], 0));
+            for (j, wy) in WEIGHTS.iter().enumerate() {
+                let fy = (2 * y + j).saturating_sub(2).min(height - 1);
+                let fine = image.pixels.row(fy).iter().zip(image.masked.row(fy));
+                for ((sums, total), (pixel, &masked)) in columns.iter_mut().zip(fine) {
+                    let weight = if masked { 0 } else { *wy };
+                    sums.iter_mut().zip(pixel).for_each(|(sum, &v)| *sum += weight * u32::from(v));
+                    *total += weight;
+                }
+            }
+            for (x, out) in row.iter_mut().enumerate() {
+                if masked[(x, y)] {
+                    continue;
+                }
+                let (mut sums, mut total) = ([0u32; 4], 0);
+                for (i, wx) in WEIGHTS.iter().enumerate() {
+                    let (column, weights) = &columns[(2 * x + i).saturating_sub(2).min(width - 1)];
+                    sums.iter_mut().zip(column).for_each(|(sum, &v)| *sum += wx * v);
+                    total += wx * weights;
+                }
+                *out = sums.map(|sum| ((2 * sum + total) / (2 * total)) as u16);
+            }
+        },
+    );
+    Image { pixels: Plane::new(w, h, pixels), masked }
 }

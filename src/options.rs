@@ -230,7 +230,7 @@ method! {
          (open).";
     fill: Fill, "none | row | median", "What becomes of invalid pixels.";
     median: Median, "off | filled | all", "Which pixels the weighted median touches (section 2.5).";
-    median_window: u32, "pixels, odd, 3 to 31", "Side of the median's window (open).";
+    median_window: u32, "pixels, odd, 3 to 31", "Side of the median's window, of which every second row is seen (open).";
     median_sigma_space: f64, "pixels", "Spatial parameter of the median's weights (open).";
     median_sigma_range: f64, "of the intensity range 0 to 1", "Range parameter of the median's weights (open).";
     confidence_floor: u32, "0 to 255", "Confidence below this sets the validity flag for low confidence.";

@@ -5,7 +5,8 @@
 //!
 //! # Units
 //! Messages, evidence and beliefs are costs, -log of the paper's probabilities, in [`UNITS_PER_NAT`] units a nat.
-//! All are non-negative integers; every message has minimum 0 over the labels.
+//! All are non-negative integers; every message has minimum 0 over the labels. They and their sums are stored in 8 bits,
+//! or 16 where the method needs them ([`Width`]), and saturate: what is that dear is no candidate, whatever it costs.
 
 use crate::error::Result;
 use crate::options::{Cost, DisparityRange, Illumination, Method, Potential, Pyramid, Resolution, Schedule};
@@ -13,7 +14,7 @@ use std::ops::Range;
 
 /// Units of cost in one nat.
 pub const UNITS_PER_NAT: f64 = 4.0;
-/// Cap of a hard potential's messages, in units: the largest for which no belief exceeds 16 bits even where a
+/// Cap of a hard potential's messages, in units: the largest for which no belief saturates in 16 bits even where a
 /// pixel is a member of all 49 factors of its window, at two resolution messages and the largest evidence.
 pub const HARD_CAP: u16 = 1023;
 /// Largest matching cost at level 0, in cost units.
@@ -32,16 +33,12 @@ pub const COLOUR_MOST: u32 = 64;
 pub const CENSUS_PLACES: u32 = 63;
 /// Fractional bits of the costs of level 1 and coarser.
 pub const COST_FRACTION_BITS: u32 = 8;
-/// Fractional bits of [`EvidenceScale::multiplier`].
-pub const EVIDENCE_BITS: u32 = 22;
-/// Stands for infinity in 16-bit sums over a resolution factor, which has five members at most.
-pub const NARROW_INFINITE: u32 = u16::MAX as u32 / 5;
 /// Side of the window that holds a dependency factor's members.
 pub const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
 pub const LABEL_BLOCK: usize = 16;
 
-const _: () = assert!(255 + (GRAPH_WINDOW * GRAPH_WINDOW + 2) as u32 * HARD_CAP as u32 <= u16::MAX as u32);
+const _: () = assert!(255 + (GRAPH_WINDOW * GRAPH_WINDOW + 3) as u32 * HARD_CAP as u32 <= u16::MAX as u32);
 
 /// Size of one level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,43 +71,76 @@ impl LevelPlan {
     }
 }
 
-/// From cost to evidence: with c in 1/256 cost units,
-/// e(d) = (min(c(d) - min c, limit) * multiplier + 2^21) >> 22, at most `cap`.
+/// From cost to evidence, in 16-bit steps. With c in 1/256 cost units and D = min(c(d) - min c, `limit`),
+/// e(d) = min(((D << `up`) * `multiplier` >> 16) + (1 << `down` >> 1) >> `down`, `cap`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EvidenceScale {
-    /// Evidence units per 1/256 cost unit, with [`EVIDENCE_BITS`] fractional bits.
-    pub multiplier: u32,
+    /// Evidence units per 1/256 cost unit, times 2^(16 + `down` - `up`); below 2^15.
+    pub multiplier: u16,
     /// The smallest difference of costs that gives the cap; differences beyond it count as this one.
-    pub limit: u32,
+    pub limit: u16,
+    /// The largest shift that keeps `limit` in 16 bits.
+    pub up: u32,
+    /// Fractional bits of the product.
+    pub down: u32,
     /// Largest evidence, in units.
-    pub cap: u32,
+    pub cap: u8,
 }
 
 impl EvidenceScale {
     fn new(gain: f64, cost_units: f64, method: &Method) -> Self {
         let per_cost = gain * UNITS_PER_NAT / (method.temperature * cost_units * 256.0);
-        let multiplier = (per_cost * f64::from(1u32 << EVIDENCE_BITS) + 0.5)
-            .floor()
-            .clamp(1.0, f64::from(1u32 << 30)) as u32;
-        let cap = (method.evidence_cap * UNITS_PER_NAT + 0.5).floor() as u32;
-        Self { multiplier, limit: (cap << EVIDENCE_BITS).div_ceil(multiplier), cap }
+        let cap = (method.evidence_cap * UNITS_PER_NAT + 0.5).floor();
+        let limit = (cap / per_cost).ceil().clamp(1.0, u16::MAX.into()) as u16;
+        let up = limit.leading_zeros();
+        let unshifted = per_cost * 65536.0 / f64::from(1u32 << up);
+        // All of 15 bits for the multiplier, so that product and rounding fit 16.
+        let mut down = 0;
+        while down < 15 && unshifted * f64::from(2u32 << down) < 32767.0 {
+            down += 1;
+        }
+        let multiplier = (unshifted * f64::from(1u32 << down) + 0.5).floor().clamp(1.0, 32767.0) as u16;
+        Self { multiplier, limit, up, down, cap: cap as u8 }
     }
 
     /// Evidence for a cost `difference` above the pixel's cheapest label, in 1/256 cost units.
     #[must_use]
-    pub fn apply(self, difference: u32) -> u8 {
-        let product = difference.min(self.limit) * self.multiplier + (1 << (EVIDENCE_BITS - 1));
-        (product >> EVIDENCE_BITS).min(self.cap) as u8
+    #[inline]
+    pub fn apply(self, difference: u16) -> u8 {
+        let product = (u32::from(difference.min(self.limit) << self.up) * u32::from(self.multiplier)) >> 16;
+        // Both fit 15 bits.
+        let e = (product as u16 + (1 << self.down >> 1)) >> self.down;
+        e.min(self.cap.into()) as u8
     }
 }
 
-/// Storage width of messages.
+/// Storage width of messages and beliefs, and where their sums saturate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MessageWidth {
-    /// Messages in 8 bits, sums over a factor in 16.
+pub enum Width {
+    /// 8 bits.
     Narrow,
-    /// Messages in 16 bits, sums over a factor in 32.
+    /// 16 bits.
     Wide,
+}
+
+impl Width {
+    /// Bytes of a value.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Narrow => 1,
+            Self::Wide => 2,
+        }
+    }
+
+    /// The largest value there is: stands for infinity.
+    #[must_use]
+    pub fn most(self) -> u16 {
+        match self {
+            Self::Narrow => u8::MAX.into(),
+            Self::Wide => u16::MAX,
+        }
+    }
 }
 
 /// How a sum of messages s becomes a message m(d) = min(s(d), high) - low.
@@ -169,8 +199,8 @@ pub struct Plan {
     pub dependency: Cut,
     /// Cut of resolution messages.
     pub resolution: Cut,
-    /// Storage width of both kinds of message.
-    pub message_width: MessageWidth,
+    /// Storage width of messages of both kinds, and of beliefs.
+    pub width: Width,
     /// The flooding, in order.
     pub phases: Vec<Phase>,
     /// Columns of the left view that [`Stage::RightView`](crate::backend::Stage::RightView) takes in: all of them, but for
@@ -220,14 +250,12 @@ impl Plan {
             Potential::Exact => Cut { tau: units(nats), rule: CutRule::Absolute },
         };
         let (dependency, resolution) = (cut(method.dependency_cut), cut(method.resolution_cut));
-        let belief_bound = levels[0].evidence.cap
-            + window as u32 * u32::from(dependency.tau)
+        // Where a pixel is in as many factors as a factor has members, as pixels are on average, nothing saturates.
+        let usual = u32::from(levels[0].evidence.cap)
+            + (neighbours + 1) as u32 * u32::from(dependency.tau)
             + 2 * u32::from(resolution.tau);
-        // A pixel's padding labels count as labels with evidence 255.
-        let sum_bound = (neighbours + 1) as u32 * (belief_bound + 255);
-        let narrow = dependency.tau.max(resolution.tau) <= 255
-            && u16::try_from(sum_bound).is_ok()
-            && 5 * belief_bound + u32::from(resolution.tau) < NARROW_INFINITE;
+        let most = u32::from(Width::Narrow.most() - dependency.tau.max(resolution.tau).min(255));
+        let stored = if usual <= most { Width::Narrow } else { Width::Wide };
 
         let last = levels.len() - 1;
         let phases = match method.schedule {
@@ -247,7 +275,7 @@ impl Plan {
             neighbours,
             dependency,
             resolution,
-            message_width: if narrow { MessageWidth::Narrow } else { MessageWidth::Wide },
+            width: stored,
             phases,
             core: 0..width,
             method,
@@ -283,19 +311,11 @@ impl Plan {
         self.neighbours + 1
     }
 
-    /// Bytes of one stored message value.
+    /// The largest belief, where their sums saturate: a message less than the largest value, so that whatever belongs to no
+    /// label stays above every label's belief when a message is taken off it.
     #[must_use]
-    pub fn message_bytes(&self) -> usize {
-        match self.message_width {
-            MessageWidth::Narrow => 1,
-            MessageWidth::Wide => 2,
-        }
-    }
-
-    /// Bytes of one stored belief.
-    #[must_use]
-    pub fn belief_bytes(&self) -> usize {
-        2
+    pub fn belief_most(&self) -> u16 {
+        self.width.most() - self.dependency.tau.max(self.resolution.tau)
     }
 
     /// Whether the texture zones limit the labels of their pixels.
@@ -342,9 +362,10 @@ impl Plan {
         let l = &self.levels[level];
         let cells = (l.pixels() * l.stride) as u64;
         let cost = if level == 0 { 1 } else { 2 };
-        let up = if level == 0 { 0 } else { self.message_bytes() };
-        let down = if level + 1 == self.levels.len() { 0 } else { self.message_bytes() };
-        let volumes = cost + 1 + self.belief_bytes() + up + down + self.slots() * self.message_bytes();
+        let width = self.width.bytes();
+        let up = if level == 0 { 0 } else { width };
+        let down = if level + 1 == self.levels.len() { 0 } else { width };
+        let volumes = cost + 1 + width + up + down + self.slots() * width;
         // The member codes, and the transposed table with its row starts.
         let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
         cells * volumes as u64 + graph as u64
@@ -431,8 +452,8 @@ mod tests {
                 let scale = EvidenceScale::new(gain, CENSUS_UNITS, &method);
                 let mut last = 0;
                 for difference in 0..=u16::MAX {
-                    let e = scale.apply(difference.into());
-                    assert!(e >= last && u32::from(e) <= scale.cap);
+                    let e = scale.apply(difference);
+                    assert!(e >= last && e <= scale.cap);
                     let exact = f64::from(difference) * gain * 4.0 / (temperature * 127.0 * 256.0);
                     let error = (f64::from(e) - exact.min(32.0)).abs();
                     assert!(error <= 0.51 + 0.01 * exact.min(32.0), "{difference}: {e} against {exact}");
@@ -443,10 +464,10 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_needs_wide_messages_and_the_default_narrow_ones() {
+    fn the_paper_needs_wide_volumes_and_the_default_narrow_ones() {
         let range = DisparityRange::new(0, 59).unwrap();
         let paper = Plan::new(450, 375, range, &Method::preset("paper").unwrap()).unwrap();
-        assert_eq!(paper.message_width, MessageWidth::Wide);
-        assert_eq!(plan(450, 375, 0, 59).message_width, MessageWidth::Narrow);
+        assert_eq!(paper.width, Width::Wide);
+        assert_eq!(plan(450, 375, 0, 59).width, Width::Narrow);
     }
 }

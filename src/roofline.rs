@@ -1,6 +1,6 @@
 //! What the flooding costs at least, counted from the plan: the roof under which every machine computes it.
 //!
-//! The message stages, [`Stage::Dependency`], [`Stage::Resolution`] and [`Stage::Belief`], do little with every value that
+//! The message stages, [`Stage::Flood`] with its parts and [`Stage::Resolution`], do little with every value that
 //! they touch, so memory bounds them. [`bytes`] is what one run of a stage must move where no cache outlives it: every
 //! volume that it reads is read once, every one that it writes is written once, in their widths as stored and padding
 //! included, for padding goes through the same arithmetic. The graph, a few bytes a pixel, is left out. Divided by
@@ -10,12 +10,14 @@
 use crate::backend::{Stage, Volume, volume_shape};
 use crate::plan::Plan;
 
-/// The stages of the flooding of `plan`, level by level: what an iteration of all levels runs.
+/// The stages of the flooding of `plan`, level by level: of [`Stage::Flood`] and the two that it consists of, a backend keeps
+/// the time of the one or of the others.
 pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
     let levels = 0..plan.levels.len();
     levels.flat_map(|z| {
         let resolution = (z > 0).then_some(Stage::Resolution(z));
-        [Some(Stage::Dependency(z)), resolution, Some(Stage::Belief(z))].into_iter().flatten()
+        let level = [Stage::Dependency(z), Stage::Belief(z), Stage::Flood(z)];
+        resolution.into_iter().chain(level)
     })
 }
 
@@ -23,7 +25,7 @@ pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
 /// padding) times members of a factor. Those of all other stages count as none.
 #[must_use]
 pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
-    let Stage::Dependency(z) = stage else { return 0 };
+    let (Stage::Dependency(z) | Stage::Flood(z)) = stage else { return 0 };
     let (rows, labels, _) = volume_shape(plan, Volume::Dependency(z));
     rows as u64 * labels as u64
 }
@@ -36,8 +38,7 @@ pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
         let width = match volume {
             Volume::Evidence(_) | Volume::Cost(0) => 1,
             Volume::Cost(_) => 2,
-            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => plan.message_bytes(),
-            Volume::Belief(_) => plan.belief_bytes(),
+            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) | Volume::Belief(_) => plan.width.bytes(),
         };
         (rows * stride * width) as u64
     };
@@ -52,6 +53,10 @@ pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
             let up = if z > 0 { stored(Volume::Up(z)) } else { 0 };
             let summands = stored(Volume::Evidence(z)) + stored(Volume::Dependency(z)) + down + up;
             summands + stored(Volume::Belief(z))
+        }
+        // The messages that are written are those that are summed up.
+        Stage::Flood(z) => {
+            bytes(plan, Stage::Dependency(z)) + bytes(plan, Stage::Belief(z)) - stored(Volume::Dependency(z))
         }
         _ => 0,
     }
@@ -72,16 +77,16 @@ mod tests {
     #[test]
     fn every_volume_counts_once() {
         // 15 pixels of 20 labels in 32 places, and 6 of 11 in 16; 5 members.
-        for (preset, m) in [("default", 1), ("paper", 2)] {
+        for (preset, b) in [("default", 1), ("paper", 2)] {
             let plan = plan(preset);
-            let b = plan.belief_bytes() as u64;
             let (fine, coarse) = (15 * 32, 6 * 16);
             for (stage, expected) in [
-                (Stage::Dependency(0), fine * (b + 2 * 5 * m)),
-                (Stage::Dependency(1), coarse * (b + 2 * 5 * m)),
-                (Stage::Resolution(1), (fine + coarse) * (b + 2 * m)),
-                (Stage::Belief(0), fine * (1 + 5 * m + m + b)),
-                (Stage::Belief(1), coarse * (1 + 5 * m + m + b)),
+                (Stage::Dependency(0), fine * (1 + 2 * 5) * b),
+                (Stage::Dependency(1), coarse * (1 + 2 * 5) * b),
+                (Stage::Resolution(1), (fine + coarse) * (1 + 2) * b),
+                (Stage::Belief(0), fine * (1 + (5 + 1 + 1) * b)),
+                (Stage::Belief(1), coarse * (1 + (5 + 1 + 1) * b)),
+                (Stage::Flood(0), fine * (1 + 2 * b + 2 * 5 * b + b)),
                 (Stage::Cost, 0),
                 (Stage::Median, 0),
             ] {
@@ -94,14 +99,16 @@ mod tests {
     }
 
     #[test]
-    fn an_iteration_runs_every_message_stage_once() {
+    fn every_message_stage_is_named_once() {
         let stages: Vec<_> = message_stages(&plan("default")).collect();
         let expected = [
             Stage::Dependency(0),
             Stage::Belief(0),
-            Stage::Dependency(1),
+            Stage::Flood(0),
             Stage::Resolution(1),
+            Stage::Dependency(1),
             Stage::Belief(1),
+            Stage::Flood(1),
         ];
         assert_eq!(stages, expected);
     }

@@ -244,11 +244,8 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
         for _ in 0..phase.iterations {
             iterations += 1;
             let levels = phase.finest..=coarsest;
-            let stages = levels
-                .clone()
-                .map(Stage::Dependency)
-                .chain(levels.clone().skip(1).map(Stage::Resolution))
-                .chain(levels.map(Stage::Belief));
+            // Every message is from old beliefs: those between levels first, then a level's own and its new beliefs.
+            let stages = levels.clone().skip(1).map(Stage::Resolution).chain(levels.map(Stage::Flood));
             for stage in stages {
                 work.run(backend, plan, stage)?;
             }
@@ -312,7 +309,7 @@ impl<'a, 'b> Work<'a, 'b> {
     fn run(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
         let cells = match stage {
             Stage::Cost => cells(plan, 0),
-            Stage::Pyramid(z) | Stage::Dependency(z) => cells(plan, z),
+            Stage::Pyramid(z) | Stage::Flood(z) => cells(plan, z),
             _ => 0.0,
         };
         self.begin(stage.name(), cells)?;

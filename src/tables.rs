@@ -49,42 +49,49 @@ pub fn ln(x: f64) -> f64 {
     f64::from(exponent) * LN_2 + 2.0 * sum
 }
 
+/// Weight of the centre of the median's window, the largest there is.
+pub const MEDIAN_WEIGHT: u8 = 127;
+/// What distance alone takes off it, at most.
+const MEDIAN_SPACE: f64 = 96.0;
+/// How far apart the rows of the window that sees every column are, in places and as a power of two: half of them do.
+const SPARSE_ROW_BITS: u32 = 1;
 /// How far apart the places of the stretched window are, as a power of two.
 const STRETCH_BITS: u32 = 2;
-/// Entries of the range table; differences beyond it weigh nothing.
-const MEDIAN_RANGE_ENTRIES: usize = 1024;
-/// Bits of each of the two weights that are multiplied.
-const MEDIAN_WEIGHT_BITS: u32 = 10;
+/// By how much the stretched window's range sigma is smaller.
+const STRETCH_SIGMA: f64 = 4.0;
 
-/// Integer weights of the bilateral window: the product of a spatial weight and a range weight, each round(1024
-/// exp(-e)), shifted right by 10. For the range weight, the squared colour difference in sixteenths of an 8-bit level
-/// is rounded down to whole steps of 2^k, the smallest (up to 2^26) of which 1024 exceed 16 variances; a difference of
-/// 1024 steps or more weighs nothing.
+/// Bilateral weights of the median's window, in integers of 8 bits:
+/// max(0, [`MEDIAN_WEIGHT`] - colour - space), with space = round(96 (1 - exp(-(dx^2 + dy^2) / 2 `sigma_space`^2))) in places,
+/// and colour = the sum over r, g and b of the guides' differences times 2^`doublings`, a guide being the 16-bit channel
+/// times `scale` >> 16. `scale` / 256 times 2^`doublings` is 0.1 / `sigma_range`: colour costs all of the weight
+/// at a difference of 1270 `sigma_range` 8-bit levels, summed over the channels. (A straight line for the Gaussian, and a sum
+/// for the product: as accurate, and bytes all the way.)
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     radius: usize,
     step_bits: u32,
+    row_bits: u32,
     /// By |dy| and dx from -radius to radius, in places, \[dy\]\[dx\].
-    space: Vec<u32>,
-    /// By squared colour difference, in steps of 2^shift, and 0 for all beyond.
-    range: Vec<u32>,
-    shift: u32,
+    space: Vec<u8>,
+    scale: u32,
+    doublings: u32,
 }
 
 impl MedianWeights {
-    /// The weights that `method` asks for.
+    /// The weights that `method` asks for, in every second row of the window.
     #[must_use]
     pub fn of(method: &Method) -> Self {
         let window = method.median_window as usize;
-        Self::new(window, method.median_sigma_space, method.median_sigma_range)
+        let weights = Self::new(window, method.median_sigma_space, method.median_sigma_range);
+        Self { row_bits: SPARSE_ROW_BITS, ..weights }
     }
 
-    /// Those of the stretched window: its places four pixels apart, each with its spatial weight, and half the range
-    /// sigma.
+    /// Those of the stretched window: all of its places, four pixels apart, each with what its distance in places costs, and a
+    /// quarter of the range sigma.
     #[must_use]
     pub fn stretched(method: &Method) -> Self {
         let window = method.median_window as usize;
-        let weights = Self::new(window, method.median_sigma_space, method.median_sigma_range / 2.0);
+        let weights = Self::new(window, method.median_sigma_space, method.median_sigma_range / STRETCH_SIGMA);
         Self { step_bits: STRETCH_BITS, ..weights }
     }
 
@@ -92,22 +99,20 @@ impl MedianWeights {
     #[must_use]
     pub fn new(window: usize, sigma_space: f64, sigma_range: f64) -> Self {
         let radius = window / 2;
-        let weight = |e: f64| (f64::from(1 << MEDIAN_WEIGHT_BITS) * exp_neg(e) + 0.5).floor() as u32;
+        let taken =
+            |d: f64| (MEDIAN_SPACE * (1.0 - exp_neg(d / (2.0 * sigma_space * sigma_space))) + 0.5) as u8;
         let space = (0..=radius)
             .flat_map(|dy| (0..=2 * radius).map(move |x| (x.abs_diff(radius).pow(2) + dy * dy) as f64))
-            .map(|d| weight(d / (2.0 * sigma_space * sigma_space)))
+            .map(taken)
             .collect();
-        // In squared sixteenths of an 8-bit level; exp(-8) is below half a unit of weight.
-        let twice_variance = 2.0 * (sigma_range * 4080.0) * (sigma_range * 4080.0);
-        let mut shift = 0;
-        while f64::from(1u32 << shift) * MEDIAN_RANGE_ENTRIES as f64 <= 8.0 * twice_variance && shift < 26 {
-            shift += 1;
+        let (mut slope, mut doublings) = (0.1 / sigma_range, 0);
+        // 7 of them take a difference of one level beyond the largest weight.
+        while slope > 1.0 && doublings < 7 {
+            slope /= 2.0;
+            doublings += 1;
         }
-        let range = (0..MEDIAN_RANGE_ENTRIES)
-            .map(|i| weight(i as f64 * f64::from(1u32 << shift) / twice_variance))
-            .chain([0])
-            .collect();
-        Self { radius, step_bits: 0, space, range, shift }
+        let scale = (256.0 * slope + 0.5).floor().clamp(1.0, 256.0) as u32;
+        Self { radius, step_bits: 0, row_bits: 0, space, scale, doublings }
     }
 
     /// Radius of the window in places.
@@ -122,37 +127,36 @@ impl MedianWeights {
         self.step_bits
     }
 
-    /// Bits by which a squared colour difference is shifted right to find its weight.
+    /// How far apart its rows are: 2 to this many places, of which the centre's row is one.
     #[must_use]
-    pub fn shift(&self) -> u32 {
-        self.shift
+    pub fn row_bits(&self) -> u32 {
+        self.row_bits
     }
 
-    /// Spatial weights by |dy| and |dx|, then range weights, as the shader takes them.
+    /// What a 16-bit channel is multiplied by, 1 ..= 256, before the upper 16 bits are its guide.
+    #[must_use]
+    pub fn scale(&self) -> u32 {
+        self.scale
+    }
+
+    /// How often a sum of differences of guides is doubled, 0 ..= 7.
+    #[must_use]
+    pub fn doublings(&self) -> u32 {
+        self.doublings
+    }
+
+    /// What distance takes off, by |dy| and |dx|, as the shader takes it.
     #[must_use]
     pub fn words(&self) -> Vec<u32> {
         let rows = self.space.chunks_exact(2 * self.radius + 1).flat_map(|row| &row[self.radius..]);
-        rows.chain(&self.range[..MEDIAN_RANGE_ENTRIES]).copied().collect()
+        rows.map(|&taken| taken.into()).collect()
     }
 
-    /// Spatial weights of the row |dy| places away, for dx from -radius to radius.
+    /// What distance takes off in the row |dy| places away, for dx from -radius to radius.
     #[must_use]
-    pub fn space_row(&self, dy: usize) -> &[u32] {
+    pub fn space_row(&self, dy: usize) -> &[u8] {
         let side = 2 * self.radius + 1;
         &self.space[dy * side..][..side]
-    }
-
-    /// Weight of a pixel of spatial weight `space` whose squared colour difference is `distance`.
-    #[must_use]
-    pub fn product(&self, space: u32, distance: u32) -> u32 {
-        let range = self.range[((distance >> self.shift) as usize).min(MEDIAN_RANGE_ENTRIES)];
-        (space * range) >> MEDIAN_WEIGHT_BITS
-    }
-
-    /// Weight of a pixel |dx|, |dy| places away whose squared colour difference is `distance`.
-    #[must_use]
-    pub fn weight(&self, dx: usize, dy: usize, distance: u32) -> u32 {
-        self.product(self.space_row(dy)[self.radius + dx], distance)
     }
 }
 

@@ -359,15 +359,15 @@ fn little_memory_makes_tiles() {
     assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
     let tiled = with(&["--dry-run", "--memory", "12MiB"]).succeeded();
     for words in
-        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 6 tiles of up to", "whole image", "  all"]
+        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "  all"]
     {
         assert!(tiled.stdout.contains(words), "no `{words}` in:\n{}", tiled.stdout);
     }
     let told = with(&[]).succeeded();
     assert!(told.stderr.contains("32 labels, 18 iterations"), "{told:?}");
     let told = with(&["--memory", "12MiB", "--timings"]).succeeded();
-    assert!(told.stderr.contains("32 labels, 6 tiles, 18 iterations"), "{told:?}");
-    for (stage, runs) in [("cost", 6), ("right view", 6), ("visibility", 1), ("median", 1)] {
+    assert!(told.stderr.contains("32 labels, 4 tiles, 18 iterations"), "{told:?}");
+    for (stage, runs) in [("cost", 4), ("right view", 4), ("visibility", 1), ("median", 1)] {
         let row = told.stderr.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }
@@ -375,7 +375,7 @@ fn little_memory_makes_tiles() {
     // Steps of one piece are what the folder shows.
     let before = listing(folder.path());
     let refused = with(&["--memory", "12MiB", "--intermediates", "steps"]);
-    refused.failed(1, &["--intermediates", "6 tiles", "give --memory"], "intermediates of tiles");
+    refused.failed(1, &["--intermediates", "4 tiles", "give --memory"], "intermediates of tiles");
     assert!(listing(folder.path()) == before);
 }
 
@@ -644,7 +644,7 @@ fn timings_name_every_stage() {
         "graph ",
         "cost ",
         "pyramid, level 5",
-        "dependency, level 0",
+        "flood, level 0",
         "region filter ",
         "median ",
         "download ",
@@ -654,7 +654,7 @@ fn timings_name_every_stage() {
         assert!(row(stage).is_some(), "no `{stage}` in:\n{table}");
     }
     assert!(row("all ").unwrap().ends_with(" 100.0 %"), "{table}");
-    assert!(row("belief, level 5").unwrap().split_whitespace().nth(3) == Some("19"), "{table}");
+    assert!(row("flood, level 5").unwrap().split_whitespace().nth(3) == Some("18"), "{table}");
     assert!(!table.contains("dispatches"), "{table}");
     let told = run(folder.path(), &[&args[..], &["--quiet"]].concat());
     told.failed(2, &["--timings", "--quiet"], "--quiet and --timings");
@@ -718,12 +718,14 @@ fn a_bench_gives_every_figure_of_both_backends() {
             let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
             assert!(close(value("median_ms"), f64::midpoint(runs[0], runs[1])));
 
-            // One level, 5 members, and messages of 1 or 2 bytes.
+            // One level, 5 members, and messages and beliefs of 1 or 2 bytes.
             let (iterations, cells) = (value("iterations"), f64::from(width * height * 32));
             let wide = if preset == "paper" { 2.0 } else { 1.0 };
             assert!(close(value("label_updates"), iterations * 5.0 * cells), "{what}, {backend}");
             let message_values = value("message_bytes") / (iterations * cells);
-            assert!((15.0 * wide + 1.0..=15.0 * wide + 5.0).contains(&message_values), "{message_values}");
+            // Where messages and beliefs come in one sweep, the five messages are not read once more.
+            let swept = if backend == "cpu" { 5.0 } else { 0.0 };
+            assert!(close(message_values, (17.0 - swept) * wide + 1.0), "{message_values}");
             for (key, count, time) in [
                 ("message_gupdates_per_s", "label_updates", "message_ms"),
                 ("match_gupdates_per_s", "label_updates", "median_ms"),
@@ -735,7 +737,8 @@ fn a_bench_gives_every_figure_of_both_backends() {
 
             let stages = found["stages"].as_object().unwrap();
             assert!(stages.values().all(|ms| ms.as_f64().is_some_and(|ms| ms >= 0.0)), "{stages:?}");
-            for stage in ["graph", "cost", "dependency, level 0", "belief, level 0", "median"] {
+            let messages = if backend == "cpu" { "flood, level 0" } else { "dependency, level 0" };
+            for stage in ["graph", "cost", messages, "median"] {
                 assert!(stages.contains_key(stage), "no {stage} in {stages:?}");
             }
             assert_eq!(stages.contains_key("zones"), preset == "paper");
@@ -749,7 +752,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
             }
         }
         // The same bits take the same work.
-        for key in ["iterations", "label_updates", "message_bytes", "plan_bytes"] {
+        for key in ["iterations", "label_updates", "plan_bytes"] {
             let of = |backend: &&str| &pair["backends"][*backend][key];
             assert!(backends.iter().all(|backend| of(backend) == of(&"cpu")), "{what}: {key}");
         }

@@ -267,7 +267,7 @@ fn wrong_beliefs(beliefs: &[Vec<u32>], marginals: &[Vec<u64>]) -> Option<String>
 }
 
 /// Evidence 0 ..= `most` with minimum 0 for every pixel.
-fn evidence(random: &mut Random, plan: &Plan, most: u32) -> Vec<Vec<u32>> {
+fn evidence(random: &mut Random, plan: &Plan, most: u8) -> Vec<Vec<u32>> {
     let mut plan = plan.clone();
     plan.levels.iter_mut().for_each(|level| level.evidence.cap = most);
     random::evidence(random, &plan)

@@ -188,15 +188,30 @@ fn median_weights() {
     for _ in 0..300 {
         let (space, range) = (random.log_within(0.1, 100.0), random.log_within(0.001, 10.0));
         let weights = MedianWeights::new(31, space, range);
+        let words = weights.words();
+        for dy in 0..16 {
+            for dx in 0..16 {
+                let taken = twin::median::space(dx, dy, space);
+                assert_eq!(i64::from(words[(16 * dy + dx) as usize]), taken, "({dx}, {dy}); sigma {space}");
+                let row = weights.space_row(dy as usize);
+                assert!(row[(15 + dx) as usize] == row[(15 - dx) as usize]);
+                assert_eq!(i64::from(row[(15 + dx) as usize]), taken);
+            }
+        }
         for _ in 0..200 {
-            let (dx, dy) = (random.within(0, 15), random.within(0, 15));
-            let most = random.pick(&[100, 10_000, 3 * 4095 * 4095]);
-            let distance = random.within(0, most);
-            assert_eq!(
-                i64::from(weights.weight(dx as usize, dy as usize, distance)),
-                twin::median::weight(dx.into(), dy.into(), distance.into(), space, range),
-                "({dx}, {dy}), {distance}; sigmas {space} and {range}"
-            );
+            let spread = random.pick(&[300, 5000, 65_535]);
+            let [a, b] = [0; 2].map(|_: i32| [0; 4].map(|_: i32| random.within(0, spread) as u16));
+            let guide = |channel: u16| (u32::from(channel) * weights.scale()) >> 16;
+            let apart: u32 = (0..3).map(|c| guide(a[c]).abs_diff(guide(b[c]))).sum();
+            let taken = twin::median::colour(a, b, range);
+            assert_eq!(i64::from(apart << weights.doublings()), taken, "{a:?}, {b:?}; sigma {range}");
+            // As the definition has it: all of the weight at 1270 sigmas in 8-bit levels.
+            let levels: f64 = (0..3).map(|c| f64::from(a[c].abs_diff(b[c])) / 256.0).sum();
+            let exact = 127.0 * levels / (1270.0 * range);
+            let step = f64::from(1 << weights.doublings());
+            let in_range = range > 0.001 && range < 20.0;
+            let error = 3.0 * step + exact * 0.5 / f64::from(weights.scale());
+            assert!(!in_range || (taken as f64 - exact).abs() <= error, "{taken} against {exact}");
         }
     }
 }

@@ -100,7 +100,7 @@ fn every_shader_validates_and_no_capability_is_asked() {
 fn validation_can_fail() {
     let source = Kernel::Belief.source(Variant::new(Kernel::Belief, &plans()[0], 0));
     assert!(validated(&source).is_ok());
-    assert!(validated(&source.replace("pack_wide(sums[i])", "sums[i]")).is_err());
+    assert!(validated(&source.replace("pack_narrow(values)", "values")).is_err());
     // 64-bit integers are a capability that was not asked for.
     assert!(
         validated(&source.replace("let blocks = quads / QUADS;", "let blocks = u32(u64(quads)) / QUADS;"))
@@ -116,9 +116,9 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
     let level = fields!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch,
         pixel_pitch, starts_pitch);
     let params = fields!(Params: level, fine, first_row, rows, row_groups, grid, outside_cost, colour_weight,
-        colour_variance, sad_radius, label_offset, evidence_multiplier, evidence_limit, evidence_cap, tau, sub_pixel,
+        colour_variance, sad_radius, label_offset, evidence_multiplier, evidence_limit, evidence_up, evidence_down, evidence_cap, tau, sub_pixel,
         visibility, median_all, region_size, confidence_floor, halo, span, first_column, columns, source_first_row,
-        source_rows, median_radius, median_step_bits, median_shift);
+        source_rows, median_radius, median_step_bits, median_scale, median_doublings, median_row_bits, belief_most);
     for_every_shader(|_, module, _| {
         let expected =
             [("Level", &level, size_of::<LevelParams>()), ("Params", &params, size_of::<Params>())];

@@ -12,7 +12,7 @@ struct Level {
     quads: u32,
     // Words in a row of a volume of 8-bit values, one a label; 16-bit ones take twice as many.
     pitch: u32,
-    // Words in a row of dependency messages.
+    // The same of dependency messages.
     dependency_pitch: u32,
     // Words in a row of member codes.
     member_pitch: u32,
@@ -40,6 +40,8 @@ struct Params {
     label_offset: i32,
     evidence_multiplier: u32,
     evidence_limit: u32,
+    evidence_up: u32,
+    evidence_down: u32,
     evidence_cap: u32,
     // Cut of the messages that the stage writes.
     tau: u32,
@@ -63,7 +65,12 @@ struct Params {
     // In places, which are 2 to median_step_bits pixels apart.
     median_radius: u32,
     median_step_bits: u32,
-    median_shift: u32,
+    median_scale: u32,
+    median_doublings: u32,
+    // Rows of places are 2 to this many places apart.
+    median_row_bits: u32,
+    // Largest belief: what exceeds it counts as it.
+    belief_most: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -99,6 +106,26 @@ fn unpack_narrow(word: u32) -> vec4<u32> {
 
 fn pack_narrow(values: vec4<u32>) -> u32 {
     return values.x | (values.y << 8u) | (values.z << 16u) | (values.w << 24u);
+}
+
+// Of messages and beliefs: labels that a word holds, words of a quad of labels, and the largest value, which stands for
+// infinity.
+const PER_WORD: u32 = 32u / BITS;
+const QUAD_WORDS: u32 = 4u / PER_WORD;
+const MOST: u32 = 0xffffffffu >> (32u - BITS);
+
+// The value of a label in the word that holds it.
+fn pick(word: u32, label: u32) -> u32 {
+    return (word >> (BITS * (label % PER_WORD))) & MOST;
+}
+
+// Which labels of a quad there are; the others are padding.
+fn are_labels(quad: u32) -> vec4<bool> {
+    return labels_of(quad) < vec4(params.level.labels);
+}
+
+fn labels_of(quad: u32) -> vec4<u32> {
+    return vec4(4u * quad) + vec4(0u, 1u, 2u, 3u);
 }
 
 fn smallest(values: vec4<u32>) -> u32 {

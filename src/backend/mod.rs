@@ -101,8 +101,9 @@ pub enum Stage {
     /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each other
     ///   place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is below the
     ///   centre's.
-    /// - AD-census: that plus (w min((|dr| + |dg| + |db|) >> 8, 64) + 32) >> 6, with the weight w = floor(48 min(v, t) / t)
-    ///   of the left pixel, 48 where t = [`Plan::colour_variance`] is 0. Over the same window, clamped places again,
+    /// - AD-census: that plus (w min(|dr| + |dg| + |db|, 64) + 32) >> 6, channels in whole 8-bit levels (>> 8), with the
+    ///   weight w = floor(48 min(v, t) / t) of the left pixel, 48 where t = [`Plan::colour_variance`] is 0. Over the same
+    ///   window, clamped places again,
     ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
     Cost,
     /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
@@ -122,9 +123,9 @@ pub enum Stage {
     /// Messages of the dependency factors of a level, from the beliefs and their own old messages.
     ///
     /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
-    /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, cut by
-    /// [`Plan::dependency`] with its bounds for the smallest s. A factor of one member, and a slot without
-    /// one, keep the message they have: 0, from the start.
+    /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
+    /// [`Width::most`](crate::plan::Width::most), cut by [`Plan::dependency`] with its bounds for the smallest s. A factor of
+    /// one member, and a slot without one, keep the message they have: 0, from the start.
     Dependency(usize),
     /// Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both directions,
     /// from the beliefs and their own old messages.
@@ -135,11 +136,13 @@ pub enum Stage {
     /// the d that agree with z, infinite if none does. To the parent: s(z) = the sum of U\[c\](z). To child c:
     /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
     /// infinite if none does. Each s is cut by [`Plan::resolution`] with its bounds for the smallest s. Infinite is
-    /// 2^20, and sums saturate there; where every s is infinite, the message is 0.
+    /// [`Width::most`](crate::plan::Width::most), and sums saturate there; where every s is infinite, the message is 0.
     Resolution(usize),
     /// Beliefs of a level: evidence, plus every dependency message to the pixel, plus the resolution messages from
-    /// above and from below.
+    /// above and from below; at most [`Plan::belief_most`].
     Belief(usize),
+    /// [`Stage::Dependency`] and then [`Stage::Belief`] of a level.
+    Flood(usize),
     /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
     /// time (of label indices; from 0 the first time), which [`Backend::change`] returns.
     Change,
@@ -179,12 +182,12 @@ pub enum Stage {
     /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
     /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
     Fill,
-    /// [`Stage::Median`] on filled pixels alone, its window stretched: its places are 4 pixels apart, each with the
-    /// spatial weight that it has there, and the range parameter is half as large.
+    /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels apart, distance counts in
+    /// places, and the range parameter is a quarter.
     FillMedian,
     /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::Method::median`] names and that have a
-    /// disparity, over the pixels of the window that have one: the smallest value at which half of the weight is
-    /// reached. Weights are [`crate::tables::MedianWeights`] of the left image.
+    /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
+    /// smallest value at which half of the weight is reached. Weights are [`crate::tables::MedianWeights`] of the left image.
     Median,
 }
 
@@ -200,6 +203,7 @@ impl Stage {
             Self::Dependency(_) => "dependency",
             Self::Resolution(_) => "resolution",
             Self::Belief(_) => "belief",
+            Self::Flood(_) => "flood",
             Self::Change => "change",
             Self::Estimate => "estimate",
             Self::RightView => "right view",
@@ -222,7 +226,8 @@ impl Stage {
             | Self::Evidence(z)
             | Self::Dependency(z)
             | Self::Resolution(z)
-            | Self::Belief(z) => Some(z),
+            | Self::Belief(z)
+            | Self::Flood(z) => Some(z),
             _ => None,
         }
     }
@@ -321,8 +326,8 @@ struct PaddedRows<'a> {
     values: &'a [u32],
     labels: usize,
     stride: usize,
-    /// How far the padding is above a row's largest value.
-    margin: u32,
+    /// The padding is at least this, and a row's largest value.
+    least: u32,
 }
 
 impl<'a> PaddedRows<'a> {
@@ -330,17 +335,17 @@ impl<'a> PaddedRows<'a> {
         let (rows, labels, stride) = volume_shape(plan, volume);
         assert_eq!(values.len(), rows * labels, "values of {volume:?}");
         // Padding must never look better than a label, also after a message is taken off a belief.
-        let margin = match volume {
-            Volume::Belief(_) => plan.dependency.tau.max(plan.resolution.tau).into(),
+        let least = match volume {
+            Volume::Belief(_) => plan.width.most().into(),
             _ => 0,
         };
-        Self { values, labels, stride, margin }
+        Self { values, labels, stride, least }
     }
 
     /// Rows of `stride` values each.
     fn iter(&self) -> impl Iterator<Item = Vec<u32>> {
         self.values.chunks_exact(self.labels).map(|row| {
-            let padding = row.iter().copied().max().unwrap_or(0) + self.margin;
+            let padding = row.iter().copied().max().unwrap_or(0).max(self.least);
             let mut row = row.to_vec();
             row.resize(self.stride, padding);
             row

@@ -319,7 +319,7 @@ impl Case<'_> {
             matcher.keep_time(timings);
             matcher.run(pair, range, &method, &mut |_| ControlFlow::Continue(()))
         };
-        let Matched { plan, iterations, ran_on, traffic, .. } = run(false)?;
+        let Matched { plan, tiles, iterations, ran_on, traffic, .. } = run(false)?;
         let (mut runs_ms, mut processor, mut timed) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..args.repeats {
             let (start, before) = (Instant::now(), processor_time());
@@ -341,7 +341,12 @@ impl Case<'_> {
             (super::stage_and_level(timing), median(timed.iter().map(|timings| ms(timings[i].time))))
         });
         let counted = |of: fn(&Plan, Stage) -> u64| -> u64 {
-            messages(&plan, &timed[0]).map(|(stage, timing)| u64::from(timing.runs) * of(&plan, stage)).sum()
+            // Every tile has run as often as any other.
+            let counts = messages(&plan, &timed[0]).map(|(stage, timing)| {
+                let once: u64 = tiles.list().iter().map(|tile| of(&tile.plan, stage)).sum();
+                u64::from(timing.runs) * once / tiles.count() as u64
+            });
+            counts.sum()
         };
         let (label_updates, message_bytes) = (counted(roofline::label_updates), counted(roofline::bytes));
         let median_ms = median(runs_ms.iter().copied());
@@ -363,7 +368,7 @@ impl Case<'_> {
             message_gb_per_s,
             copy_gb_per_s,
             copy_share: 100.0 * message_gb_per_s / copy_gb_per_s,
-            plan_bytes: plan.bytes(),
+            plan_bytes: tiles.bytes(),
             peak_bytes,
             device_bytes: Some(traffic.bytes_held).filter(|&bytes| bytes > 0),
             runs_ms,
@@ -461,7 +466,8 @@ impl Row {
             self.backends.values().flatten().flat_map(|f| f.stages.keys()).map(|name| stage(name)).collect();
         let time = |figures: &Option<Figures>, wanted: &str| {
             let of_stage = figures.as_ref()?.stages.iter().filter(|(name, _)| stage(name) == wanted);
-            Some(of_stage.map(|(_, ms)| ms).sum::<f64>())
+            // A backend keeps the time of a sweep or of its parts.
+            of_stage.map(|(_, ms)| *ms).reduce(|sum, ms| sum + ms)
         };
         let mut stages: Vec<(&str, Vec<Option<f64>>)> = stages
             .into_iter()

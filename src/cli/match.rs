@@ -7,7 +7,7 @@ use mrfgs::front::check;
 use mrfgs::image::{Pair, calib::Calibration, colour, read, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
-use mrfgs::plan::{MessageWidth, Plan};
+use mrfgs::plan::Plan;
 use mrfgs::solver::Glimpse;
 use mrfgs::tiles::Tiles;
 use mrfgs::{Error, Matcher, Result};
@@ -274,10 +274,7 @@ fn describe(tiles: &Tiles) -> String {
         let _ = writeln!(out, "whole image{:>46}", bytes(tiles.bytes() - plan.bytes()));
     }
     let _ = writeln!(out, "  all{:>52}\n", bytes(tiles.bytes()));
-    let width = match plan.message_width {
-        MessageWidth::Narrow => 8,
-        MessageWidth::Wide => 16,
-    };
+    let width = 8 * plan.width.bytes();
     let _ = writeln!(out, "messages   {width} bits, factors of {} pixels and their centre", plan.neighbours);
     let last = plan.levels.len() - 1;
     for (i, phase) in plan.phases.iter().enumerate() {

@@ -243,19 +243,15 @@ impl State {
     /// The twin's new beliefs of one level.
     pub fn believe_at(&mut self, plan: &Plan, graphs: &[LevelGraph], z: usize) {
         self.belief[z] = twin::belief::belief(
+            plan,
+            z,
             &graphs[z],
-            plan.levels[z].labels,
             &self.evidence[z],
             &self.dependency[z],
             &self.down[z],
             &self.up[z],
         );
     }
-}
-
-/// The largest belief that `plan` allows for.
-pub fn belief_bound(plan: &Plan) -> u32 {
-    plan.levels[0].evidence.cap + 49 * u32::from(plan.dependency.tau) + 2 * u32::from(plan.resolution.tau)
 }
 
 /// A message: minimum 0, at most `tau`.
@@ -279,14 +275,16 @@ pub fn evidence(random: &mut Random, plan: &Plan) -> Vec<Vec<u32>> {
     plan.levels
         .iter()
         .map(|level| {
-            (0..level.pixels()).flat_map(|_| message(random, level.labels, level.evidence.cap)).collect()
+            (0..level.pixels())
+                .flat_map(|_| message(random, level.labels, level.evidence.cap.into()))
+                .collect()
         })
         .collect()
 }
 
 /// A state in the middle of a flood: messages with minimum 0 and at most their cut, 0 where a slot has no member or
-/// a factor no second one, and beliefs that are the sum of their parts, or, where `loose`, any that are within
-/// the plan's bound and not below a message that is part of them.
+/// a factor no second one, and beliefs that are the sum of their parts, or, where `loose`, any that are at
+/// most the largest and not below a message that is part of them.
 pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: bool) -> State {
     let mut state = State::fresh(plan, evidence(random, plan));
     for (z, level) in plan.levels.iter().enumerate() {
@@ -311,7 +309,7 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
     }
     state.believe(plan, graphs);
     if loose {
-        let bound = belief_bound(plan);
+        let bound = twin::belief::belief_most(plan);
         for z in 0..plan.levels.len() {
             let labels = plan.levels[z].labels;
             let mut least = vec![0; state.belief[z].len()];
@@ -332,11 +330,12 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
                 }
             }
             for row in 0..plan.levels[z].pixels() {
-                let style = random.within(0, 2);
+                let style = random.within(0, 3);
                 for i in row * labels..(row + 1) * labels {
                     state.belief[z][i] = match style {
                         0 => random.within(least[i], bound),
                         1 => least[i] + random.within(0, (bound - least[i]).min(9)),
+                        2 => random.within(least[i].max(bound.saturating_sub(9)), bound),
                         _ => least[i],
                     };
                 }

@@ -1,42 +1,103 @@
 //! Beliefs: see [`crate::backend::Stage::Belief`].
 
-use super::message::Message;
+use super::units::{Blocks, Units, block, block_mut, padding};
 use crate::graph::LevelGraph;
+use crate::plan::Plan;
 use rayon::prelude::*;
+use std::array::from_fn;
 
-pub(super) fn run<M: Message>(
+/// What the beliefs of a level are the sums of.
+pub(super) struct Summands<'a, U> {
+    pub(super) graph: &'a LevelGraph,
+    pub(super) evidence: &'a [u8],
+    /// Empty at the coarsest level.
+    pub(super) down: &'a [U],
+    /// Empty at level 0.
+    pub(super) up: &'a [U],
     stride: usize,
-    graph: &LevelGraph,
-    evidence: &[u8],
-    dependency: &[M],
-    down: &[M],
-    up: &[M],
-    belief: &mut [u16],
-) {
-    let width = graph.width();
-    belief.par_chunks_mut(width * stride).enumerate().for_each(|(y, row)| {
-        for (x, belief) in row.chunks_exact_mut(stride).enumerate() {
-            let pixel = y * width + x;
-            let at = pixel * stride;
-            for (b, &e) in belief.iter_mut().zip(&evidence[at..][..stride]) {
-                *b = e.into();
-            }
-            // Empty at the coarsest and the finest level.
-            for messages in [down, up] {
-                if let Some(message) = messages.get(at..at + stride) {
-                    add(belief, message);
-                }
-            }
-            for &entry in graph.incoming_of(pixel) {
-                add(belief, &dependency[entry as usize * stride..][..stride]);
-            }
-        }
-    });
+    most: U,
+    padding: Vec<U>,
 }
 
-fn add<M: Message>(belief: &mut [u16], message: &[M]) {
-    for (b, &m) in belief.iter_mut().zip(message) {
-        let m: u16 = m.into();
-        *b += m;
+impl<'a, U: Units> Summands<'a, U> {
+    pub(super) fn new(
+        plan: &Plan,
+        level: usize,
+        graph: &'a LevelGraph,
+        evidence: &'a [u8],
+        [down, up]: [&'a [U]; 2],
+    ) -> Self {
+        let l = &plan.levels[level];
+        let (most, padding) = (U::of(plan.belief_most().into()), padding(l.labels, l.stride));
+        Self { graph, evidence, down, up, stride: l.stride, most, padding }
     }
+}
+
+/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on.
+pub(super) fn row<U: Units>(
+    summands: &Summands<U>,
+    y: usize,
+    first: usize,
+    dependency: &[U],
+    belief: &mut [U],
+) {
+    let Summands { graph, evidence, down, up, stride, most, padding } = summands;
+    let width = graph.width();
+    let base = first * width * graph.slots();
+    for (x, belief) in belief.chunks_exact_mut(*stride).enumerate() {
+        let pixel = y * width + x;
+        let start = pixel * stride;
+        let mut sum = Sum {
+            evidence: &evidence[start..][..*stride],
+            down: down.get(start..start + stride),
+            up: up.get(start..start + stride),
+            dependency,
+            base,
+            incoming: graph.incoming_of(pixel),
+            most: *most,
+            padding,
+            belief,
+        };
+        sum.all(*stride);
+    }
+}
+
+pub(super) fn run<U: Units>(summands: &Summands<U>, dependency: &[U], belief: &mut [U]) {
+    let cells = summands.graph.width() * summands.stride;
+    belief.par_chunks_mut(cells).enumerate().for_each(|(y, belief)| row(summands, y, 0, dependency, belief));
+}
+
+/// A pixel's belief, and what it is the sum of.
+struct Sum<'a, U> {
+    evidence: &'a [u8],
+    down: Option<&'a [U]>,
+    up: Option<&'a [U]>,
+    dependency: &'a [U],
+    /// What the entries of `incoming` count from.
+    base: usize,
+    incoming: &'a [u32],
+    most: U,
+    padding: &'a [U],
+    belief: &'a mut [U],
+}
+
+impl<U: Units> Blocks for Sum<'_, U> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, at: usize) {
+        let stride = self.evidence.len();
+        let mut sum = block::<u8, N>(self.evidence, at).map(U::from);
+        for message in [self.down, self.up].into_iter().flatten() {
+            sum = plus(sum, block(message, at));
+        }
+        for &entry in self.incoming {
+            sum = plus(sum, block(self.dependency, (entry as usize - self.base) * stride + at));
+        }
+        let padding = block::<U, N>(self.padding, at);
+        *block_mut(self.belief, at) = from_fn::<U, N, _>(|i| sum[i].min(self.most).max(padding[i]));
+    }
+}
+
+#[inline(always)]
+fn plus<U: Units, const N: usize>(sum: [U; N], message: &[U; N]) -> [U; N] {
+    from_fn(|i| sum[i].plus(message[i]))
 }

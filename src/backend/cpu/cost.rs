@@ -1,11 +1,13 @@
 //! Matching cost of level 0: see [`crate::backend::Stage::Cost`].
 
+use super::units::{Blocks, block, block_mut};
 use crate::image::{Image, Pair, Pixel};
 use crate::options::Cost;
 use crate::plan::{CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, COLOUR_MOST, COST_MAX, Plan};
 use rayon::prelude::*;
+use std::array::from_fn;
 
-const CENSUS_X: isize = 4;
+const CENSUS_X: usize = 4;
 const CENSUS_Y: isize = 3;
 
 pub(super) fn run(plan: &Plan, pair: &Pair, out: &mut [u8]) {
@@ -19,165 +21,239 @@ fn difference(a: Pixel, b: Pixel) -> u32 {
     (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum()
 }
 
-/// A row of the right image from right to left, so that ascending labels are side by side.
-struct Reversed {
-    channels: [Vec<u16>; 3],
-    census: Vec<[u32; 2]>,
-    masked: Vec<bool>,
-}
-
-impl Reversed {
-    fn new(width: usize) -> Self {
-        Self {
-            channels: [0, 1, 2].map(|_| vec![0; width]),
-            census: vec![[0; 2]; width],
-            masked: vec![false; width],
-        }
-    }
-
-    fn fill(&mut self, pixels: &[Pixel], census: &[[u32; 2]], masked: &[bool]) {
-        for (c, channel) in self.channels.iter_mut().enumerate() {
-            for (out, pixel) in channel.iter_mut().zip(pixels.iter().rev()) {
-                *out = pixel[c];
-            }
-        }
-        self.census.iter_mut().zip(census.iter().rev()).for_each(|(out, &c)| *out = c);
-        self.masked.iter_mut().zip(masked.iter().rev()).for_each(|(out, &m)| *out = m);
-    }
-}
-
 fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
-    let (left, right) = (pair.left(), pair.right());
-    let (left_census, right_census) = (census_bits(left), census_bits(right));
     let width = level.width;
+    // The right image is seen from right to left, so that ascending labels are side by side.
+    let [left, right] = [Greys::new(pair.left(), false), Greys::new(pair.right(), true)];
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
-        || (Reversed::new(width), vec![0; width]),
-        |(reversed, weights), (y, row)| {
-            colour_weights(plan, left, y, weights);
-            let of_row = y * width..(y + 1) * width;
-            reversed.fill(right.pixels.row(y), &right_census[of_row.clone()], right.masked.row(y));
-            let (pixels, census) = (left.pixels.row(y), &left_census[of_row]);
-            for (x, costs) in row.chunks_exact_mut(level.stride).enumerate() {
-                costs.fill(plan.outside_cost);
-                // x - d is inside for first <= label index < end.
-                let first = (x as i64 - (width as i64 - 1) - i64::from(level.min)).max(0);
-                let end = (x as i64 - i64::from(level.min) + 1).min(level.labels as i64);
-                if left.masked[(x, y)] || first >= end {
-                    continue;
-                }
-                let start = (width as i64 - 1 - x as i64 + i64::from(level.min) + first) as usize;
-                let costs = &mut costs[first as usize..end as usize];
-                pixel_costs(pixels[x], census[x], weights[x], reversed, start, plan.outside_cost, costs);
-            }
+        || (Row::new(width, level.stride), Row::new(width, level.stride), vec![0; width]),
+        |(here, there, weights), (y, row)| {
+            fill_row(here, pair.left(), &left, y);
+            fill_row(there, pair.right(), &right, y);
+            colour_weights(plan, &left, y, weights);
+            cost_row(plan, here, there, weights, row);
         },
     );
 }
 
-/// The costs of a left pixel against those of the right row from `start` on.
-fn pixel_costs(
-    pixel: Pixel,
-    census: [u32; 2],
-    weight: u32,
-    right: &Reversed,
-    start: usize,
-    outside: u8,
-    costs: &mut [u8],
+/// The costs of a row.
+#[pulp::with_simd(cost_row = pulp::Arch::new())]
+#[inline(always)]
+fn cost_row_on<'a, S: pulp::Simd>(
+    _: S,
+    plan: &'a Plan,
+    here: &'a Row,
+    there: &'a Row,
+    weights: &'a [u16],
+    row: &'a mut [u8],
 ) {
-    let seen = start..start + costs.len();
-    for (cost, other) in costs.iter_mut().zip(&right.census[seen.clone()]) {
-        let bits = (census[0] ^ other[0]).count_ones() + (census[1] ^ other[1]).count_ones();
-        *cost = (CENSUS_BIT_COST * bits.min(CENSUS_BITS)) as u8;
-    }
-    if weight > 0 {
-        let [r, g, b] = right.channels.each_ref().map(|channel| &channel[seen.clone()]);
-        for (cost, ((&r, &g), &b)) in costs.iter_mut().zip(r.iter().zip(g).zip(b)) {
-            let apart = |a: u16, b: u16| u32::from(a.abs_diff(b));
-            let sum = apart(pixel[0], r) + apart(pixel[1], g) + apart(pixel[2], b);
-            let colour = (sum >> 8).min(COLOUR_MOST);
-            *cost += ((weight * colour + COLOUR_MOST / 2) / COLOUR_MOST) as u8;
-        }
-    }
-    for (cost, &masked) in costs.iter_mut().zip(&right.masked[seen]) {
-        *cost = if masked { outside } else { *cost };
-    }
-}
-
-/// Calls `see` with every place (dx, dy) of the window around the pixels of row `y`, and what `value` is there for each of
-/// them, places clamped to the image: a row at once is a vector.
-fn around<T: Copy>(
-    (width, height): (usize, usize),
-    y: usize,
-    value: impl Fn(usize, usize) -> T,
-    mut see: impl FnMut(isize, isize, &[T]),
-) {
-    let clamp = |v: isize, size: usize| v.clamp(0, size as isize - 1) as usize;
-    let mut padded = Vec::with_capacity(width + 2 * CENSUS_X as usize);
-    for dy in -CENSUS_Y..=CENSUS_Y {
-        let ny = clamp(y as isize + dy, height);
-        padded.clear();
-        padded.extend((-CENSUS_X..width as isize + CENSUS_X).map(|x| value(clamp(x, width), ny)));
-        for dx in -CENSUS_X..=CENSUS_X {
-            see(dx, dy, &padded[(dx + CENSUS_X) as usize..][..width]);
-        }
-    }
-}
-
-/// The census of every pixel: a bit for each other place of the window, those before the pixel and those after it in
-/// halves of their own.
-fn census_bits(image: &Image) -> Vec<[u32; 2]> {
-    let (width, height) = image.pixels.size();
-    // A masked pixel is below nobody.
-    let grey = |x: usize, y: usize| if image.masked[(x, y)] { u16::MAX } else { image.pixels[(x, y)][3] };
-    let mut out = vec![[0; 2]; width * height];
-    out.par_chunks_mut(width).enumerate().for_each_init(
-        || [vec![0u32; width], vec![0u32; width], vec![0u32; width]],
-        |[centre, before, after], (y, row)| {
-            for ((centre, pixel), sums) in
-                centre.iter_mut().zip(image.pixels.row(y)).zip(before.iter_mut().zip(after.iter_mut()))
-            {
-                *centre = pixel[3].into();
-                (*sums.0, *sums.1) = (0, 0);
+    let level = &plan.levels[0];
+    let width = level.width;
+    let any_masked = there.masked.iter().any(|&masked| masked != 0);
+    for (x, costs) in row.chunks_exact_mut(level.stride).enumerate() {
+        // The right pixel of label index j is at `place` + j from the right.
+        let place = (width - 1 - x) as i64 + i64::from(level.min);
+        let first = (-place).max(0);
+        let end = (width as i64 - place).min(level.labels as i64);
+        let (first, end) = if here.masked[here.margin + x] != 0 || first >= end {
+            (0, 0)
+        } else {
+            let place = (here.margin as i64 + place) as usize;
+            let mut pixel = PixelCosts { here, there, at: here.margin + x, place, weight: weights[x], costs };
+            pixel.all(level.stride);
+            (first as usize, end as usize)
+        };
+        if any_masked {
+            let seen = &there.masked[(here.margin as i64 + place).max(0) as usize..];
+            for (cost, &masked) in costs[first..end].iter_mut().zip(&seen[first..]) {
+                *cost = if masked == 0 { *cost } else { plan.outside_cost };
             }
-            around((width, height), y, grey, |dx, dy, greys| {
-                let bits = if (dy, dx) < (0, 0) { &mut *before } else { &mut *after };
-                if (dy, dx) != (0, 0) {
-                    for ((bits, &grey), &centre) in bits.iter_mut().zip(greys).zip(centre.iter()) {
-                        *bits = *bits << 1 | u32::from(u32::from(grey) < centre);
-                    }
+        }
+        costs[..first].fill(plan.outside_cost);
+        costs[end..level.labels].fill(plan.outside_cost);
+        costs[level.labels..].fill(u8::MAX);
+    }
+}
+
+/// The costs of a left pixel against those of the right row, whatever is there.
+struct PixelCosts<'a> {
+    here: &'a Row,
+    there: &'a Row,
+    /// Where the pixel is in its row, and where the one of label index 0 is in the other.
+    at: usize,
+    place: usize,
+    weight: u16,
+    costs: &'a mut [u8],
+}
+
+impl Blocks for PixelCosts<'_> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, label: usize) {
+        let mut bits = [0u8; N];
+        for (here, there) in self.here.census.iter().zip(&self.there.census) {
+            let (here, there) = (here[self.at], block::<u8, N>(there, self.place + label));
+            bits = from_fn(|i| bits[i] + (here ^ there[i]).count_ones() as u8);
+        }
+        let mut costs: [u8; N] = from_fn(|i| CENSUS_BIT_COST as u8 * bits[i].min(CENSUS_BITS as u8));
+        if self.weight > 0 {
+            let mut apart = [0u8; N];
+            for (here, there) in self.here.channels.iter().zip(&self.there.channels) {
+                let (here, there) = (here[self.at], block::<u8, N>(there, self.place + label));
+                apart = from_fn(|i| apart[i].saturating_add(here.abs_diff(there[i])));
+            }
+            let weighted: [u16; N] = from_fn(|i| self.weight * u16::from(apart[i].min(COLOUR_MOST as u8)));
+            costs =
+                from_fn(|i| costs[i] + ((weighted[i] + COLOUR_MOST as u16 / 2) / COLOUR_MOST as u16) as u8);
+        }
+        *block_mut(self.costs, label) = costs;
+    }
+}
+
+/// The grey of an image, its columns continued by what a census sees beyond the border.
+struct Greys {
+    size: (usize, usize),
+    mirrored: bool,
+    /// By rows of the width and [`CENSUS_X`] more on either side.
+    values: Vec<u16>,
+    /// 0, or the largest there is where masked; `None` where nothing is.
+    masked: Option<Vec<u16>>,
+}
+
+impl Greys {
+    fn new(image: &Image, mirrored: bool) -> Self {
+        let size @ (width, height) = image.pixels.size();
+        let pitch = width + 2 * CENSUS_X;
+        let padded = |value: &(dyn Fn(usize, usize) -> u16 + Sync)| {
+            let mut out = vec![0; pitch * height];
+            out.par_chunks_mut(pitch).enumerate().for_each(|(y, row)| {
+                for (i, out) in row.iter_mut().enumerate() {
+                    let x = i.saturating_sub(CENSUS_X).min(width - 1);
+                    *out = value(if mirrored { width - 1 - x } else { x }, y);
                 }
             });
-            for (bits, (&before, &after)) in row.iter_mut().zip(before.iter().zip(after.iter())) {
-                *bits = [before, after];
+            out
+        };
+        let any = image.masked.data().iter().any(|&masked| masked);
+        Self {
+            size,
+            mirrored,
+            values: padded(&|x, y| image.pixels[(x, y)][3]),
+            masked: any.then(|| padded(&|x, y| if image.masked[(x, y)] { u16::MAX } else { 0 })),
+        }
+    }
+
+    /// Calls `see` with every place (dx, dy) of the window around the pixels of row `y`, with the greys there for each of
+    /// them, and what is masked: a row at once is a vector.
+    #[inline(always)]
+    fn around(&self, y: usize, mut see: impl FnMut(isize, isize, &[u16], Option<&[u16]>)) {
+        let (width, height) = self.size;
+        for dy in -CENSUS_Y..=CENSUS_Y {
+            let ny = (y as isize + dy).clamp(0, height as isize - 1) as usize;
+            for i in 0..=2 * CENSUS_X {
+                // In the image's own order, whichever way it is seen.
+                let column = if self.mirrored { 2 * CENSUS_X - i } else { i };
+                let there = ny * (width + 2 * CENSUS_X) + column..;
+                let masked = self.masked.as_ref().map(|masked| &masked[there.clone()][..width]);
+                see(i as isize - CENSUS_X as isize, dy, &self.values[there][..width], masked);
             }
-        },
-    );
-    out
+        }
+    }
+
+    /// The greys of row `y` itself.
+    fn row(&self, y: usize) -> &[u16] {
+        let (width, _) = self.size;
+        &self.values[y * (width + 2 * CENSUS_X) + CENSUS_X..][..width]
+    }
+}
+
+/// A row of an image as the costs see it, with as many places as there are labels beyond either end.
+struct Row {
+    margin: usize,
+    /// Eight bits of the census a plane.
+    census: [Vec<u8>; 8],
+    /// 8-bit levels.
+    channels: [Vec<u8>; 3],
+    /// 0, or the largest there is where masked.
+    masked: Vec<u8>,
+}
+
+impl Row {
+    fn new(width: usize, margin: usize) -> Self {
+        let row = || vec![0; width + 2 * margin];
+        Self { margin, census: [(); 8].map(|()| row()), channels: [(); 3].map(|()| row()), masked: row() }
+    }
+}
+
+/// Fills a row with row `y` of an image.
+#[pulp::with_simd(fill_row = pulp::Arch::new())]
+#[inline(always)]
+fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, greys: &'a Greys, y: usize) {
+    let centre = greys.row(y);
+    let inside = row.margin..row.margin + centre.len();
+    let mut place = 0;
+    greys.around(y, |dx, dy, others, masked| {
+        if (dx, dy) == (0, 0) {
+            return;
+        }
+        let plane = &mut row.census[place / 8][inside.clone()];
+        let fresh = place % 8 == 0;
+        place += 1;
+        for ((bits, &grey), &centre) in plane.iter_mut().zip(others).zip(centre) {
+            let before = if fresh { 0 } else { *bits << 1 };
+            *bits = before | u8::from(grey < centre);
+        }
+        if let Some(masked) = masked {
+            // A masked pixel is below nobody.
+            plane.iter_mut().zip(masked).for_each(|(bits, &masked)| *bits &= !(masked as u8 & 1));
+        }
+    });
+    let pixels = image.pixels.row(y);
+    let width = pixels.len();
+    let at = |x: usize| if greys.mirrored { width - 1 - x } else { x };
+    for (c, channel) in row.channels.iter_mut().enumerate() {
+        channel[inside.clone()]
+            .iter_mut()
+            .enumerate()
+            .for_each(|(x, out)| *out = (pixels[at(x)][c] >> 8) as u8);
+    }
+    let masked = image.masked.row(y);
+    row.masked[inside].iter_mut().enumerate().for_each(|(x, out)| *out = u8::from(masked[at(x)]));
 }
 
 /// How much colour counts at each pixel of row `y`: by the variance of grey around it.
-fn colour_weights(plan: &Plan, image: &Image, y: usize, weights: &mut [u32]) {
+#[pulp::with_simd(colour_weights = pulp::Arch::new())]
+#[inline(always)]
+fn colour_weights_on<'a, S: pulp::Simd>(
+    _: S,
+    plan: &'a Plan,
+    greys: &'a Greys,
+    y: usize,
+    weights: &'a mut [u16],
+) {
     let (full, most) = (plan.colour_weight(), plan.colour_variance());
     if full == 0 || most == 0 {
-        weights.fill(full);
+        weights.fill(full as u16);
         return;
     }
-    let width = weights.len();
-    let masked_grey = |x: usize, y: usize| {
-        (u32::from(image.pixels[(x, y)][3] >> 8), if image.masked[(x, y)] { u32::MAX } else { 0 })
-    };
-    let (mut sums, mut squares) = (vec![0; width], vec![0; width]);
-    let centre: Vec<u32> = image.pixels.row(y).iter().map(|pixel| u32::from(pixel[3] >> 8)).collect();
-    around(image.pixels.size(), y, masked_grey, |_, _, greys| {
-        let here = sums.iter_mut().zip(squares.iter_mut()).zip(&centre);
-        for (((sum, square), &centre), &(grey, masked)) in here.zip(greys) {
-            let grey = grey & !masked | centre & masked;
-            *sum += grey;
-            *square += grey * grey;
+    let centre = greys.row(y);
+    let (mut sums, mut squares) = (vec![0u16; centre.len()], vec![0u32; centre.len()]);
+    greys.around(y, |_, _, others, masked| {
+        let mut add = |i: usize, grey: u16| {
+            let grey = grey >> 8;
+            sums[i] += grey;
+            squares[i] += u32::from(grey * grey);
+        };
+        match masked {
+            None => others.iter().enumerate().for_each(|(i, &grey)| add(i, grey)),
+            Some(masked) => {
+                (0..others.len()).for_each(|i| add(i, others[i] & !masked[i] | centre[i] & masked[i]));
+            }
         }
     });
     for (weight, (sum, square)) in weights.iter_mut().zip(sums.into_iter().zip(squares)) {
-        *weight = full * (CENSUS_PLACES * square - sum * sum).min(most) / most;
+        let sum = u32::from(sum);
+        *weight = (full * (CENSUS_PLACES * square - sum * sum).min(most) / most) as u16;
     }
 }
 
@@ -189,7 +265,10 @@ fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
         || vec![(0u64, 0u32); width + 1],
         |sums, (y, row)| {
-            row.fill(plan.outside_cost);
+            for costs in row.chunks_exact_mut(level.stride) {
+                costs[..level.labels].fill(plan.outside_cost);
+                costs[level.labels..].fill(u8::MAX);
+            }
             let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);
             for j in 0..level.labels {
                 let d = i64::from(level.min) + j as i64;

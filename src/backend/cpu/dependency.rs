@@ -1,75 +1,166 @@
 //! Messages of the dependency factors: see [`crate::backend::Stage::Dependency`].
 //!
 //! A factor reads old beliefs and its own old messages and writes its own messages only, so flooding is exact in
-//! place. Padding labels go through the same arithmetic as labels; their evidence is the largest there is, so by
-//! induction no message or belief of theirs is ever below a label's, and no minimum is theirs alone.
+//! place. Padding labels go through the same arithmetic as labels; their belief is the largest there is, and no label's
+//! exceeds [`Plan::belief_most`], so that no minimum is theirs alone.
 
-use super::message::Message;
-use crate::graph::LevelGraph;
-use crate::plan::{CutRule, Plan};
+use super::units::{Blocks, Cutting, Least, Units, block, block_mut, keep_least, least_of, smallest};
+use crate::graph::{LevelGraph, NO_MEMBER, offset};
+use crate::plan::{Cut, CutRule, GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use rayon::prelude::*;
+use std::array::from_fn;
 
-struct Scratch<S> {
+/// What a thread needs for its factors.
+pub(super) struct Scratch<U> {
     /// q of each member, \[member\]\[label\].
-    q: Vec<S>,
-    /// Sum of q over the members.
-    total: Vec<S>,
-    members: Vec<(usize, usize)>,
+    q: Vec<U>,
+    /// Sum of q over the members before.
+    before: Vec<U>,
+    /// Sums of q over the other members.
+    sums: Vec<U>,
+    /// Slot of each member, and where its belief starts in which row around the factor's.
+    members: Vec<(usize, usize, usize)>,
 }
 
-pub(super) fn run<M: Message>(
+impl<U: Units> Scratch<U> {
+    pub(super) fn new(stride: usize, slots: usize) -> Self {
+        Self {
+            q: vec![U::default(); slots * stride],
+            before: vec![U::default(); stride],
+            sums: vec![U::default(); 3 * stride],
+            members: Vec::with_capacity(slots),
+        }
+    }
+}
+
+/// Beliefs of the rows around a factor's, three above to three below; empty outside the image.
+pub(super) type Around<'a, U> = [&'a [U]; GRAPH_WINDOW];
+
+pub(super) fn run<U: Units>(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[U], messages: &mut [U]) {
+    let l = &plan.levels[level];
+    let cells = l.width * l.stride;
+    messages.par_chunks_mut(cells * graph.slots()).enumerate().for_each_init(
+        || Scratch::new(l.stride, graph.slots()),
+        |scratch, (y, messages)| {
+            let around: Around<U> = from_fn(|k| {
+                let ny = (y + k).checked_sub(GRAPH_WINDOW / 2).filter(|&ny| ny < l.height);
+                ny.map_or(&[][..], |ny| &belief[ny * cells..][..cells])
+            });
+            row(plan, level, graph, y, &around, messages, scratch);
+        },
+    );
+}
+
+/// The messages of the factors of row `y`.
+pub(super) fn row<U: Units>(
     plan: &Plan,
     level: usize,
     graph: &LevelGraph,
-    belief: &[u16],
-    messages: &mut [M],
+    y: usize,
+    around: &Around<U>,
+    messages: &mut [U],
+    scratch: &mut Scratch<U>,
 ) {
-    let l = &plan.levels[level];
-    let (stride, slots) = (l.stride, graph.slots());
-    let cut = plan.dependency;
-    messages.par_chunks_mut(l.width * slots * stride).enumerate().for_each_init(
-        || Scratch::<M::Sum> {
-            q: vec![M::Sum::default(); slots * stride],
-            total: vec![M::Sum::default(); stride],
-            members: Vec::with_capacity(slots),
-        },
-        |Scratch { q, total, members }, (y, row)| {
-            for (x, messages) in row.chunks_exact_mut(slots * stride).enumerate() {
-                let factor = y * l.width + x;
-                members.clear();
-                members.extend((0..slots).filter_map(|s| graph.member(factor, s).map(|pixel| (s, pixel))));
-                if members.len() < 2 {
-                    continue;
-                }
-                total.fill(M::Sum::default());
-                for (q, &(slot, pixel)) in q.chunks_exact_mut(stride).zip(members.iter()) {
-                    let b = &belief[pixel * stride..][..stride];
-                    let f = &messages[slot * stride..][..stride];
-                    for ((q, &b), &f) in q.iter_mut().zip(b).zip(f) {
-                        let f: u16 = f.into();
-                        *q = M::Sum::from(b - f);
-                    }
-                    if cut.rule == CutRule::Absolute {
-                        let min = q.iter().copied().min().unwrap_or_default();
-                        for q in q.iter_mut() {
-                            *q = *q - min;
-                        }
-                    }
-                    for (total, &q) in total.iter_mut().zip(q.iter()) {
-                        *total = *total + q;
-                    }
-                }
-                for (q, &(slot, _)) in q.chunks_exact(stride).zip(members.iter()) {
-                    let sums = total.iter().zip(q);
-                    let min = sums.clone().map(|(&t, &q)| t - q).min().unwrap_or_default();
-                    let (high, low) = cut.bounds(min.into());
-                    let (high, low) = (M::sum_from_u32(high), M::sum_from_u32(low));
-                    let out = &mut messages[slot * stride..][..stride];
-                    for (out, (&t, &q)) in out.iter_mut().zip(sums) {
-                        *out = M::from_sum((t - q).min(high) - low);
-                    }
-                }
+    let (cut, stride, slots) = (plan.dependency, plan.levels[level].stride, graph.slots());
+    let centre = GRAPH_WINDOW / 2;
+    for (x, messages) in messages.chunks_exact_mut(slots * stride).enumerate() {
+        let members = &mut scratch.members;
+        members.clear();
+        members.push((0, centre, x * stride));
+        let neighbours = graph.neighbours_of(x, y).iter().enumerate().filter(|(_, code)| **code != NO_MEMBER);
+        members.extend(neighbours.map(|(i, &code)| {
+            let (dx, dy) = offset(code);
+            (i + 1, centre.wrapping_add_signed(dy as isize), x.wrapping_add_signed(dx as isize) * stride)
+        }));
+        let belief = |&(_, row, start): &(usize, usize, usize)| &around[row][start..][..stride];
+        match &members[..] {
+            [_] => {}
+            [first, second, third] if slots == 3 && cut.rule == CutRule::Relative => {
+                three(cut, [belief(first), belief(second), belief(third)], messages, &mut scratch.sums);
             }
-        },
-    );
+            _ => any(cut, stride, around, messages, scratch),
+        }
+    }
+}
+
+/// A factor of three, whose sums are of two each.
+struct Three<'a, U> {
+    beliefs: [&'a [U]; 3],
+    messages: &'a [U],
+    sums: &'a mut [U],
+    least: [Least<U>; 3],
+}
+
+impl<U: Units> Blocks for Three<'_, U> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, at: usize) {
+        let q: [[U; N]; 3] = [self.q(0, at), self.q(1, at), self.q(2, at)];
+        self.sum(0, at, &q[1], &q[2]);
+        self.sum(1, at, &q[0], &q[2]);
+        self.sum(2, at, &q[0], &q[1]);
+    }
+}
+
+impl<U: Units> Three<'_, U> {
+    #[inline(always)]
+    fn q<const N: usize>(&self, slot: usize, at: usize) -> [U; N] {
+        let b = block::<U, N>(self.beliefs[slot], at);
+        let m = block::<U, N>(self.messages, slot * self.beliefs[0].len() + at);
+        from_fn(|i| b[i].less(m[i]))
+    }
+
+    /// The sum for the member in `slot`, of the q of the two others.
+    #[inline(always)]
+    fn sum<const N: usize>(&mut self, slot: usize, at: usize, a: &[U; N], b: &[U; N]) {
+        let sums: [U; N] = from_fn(|i| a[i].plus(b[i]));
+        keep_least(&mut self.least[slot], &sums);
+        *block_mut(self.sums, slot * self.beliefs[0].len() + at) = sums;
+    }
+}
+
+/// The messages of a factor of three.
+#[inline(always)]
+fn three<U: Units>(cut: Cut, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut [U]) {
+    let stride = beliefs[0].len();
+    let mut factor = Three { beliefs, messages: &*messages, sums, least: [[U::MOST; LABEL_BLOCK]; 3] };
+    factor.all(stride);
+    let least = factor.least;
+    for ((out, sums), least) in messages.chunks_exact_mut(stride).zip(sums.chunks_exact(stride)).zip(least) {
+        Cutting::new(sums, least_of(&least), cut, out).all(stride);
+    }
+}
+
+/// The messages of a factor of any number of members.
+fn any<U: Units>(cut: Cut, stride: usize, around: &Around<U>, messages: &mut [U], scratch: &mut Scratch<U>) {
+    let Scratch { q, before, sums, members } = scratch;
+    for (q, &(slot, row, start)) in q.chunks_exact_mut(stride).zip(members.iter()) {
+        let b = &around[row][start..][..stride];
+        let f = &messages[slot * stride..][..stride];
+        for ((q, &b), &f) in q.iter_mut().zip(b).zip(f) {
+            *q = b.less(f);
+        }
+        if cut.rule == CutRule::Absolute {
+            let least = smallest(q);
+            for q in q.iter_mut() {
+                *q = q.less(least);
+            }
+        }
+    }
+    // Sums that saturate cannot be taken off again: those of the members before and after are added.
+    let sum = &mut sums[..stride];
+    before.fill(U::default());
+    for (i, &(slot, ..)) in members.iter().enumerate() {
+        sum.copy_from_slice(before);
+        for q in q.chunks_exact(stride).take(members.len()).skip(i + 1) {
+            add(sum, q);
+        }
+        add(before, &q[i * stride..][..stride]);
+        Cutting::new(sum, smallest(sum), cut, &mut messages[slot * stride..][..stride]).all(stride);
+    }
+}
+
+fn add<U: Units>(sum: &mut [U], q: &[U]) {
+    for (sum, &q) in sum.iter_mut().zip(q) {
+        *sum = sum.plus(q);
+    }
 }

@@ -1,58 +1,111 @@
 //! The optimum of the beliefs: see [`crate::backend::Stage::Estimate`], [`crate::backend::Stage::RightView`] and
 //! [`crate::backend::Stage::Change`].
 
+use super::units::{Units, smallest};
 use super::{Finest, Peak};
 use crate::backend::NO_LABEL;
-use crate::plan::Plan;
+use crate::plan::{LABEL_BLOCK, LevelPlan, Plan};
 use rayon::prelude::*;
 
-pub(super) fn run(plan: &Plan, belief: &[u16], maps: &mut Finest) {
+pub(super) fn run<U: Units>(plan: &Plan, belief: &[U], maps: &mut Finest) {
     let level = &plan.levels[0];
-    let peaks = maps.peaks.data_mut().par_iter_mut();
-    peaks.zip(belief.par_chunks_exact(level.stride)).for_each(|(peak, belief)| {
-        *peak = peak_of(&belief[..level.labels]);
-    });
+    let peaks = maps.peaks.data_mut().par_chunks_mut(level.width);
+    peaks
+        .zip(belief.par_chunks_exact(level.width * level.stride))
+        .for_each(|(peaks, beliefs)| peak_row(level, beliefs, peaks));
 }
 
-pub(super) fn right_view(plan: &Plan, belief: &[u16], maps: &mut Finest) {
+#[pulp::with_simd(peak_row = pulp::Arch::new())]
+#[inline(always)]
+fn peak_row_on<'a, S: pulp::Simd, U: Units>(
+    _: S,
+    level: &'a LevelPlan,
+    beliefs: &'a [U],
+    peaks: &'a mut [Peak],
+) {
+    for (peak, belief) in peaks.iter_mut().zip(beliefs.chunks_exact(level.stride)) {
+        *peak = peak_of(&belief[..level.labels]);
+    }
+}
+
+pub(super) fn right_view<U: Units>(plan: &Plan, belief: &[U], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, labels, stride) = (level.width, level.labels, level.stride);
+    let names: Vec<u16> = (0..labels as u16).collect();
     let rows =
         maps.right.data_mut().par_chunks_mut(width).zip(maps.right_best.data_mut().par_chunks_mut(width));
-    rows.zip(belief.par_chunks(width * stride)).for_each(|((right, smallest), row)| {
-        smallest.fill(u16::MAX);
-        right.fill(NO_LABEL);
-        for (x, belief) in row.chunks_exact(stride).enumerate().take(plan.core.end).skip(plan.core.start) {
-            // Label j of left pixel x is seen at right pixel x - min - j. For one right pixel x falls as j does, so
-            // labels arrive in ascending order and the first of equals stays.
-            let seen = x as i64 - i64::from(level.min);
-            for (j, &b) in belief[..labels].iter().enumerate() {
-                let xr = seen - j as i64;
-                if xr >= 0
-                    && xr < width as i64
-                    && (right[xr as usize] == NO_LABEL || b < smallest[xr as usize])
-                {
-                    (right[xr as usize], smallest[xr as usize]) = (j as u16, b);
-                }
+    rows.zip(belief.par_chunks(width * stride)).for_each_init(
+        // By the right pixel's place from the right, so that ascending labels are side by side.
+        || (vec![NO_LABEL; width], vec![U::MOST; width]),
+        |(found, smallest), ((right, best), row)| {
+            smallest.fill(U::MOST);
+            found.fill(NO_LABEL);
+            right_row(plan, &names, row, found, smallest);
+            right.iter_mut().zip(found.iter().rev()).for_each(|(right, &found)| *right = found);
+            for ((best, &least), &label) in best.iter_mut().zip(smallest.iter().rev()).zip(right.iter()) {
+                *best = if label == NO_LABEL { u16::MAX } else { least.into() };
             }
-        }
-    });
+        },
+    );
 }
 
-fn peak_of(belief: &[u16]) -> Peak {
+#[pulp::with_simd(right_row = pulp::Arch::new())]
+#[inline(always)]
+fn right_row_on<'a, S: pulp::Simd, U: Units>(
+    _: S,
+    plan: &'a Plan,
+    names: &'a [u16],
+    row: &'a [U],
+    found: &'a mut [u16],
+    smallest: &'a mut [U],
+) {
+    let level = &plan.levels[0];
+    let (width, labels) = (level.width, level.labels);
+    for (x, belief) in row.chunks_exact(level.stride).enumerate().take(plan.core.end).skip(plan.core.start) {
+        // Label j of left pixel x is seen at right pixel x - min - j. For one right pixel x falls as j does, so
+        // labels arrive in ascending order and the first of equals stays.
+        let place = (width - 1 - x) as i64 + i64::from(level.min);
+        let first = (-place).clamp(0, labels as i64) as usize;
+        let end = (width as i64 - place).clamp(first as i64, labels as i64) as usize;
+        if first >= end {
+            continue;
+        }
+        let seen = (place + first as i64) as usize..(place + end as i64) as usize;
+        let (found, smallest) = (&mut found[seen.clone()], &mut smallest[seen]);
+        let beliefs = belief[first..end].iter().zip(&names[first..end]);
+        for ((found, least), (&b, &label)) in found.iter_mut().zip(smallest).zip(beliefs) {
+            // No label's belief is the largest there is.
+            *found = if b < *least { label } else { *found };
+            *least = b.min(*least);
+        }
+    }
+}
+
+#[inline(always)]
+fn peak_of<U: Units>(belief: &[U]) -> Peak {
     let (label, best) = optimum(belief);
     let below = &belief[..label.saturating_sub(1)];
     let above = belief.get(label + 2..).unwrap_or_default();
-    Peak { label: label as u16, best, rival: below.iter().chain(above).copied().min().unwrap_or(u16::MAX) }
+    let rival = if below.is_empty() && above.is_empty() {
+        u16::MAX
+    } else {
+        smallest(below).min(smallest(above)).into()
+    };
+    Peak { label: label as u16, best: best.into(), rival }
 }
 
 /// Index and value of the smallest belief, the lowest index on ties.
-fn optimum(belief: &[u16]) -> (usize, u16) {
-    let best = belief.iter().copied().min().unwrap_or(0);
-    (belief.iter().position(|&b| b == best).unwrap_or(0), best)
+#[inline(always)]
+fn optimum<U: Units>(belief: &[U]) -> (usize, U) {
+    let best = smallest(belief);
+    // By blocks: whether one holds it is a vector's question.
+    let holds = |block: &[U]| smallest(block) == best;
+    let block = belief.chunks(LABEL_BLOCK).position(holds);
+    let start = block.unwrap_or(0) * LABEL_BLOCK;
+    (start + belief[start..].iter().position(|&b| b == best).unwrap_or(0), best)
 }
 
-pub(super) fn change(plan: &Plan, belief: &[u16], labels: &mut [u16]) -> u64 {
+pub(super) fn change<U: Units>(plan: &Plan, belief: &[U], labels: &mut [u16]) -> u64 {
     let level = &plan.levels[0];
     labels
         .par_chunks_mut(level.width)

@@ -7,14 +7,15 @@ mod dependency;
 mod estimate;
 mod evidence;
 mod fill;
+mod flood;
 mod median;
-mod message;
 mod mosaic;
 mod pyramid;
 mod region_filter;
 mod resolution;
 mod restrict;
 mod sub_pixel;
+mod units;
 mod visibility;
 
 use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
@@ -23,12 +24,13 @@ use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane, Rect};
 use crate::maps::Maps;
 use crate::memory;
-use crate::plan::{COST_FRACTION_BITS, COST_MAX, MessageWidth, Plan};
-use message::Message;
+use crate::plan::{COST_FRACTION_BITS, COST_MAX, Plan, Width};
+use belief::Summands;
 pub use mosaic::Mosaic;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
+use units::Units;
 
 /// What [`Cpu::copy_rate`] copies, and how often.
 const COPIED_BYTES: usize = 1 << 28;
@@ -62,19 +64,19 @@ impl Cpu {
     }
 }
 
-/// Volumes in the message width that the plan asks for.
+/// Volumes in the width that the plan asks for.
 enum State {
     Narrow(Volumes<u8>),
     Wide(Volumes<u16>),
 }
 
 /// All volumes of a match.
-struct Volumes<M> {
+struct Volumes<U> {
     plan: Plan,
     pair: Pair,
     /// Cost of level 0; coarser ones are in `levels`.
     fine_cost: Vec<u8>,
-    levels: Vec<Level<M>>,
+    levels: Vec<Level<U>>,
     /// First and last label of each pixel, by level; empty where all labels are in question.
     supports: Vec<Plane<[u16; 2]>>,
     /// Label map of the last change, and its sum.
@@ -176,20 +178,20 @@ impl Finest {
 }
 
 /// Volumes of one level, each \[y\]\[x\]\[slot\]\[label\] with padded labels.
-struct Level<M> {
+struct Level<U> {
     graph: LevelGraph,
     /// In 1/256 cost units; empty at level 0.
     cost: Vec<u16>,
     evidence: Vec<u8>,
-    dependency: Vec<M>,
+    dependency: Vec<U>,
     /// Empty at the coarsest level.
-    down: Vec<M>,
+    down: Vec<U>,
     /// Empty at level 0.
-    up: Vec<M>,
-    belief: Vec<u16>,
+    up: Vec<U>,
+    belief: Vec<U>,
 }
 
-impl<M: Message> Volumes<M> {
+impl<U: Units> Volumes<U> {
     fn new(plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Self {
         let last = plan.levels.len() - 1;
         let levels = graphs
@@ -201,10 +203,10 @@ impl<M: Message> Volumes<M> {
                 Level {
                     cost: vec![0; if z == 0 { 0 } else { cells }],
                     evidence: vec![0; cells],
-                    dependency: vec![M::default(); cells * graph.slots()],
-                    down: vec![M::default(); if z == last { 0 } else { cells }],
-                    up: vec![M::default(); if z == 0 { 0 } else { cells }],
-                    belief: vec![0; cells],
+                    dependency: vec![U::default(); cells * graph.slots()],
+                    down: vec![U::default(); if z == last { 0 } else { cells }],
+                    up: vec![U::default(); if z == 0 { 0 } else { cells }],
+                    belief: vec![U::default(); cells],
                     graph,
                 }
             })
@@ -230,7 +232,7 @@ impl<M: Message> Volumes<M> {
         for (level, graph) in self.levels.iter_mut().zip(graphs) {
             level.graph = graph;
             for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
-                messages.par_chunks_mut(1 << 20).for_each(|part| part.fill(M::default()));
+                messages.par_chunks_mut(1 << 20).for_each(|part| part.fill(U::default()));
             }
         }
     }
@@ -242,9 +244,9 @@ impl<M: Message> Volumes<M> {
         for level in &mut self.levels {
             level.cost.fill(wide);
             level.evidence.fill(byte);
-            level.belief.fill(wide);
+            level.belief.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
             for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
-                messages.fill(M::from_u32(wide.into()));
+                messages.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
             }
         }
         for map in Map::ALL {
@@ -289,9 +291,14 @@ impl<M: Message> Volumes<M> {
                 resolution::run(plan, z, &fine.belief, &coarse.belief, &mut fine.down, &mut coarse.up);
             }
             Stage::Belief(z) => {
-                let stride = plan.levels[z].stride;
                 let l = &mut levels[z];
-                belief::run(stride, &l.graph, &l.evidence, &l.dependency, &l.down, &l.up, &mut l.belief);
+                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&l.down, &l.up]);
+                belief::run(&summands, &l.dependency, &mut l.belief);
+            }
+            Stage::Flood(z) => {
+                let l = &mut levels[z];
+                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&l.down, &l.up]);
+                flood::run(plan, z, &summands, &mut l.dependency, &mut l.belief);
             }
             Stage::Change => *change = estimate::change(plan, &levels[0].belief, labels),
             Stage::Estimate => estimate::run(plan, &levels[0].belief, maps),
@@ -326,15 +333,15 @@ impl<M: Message> Volumes<M> {
             Volume::Cost(0) => rows.fill(&mut self.fine_cost, |v| v as u8),
             Volume::Cost(_) => rows.fill(&mut self.levels[z].cost, |v| v as u16),
             Volume::Evidence(_) => rows.fill(&mut self.levels[z].evidence, |v| v as u8),
-            Volume::Dependency(_) => rows.fill(&mut self.levels[z].dependency, M::from_u32),
-            Volume::Down(_) => rows.fill(&mut self.levels[z].down, M::from_u32),
-            Volume::Up(_) => rows.fill(&mut self.levels[z].up, M::from_u32),
-            Volume::Belief(_) => rows.fill(&mut self.levels[z].belief, |v| v as u16),
+            Volume::Dependency(_) => rows.fill(&mut self.levels[z].dependency, U::of),
+            Volume::Down(_) => rows.fill(&mut self.levels[z].down, U::of),
+            Volume::Up(_) => rows.fill(&mut self.levels[z].up, U::of),
+            Volume::Belief(_) => rows.fill(&mut self.levels[z].belief, U::of),
         }
     }
 }
 
-/// Runs an expression on the volumes, whatever their message width.
+/// Runs an expression on the volumes, whatever their width.
 macro_rules! on_volumes {
     ($self:ident, $volumes:ident => $body:expr) => {
         match $self.state.as_mut().expect("prepare comes before every stage") {
@@ -358,9 +365,9 @@ impl Backend for Cpu {
                 // What the last match holds goes before the next one asks for more.
                 self.state = None;
                 memory::check(plan.bytes())?;
-                self.state = Some(match plan.message_width {
-                    MessageWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
-                    MessageWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)),
+                self.state = Some(match plan.width {
+                    Width::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
+                    Width::Wide => State::Wide(Volumes::new(plan, pair, graphs)),
                 });
             }
         }

@@ -5,20 +5,77 @@ use rayon::prelude::*;
 
 const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
 
-/// A stored cost in 1/256 cost units.
-pub(super) trait StoredCost: Copy + Sync {
-    fn fraction(self) -> u32;
+/// A stored cost.
+pub(super) trait StoredCost: Copy + Default + Ord + Send + Sync {
+    /// What sums of it over a 5 x 5 binomial window fit in: of 256 times 254 at most, or of 16-bit values.
+    type Sum: Copy + Default + Send + Sync;
+
+    /// The largest that can be stored.
+    const MOST: Self;
+
+    /// In 1/256 cost units.
+    fn fraction(self) -> u16;
+
+    /// `sum` and `weight` times this.
+    fn add(self, sum: Self::Sum, weight: u32) -> Self::Sum;
+
+    /// `sum` and `weight` times `other`.
+    fn add_sums(sum: Self::Sum, weight: u32, other: Self::Sum) -> Self::Sum;
+
+    /// What a sum over the whole window is in 1/256 cost units, to the nearest.
+    fn mean(sum: Self::Sum) -> u16;
 }
 
 impl StoredCost for u8 {
-    fn fraction(self) -> u32 {
-        u32::from(self) << crate::plan::COST_FRACTION_BITS
+    type Sum = u16;
+
+    const MOST: Self = Self::MAX;
+
+    #[inline(always)]
+    fn fraction(self) -> u16 {
+        u16::from(self) << crate::plan::COST_FRACTION_BITS
+    }
+
+    #[inline(always)]
+    fn add(self, sum: u16, weight: u32) -> u16 {
+        sum.wrapping_add(u16::from(self).wrapping_mul(weight as u16))
+    }
+
+    #[inline(always)]
+    fn add_sums(sum: u16, weight: u32, other: u16) -> u16 {
+        sum.wrapping_add(other.wrapping_mul(weight as u16))
+    }
+
+    /// The weights sum to 256, which are the fraction.
+    #[inline(always)]
+    fn mean(sum: u16) -> u16 {
+        sum
     }
 }
 
 impl StoredCost for u16 {
-    fn fraction(self) -> u32 {
-        u32::from(self)
+    type Sum = u32;
+
+    const MOST: Self = Self::MAX;
+
+    #[inline(always)]
+    fn fraction(self) -> u16 {
+        self
+    }
+
+    #[inline(always)]
+    fn add(self, sum: u32, weight: u32) -> u32 {
+        sum + u32::from(self) * weight
+    }
+
+    #[inline(always)]
+    fn add_sums(sum: u32, weight: u32, other: u32) -> u32 {
+        sum + other * weight
+    }
+
+    #[inline(always)]
+    fn mean(sum: u32) -> u16 {
+        ((sum + 128) >> 8) as u16
     }
 }
 
@@ -28,46 +85,60 @@ pub(super) fn run<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mu
     let minimum = plan.minimum_over_d();
     let row_cells = fl.width * fl.stride;
     out.par_chunks_mut(cl.width * cl.stride).enumerate().for_each_init(
-        // The five fine rows reduced over y, then one pixel reduced over x as well.
-        || (vec![0u32; row_cells], vec![0u32; fl.stride]),
-        |(column, smooth), (y, row)| {
-            column.fill(0);
-            for (j, wy) in WEIGHTS.iter().enumerate() {
+        // The five fine rows reduced over y, then one pixel reduced over x as well, two labels around it.
+        || {
+            let sums = |n| vec![C::Sum::default(); n];
+            (sums(row_cells), sums(fl.stride), vec![0u16; 2 * cl.stride + 5])
+        },
+        |(column, sums, smooth), (y, row)| {
+            let fine_row = |j: usize| {
                 let fy = (2 * y + j).saturating_sub(2).min(fl.height - 1);
-                for (sum, cost) in column.iter_mut().zip(&fine[fy * row_cells..][..row_cells]) {
-                    *sum += wy * cost.fraction();
-                }
-            }
+                &fine[fy * row_cells..][..row_cells]
+            };
+            let rows = [0, 1, 2, 3, 4].map(fine_row);
+            add_all(rows, |sum, weight, cost| cost.add(sum, weight), column);
             for (x, costs) in row.chunks_exact_mut(cl.stride).enumerate() {
-                smooth.fill(128);
-                for (i, wx) in WEIGHTS.iter().enumerate() {
+                let columns = [0, 1, 2, 3, 4].map(|i: usize| {
                     let fx = (2 * x + i).saturating_sub(2).min(fl.width - 1);
-                    for (sum, v) in smooth.iter_mut().zip(&column[fx * fl.stride..]) {
-                        *sum += wx * v;
-                    }
-                }
-                for sum in smooth.iter_mut() {
-                    *sum >>= 8;
-                }
-                reduce_labels(&smooth[..fl.labels], offset, minimum, &mut costs[..cl.labels]);
+                    &column[fx * fl.stride..][..fl.labels]
+                });
+                let (before, inside) = smooth.split_at_mut((2 - offset) as usize);
+                let (inside, after) = inside.split_at_mut(fl.labels);
+                add_all(columns, C::add_sums, &mut sums[..fl.labels]);
+                inside.iter_mut().zip(sums.iter()).for_each(|(mean, &sum)| *mean = C::mean(sum));
+                before.fill(inside[0]);
+                after.fill(inside[fl.labels - 1]);
+                reduce_labels(smooth, minimum, &mut costs[..cl.labels]);
                 costs[cl.labels..].fill(u16::MAX);
             }
         },
     );
 }
 
-/// The cost of each coarse label from the smoothed costs of the fine ones.
-fn reduce_labels(fine: &[u32], offset: i32, minimum: bool, out: &mut [u16]) {
-    let last = fine.len() as i32 - 1;
-    for (z, out) in out.iter_mut().enumerate() {
-        let centre = 2 * z as i32 + offset;
-        let at = |i: i32| fine[i.clamp(0, last) as usize];
-        *out = if minimum {
-            // Clamping repeats a label of the three unless the centre is outside; then it is the one inside.
-            at(centre).min(at(centre - 1)).min(at(centre + 1)) as u16
-        } else {
-            let sum: u32 = WEIGHTS.iter().enumerate().map(|(i, w)| w * at(centre + i as i32 - 2)).sum();
-            ((sum + 8) >> 4) as u16
-        };
+/// The binomial sum of five rows, by what adds to a sum a weight times a value.
+#[inline(always)]
+fn add_all<T: Copy, S: Copy + Default>(rows: [&[T]; 5], add: impl Fn(S, u32, T) -> S, out: &mut [S]) {
+    let [a, b, c, d, e] = rows.map(|row| &row[..out.len()]);
+    for (i, out) in out.iter_mut().enumerate() {
+        let values = [a[i], b[i], c[i], d[i], e[i]];
+        *out = values.into_iter().zip(WEIGHTS).fold(S::default(), |sum, (v, w)| add(sum, w, v));
+    }
+}
+
+/// The cost of each coarse label from the smoothed costs of the fine ones: the five around coarse label z start at 2 z.
+#[inline(always)]
+fn reduce_labels(fine: &[u16], minimum: bool, out: &mut [u16]) {
+    let pairs = || fine.chunks_exact(2);
+    if minimum {
+        // Clamping repeats a label of the three unless the centre is outside; then it is the one inside.
+        for (out, (first, second)) in out.iter_mut().zip(pairs().zip(pairs().skip(1))) {
+            *out = first[1].min(second[0]).min(second[1]);
+        }
+    } else {
+        let triples = pairs().zip(pairs().skip(1)).zip(pairs().skip(2));
+        for (out, ((first, second), third)) in out.iter_mut().zip(triples) {
+            let [a, b, c, d, e] = [first[0], first[1], second[0], second[1], third[0]].map(u32::from);
+            *out = ((a + 4 * b + 6 * c + 4 * d + e + 8) >> 4) as u16;
+        }
     }
 }

@@ -1,117 +1,192 @@
 //! Messages of the resolution factors: see [`crate::backend::Stage::Resolution`].
+//!
+//! Rows of labels are worked on with their padding; what belongs to no label counts as infinite.
 
-use super::message::Message;
-use crate::plan::{Cut, CutRule, Plan};
+use super::units::{Blocks, Cutting, Units, block, block_mut, keep_least, least_of, padding, smallest};
+use crate::plan::{Cut, CutRule, LABEL_BLOCK, Plan};
 use rayon::prelude::*;
+use std::array::from_fn;
 
-struct Scratch<S> {
+struct Scratch<U> {
     /// q of the parent, by coarse label.
-    parent: Vec<S>,
-    /// q of one child, infinite around it: at 2 z + 1 the fine label that agrees best with coarse label z.
-    child: Vec<S>,
-    /// U of each child, \[child\]\[coarse label\].
-    best: Vec<S>,
-    /// Sum of q of the parent and U of all children, not saturated.
-    total: Vec<S>,
-    /// The message to the parent before its cut; t of a child, and infinite after it.
-    coarse: Vec<S>,
-    /// The message to a child before its cut, at 2 z the fine label that agrees best with coarse label z.
-    fine: Vec<S>,
+    parent: Vec<U>,
+    /// q of each child, infinite around it: at 2 z + 1 the fine label that agrees best with coarse label z.
+    child: [Vec<U>; 4],
+    /// U of each child, \[child\]\[coarse label\]; 0 for a child outside the image.
+    best: [Vec<U>; 4],
+    /// The message to the parent before its cut, and t of each child with an infinite value after it.
+    sums: [Vec<U>; 5],
+    /// The message to each child before its cut, at 2 z the fine label that agrees best with coarse label z.
+    fine: [Vec<U>; 4],
 }
 
-pub(super) fn run<M: Message>(
+/// What all factors between two levels share.
+struct Between<U> {
+    cut: Cut,
+    interpolating: bool,
+    /// Fine label 2 z - `lead` agrees best with coarse label z; 0 or 1.
+    lead: usize,
+    fine_stride: usize,
+    coarse_stride: usize,
+    fine_padding: Vec<U>,
+    coarse_padding: Vec<U>,
+}
+
+pub(super) fn run<U: Units>(
     plan: &Plan,
     level: usize,
-    fine_belief: &[u16],
-    coarse_belief: &[u16],
-    down: &mut [M],
-    up: &mut [M],
+    fine_belief: &[U],
+    coarse_belief: &[U],
+    down: &mut [U],
+    up: &mut [U],
 ) {
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
-    // Fine labels are 2 z + offset; the offset is 0 or -1.
-    let lead = plan.label_offset(level).unsigned_abs() as usize;
-    let interpolating = plan.interpolating();
-    let (cut, labels) = (plan.resolution, cl.labels);
-    let infinite = M::INFINITE;
+    let between = Between {
+        cut: plan.resolution,
+        interpolating: plan.interpolating(),
+        lead: plan.label_offset(level).unsigned_abs() as usize,
+        fine_stride: fl.stride,
+        coarse_stride: cl.stride,
+        fine_padding: padding(fl.labels, fl.stride),
+        coarse_padding: padding(cl.labels, cl.stride),
+    };
     let rows = up
         .par_chunks_mut(cl.width * cl.stride)
         .zip(down.par_chunks_mut(2 * fl.width * fl.stride))
         .enumerate();
     rows.for_each_init(
-        || Scratch::<M::Sum> {
-            parent: vec![infinite; labels],
-            child: vec![infinite; 2 * labels + 2],
-            best: vec![infinite; 4 * labels],
-            total: vec![infinite; labels],
-            coarse: vec![infinite; labels + 1],
-            fine: vec![infinite; 2 * labels],
+        || {
+            let coarse = || vec![U::MOST; cl.stride + 1];
+            Scratch {
+                parent: vec![U::MOST; cl.stride],
+                // Long enough for the padding of both levels.
+                child: [(); 4].map(|()| vec![U::MOST; (2 * cl.stride).max(fl.stride) + 4]),
+                best: [(); 4].map(|()| vec![U::MOST; cl.stride]),
+                sums: [(); 5].map(|()| coarse()),
+                fine: [(); 4].map(|()| vec![U::MOST; (2 * cl.stride).max(fl.stride) + 2]),
+            }
         },
-        |Scratch { parent, child, best, total, coarse, fine }, (y, (up, down))| {
-            for (x, up) in up.chunks_exact_mut(cl.stride).enumerate() {
-                let belief = &coarse_belief[(y * cl.width + x) * cl.stride..];
-                variable_message(belief, up, parent, cut);
-                total.copy_from_slice(parent);
-                let children = (0..4)
-                    .map(|c| (2 * x + c % 2, c / 2))
-                    .filter(|&(fx, j)| fx < fl.width && 2 * y + j < fl.height);
-                for ((fx, j), best) in children.clone().zip(best.chunks_exact_mut(labels)) {
-                    let belief = &fine_belief[((2 * y + j) * fl.width + fx) * fl.stride..];
-                    let old = &down[(j * fl.width + fx) * fl.stride..];
-                    variable_message(belief, old, &mut child[1 + lead..][..fl.labels], cut);
-                    let around = child.chunks_exact(2).zip(child[2..].chunks_exact(2));
-                    for (best, (before, after)) in best.iter_mut().zip(around) {
-                        *best =
-                            if interpolating { before[0].min(before[1]).min(after[0]) } else { before[1] };
-                    }
-                    for (total, &best) in total.iter_mut().zip(best.iter()) {
-                        *total = *total + best;
-                    }
-                }
-                for (sum, (&total, &q)) in coarse.iter_mut().zip(total.iter().zip(parent.iter())) {
-                    *sum = (total - q).min(infinite);
-                }
-                write_message(&coarse[..labels], cut, up);
-                for ((fx, j), best) in children.zip(best.chunks_exact(labels)) {
-                    for (t, (&total, &best)) in coarse.iter_mut().zip(total.iter().zip(best)) {
-                        *t = (total - best).min(infinite);
-                    }
-                    for (sums, (&t, &next)) in fine.chunks_exact_mut(2).zip(coarse.iter().zip(&coarse[1..])) {
-                        sums[0] = t;
-                        sums[1] = if interpolating { t.min(next) } else { infinite };
-                    }
-                    let out = &mut down[(j * fl.width + fx) * fl.stride..][..fl.stride];
-                    write_message(&fine[lead..][..fl.labels], cut, out);
-                }
+        |scratch, (y, (up, down))| {
+            let coarse = coarse_belief[y * cl.width * cl.stride..].chunks_exact(cl.stride);
+            let fine = &fine_belief[2 * y * fl.width * fl.stride..];
+            for (x, (up, belief)) in up.chunks_exact_mut(cl.stride).zip(coarse).enumerate() {
+                // Where each child is in the rows of this factor.
+                let children = [0, 1, 2, 3].map(|c| {
+                    let (fx, j) = (2 * x + c % 2, c / 2);
+                    let inside = fx < fl.width && 2 * y + j < fl.height;
+                    inside.then_some((j * fl.width + fx) * fl.stride)
+                });
+                factor(&between, children, fine, belief, down, up, scratch);
             }
         },
     );
 }
 
-/// q: the belief less the factor's old message.
-fn variable_message<M: Message>(belief: &[u16], message: &[M], q: &mut [M::Sum], cut: Cut) {
-    for ((q, &b), &m) in q.iter_mut().zip(belief).zip(message) {
-        let m: u16 = m.into();
-        *q = M::Sum::from(b - m);
-    }
-    if cut.rule == CutRule::Absolute {
-        let min = q.iter().copied().min().unwrap_or_default();
-        for q in q.iter_mut() {
-            *q = *q - min;
+#[inline(always)]
+fn factor<U: Units>(
+    between: &Between<U>,
+    children: [Option<usize>; 4],
+    fine_belief: &[U],
+    coarse_belief: &[U],
+    down: &mut [U],
+    up: &mut [U],
+    Scratch { parent, child, best, sums, fine }: &mut Scratch<U>,
+) {
+    let Between { cut, interpolating, lead, fine_stride, coarse_stride, .. } = *between;
+    variable_message(coarse_belief, up, parent, &between.coarse_padding, cut);
+    // What is written at one alignment and read at another goes through memory: everything is written first.
+    for (place, child) in children.into_iter().zip(child.iter_mut()) {
+        if let Some(at) = place {
+            let (belief, old) = (&fine_belief[at..][..fine_stride], &down[at..][..fine_stride]);
+            variable_message(belief, old, &mut child[1 + lead..][..fine_stride], &between.fine_padding, cut);
         }
+    }
+    for ((place, child), best) in children.into_iter().zip(child.iter()).zip(best.iter_mut()) {
+        if place.is_none() {
+            best.fill(U::default());
+            continue;
+        }
+        for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
+            agreeing(block(child, 2 * z), interpolating, block_mut(best, z));
+        }
+    }
+    // Sums that saturate cannot be taken off again: each is of the others.
+    let mut least = [[U::MOST; LABEL_BLOCK]; 5];
+    for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
+        let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
+        let parent = *block::<U, LABEL_BLOCK>(parent, z);
+        let add =
+            |a: [U; LABEL_BLOCK], b: [U; LABEL_BLOCK]| -> [U; LABEL_BLOCK] { from_fn(|i| a[i].plus(b[i])) };
+        let (upper, lower) = (add(u0, u1), add(u2, u3));
+        let (with_upper, with_lower) = (add(parent, upper), add(parent, lower));
+        let all = [
+            add(upper, lower),
+            add(u1, with_lower),
+            add(u0, with_lower),
+            add(u3, with_upper),
+            add(u2, with_upper),
+        ];
+        for ((sums, all), least) in sums.iter_mut().zip(all).zip(&mut least) {
+            *block_mut(sums, z) = all;
+            keep_least(least, &all);
+        }
+    }
+    // The padding of the sums to the parent is infinite, as all that agrees with it is.
+    Cutting::new(&sums[0], least_of(&least[0]), cut, up).all(coarse_stride);
+    for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
+        if place.is_some() {
+            for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
+                spread(block(t, z), interpolating, block_mut(fine, 2 * z));
+            }
+        }
+    }
+    for (place, fine) in children.into_iter().zip(fine.iter()) {
+        let Some(at) = place else { continue };
+        let fine = &fine[lead..][..fine_stride];
+        let mut least = [U::MOST; LABEL_BLOCK];
+        for d in (0..fine_stride).step_by(LABEL_BLOCK) {
+            let (sums, padding) =
+                (block::<U, LABEL_BLOCK>(fine, d), block::<U, LABEL_BLOCK>(&between.fine_padding, d));
+            keep_least(&mut least, &from_fn::<U, LABEL_BLOCK, _>(|i| sums[i].max(padding[i])));
+        }
+        Cutting::new(fine, least_of(&least), cut, &mut down[at..][..fine_stride]).all(fine_stride);
     }
 }
 
-/// Cuts `sum` into `out`; padding gets the largest message there is.
-fn write_message<M: Message>(sum: &[M::Sum], cut: Cut, out: &mut [M]) {
-    let min = sum.iter().copied().min().unwrap_or_default();
-    if min == M::INFINITE {
-        out[..sum.len()].fill(M::default());
+/// The smallest q of the fine labels that agree with each coarse one; `around` holds those below, at and above the centres.
+/// (This function and the next are shuffles of vectors to the compiler on their own, and loops over bytes where they are
+/// inlined.)
+#[inline(never)]
+fn agreeing<U: Units>(around: &[U; 2 * LABEL_BLOCK + 1], interpolating: bool, best: &mut [U; LABEL_BLOCK]) {
+    *best = if interpolating {
+        from_fn(|i| around[2 * i].min(around[2 * i + 1]).min(around[2 * i + 2]))
     } else {
-        let (high, low) = cut.bounds(min.into());
-        let (high, low) = (M::sum_from_u32(high), M::sum_from_u32(low));
-        for (out, &s) in out.iter_mut().zip(sum) {
-            *out = M::from_sum(s.min(high) - low);
+        from_fn(|i| around[2 * i + 1])
+    };
+}
+
+/// What fine labels take from the coarse ones that agree with them.
+#[inline(never)]
+fn spread<U: Units>(t: &[U; LABEL_BLOCK + 1], interpolating: bool, fine: &mut [U; 2 * LABEL_BLOCK]) {
+    *fine = if interpolating {
+        from_fn(|d| if d % 2 == 0 { t[d / 2] } else { t[d / 2].min(t[d / 2 + 1]) })
+    } else {
+        from_fn(|d| if d % 2 == 0 { t[d / 2] } else { U::MOST })
+    };
+}
+
+/// q: the belief less the factor's old message; infinite where there is no label.
+#[inline(always)]
+fn variable_message<U: Units>(belief: &[U], message: &[U], q: &mut [U], padding: &[U], cut: Cut) {
+    for at in (0..belief.len()).step_by(LABEL_BLOCK) {
+        let (b, m) = (block::<U, LABEL_BLOCK>(belief, at), block::<U, LABEL_BLOCK>(message, at));
+        let padding = block::<U, LABEL_BLOCK>(padding, at);
+        *block_mut(q, at) = from_fn::<U, LABEL_BLOCK, _>(|i| b[i].less(m[i]).max(padding[i]));
+    }
+    if cut.rule == CutRule::Absolute {
+        let least = smallest(q);
+        for (q, &padding) in q.iter_mut().zip(padding) {
+            *q = q.less(least).max(padding);
         }
     }
-    out[sum.len()..].fill(M::from_u32(cut.tau.into()));
 }

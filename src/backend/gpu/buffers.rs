@@ -15,6 +15,9 @@ use std::ops::Range;
 /// Rows of its neighbours that a part holds on either side: as far as any stage looks around in a volume.
 pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
 
+/// Places of a quarter of the median's largest window, its axes included.
+const MEDIAN_WORDS: u64 = 16 * 16;
+
 /// `rows` with up to `halo` rows above and below.
 pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32> {
     rows.start.saturating_sub(halo)..rows.end.saturating_add(halo).min(height)
@@ -262,7 +265,8 @@ impl Allocator<'_> {
 
 /// First rows of the parts of a level, and its height: even, so that the two rows of a coarser pixel stay together.
 fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec<u32>> {
-    let widest = params.dependency_pitch.max(2 * params.pitch);
+    let bytes = plan.width.bytes() as u32;
+    let widest = (bytes * params.dependency_pitch).max(2 * params.pitch);
     let fitting = device.max_buffer / (4 * u64::from(widest));
     if fitting >= u64::from(params.height) {
         return Ok(vec![0, params.height]);
@@ -304,7 +308,8 @@ impl Buffers {
             let starts = part_starts(device, plan, &p)?;
             // What a level does not have still has a name in the shaders.
             let none = [0, 0];
-            let message = p.pitch * plan.message_bytes() as u32;
+            let bytes = plan.width.bytes() as u32;
+            let values = bytes * p.pitch;
             let incoming = starts.windows(2).map(|own| {
                 // The factors that hold a pixel are at most three rows away; rows are aligned.
                 let rows = with_halo(&(own[0]..own[1]), HALO, p.height).len() * p.width as usize;
@@ -315,10 +320,10 @@ impl Buffers {
             levels.push(LevelBuffers {
                 cost: a.rows("cost", if z == 0 { p.pitch } else { 2 * p.pitch }, &starts)?,
                 evidence: a.rows("evidence", p.pitch, &starts)?,
-                dependency: a.rows("dependency messages", p.dependency_pitch, &starts)?,
-                down: a.rows("messages from above", message, if z == last { &none } else { &starts })?,
-                up: a.rows("messages from below", message, if z == 0 { &none } else { &starts })?,
-                belief: a.rows("belief", 2 * p.pitch, &starts)?,
+                dependency: a.rows("dependency messages", bytes * p.dependency_pitch, &starts)?,
+                down: a.rows("messages from above", values, if z == last { &none } else { &starts })?,
+                up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
+                belief: a.rows("belief", values, &starts)?,
                 support: a.rows("support", p.pixel_pitch, if plan.restricted() { &starts } else { &none })?,
                 members: a.rows("members", p.member_pitch, &starts)?,
                 starts: a.rows("starts", p.starts_pitch, &starts)?,
@@ -340,8 +345,8 @@ impl Buffers {
         let (region_parents, region_sizes) = (map("region parents", 1)?, map("region sizes", 1)?);
         let rows = u64::from(fine.height);
         Ok(Self {
-            median_weights: a.buffer("median weights", 2048)?,
-            stretched_weights: a.buffer("stretched weights", 2048)?,
+            median_weights: a.buffer("median weights", MEDIAN_WORDS)?,
+            stretched_weights: a.buffer("stretched weights", MEDIAN_WORDS)?,
             change_sums: a.buffer("change", 2 * rows)?,
             filled_rows: a.buffer("filled rows", rows)?,
             source_rows: a.buffer("source rows", rows)?,

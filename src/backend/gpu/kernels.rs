@@ -1,9 +1,34 @@
 //! The shaders, put together from their files, and what they are told.
+//!
+//! # Floors
+//! What a kernel must move and compute at least for each pixel and label of its level, or for each pixel where the table says
+//! so, counted from its definition for the default method: values of 8 bits, factors of three members, a median's window of
+//! 15 x 15 places, every second row of it. The least bytes are those that come from memory and go back where a cache
+//! holds what neighbours share; asked is what the invocations ask for. An operation is one on a vector of four labels, unpacking
+//! and packing included.
+//!
+//! | kernel | bytes, least | asked | operations / 4 labels, about | what it asks more than once |
+//! |---|---|---|---|---|
+//! | `census`, `contrast` | 24, 20 a pixel | 1,000 a pixel | 400 a pixel | the 63 places of the window |
+//! | `ad_census` | 1 | 32 | 100 | the right row, once a label |
+//! | `pyramid` (level 1, a fine label) | 1 + 2/8 | 31 | 100 | the 5 x 5 window |
+//! | `evidence` | 1 + 1 + 1 | 4 | 25 | the costs, for their minimum |
+//! | `dependency` | 1 + 3 + 3 | 15 | 50 | beliefs of three members, all of it again after the minimum |
+//! | `belief` | 1 + 3 + 1 + 1 | 6 | 20 | nothing but the table of the graph |
+//! | `resolution` (level 1, a fine label) | 1 + 1 + 1 + 3/8 | 17 | 100 | words of four labels, once a label and once more after the minimum |
+//! | `estimate` | 1 | 2 | 15 | the beliefs, for the rival |
+//! | `right_view` | 1 | 4 | 20 | words of four labels of which it wants one |
+//! | `median` | 28 a pixel | 3,000 a pixel and pass | 2,500 a pixel and pass | the 105 places, in up to nine passes |
+//!
+//! What they ask more than once is near, and left to the caches. [`crate::roofline`] adds the least bytes of the message stages
+//! up for a plan, and `mrfgs bench` holds them against the rate at which the device copies.
 
-use crate::plan::{CutRule, LABEL_BLOCK, LevelPlan, MessageWidth, Plan};
+use crate::plan::{CutRule, LABEL_BLOCK, LevelPlan, Plan, Width};
 use bytemuck::{Pod, Zeroable};
 
 const PARAMS: &str = include_str!("../../../shaders/shared/params.wgsl");
+const NARROW: &str = include_str!("../../../shaders/shared/narrow.wgsl");
+const WIDE: &str = include_str!("../../../shaders/shared/wide.wgsl");
 const IMAGE: &str = include_str!("../../../shaders/shared/image.wgsl");
 const MAPS: &str = include_str!("../../../shaders/shared/maps.wgsl");
 const REGION: &str = include_str!("../../../shaders/shared/region.wgsl");
@@ -145,10 +170,11 @@ impl Kernel {
     pub fn source(self, variant: Variant) -> String {
         let Variant { narrow, fine_narrow, slots, absolute, interpolating, low_pass, has_down, has_up } =
             variant;
+        let width = if narrow { NARROW } else { WIDE };
         format!(
-            "const NARROW = {narrow};\nconst FINE_NARROW = {fine_narrow};\nconst SLOTS = {slots}u;\n\
-             const ABSOLUTE = {absolute};\nconst INTERPOLATING = {interpolating};\nconst LOW_PASS = {low_pass};\n\
-             const HAS_DOWN = {has_down};\nconst HAS_UP = {has_up};\n{PARAMS}\n{IMAGE}\n{MAPS}\n{REGION}\n{}",
+            "const FINE_NARROW = {fine_narrow};\nconst SLOTS = {slots}u;\nconst ABSOLUTE = {absolute};\n\
+             const INTERPOLATING = {interpolating};\nconst LOW_PASS = {low_pass};\nconst HAS_DOWN = {has_down};\n\
+             const HAS_UP = {has_up};\n{PARAMS}\n{width}\n{IMAGE}\n{MAPS}\n{REGION}\n{}",
             self.body()
         )
     }
@@ -201,7 +227,7 @@ impl Kernel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a constant of the shaders")]
 pub struct Variant {
-    /// Messages are stored in 8 bits instead of 16.
+    /// Messages and beliefs are stored in 8 bits instead of 16.
     pub narrow: bool,
     /// Costs read are stored in 8 bits instead of 16.
     pub fine_narrow: bool,
@@ -224,10 +250,18 @@ impl Variant {
     #[must_use]
     pub fn new(kernel: Kernel, plan: &Plan, level: usize) -> Self {
         let looks = |kernels: &[Kernel]| kernels.contains(&kernel);
-        let messages = looks(&[Kernel::Dependency, Kernel::Resolution, Kernel::Belief]);
+        let volumes = looks(&[
+            Kernel::Evidence,
+            Kernel::Dependency,
+            Kernel::Resolution,
+            Kernel::Belief,
+            Kernel::Estimate,
+            Kernel::RightView,
+            Kernel::Change,
+        ]);
         let potentials = looks(&[Kernel::Dependency, Kernel::Resolution]);
         Self {
-            narrow: messages && plan.message_width == MessageWidth::Narrow,
+            narrow: volumes && plan.width == Width::Narrow,
             fine_narrow: match kernel {
                 Kernel::Restrict | Kernel::Evidence => level == 0,
                 Kernel::Pyramid => level == 1,
@@ -277,7 +311,7 @@ impl LevelParams {
             labels: level.labels as u32,
             quads: quads as u32,
             pitch: pitch(level.width * quads),
-            dependency_pitch: pitch(level.width * plan.slots() * quads * plan.message_bytes()),
+            dependency_pitch: pitch(level.width * plan.slots() * quads),
             member_pitch: pitch(level.width * plan.neighbours.div_ceil(4)),
             pixel_pitch: pitch(level.width),
             starts_pitch: pitch(level.width + 1),
@@ -305,6 +339,8 @@ pub struct Params {
     pub label_offset: i32,
     pub evidence_multiplier: u32,
     pub evidence_limit: u32,
+    pub evidence_up: u32,
+    pub evidence_down: u32,
     pub evidence_cap: u32,
     pub tau: u32,
     pub sub_pixel: u32,
@@ -320,6 +356,8 @@ pub struct Params {
     pub source_rows: u32,
     pub median_radius: u32,
     pub median_step_bits: u32,
-    pub median_shift: u32,
-    pub padding_2: u32,
+    pub median_scale: u32,
+    pub median_doublings: u32,
+    pub median_row_bits: u32,
+    pub belief_most: u32,
 }

@@ -285,21 +285,21 @@ impl Gpu {
     /// Where a volume is, words a row and values a word.
     fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
         let state = self.state();
-        let narrow = if state.plan.message_bytes() == 1 { 4 } else { 2 };
+        let width = state.plan.width.bytes();
         let level = &state.buffers.levels[volume.level()];
-        let (rows, per_word) = match volume {
-            Volume::Cost(z) => (&level.cost, if z == 0 { 4 } else { 2 }),
-            Volume::Evidence(_) => (&level.evidence, 4),
-            Volume::Dependency(_) => (&level.dependency, narrow),
-            Volume::Down(_) => (&level.down, narrow),
-            Volume::Up(_) => (&level.up, narrow),
-            Volume::Belief(_) => (&level.belief, 2),
+        let (rows, bytes) = match volume {
+            Volume::Cost(z) => (&level.cost, if z == 0 { 1 } else { 2 }),
+            Volume::Evidence(_) => (&level.evidence, 1),
+            Volume::Dependency(_) => (&level.dependency, width),
+            Volume::Down(_) => (&level.down, width),
+            Volume::Up(_) => (&level.up, width),
+            Volume::Belief(_) => (&level.belief, width),
         };
         let pitch = match volume {
             Volume::Dependency(_) => level.params.dependency_pitch,
-            _ => level.params.pitch * (4 / per_word as u32),
+            _ => level.params.pitch,
         };
-        (rows.clone(), pitch as usize, per_word)
+        (rows.clone(), bytes * pitch as usize, 4 / bytes)
     }
 
     /// Where a map is: the buffer, words a pixel, the word, the lowest bit and the mask.
@@ -375,6 +375,11 @@ impl Backend for Gpu {
     }
 
     fn run(&mut self, stage: Stage) -> Result<()> {
+        if let Stage::Flood(z) = stage {
+            // The device goes over all pixels at once: there is nothing to gain by going over them together.
+            self.run(Stage::Dependency(z))?;
+            return self.run(Stage::Belief(z));
+        }
         self.device.count_stage();
         let steps = Arc::clone(&self.state().steps[&stage]);
         let Some(timer) = &mut self.timer else { return self.record(&steps) };

@@ -50,9 +50,12 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         colour_variance: plan.colour_variance(),
         sad_radius: (method.sad_window / 2) as i32,
         label_offset: if level == 0 { 0 } else { plan.label_offset(level) },
-        evidence_multiplier: scale.multiplier,
-        evidence_limit: scale.limit,
-        evidence_cap: scale.cap,
+        evidence_multiplier: scale.multiplier.into(),
+        evidence_limit: scale.limit.into(),
+        evidence_up: scale.up,
+        evidence_down: scale.down,
+        evidence_cap: scale.cap.into(),
+        belief_most: plan.belief_most().into(),
         sub_pixel: method.sub_pixel.into(),
         visibility: (method.visibility != Visibility::Off).into(),
         region_size: method.region_size,
@@ -387,7 +390,9 @@ impl Gpu {
         let params = Params {
             median_radius: radius,
             median_step_bits: step_bits,
-            median_shift: weights.shift(),
+            median_scale: weights.scale(),
+            median_doublings: weights.doublings(),
+            median_row_bits: weights.row_bits(),
             median_all: all.into(),
             ..base
         };

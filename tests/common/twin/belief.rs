@@ -1,15 +1,23 @@
-use super::members;
+use super::{members, most};
 use mrfgs::graph::LevelGraph;
+use mrfgs::plan::Plan;
 
-/// Beliefs of a level; `down` and `up` are empty where there is no level above or below.
+/// The largest belief: a message less than the largest value.
+pub fn belief_most(plan: &Plan) -> u32 {
+    most(plan) - u32::from(plan.dependency.tau.max(plan.resolution.tau))
+}
+
+/// Beliefs of `level`; `down` and `up` are empty where there is no level above or below.
 pub fn belief(
+    plan: &Plan,
+    level: usize,
     graph: &LevelGraph,
-    labels: usize,
     evidence: &[u32],
     dependency: &[u32],
     down: &[u32],
     up: &[u32],
 ) -> Vec<u32> {
+    let labels = plan.levels[level].labels;
     let mut out = evidence.to_vec();
     for messages in [down, up] {
         for (b, m) in out.iter_mut().zip(messages) {
@@ -25,5 +33,5 @@ pub fn belief(
             }
         }
     }
-    out
+    out.into_iter().map(|sum| sum.min(belief_most(plan))).collect()
 }

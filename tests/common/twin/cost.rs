@@ -24,7 +24,7 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
                         let (l, r) = (&left_census[at(x)], &right_census[at(x - d)]);
                         let hamming = l.iter().zip(r).filter(|(l, r)| l != r).count();
                         let census = 4 * (hamming as i64).min(40);
-                        let colour = (difference(left, x, right, x - d, y) / 256).min(64);
+                        let colour = difference(left, x, right, x - d, y, |level| level / 256).min(64);
                         match plan.method.cost {
                             Cost::AdCensus => census + (weight(plan, left, x, y) * colour + 32) / 64,
                             _ => census,
@@ -64,7 +64,7 @@ fn sad(left: &Image, right: &Image, x: i64, y: i64, d: i64, window: i64) -> i64 
     for j in -radius..=radius {
         for i in -radius..=radius {
             if usable(left, x + i, y + j) && usable(right, x - d + i, y + j) {
-                sum += difference(left, x + i, right, x - d + i, y + j);
+                sum += difference(left, x + i, right, x - d + i, y + j, |level| level);
                 places += 1;
             }
         }
@@ -78,9 +78,9 @@ fn usable(image: &Image, x: i64, y: i64) -> bool {
     inside && !image.masked[(x as usize, y as usize)]
 }
 
-/// |dr| + |dg| + |db|.
-fn difference(left: &Image, xl: i64, right: &Image, xr: i64, y: i64) -> i64 {
+/// |dr| + |dg| + |db|, each channel seen as `level` of it.
+fn difference(left: &Image, xl: i64, right: &Image, xr: i64, y: i64, level: fn(i64) -> i64) -> i64 {
     let l = left.pixels[(xl as usize, y as usize)];
     let r = right.pixels[(xr as usize, y as usize)];
-    (0..3).map(|c| (i64::from(l[c]) - i64::from(r[c])).abs()).sum()
+    (0..3).map(|c| (level(l[c].into()) - level(r[c].into())).abs()).sum()
 }

@@ -1,4 +1,4 @@
-use super::{cut, members, variable_message};
+use super::{cut, members, most, variable_message};
 use mrfgs::graph::LevelGraph;
 use mrfgs::plan::Plan;
 
@@ -25,6 +25,7 @@ pub fn dependency(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[u32],
                     }
                 }
             }
+            let s: Vec<i64> = s.into_iter().map(|s: i64| s.min(most(plan).into())).collect();
             out[range(*to)].copy_from_slice(&cut(&s, plan.dependency));
         }
     }

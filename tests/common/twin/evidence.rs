@@ -10,7 +10,8 @@ pub fn evidence(plan: &Plan, level: usize, cost: &[u32]) -> Vec<u32> {
         let smallest = pixel.iter().map(|&c| i64::from(c) * unit).min().unwrap();
         for &c in pixel {
             let difference = (i64::from(c) * unit - smallest).min(i64::from(scale.limit));
-            let e = (difference * i64::from(scale.multiplier) + (1 << 21)) >> 22;
+            let product = ((difference << scale.up) * i64::from(scale.multiplier)) >> 16;
+            let e = (product + ((1 << scale.down) >> 1)) >> scale.down;
             out.push(u32::try_from(e.min(i64::from(scale.cap))).unwrap());
         }
     }

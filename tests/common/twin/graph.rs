@@ -15,22 +15,22 @@ pub fn graphs(image: &Image, plan: &Plan) -> Vec<Vec<u8>> {
     out
 }
 
-/// Squared colour difference, channel by channel in whole sixteenths of an 8-bit level.
-pub fn colour_distance(a: [u16; 4], b: [u16; 4]) -> i64 {
+/// Squared colour difference, channel by channel in whole quarters of an 8-bit level.
+fn colour_distance(a: [u16; 4], b: [u16; 4]) -> i64 {
     (0..3)
         .map(|c| {
-            let sixteenths = (i64::from(a[c]) - i64::from(b[c])).abs() / 16;
-            sixteenths * sixteenths
+            let quarters = (i64::from(a[c]) - i64::from(b[c])).abs() / 64;
+            quarters * quarters
         })
         .sum()
 }
 
 fn codes(image: &Image, plan: &Plan) -> Vec<u8> {
     let (width, height) = (image.width() as i64, image.height() as i64);
-    // exp(-r^2 / 2 sd^2 - c^2 / 2 sr^2) is the greater, the smaller c^2 + (sr / sd)^2 r^2 is; c in sixteenths of an
-    // 8-bit level, of which the range 0 to 1 has 4080.
-    let ratio = plan.method.sigma_range * 4080.0 / plan.method.sigma_space;
-    let weight = (ratio * ratio).round().min(f64::from(1 << 26)) as i64;
+    // exp(-r^2 / 2 sd^2 - c^2 / 2 sr^2) is the greater, the smaller c^2 + (sr / sd)^2 r^2 is; c in quarters of an
+    // 8-bit level, of which the range 0 to 1 has 1020.
+    let ratio = plan.method.sigma_range * 1020.0 / plan.method.sigma_space;
+    let weight = (ratio * ratio).round().min(f64::from(1 << 20)) as i64;
     let mut out = Vec::new();
     for y in 0..height {
         for x in 0..width {

@@ -1,29 +1,30 @@
 use super::Finest;
 use super::fill::invalid;
-use super::graph::colour_distance;
 use mrfgs::image::{Pair, Plane};
 use mrfgs::maps::flag;
 use mrfgs::options::Median;
 use mrfgs::plan::Plan;
 
-/// Integer weight of a pixel at (dx, dy) whose squared colour difference is `distance`.
-pub fn weight(dx: i64, dy: i64, distance: i64, sigma_space: f64, sigma_range: f64) -> i64 {
-    let round = |e: f64| (1024.0 * (-e).exp()).round() as i64;
-    let space = round((dx * dx + dy * dy) as f64 / (2.0 * sigma_space * sigma_space));
-    // The colour difference counts in steps of the smallest power of two, at most 2^26, of which 1024 reach beyond 8
-    // times twice the variance.
-    let twice_variance = 2.0 * (sigma_range * 4080.0) * (sigma_range * 4080.0);
-    let step = (0..=26).map(|k| 1i64 << k).find(|&s| s as f64 * 1024.0 > 8.0 * twice_variance);
-    let step = step.unwrap_or(1 << 26);
-    let range =
-        if distance / step < 1024 { round((distance / step * step) as f64 / twice_variance) } else { 0 };
-    space * range / 1024
+/// What distance takes off the weight of a pixel at (dx, dy).
+pub fn space(dx: i64, dy: i64, sigma_space: f64) -> i64 {
+    let e = (dx * dx + dy * dy) as f64 / (2.0 * sigma_space * sigma_space);
+    (96.0 * (1.0 - (-e).exp())).round() as i64
+}
+
+/// What the difference of two colours takes off it.
+pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
+    // How steep it is, as at most 1 and a number of doublings.
+    let slope = 0.1 / sigma_range;
+    let doublings = (0..7).find(|&k| slope / f64::from(1 << k) <= 1.0).unwrap_or(7);
+    let scale = (256.0 * slope / f64::from(1 << doublings)).round().clamp(1.0, 256.0) as i64;
+    let guide = |channel: u16| i64::from(channel) * scale / 65_536;
+    (0..3).map(|c| (guide(a[c]) - guide(b[c])).abs()).sum::<i64>() * (1 << doublings)
 }
 
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let sigma_range = plan.method.median_sigma_range;
-    smooth(plan, pair, maps, 1, sigma_range, |validity| match plan.method.median {
+    smooth(plan, pair, maps, (1, 2), sigma_range, |validity| match plan.method.median {
         Median::Off => false,
         Median::Filled => filled(validity),
         Median::All => known(validity),
@@ -32,7 +33,7 @@ pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
 
 /// The same of filled pixels, the window's places four pixels apart.
 pub fn fill_median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    smooth(plan, pair, maps, 4, plan.method.median_sigma_range / 2.0, filled);
+    smooth(plan, pair, maps, (4, 1), plan.method.median_sigma_range / 4.0, filled);
 }
 
 fn filled(validity: i32) -> bool {
@@ -47,7 +48,7 @@ fn smooth(
     plan: &Plan,
     pair: &Pair,
     maps: &mut Finest,
-    step: i64,
+    (step, every): (i64, i64),
     sigma_range: f64,
     touched: impl Fn(i32) -> bool,
 ) {
@@ -62,7 +63,7 @@ fn smooth(
             return disparity[(x, y)];
         }
         let mut values = Vec::new();
-        for j in -radius..=radius {
+        for j in (-radius..=radius).filter(|j| j % every == 0) {
             for i in -radius..=radius {
                 let (nx, ny) = (x as i64 + step * i, y as i64 + step * j);
                 if nx < 0 || ny < 0 || nx >= width as i64 || ny >= height as i64 {
@@ -70,8 +71,8 @@ fn smooth(
                 }
                 let at = (nx as usize, ny as usize);
                 if known(validity[at]) {
-                    let distance = colour_distance(guide.pixels[(x, y)], guide.pixels[at]);
-                    values.push((disparity[at], weight(i, j, distance, sigma_space, sigma_range)));
+                    let colour = colour(guide.pixels[(x, y)], guide.pixels[at], sigma_range);
+                    values.push((disparity[at], (127 - colour - space(i, j, sigma_space)).max(0)));
                 }
             }
         }

@@ -25,7 +25,7 @@ pub mod visibility;
 use mrfgs::backend::{Backend, Map};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::Plane;
-use mrfgs::plan::{Cut, CutRule};
+use mrfgs::plan::{Cut, CutRule, Plan, Width};
 
 /// What the finest level knows of each pixel: the plane of every [`Map`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -91,8 +91,13 @@ pub fn binomial(place: i64) -> i64 {
     }
 }
 
-/// "No label agrees", and where sums saturate.
-pub const INFINITE: i64 = 1 << 20;
+/// The largest value of messages and beliefs, where their sums saturate; "no label agrees", too.
+pub fn most(plan: &Plan) -> u32 {
+    match plan.width {
+        Width::Narrow => 255,
+        Width::Wide => 65_535,
+    }
+}
 
 /// Cuts the sums `s` into a message.
 pub fn cut(s: &[i64], cut: Cut) -> Vec<u32> {

@@ -1,4 +1,4 @@
-use super::{INFINITE, cut, variable_message};
+use super::{cut, most, variable_message};
 use mrfgs::options::Resolution;
 use mrfgs::plan::Plan;
 
@@ -11,6 +11,7 @@ pub fn resolution(
     old_down: &[u32],
     old_up: &[u32],
 ) -> (Vec<u32>, Vec<u32>) {
+    let infinite = i64::from(most(plan));
     let (f, c) = (&plan.levels[level - 1], &plan.levels[level]);
     let agree = |d: usize, z: usize| {
         let (d, z) = (i64::from(f.min) + d as i64, i64::from(c.min) + z as i64);
@@ -19,9 +20,9 @@ pub fn resolution(
             Resolution::Interpolating => (d - 2 * z).abs() <= 1,
         }
     };
-    let smallest = |values: &mut dyn Iterator<Item = i64>| values.min().unwrap_or(INFINITE);
+    let smallest = |values: &mut dyn Iterator<Item = i64>| values.min().unwrap_or(infinite);
     let message = |s: Vec<i64>| {
-        if s.iter().all(|&s| s == INFINITE) { vec![0; s.len()] } else { cut(&s, plan.resolution) }
+        if s.iter().all(|&s| s == infinite) { vec![0; s.len()] } else { cut(&s, plan.resolution) }
     };
     let (mut down, mut up) = (old_down.to_vec(), old_up.to_vec());
     for y in 0..c.height {
@@ -46,12 +47,12 @@ pub fn resolution(
                 u.push((0..c.labels).map(best).collect::<Vec<i64>>());
             }
             let to_parent =
-                (0..c.labels).map(|z| u.iter().map(|u| u[z]).sum::<i64>().min(INFINITE)).collect();
+                (0..c.labels).map(|z| u.iter().map(|u| u[z]).sum::<i64>().min(infinite)).collect();
             up[parent].copy_from_slice(&message(to_parent));
             for (i, child) in children.iter().enumerate() {
                 let others =
                     |z: usize| u.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, u)| u[z]).sum::<i64>();
-                let t: Vec<i64> = (0..c.labels).map(|z| (q[z] + others(z)).min(INFINITE)).collect();
+                let t: Vec<i64> = (0..c.labels).map(|z| (q[z] + others(z)).min(infinite)).collect();
                 let to_child = (0..f.labels)
                     .map(|d| smallest(&mut (0..c.labels).filter(|&z| agree(d, z)).map(|z| t[z])))
                     .collect();

@@ -1,0 +1,131 @@
+//! Amounts of cost in the two widths of volumes, and rows of them.
+
+use crate::plan::{Cut, LABEL_BLOCK};
+use std::array::from_fn;
+
+/// An amount of cost, in units, as a volume stores it. Its sums saturate and its differences stop at 0.
+pub(super) trait Units: Copy + Default + Ord + Send + Sync + From<u8> + Into<u16> + Into<u32> {
+    /// The largest amount there is: stands for infinity.
+    const MOST: Self;
+
+    /// The sum.
+    fn plus(self, other: Self) -> Self;
+
+    /// The difference.
+    fn less(self, other: Self) -> Self;
+
+    /// A value, at most the largest.
+    fn of(value: u32) -> Self;
+}
+
+macro_rules! units {
+    ($type:ty) => {
+        impl Units for $type {
+            const MOST: Self = Self::MAX;
+
+            #[inline(always)]
+            fn plus(self, other: Self) -> Self {
+                self.saturating_add(other)
+            }
+
+            #[inline(always)]
+            fn less(self, other: Self) -> Self {
+                self.saturating_sub(other)
+            }
+
+            fn of(value: u32) -> Self {
+                Self::try_from(value).unwrap_or(Self::MOST)
+            }
+        }
+    };
+}
+
+units!(u8);
+units!(u16);
+
+/// The smallest of a row, the largest there is for an empty one.
+#[inline(always)]
+pub(super) fn smallest<U: Units>(row: &[U]) -> U {
+    row.iter().fold(U::MOST, |least, &v| least.min(v))
+}
+
+/// 0 for each label and the largest there is for the padding after them.
+pub(super) fn padding<U: Units>(labels: usize, stride: usize) -> Vec<U> {
+    (0..stride).map(|label| if label < labels { U::default() } else { U::MOST }).collect()
+}
+
+/// `N` labels of a row from `at` on: what stays in registers while several rows are worked on together.
+#[inline(always)]
+pub(super) fn block<T, const N: usize>(row: &[T], at: usize) -> &[T; N] {
+    row[at..].first_chunk().expect("rows are whole blocks")
+}
+
+/// As [`block`], to change.
+#[inline(always)]
+pub(super) fn block_mut<T, const N: usize>(row: &mut [T], at: usize) -> &mut [T; N] {
+    row[at..].first_chunk_mut().expect("rows are whole blocks")
+}
+
+/// The smallest of each of `LABEL_BLOCK` lanes.
+pub(super) type Least<U> = [U; LABEL_BLOCK];
+
+/// The smallest of all lanes.
+#[inline(always)]
+pub(super) fn least_of<U: Units>(lanes: &Least<U>) -> U {
+    let pairs: [U; 8] = from_fn(|i| lanes[i].min(lanes[i + 8]));
+    let quads: [U; 4] = from_fn(|i| pairs[i].min(pairs[i + 4]));
+    let halves: [U; 2] = from_fn(|i| quads[i].min(quads[i + 2]));
+    halves[0].min(halves[1])
+}
+
+/// Lane by lane, the smaller of `least` and all of `values`.
+#[inline(always)]
+pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values: &[U; N]) {
+    for values in values.as_chunks().0 {
+        let values: &Least<U> = values;
+        *least = from_fn(|i| least[i].min(values[i]));
+    }
+}
+
+/// What is done to rows of labels block by block.
+pub(super) trait Blocks {
+    /// Works on `N` labels from `at` on.
+    fn block<const N: usize>(&mut self, at: usize);
+
+    /// Works on all of `stride` labels.
+    #[inline(always)]
+    fn all(&mut self, stride: usize) {
+        let mut at = 0;
+        while at + 2 * LABEL_BLOCK <= stride {
+            self.block::<{ 2 * LABEL_BLOCK }>(at);
+            at += 2 * LABEL_BLOCK;
+        }
+        if at < stride {
+            self.block::<LABEL_BLOCK>(at);
+        }
+    }
+}
+
+/// Cuts sums into a message.
+pub(super) struct Cutting<'a, U> {
+    sums: &'a [U],
+    high: U,
+    low: U,
+    out: &'a mut [U],
+}
+
+impl<'a, U: Units> Cutting<'a, U> {
+    #[inline(always)]
+    pub(super) fn new(sums: &'a [U], least: U, cut: Cut, out: &'a mut [U]) -> Self {
+        let (high, low) = cut.bounds(least.into());
+        Self { sums, high: U::of(high), low: U::of(low), out }
+    }
+}
+
+impl<U: Units> Blocks for Cutting<'_, U> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, at: usize) {
+        let sums = block::<U, N>(self.sums, at);
+        *block_mut(self.out, at) = from_fn::<U, N, _>(|i| sums[i].min(self.high).less(self.low));
+    }
+}
