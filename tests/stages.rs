@@ -24,7 +24,7 @@ use std::collections::HashSet;
 const SIZES: &[(usize, usize)] =
     &[(1, 1), (1, 9), (13, 1), (2, 2), (5, 7), (8, 8), (17, 11), (33, 6), (9, 40), (31, 19), (67, 3)];
 const LABELS: &[usize] = &[1, 2, 31, 32, 33, 64, 257];
-const MINIMA: &[i32] = &[-20, 0, 5];
+const MINIMA: &[i32] = &[-20, 0, 5, 700, -900];
 const NEIGHBOURS: &[usize] = &[0, 1, 2, 4, 8, 12, 25, 48];
 /// Cells of the dependency messages of one case, at most.
 const CELLS: usize = 1_000_000;
@@ -106,7 +106,10 @@ fn the_cases_cover_what_they_should() {
     assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost, p.method.pyramid)).len(), 6);
     assert_eq!(seen(&|p| p.neighbours.to_string()).len(), NEIGHBOURS.len());
     assert_eq!(seen(&|p| p.levels.len().to_string()).len(), 5);
-    assert_eq!(seen(&|p| format!("{} {}", p.range.min, p.levels[0].labels)).len(), 21);
+    assert_eq!(
+        seen(&|p| format!("{} {}", p.range.min, p.levels[0].labels)).len(),
+        MINIMA.len() * LABELS.len()
+    );
     // Both alignments of the labels of two levels.
     assert_eq!(
         seen(&|p| (1..p.levels.len()).map(|z| p.label_offset(z)).min().unwrap_or(1).to_string()).len(),

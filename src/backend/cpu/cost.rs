@@ -56,17 +56,17 @@ fn cost_row_on<'a, S: pulp::Simd>(
         let place = (width - 1 - x) as i64 + i64::from(level.min);
         let first = (-place).max(0);
         let end = (width as i64 - place).min(level.labels as i64);
-        let (first, end) = if here.masked[here.margin + x] != 0 || first >= end {
-            (0, 0)
-        } else {
-            let place = (here.margin as i64 + place) as usize;
-            let mut pixel = PixelCosts { here, there, at: here.margin + x, place, weight: weights[x], costs };
-            pixel.all(level.stride);
-            (first as usize, end as usize)
-        };
+        if here.masked[here.margin + x] != 0 || first >= end {
+            costs[..level.labels].fill(plan.outside_cost);
+            costs[level.labels..].fill(u8::MAX);
+            continue;
+        }
+        let place = (here.margin as i64 + place) as usize;
+        PixelCosts { here, there, at: here.margin + x, place, weight: weights[x], costs }.all(level.stride);
+        let (first, end) = (first as usize, end as usize);
         if any_masked {
-            let seen = &there.masked[(here.margin as i64 + place).max(0) as usize..];
-            for (cost, &masked) in costs[first..end].iter_mut().zip(&seen[first..]) {
+            let masked = &there.masked[place + first..];
+            for (cost, &masked) in costs[first..end].iter_mut().zip(masked) {
                 *cost = if masked == 0 { *cost } else { plan.outside_cost };
             }
         }
