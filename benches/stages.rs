@@ -36,6 +36,7 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
         ("dependency", vec![Stage::Dependency(0)]),
         ("resolution", vec![Stage::Resolution(1)]),
         ("belief", vec![Stage::Belief(0)]),
+        ("flood", vec![Stage::Flood(0)]),
         ("estimate", vec![Stage::Estimate, Stage::RightView, Stage::SubPixel]),
         ("region filter", vec![Stage::Visibility, Stage::RegionFilter]),
         ("fill", vec![Stage::Fill, Stage::FillMedian]),
