@@ -17,6 +17,7 @@ mod restrict;
 mod sub_pixel;
 mod units;
 mod visibility;
+mod zeroed;
 
 use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
 use crate::error::Result;
@@ -31,6 +32,7 @@ use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use units::Units;
+use zeroed::Zeroed;
 
 /// What [`Cpu::copy_rate`] copies, and how often.
 const COPIED_BYTES: usize = 1 << 28;
@@ -75,7 +77,7 @@ struct Volumes<U> {
     plan: Plan,
     pair: Pair,
     /// Cost of level 0; coarser ones are in `levels`.
-    fine_cost: Vec<u8>,
+    fine_cost: Zeroed<u8>,
     levels: Vec<Level<U>>,
     /// First and last label of each pixel, by level; empty where all labels are in question.
     supports: Vec<Plane<[u16; 2]>>,
@@ -181,18 +183,18 @@ impl Finest {
 struct Level<U> {
     graph: LevelGraph,
     /// In 1/256 cost units; empty at level 0.
-    cost: Vec<u16>,
-    evidence: Vec<u8>,
-    dependency: Vec<U>,
+    cost: Zeroed<u16>,
+    evidence: Zeroed<u8>,
+    dependency: Zeroed<U>,
     /// Empty at the coarsest level.
-    down: Vec<U>,
+    down: Zeroed<U>,
     /// Empty at level 0.
-    up: Vec<U>,
-    belief: Vec<U>,
+    up: Zeroed<U>,
+    belief: Zeroed<U>,
 }
 
 impl<U: Units> Volumes<U> {
-    fn new(plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Self {
+    fn new(plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<Self> {
         let last = plan.levels.len() - 1;
         let levels = graphs
             .into_iter()
@@ -200,28 +202,28 @@ impl<U: Units> Volumes<U> {
             .map(|(z, graph)| {
                 let level = &plan.levels[z];
                 let cells = level.pixels() * level.stride;
-                Level {
-                    cost: vec![0; if z == 0 { 0 } else { cells }],
-                    evidence: vec![0; cells],
-                    dependency: vec![U::default(); cells * graph.slots()],
-                    down: vec![U::default(); if z == last { 0 } else { cells }],
-                    up: vec![U::default(); if z == 0 { 0 } else { cells }],
-                    belief: vec![U::default(); cells],
+                Ok(Level {
+                    cost: Zeroed::new(if z == 0 { 0 } else { cells })?,
+                    evidence: Zeroed::new(cells)?,
+                    dependency: Zeroed::new(cells * graph.slots())?,
+                    down: Zeroed::new(if z == last { 0 } else { cells })?,
+                    up: Zeroed::new(if z == 0 { 0 } else { cells })?,
+                    belief: Zeroed::new(cells)?,
                     graph,
-                }
+                })
             })
-            .collect();
+            .collect::<Result<_>>()?;
         let fine = &plan.levels[0];
-        Self {
+        Ok(Self {
             plan: plan.clone(),
             pair: pair.clone(),
-            fine_cost: vec![0; fine.pixels() * fine.stride],
+            fine_cost: Zeroed::new(fine.pixels() * fine.stride)?,
             levels,
             supports: Vec::new(),
             labels: vec![0; fine.pixels()],
             change: 0,
             maps: Finest::new(plan.size()),
-        }
+        })
     }
 
     /// Ready for another pair whose plan fits, as [`Self::new`] would be.
@@ -292,12 +294,12 @@ impl<U: Units> Volumes<U> {
             }
             Stage::Belief(z) => {
                 let l = &mut levels[z];
-                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&l.down, &l.up]);
+                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&*l.down, &*l.up]);
                 belief::run(&summands, &l.dependency, &mut l.belief);
             }
             Stage::Flood(z) => {
                 let l = &mut levels[z];
-                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&l.down, &l.up]);
+                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&*l.down, &*l.up]);
                 flood::run(plan, z, &summands, &mut l.dependency, &mut l.belief);
             }
             Stage::Change => *change = estimate::change(plan, &levels[0].belief, labels),
@@ -366,8 +368,8 @@ impl Backend for Cpu {
                 self.state = None;
                 memory::check(plan.bytes())?;
                 self.state = Some(match plan.width {
-                    Width::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)),
-                    Width::Wide => State::Wide(Volumes::new(plan, pair, graphs)),
+                    Width::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)?),
+                    Width::Wide => State::Wide(Volumes::new(plan, pair, graphs)?),
                 });
             }
         }

@@ -4,7 +4,9 @@ use crate::plan::{Cut, LABEL_BLOCK};
 use std::array::from_fn;
 
 /// An amount of cost, in units, as a volume stores it. Its sums saturate and its differences stop at 0.
-pub(super) trait Units: Copy + Default + Ord + Send + Sync + From<u8> + Into<u16> + Into<u32> {
+pub(super) trait Units:
+    bytemuck::Pod + Default + Ord + Send + Sync + From<u8> + Into<u16> + Into<u32>
+{
     /// The largest amount there is: stands for infinity.
     const MOST: Self;
 

@@ -1,0 +1,49 @@
+//! Memory for volumes.
+
+use crate::error::{Error, Result};
+use bytemuck::Pod;
+use memmap2::MmapMut;
+use std::marker::PhantomData;
+use std::ops::{Deref, DerefMut};
+
+/// Values that are 0 at first, in large pages where the system has them: it hands out small ones at their first touch, one
+/// by one, and that takes longer than a match.
+pub(super) struct Zeroed<T> {
+    /// `None` where there are none.
+    bytes: Option<MmapMut>,
+    values: PhantomData<T>,
+}
+
+impl<T: Pod> Zeroed<T> {
+    /// `len` values.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when the system has not as much.
+    pub(super) fn new(len: usize) -> Result<Self> {
+        let size = len * size_of::<T>();
+        if size == 0 {
+            return Ok(Self { bytes: None, values: PhantomData });
+        }
+        let bytes = MmapMut::map_anon(size)
+            .map_err(|e| Error::Memory(format!("{} MiB for a volume cannot be had: {e}", size >> 20)))?;
+        // A wish: a system without large pages gives small ones.
+        #[cfg(target_os = "linux")]
+        let _ = bytes.advise(memmap2::Advice::HugePage);
+        Ok(Self { bytes: Some(bytes), values: PhantomData })
+    }
+}
+
+impl<T: Pod> Deref for Zeroed<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        // Pages are aligned for everything.
+        self.bytes.as_ref().map_or(&[], |bytes| bytemuck::cast_slice(bytes))
+    }
+}
+
+impl<T: Pod> DerefMut for Zeroed<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        self.bytes.as_mut().map_or(&mut [], |bytes| bytemuck::cast_slice_mut(bytes))
+    }
+}
