@@ -6,7 +6,7 @@
 //! # Units
 //! Messages, evidence and beliefs are costs, -log of the paper's probabilities, in [`UNITS_PER_NAT`] units a nat.
 //! All are non-negative integers; every message has minimum 0 over the labels. They and their sums are stored in 8 bits,
-//! or 16 where the method needs them ([`Width`]), and saturate: what is that dear is no candidate, whatever it costs.
+//! or 16 where the method needs them ([`VolumeWidth`]), and saturate: what is that dear is no candidate, whatever it costs.
 
 use crate::error::Result;
 use crate::options::{Cost, DisparityRange, Illumination, Method, Potential, Pyramid, Resolution, Schedule};
@@ -116,14 +116,14 @@ impl EvidenceScale {
 
 /// Storage width of messages and beliefs, and where their sums saturate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Width {
+pub enum VolumeWidth {
     /// 8 bits.
     Narrow,
     /// 16 bits.
     Wide,
 }
 
-impl Width {
+impl VolumeWidth {
     /// Bytes of a value.
     #[must_use]
     pub fn bytes(self) -> usize {
@@ -200,7 +200,7 @@ pub struct Plan {
     /// Cut of resolution messages.
     pub resolution: Cut,
     /// Storage width of messages of both kinds, and of beliefs.
-    pub width: Width,
+    pub volume_width: VolumeWidth,
     /// The flooding, in order.
     pub phases: Vec<Phase>,
     /// Columns of the left view that [`Stage::RightView`](crate::backend::Stage::RightView) takes in: all of them, but for
@@ -254,8 +254,8 @@ impl Plan {
         let usual = u32::from(levels[0].evidence.cap)
             + (neighbours + 1) as u32 * u32::from(dependency.tau)
             + 2 * u32::from(resolution.tau);
-        let most = u32::from(Width::Narrow.most() - dependency.tau.max(resolution.tau).min(255));
-        let stored = if usual <= most { Width::Narrow } else { Width::Wide };
+        let most = u32::from(VolumeWidth::Narrow.most() - dependency.tau.max(resolution.tau).min(255));
+        let volume_width = if usual <= most { VolumeWidth::Narrow } else { VolumeWidth::Wide };
 
         let last = levels.len() - 1;
         let phases = match method.schedule {
@@ -275,7 +275,7 @@ impl Plan {
             neighbours,
             dependency,
             resolution,
-            width: stored,
+            volume_width,
             phases,
             core: 0..width,
             method,
@@ -315,7 +315,7 @@ impl Plan {
     /// label stays above every label's belief when a message is taken off it.
     #[must_use]
     pub fn belief_most(&self) -> u16 {
-        self.width.most() - self.dependency.tau.max(self.resolution.tau)
+        self.volume_width.most() - self.dependency.tau.max(self.resolution.tau)
     }
 
     /// Whether the texture zones limit the labels of their pixels.
@@ -362,7 +362,7 @@ impl Plan {
         let l = &self.levels[level];
         let cells = (l.pixels() * l.stride) as u64;
         let cost = if level == 0 { 1 } else { 2 };
-        let width = self.width.bytes();
+        let width = self.volume_width.bytes();
         let up = if level == 0 { 0 } else { width };
         let down = if level + 1 == self.levels.len() { 0 } else { width };
         let volumes = cost + 1 + width + up + down + self.slots() * width;
@@ -467,7 +467,7 @@ mod tests {
     fn the_paper_needs_wide_volumes_and_the_default_narrow_ones() {
         let range = DisparityRange::new(0, 59).unwrap();
         let paper = Plan::new(450, 375, range, &Method::preset("paper").unwrap()).unwrap();
-        assert_eq!(paper.width, Width::Wide);
-        assert_eq!(plan(450, 375, 0, 59).width, Width::Narrow);
+        assert_eq!(paper.volume_width, VolumeWidth::Wide);
+        assert_eq!(plan(450, 375, 0, 59).volume_width, VolumeWidth::Narrow);
     }
 }

@@ -38,7 +38,9 @@ pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
         let width = match volume {
             Volume::Evidence(_) | Volume::Cost(0) => 1,
             Volume::Cost(_) => 2,
-            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) | Volume::Belief(_) => plan.width.bytes(),
+            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) | Volume::Belief(_) => {
+                plan.volume_width.bytes()
+            }
         };
         (rows * stride * width) as u64
     };

@@ -304,6 +304,19 @@ fn control_changes_are_found() {
     }
 }
 
+/// The maps that the naive twins make of what a match leaves in `finest`.
+fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
+    finest.disparity = finest.raw.clone();
+    twin_maps(finest, plan, pair);
+    let bytes = |plane: &Plane<i32>| plane.map(|&v| u8::try_from(v).unwrap());
+    Maps {
+        disparity: finest.disparity.clone(),
+        raw: finest.raw.clone(),
+        confidence: bytes(&finest.confidence),
+        validity: bytes(&finest.validity),
+    }
+}
+
 /// The maps by the twins, from the estimate on, in the order in which the stages are described.
 fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::visibility::visibility(plan, pair, maps);
@@ -366,15 +379,7 @@ fn the_stages_run_in_order() {
                 _ => backend.read_map(Map::RightLabel).unwrap(),
             };
             finest.raw = backend.read_map(Map::Raw).unwrap();
-            finest.disparity = finest.raw.clone();
-            twin_maps(&mut finest, &plan, &pair);
-            let bytes = |plane: &Plane<i32>| plane.map(|&v| u8::try_from(v).unwrap());
-            let expected = Maps {
-                disparity: finest.disparity.clone(),
-                raw: finest.raw.clone(),
-                confidence: bytes(&finest.confidence),
-                validity: bytes(&finest.validity),
-            };
+            let expected = finished(&mut finest, &plan, &pair);
             for (solver, actual) in solve(&pair, &plan) {
                 if let Err(e) = compare_all(&actual.maps, &expected) {
                     panic!("{solver} against twins after {name}, seed {seed}: {e}\n{:?}", plan.method);
@@ -444,15 +449,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
                 }
             }
         }
-        finest.disparity = finest.raw.clone();
-        twin_maps(&mut finest, &plan, &pair);
-        let bytes = |plane: &Plane<i32>| plane.map(|&v| u8::try_from(v).unwrap());
-        let expected = Maps {
-            disparity: finest.disparity.clone(),
-            raw: finest.raw.clone(),
-            confidence: bytes(&finest.confidence),
-            validity: bytes(&finest.validity),
-        };
+        let expected = finished(&mut finest, &plan, &pair);
         for (name, mut backend) in backends() {
             let observer = &mut |_| ControlFlow::Continue(());
             let actual = solver::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();

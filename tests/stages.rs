@@ -15,7 +15,7 @@ use mrfgs::backend::{Backend, Stage, Volume, volume_shape};
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::{Pair, Plane};
 use mrfgs::options::{Cost, Method, PRESETS, Potential, Pyramid, Resolution, Schedule};
-use mrfgs::plan::{COST_MAX, Cut, CutRule, LevelPlan, Plan, Width};
+use mrfgs::plan::{COST_MAX, Cut, CutRule, LevelPlan, Plan, VolumeWidth};
 use mrfgs::solver;
 use std::cell::Cell;
 use std::collections::HashSet;
@@ -102,7 +102,7 @@ fn the_cases_cover_what_they_should() {
     let cases = cases();
     let seen = |f: &dyn Fn(&Plan) -> String| cases.iter().map(|c| f(&c.plan)).collect::<HashSet<_>>();
     assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.potential, p.method.resolution)).len(), 6);
-    assert_eq!(seen(&|p| format!("{:?} {:?}", p.width, p.dependency.rule)).len(), 4);
+    assert_eq!(seen(&|p| format!("{:?} {:?}", p.volume_width, p.dependency.rule)).len(), 4);
     assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost, p.method.pyramid)).len(), 6);
     assert_eq!(seen(&|p| p.neighbours.to_string()).len(), NEIGHBOURS.len());
     assert_eq!(seen(&|p| p.levels.len().to_string()).len(), 5);
@@ -687,7 +687,7 @@ fn wide_beliefs_stay_below_their_largest() {
 }
 
 /// A plan of either width whose cuts are larger than a plan's own: beliefs exceed what it stores on full graphs.
-fn saturating(neighbours: usize, width: Width, rule: CutRule, resolution: Resolution) -> Plan {
+fn saturating(neighbours: usize, width: VolumeWidth, rule: CutRule, resolution: Resolution) -> Plan {
     let mut method = Method::default();
     method.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
     method.evidence_cap = 10.0;
@@ -695,16 +695,16 @@ fn saturating(neighbours: usize, width: Width, rule: CutRule, resolution: Resolu
     method.resolution = resolution;
     let mut plan = random::plan((15, 13), -3, 20, &method);
     let tau = match width {
-        Width::Narrow => 40,
-        Width::Wide => 5000,
+        VolumeWidth::Narrow => 40,
+        VolumeWidth::Wide => 5000,
     };
-    (plan.dependency, plan.resolution, plan.width) = (Cut { tau, rule }, Cut { tau, rule }, width);
+    (plan.dependency, plan.resolution, plan.volume_width) = (Cut { tau, rule }, Cut { tau, rule }, width);
     plan
 }
 
 #[test]
 fn beliefs_that_saturate() {
-    for width in [Width::Narrow, Width::Wide] {
+    for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         for rule in [CutRule::Relative, CutRule::Absolute] {
             for resolution in [Resolution::Strict, Resolution::Interpolating] {
                 let plan = saturating(48, width, rule, resolution);
@@ -718,7 +718,7 @@ fn beliefs_that_saturate() {
 /// saturate would.
 #[test]
 fn control_saturated_sums_say_nothing() {
-    for width in [Width::Narrow, Width::Wide] {
+    for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         for resolution in [Resolution::Strict, Resolution::Interpolating] {
             let plan = saturating(48, width, CutRule::Relative, resolution);
             let pair = random::pair(&mut Random::new(3), 15, 13);
@@ -771,7 +771,7 @@ fn control_saturated_sums_say_nothing() {
 /// message is taken off it.
 #[test]
 fn control_padding_stays_behind_beliefs_that_saturate() {
-    for width in [Width::Narrow, Width::Wide] {
+    for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         let plan = saturating(1, width, CutRule::Relative, Resolution::Interpolating);
         let level = &plan.levels[0];
         assert!(level.labels < level.stride);
@@ -813,16 +813,16 @@ fn every_plan_leaves_room_for_its_beliefs() {
         let plan = random::plan((9, 9), 0, 9, &random::method(&mut random, neighbours));
         let (dependency, resolution) = (u32::from(plan.dependency.tau), u32::from(plan.resolution.tau));
         // As many as a factor has members in 8 bits, as many as there can be in 16.
-        let factors = match plan.width {
-            Width::Narrow => plan.neighbours as u32 + 1,
-            Width::Wide => 49,
+        let factors = match plan.volume_width {
+            VolumeWidth::Narrow => plan.neighbours as u32 + 1,
+            VolumeWidth::Wide => 49,
         };
         let cap = u32::from(plan.levels[0].evidence.cap);
         assert!(plan.levels.iter().all(|l| u32::from(l.evidence.cap) == cap));
         let usual = cap + factors * dependency + 2 * resolution;
         assert!(usual <= belief_most(&plan), "{:?}", plan.method);
         assert_eq!(belief_most(&plan), u32::from(plan.belief_most()));
-        widths.insert(format!("{:?}", plan.width));
+        widths.insert(format!("{:?}", plan.volume_width));
     }
     assert_eq!(widths.len(), 2);
 }
@@ -942,9 +942,9 @@ fn control_a_changed_parameter_is_found() {
 /// Negative control: twins that saturate later than a narrow plan does give other volumes.
 #[test]
 fn control_saturation_in_8_bits_is_found() {
-    let plan = saturating(48, Width::Narrow, CutRule::Relative, Resolution::Interpolating);
+    let plan = saturating(48, VolumeWidth::Narrow, CutRule::Relative, Resolution::Interpolating);
     let mut wider = plan.clone();
-    wider.width = Width::Wide;
+    wider.volume_width = VolumeWidth::Wide;
     let graphs = full_graphs(&plan);
     let mut random = Random::new(12);
     let state = random::state(&mut random, &plan, &graphs, true);

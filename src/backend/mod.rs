@@ -124,7 +124,7 @@ pub enum Stage {
     ///
     /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
     /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
-    /// [`Width::most`](crate::plan::Width::most), cut by [`Plan::dependency`] with its bounds for the smallest s. A factor of
+    /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), cut by [`Plan::dependency`] with its bounds for the smallest s. A factor of
     /// one member, and a slot without one, keep the message they have: 0, from the start.
     Dependency(usize),
     /// Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both directions,
@@ -136,7 +136,7 @@ pub enum Stage {
     /// the d that agree with z, infinite if none does. To the parent: s(z) = the sum of U\[c\](z). To child c:
     /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
     /// infinite if none does. Each s is cut by [`Plan::resolution`] with its bounds for the smallest s. Infinite is
-    /// [`Width::most`](crate::plan::Width::most), and sums saturate there; where every s is infinite, the message is 0.
+    /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), and sums saturate there; where every s is infinite, the message is 0.
     Resolution(usize),
     /// Beliefs of a level: evidence, plus every dependency message to the pixel, plus the resolution messages from
     /// above and from below; at most [`Plan::belief_most`].
@@ -182,8 +182,8 @@ pub enum Stage {
     /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
     /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
     Fill,
-    /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels apart, distance counts in
-    /// places, and the range parameter is a quarter.
+    /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
+    /// apart, distance counts in places, and the range parameter is a quarter.
     FillMedian,
     /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::Method::median`] names and that have a
     /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
@@ -248,12 +248,14 @@ pub struct Traffic {
     pub bytes_held: u64,
 }
 
+/// Of one match after another: what went through adds up, and the most was held.
 impl std::ops::AddAssign for Traffic {
     fn add_assign(&mut self, more: Self) {
         self.dispatches += more.dispatches;
         self.submissions += more.submissions;
         self.bytes_up += more.bytes_up;
         self.bytes_down += more.bytes_down;
+        self.bytes_held = self.bytes_held.max(more.bytes_held);
     }
 }
 
@@ -336,7 +338,7 @@ impl<'a> PaddedRows<'a> {
         assert_eq!(values.len(), rows * labels, "values of {volume:?}");
         // Padding must never look better than a label, also after a message is taken off a belief.
         let least = match volume {
-            Volume::Belief(_) => plan.width.most().into(),
+            Volume::Belief(_) => plan.volume_width.most().into(),
             _ => 0,
         };
         Self { values, labels, stride, least }

@@ -274,7 +274,7 @@ fn describe(tiles: &Tiles) -> String {
         let _ = writeln!(out, "whole image{:>46}", bytes(tiles.bytes() - plan.bytes()));
     }
     let _ = writeln!(out, "  all{:>52}\n", bytes(tiles.bytes()));
-    let width = 8 * plan.width.bytes();
+    let width = 8 * plan.volume_width.bytes();
     let _ = writeln!(out, "messages   {width} bits, factors of {} pixels and their centre", plan.neighbours);
     let last = plan.levels.len() - 1;
     for (i, phase) in plan.phases.iter().enumerate() {

@@ -9,11 +9,11 @@ use std::array::from_fn;
 /// What the beliefs of a level are the sums of.
 pub(super) struct Summands<'a, U> {
     pub(super) graph: &'a LevelGraph,
-    pub(super) evidence: &'a [u8],
+    evidence: &'a [u8],
     /// Empty at the coarsest level.
-    pub(super) down: &'a [U],
+    down: &'a [U],
     /// Empty at level 0.
-    pub(super) up: &'a [U],
+    up: &'a [U],
     stride: usize,
     most: U,
     padding: Vec<U>,

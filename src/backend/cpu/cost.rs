@@ -27,12 +27,12 @@ fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     // The right image is seen from right to left, so that ascending labels are side by side.
     let [left, right] = [Greys::new(pair.left(), false), Greys::new(pair.right(), true)];
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
-        || (Row::new(width, level.stride), Row::new(width, level.stride), vec![0; width]),
-        |(here, there, weights), (y, row)| {
+        || (Row::new(width, level.stride), Row::new(width, level.stride), Contrast::new(width)),
+        |(here, there, contrast), (y, row)| {
             fill_row(here, pair.left(), &left, y);
             fill_row(there, pair.right(), &right, y);
-            colour_weights(plan, &left, y, weights);
-            cost_row(plan, here, there, weights, row);
+            colour_weights(plan, &left, y, contrast);
+            cost_row(plan, here, there, &contrast.weights, row);
         },
     );
 }
@@ -174,7 +174,7 @@ struct Row {
     census: [Vec<u8>; 8],
     /// 8-bit levels.
     channels: [Vec<u8>; 3],
-    /// 0, or the largest there is where masked.
+    /// 1 where masked, else 0.
     masked: Vec<u8>,
 }
 
@@ -221,6 +221,20 @@ fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, grey
     row.masked[inside].iter_mut().enumerate().for_each(|(x, out)| *out = u8::from(masked[at(x)]));
 }
 
+/// How much colour counts at each pixel of a row, and what that is reckoned from.
+struct Contrast {
+    weights: Vec<u16>,
+    /// Of grey and of its square over the window.
+    sums: Vec<u16>,
+    squares: Vec<u32>,
+}
+
+impl Contrast {
+    fn new(width: usize) -> Self {
+        Self { weights: vec![0; width], sums: vec![0; width], squares: vec![0; width] }
+    }
+}
+
 /// How much colour counts at each pixel of row `y`: by the variance of grey around it.
 #[pulp::with_simd(colour_weights = pulp::Arch::new())]
 #[inline(always)]
@@ -229,15 +243,18 @@ fn colour_weights_on<'a, S: pulp::Simd>(
     plan: &'a Plan,
     greys: &'a Greys,
     y: usize,
-    weights: &'a mut [u16],
+    contrast: &'a mut Contrast,
 ) {
+    let Contrast { weights, sums, squares } = contrast;
     let (full, most) = (plan.colour_weight(), plan.colour_variance());
     if full == 0 || most == 0 {
         weights.fill(full as u16);
         return;
     }
     let centre = greys.row(y);
-    let (mut sums, mut squares) = (vec![0u16; centre.len()], vec![0u32; centre.len()]);
+    sums.fill(0);
+    squares.fill(0);
+    let (sums, squares) = (&mut sums[..centre.len()], &mut squares[..centre.len()]);
     greys.around(y, |_, _, others, masked| {
         let mut add = |i: usize, grey: u16| {
             let grey = grey >> 8;
@@ -251,8 +268,8 @@ fn colour_weights_on<'a, S: pulp::Simd>(
             }
         }
     });
-    for (weight, (sum, square)) in weights.iter_mut().zip(sums.into_iter().zip(squares)) {
-        let sum = u32::from(sum);
+    for (weight, (sum, square)) in weights.iter_mut().zip(sums.iter().zip(squares.iter())) {
+        let (sum, square) = (u32::from(*sum), *square);
         *weight = (full * (CENSUS_PLACES * square - sum * sum).min(most) / most) as u16;
     }
 }

@@ -12,8 +12,9 @@ use std::array::from_fn;
 
 /// What a thread needs for its factors.
 pub(super) struct Scratch<U> {
-    /// q of each member, \[member\]\[label\].
+    /// q of each member, \[member\]\[label\], and the sum of q over the members after it.
     q: Vec<U>,
+    after: Vec<U>,
     /// Sum of q over the members before.
     before: Vec<U>,
     /// Sums of q over the other members.
@@ -26,6 +27,7 @@ impl<U: Units> Scratch<U> {
     pub(super) fn new(stride: usize, slots: usize) -> Self {
         Self {
             q: vec![U::default(); slots * stride],
+            after: vec![U::default(); slots * stride],
             before: vec![U::default(); stride],
             sums: vec![U::default(); 3 * stride],
             members: Vec::with_capacity(slots),
@@ -33,7 +35,10 @@ impl<U: Units> Scratch<U> {
     }
 }
 
-/// Beliefs of the rows around a factor's, three above to three below; empty outside the image.
+/// How far a factor reaches, in rows and columns.
+pub(super) const REACH: usize = GRAPH_WINDOW / 2;
+
+/// Beliefs of the rows around a factor's, [`REACH`] above to as many below; empty outside the image.
 pub(super) type Around<'a, U> = [&'a [U]; GRAPH_WINDOW];
 
 pub(super) fn run<U: Units>(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[U], messages: &mut [U]) {
@@ -43,7 +48,7 @@ pub(super) fn run<U: Units>(plan: &Plan, level: usize, graph: &LevelGraph, belie
         || Scratch::new(l.stride, graph.slots()),
         |scratch, (y, messages)| {
             let around: Around<U> = from_fn(|k| {
-                let ny = (y + k).checked_sub(GRAPH_WINDOW / 2).filter(|&ny| ny < l.height);
+                let ny = (y + k).checked_sub(REACH).filter(|&ny| ny < l.height);
                 ny.map_or(&[][..], |ny| &belief[ny * cells..][..cells])
             });
             row(plan, level, graph, y, &around, messages, scratch);
@@ -62,15 +67,14 @@ pub(super) fn row<U: Units>(
     scratch: &mut Scratch<U>,
 ) {
     let (cut, stride, slots) = (plan.dependency, plan.levels[level].stride, graph.slots());
-    let centre = GRAPH_WINDOW / 2;
     for (x, messages) in messages.chunks_exact_mut(slots * stride).enumerate() {
         let members = &mut scratch.members;
         members.clear();
-        members.push((0, centre, x * stride));
+        members.push((0, REACH, x * stride));
         let neighbours = graph.neighbours_of(x, y).iter().enumerate().filter(|(_, code)| **code != NO_MEMBER);
         members.extend(neighbours.map(|(i, &code)| {
             let (dx, dy) = offset(code);
-            (i + 1, centre.wrapping_add_signed(dy as isize), x.wrapping_add_signed(dx as isize) * stride)
+            (i + 1, REACH.wrapping_add_signed(dy as isize), x.wrapping_add_signed(dx as isize) * stride)
         }));
         let belief = |&(_, row, start): &(usize, usize, usize)| &around[row][start..][..stride];
         match &members[..] {
@@ -132,7 +136,7 @@ fn three<U: Units>(cut: Cut, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut 
 
 /// The messages of a factor of any number of members.
 fn any<U: Units>(cut: Cut, stride: usize, around: &Around<U>, messages: &mut [U], scratch: &mut Scratch<U>) {
-    let Scratch { q, before, sums, members } = scratch;
+    let Scratch { q, after, before, sums, members } = scratch;
     for (q, &(slot, row, start)) in q.chunks_exact_mut(stride).zip(members.iter()) {
         let b = &around[row][start..][..stride];
         let f = &messages[slot * stride..][..stride];
@@ -147,13 +151,18 @@ fn any<U: Units>(cut: Cut, stride: usize, around: &Around<U>, messages: &mut [U]
         }
     }
     // Sums that saturate cannot be taken off again: those of the members before and after are added.
+    let last = (members.len() - 1) * stride;
+    after[last..][..stride].fill(U::default());
+    for at in (0..last).step_by(stride).rev() {
+        let (here, next) = after[at..].split_at_mut(stride);
+        here.copy_from_slice(&next[..stride]);
+        add(here, &q[at + stride..][..stride]);
+    }
     let sum = &mut sums[..stride];
     before.fill(U::default());
     for (i, &(slot, ..)) in members.iter().enumerate() {
-        sum.copy_from_slice(before);
-        for q in q.chunks_exact(stride).take(members.len()).skip(i + 1) {
-            add(sum, q);
-        }
+        sum.copy_from_slice(&after[i * stride..][..stride]);
+        add(sum, before);
         add(before, &q[i * stride..][..stride]);
         Cutting::new(sum, smallest(sum), cut, &mut messages[slot * stride..][..stride]).all(stride);
     }

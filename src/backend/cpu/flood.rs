@@ -5,14 +5,12 @@
 //! three rows of where two bands meet waits until all have swept.
 
 use super::belief::{self, Summands};
-use super::dependency::{self, Around, Scratch};
+use super::dependency::{self, Around, REACH, Scratch};
 use super::units::Units;
-use crate::plan::{GRAPH_WINDOW, Plan};
+use crate::plan::Plan;
 use rayon::prelude::*;
 use std::array::from_fn;
 
-/// How far a factor reaches.
-const REACH: usize = GRAPH_WINDOW / 2;
 /// Bands a thread, so that one that is held up does not hold up all.
 const BANDS: usize = 4;
 /// Rows of a band, at least.

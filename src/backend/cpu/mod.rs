@@ -25,7 +25,7 @@ use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane, Rect};
 use crate::maps::Maps;
 use crate::memory;
-use crate::plan::{COST_FRACTION_BITS, COST_MAX, Plan, Width};
+use crate::plan::{COST_FRACTION_BITS, COST_MAX, Plan, VolumeWidth};
 use belief::Summands;
 pub use mosaic::Mosaic;
 use rayon::prelude::*;
@@ -367,9 +367,9 @@ impl Backend for Cpu {
                 // What the last match holds goes before the next one asks for more.
                 self.state = None;
                 memory::check(plan.bytes())?;
-                self.state = Some(match plan.width {
-                    Width::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)?),
-                    Width::Wide => State::Wide(Volumes::new(plan, pair, graphs)?),
+                self.state = Some(match plan.volume_width {
+                    VolumeWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)?),
+                    VolumeWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)?),
                 });
             }
         }

@@ -265,7 +265,7 @@ impl Allocator<'_> {
 
 /// First rows of the parts of a level, and its height: even, so that the two rows of a coarser pixel stay together.
 fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec<u32>> {
-    let bytes = plan.width.bytes() as u32;
+    let bytes = plan.volume_width.bytes() as u32;
     let widest = (bytes * params.dependency_pitch).max(2 * params.pitch);
     let fitting = device.max_buffer / (4 * u64::from(widest));
     if fitting >= u64::from(params.height) {
@@ -308,7 +308,7 @@ impl Buffers {
             let starts = part_starts(device, plan, &p)?;
             // What a level does not have still has a name in the shaders.
             let none = [0, 0];
-            let bytes = plan.width.bytes() as u32;
+            let bytes = plan.volume_width.bytes() as u32;
             let values = bytes * p.pitch;
             let incoming = starts.windows(2).map(|own| {
                 // The factors that hold a pixel are at most three rows away; rows are aligned.

@@ -23,7 +23,7 @@
 //! What they ask more than once is near, and left to the caches. [`crate::roofline`] adds the least bytes of the message stages
 //! up for a plan, and `mrfgs bench` holds them against the rate at which the device copies.
 
-use crate::plan::{CutRule, LABEL_BLOCK, LevelPlan, Plan, Width};
+use crate::plan::{CutRule, LABEL_BLOCK, LevelPlan, Plan, VolumeWidth};
 use bytemuck::{Pod, Zeroable};
 
 const PARAMS: &str = include_str!("../../../shaders/shared/params.wgsl");
@@ -261,7 +261,7 @@ impl Variant {
         ]);
         let potentials = looks(&[Kernel::Dependency, Kernel::Resolution]);
         Self {
-            narrow: volumes && plan.width == Width::Narrow,
+            narrow: volumes && plan.volume_width == VolumeWidth::Narrow,
             fine_narrow: match kernel {
                 Kernel::Restrict | Kernel::Evidence => level == 0,
                 Kernel::Pyramid => level == 1,

@@ -285,7 +285,7 @@ impl Gpu {
     /// Where a volume is, words a row and values a word.
     fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
         let state = self.state();
-        let width = state.plan.width.bytes();
+        let width = state.plan.volume_width.bytes();
         let level = &state.buffers.levels[volume.level()];
         let (rows, bytes) = match volume {
             Volume::Cost(z) => (&level.cost, if z == 0 { 1 } else { 2 }),

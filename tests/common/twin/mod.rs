@@ -25,7 +25,7 @@ pub mod visibility;
 use mrfgs::backend::{Backend, Map};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::Plane;
-use mrfgs::plan::{Cut, CutRule, Plan, Width};
+use mrfgs::plan::{Cut, CutRule, Plan, VolumeWidth};
 
 /// What the finest level knows of each pixel: the plane of every [`Map`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,9 +93,9 @@ pub fn binomial(place: i64) -> i64 {
 
 /// The largest value of messages and beliefs, where their sums saturate; "no label agrees", too.
 pub fn most(plan: &Plan) -> u32 {
-    match plan.width {
-        Width::Narrow => 255,
-        Width::Wide => 65_535,
+    match plan.volume_width {
+        VolumeWidth::Narrow => 255,
+        VolumeWidth::Wide => 65_535,
     }
 }
 
