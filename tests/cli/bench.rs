@@ -1,0 +1,121 @@
+//! `mrfgs bench`.
+
+use std::fs;
+
+use serde_json::Value;
+
+use super::{has_gpu, listing, run, workshop};
+
+#[test]
+fn a_bench_gives_every_figure_of_both_backends() {
+    let folder = workshop();
+    let (backends, which) = if has_gpu() { (&["cpu", "gpu"][..], "both") } else { (&["cpu"][..], "cpu") };
+    let args = ["bench", "misfit", "without-disp0GT.pfm", "--repeats", "2", "--json", "out.json"];
+    let more = ["--backend", which, "--threads", "2", "--set", "levels=1", "--set", "percentile=92"];
+    let told = run(folder.path(), &[&args[..], &more].concat()).succeeded();
+    let json = fs::read_to_string(folder.path().join("out.json")).unwrap();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!((&json["threads"], &json["repeats"]), (&2.into(), &2.into()));
+
+    let pairs = json["pairs"].as_array().unwrap();
+    let expected = [("misfit", 60, 40), ("without-disp0GT.pfm", 240, 180)];
+    let expected = expected.iter().flat_map(|pair| ["default", "paper"].map(|preset| (pair, preset)));
+    assert_eq!(pairs.len(), 4);
+    for (pair, (&(name, width, height), preset)) in pairs.iter().zip(expected) {
+        let what = format!("{name}, preset {preset}");
+        assert_eq!((&pair["name"], &pair["preset"]), (&name.into(), &preset.into()));
+        assert_eq!((&pair["width"], &pair["height"]), (&width.into(), &height.into()), "{what}");
+        assert_eq!(pair["labels"], 32, "{what}");
+        assert!(
+            told.stdout.contains(&format!("{what}: {width} x {height} pixels, 32 labels")),
+            "{}",
+            told.stdout
+        );
+        let method = &json["methods"][preset];
+        assert_eq!(method["levels"], 1, "--set counts for every preset");
+        assert_eq!(pair["backends"].as_object().unwrap().len(), backends.len());
+
+        for &backend in backends {
+            let found = &pair["backends"][backend];
+            let value = |key: &str| {
+                let value = found[key].as_f64().unwrap_or_else(|| panic!("{what}, {backend}: no {key}"));
+                assert!(value > 0.0 && value.is_finite(), "{what}, {backend}: {key} is {value}");
+                value
+            };
+            assert!(told.stderr.contains(&format!("{what}, {backend}: ")), "{}", told.stderr);
+            assert_eq!(found["ran_on"].as_str().unwrap().starts_with("the CPU path"), backend == "cpu");
+            let runs: Vec<f64> =
+                found["runs_ms"].as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+            assert_eq!(runs.len(), 2);
+            assert!(runs.contains(&value("min_ms")) && runs.contains(&value("max_ms")));
+            let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+            assert!(close(value("median_ms"), f64::midpoint(runs[0], runs[1])));
+
+            // One level, 5 members, and messages and beliefs of 1 or 2 bytes.
+            let (iterations, cells) = (value("iterations"), f64::from(width * height * 32));
+            let wide = if preset == "paper" { 2.0 } else { 1.0 };
+            assert!(close(value("label_updates"), iterations * 5.0 * cells), "{what}, {backend}");
+            let message_values = value("message_bytes") / (iterations * cells);
+            // Where messages and beliefs come in one sweep, the five messages are not read once more.
+            let swept = if backend == "cpu" { 5.0 } else { 0.0 };
+            assert!(close(message_values, (17.0 - swept) * wide + 1.0), "{message_values}");
+            for (key, count, time) in [
+                ("message_gupdates_per_s", "label_updates", "message_ms"),
+                ("match_gupdates_per_s", "label_updates", "median_ms"),
+                ("message_gb_per_s", "message_bytes", "message_ms"),
+            ] {
+                assert!(close(value(key), value(count) / value(time) / 1e6), "{what}, {backend}: {key}");
+            }
+            assert!(close(value("copy_share"), 100.0 * value("message_gb_per_s") / value("copy_gb_per_s")));
+
+            let stages = found["stages"].as_object().unwrap();
+            assert!(stages.values().all(|ms| ms.as_f64().is_some_and(|ms| ms >= 0.0)), "{stages:?}");
+            let messages = if backend == "cpu" { "flood, level 0" } else { "dependency, level 0" };
+            for stage in ["graph", "cost", messages, "median"] {
+                assert!(stages.contains_key(stage), "no {stage} in {stages:?}");
+            }
+            assert_eq!(stages.contains_key("zones"), preset == "paper");
+            assert_eq!(found["device_bytes"].is_null(), backend == "cpu");
+            if backend == "gpu" {
+                assert!(value("device_bytes") >= value("plan_bytes") / 2.0, "{what}");
+            }
+            if cfg!(target_os = "linux") {
+                assert!(value("processor_ms") > 0.0);
+                assert!(value("peak_bytes") > cells, "{what}, {backend}");
+            }
+        }
+        // The same bits take the same work.
+        for key in ["iterations", "label_updates", "plan_bytes"] {
+            let of = |backend: &&str| &pair["backends"][*backend][key];
+            assert!(backends.iter().all(|backend| of(backend) == of(&"cpu")), "{what}: {key}");
+        }
+    }
+
+    // A single case, printed.
+    let args = ["bench", "misfit", "--preset", "fgs", "--backend", "cpu", "--repeats", "1", "--json", "-"];
+    let pairs = &run(folder.path(), &args).succeeded().json()["pairs"];
+    assert_eq!((pairs.as_array().unwrap().len(), &pairs[0]["preset"]), (1, &"fgs".into()));
+    assert_eq!(pairs[0]["backends"]["gpu"], Value::Null);
+}
+
+#[test]
+fn a_bench_without_folders_makes_up_its_pair() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["bench", "--preset", "default", "--backend", "cpu", "--repeats", "1", "--set", "levels=1"];
+    let told = run(folder.path(), &args).succeeded();
+    assert!(told.stdout.contains("small, preset default: 450 x 375 pixels, 60 labels"), "{}", told.stdout);
+    assert!(listing(folder.path()).is_empty());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_bench_that_cannot_be_written_fails() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["bench", "misfit", "--preset", "default", "--backend", "cpu", "--repeats", "1"];
+    let told = run(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat());
+    assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""), "{told:?}");
+    assert!(told.stderr.lines().last().unwrap().contains("/dev/full"), "{told:?}");
+    assert!(listing(folder.path()) == before);
+}

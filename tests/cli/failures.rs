@@ -1,0 +1,260 @@
+//! What goes wrong: one line that says so, and nothing left behind.
+
+use std::fs;
+use std::path::Path;
+
+use super::{NO_DRIVER, has_gpu, listing, run, run_with, workshop};
+
+/// Arguments, separated by spaces; exit status; what the message must say: the thing and the remedy.
+type Failure = (&'static str, i32, &'static [&'static str]);
+
+/// `M` stands for a `match` that would succeed, up to its output.
+const FAILURES: &[Failure] = &[
+    // The command line itself.
+    ("", 2, &["subcommand", "match, evaluate", "--help"]),
+    ("frobnicate", 2, &["frobnicate", "--help"]),
+    ("match left.png", 2, &["<RIGHT> <OUTPUT>", "mrfgs match --help"]),
+    ("M out.pfm --frobnicate", 2, &["--frobnicate", "--help"]),
+    ("M out.pfm --mask", 2, &["--mask", "value"]),
+    ("M out.pfm surplus.pfm", 2, &["surplus.pfm", "--help"]),
+    // Inputs.
+    ("match none.png right.png out.pfm", 1, &["none.png", "no such file", "check the name"]),
+    ("match left.png none.png out.pfm --max-disparity 9", 1, &["none.png", "no such file", "check the name"]),
+    ("match folder right.png out.pfm --max-disparity 9", 1, &["folder: is a folder", "give the image file"]),
+    ("match left.png folder out.pfm --max-disparity 9", 1, &["folder: is a folder", "give the image file"]),
+    (
+        "match left.png narrow.png out.pfm --max-disparity 9",
+        1,
+        &["left.png is 60 x 40", "narrow.png is 30 x 40"],
+    ),
+    ("match cut.png right.png out.pfm --max-disparity 9", 1, &["cut.png", "truncated", "get the file again"]),
+    ("match left.png empty.png out.pfm --max-disparity 9", 1, &["empty.png", "empty", "get it again"]),
+    ("match text.png right.png out.pfm --max-disparity 9", 1, &["text.png", "not an image", "give PNG"]),
+    ("M out.pfm --mask narrow.png", 1, &["narrow.png is 30 x 40", "a mask has the size of the left image"]),
+    ("M out.pfm --mask none.png", 1, &["none.png", "check the name"]),
+    ("M out.pfm --mask text.png", 1, &["text.png", "give PNG"]),
+    // Outputs.
+    ("M out.jpg", 1, &["out.jpg", ".pfm (float), .tif (float) or .png"]),
+    ("M out", 1, &["out:", ".pfm"]),
+    ("M none/out.pfm", 1, &["none/out.pfm", "there is no folder none", "create it"]),
+    ("M left.png/out.pfm", 1, &["left.png/out.pfm", "there is no folder", "create it"]),
+    ("M taken.pfm", 1, &["taken.pfm", "is a folder", "name of a file"]),
+    ("M out.pfm --raw taken.pfm", 1, &["taken.pfm", "is a folder"]),
+    ("M out.pfm --raw raw.bmp", 1, &["raw.bmp", ".pfm"]),
+    ("M out.pfm --raw none/raw.pfm", 1, &["none/raw.pfm", "create it"]),
+    ("M out.pfm --confidence c.pfm", 1, &["c.pfm", "ends in .png"]),
+    ("M out.pfm --validity v.tif", 1, &["v.tif", "ends in .png"]),
+    ("M out.pfm --validity taken.png", 1, &["taken.png", "is a folder"]),
+    ("M out.pfm --preview p.jpg", 1, &["p.jpg", "ends in .png"]),
+    ("M out.pfm --preview none/p.png", 1, &["none/p.png", "create it"]),
+    ("M out.png --min-disparity -1", 1, &["out.png", "-1 to 9", ".pfm or .tif"]),
+    ("M out.pfm --raw raw.png --min-disparity -1", 1, &["raw.png", "-1 to 9", ".pfm or .tif"]),
+    ("match left.png right.png out.png --max-disparity 256", 1, &["out.png", "0 to 256", ".pfm or .tif"]),
+    ("M out.pfm --raw out.pfm", 1, &["--raw", "out.pfm is OUTPUT already", "another name"]),
+    ("M out.pfm --raw ./folder/../out.pfm", 1, &["--raw", "OUTPUT", "another name"]),
+    ("M a.png --preview a.png", 1, &["--preview", "a.png is OUTPUT already", "another name"]),
+    (
+        "M out.pfm --confidence c.png --validity c.png",
+        1,
+        &["--validity", "c.png is --confidence", "another name"],
+    ),
+    ("M left.png", 1, &["OUTPUT", "left.png is LEFT already", "another name"]),
+    ("M out.pfm --preview folder/../right.png", 1, &["--preview", "is RIGHT already", "another name"]),
+    ("M narrow.png --mask left.png --preview left.png", 1, &["--preview", "LEFT", "another name"]),
+    // The range.
+    ("match flat.png flat.png out.pfm", 1, &["--max-disparity", "too few matches"]),
+    ("match flat.png flat.png out.pfm --max-disparity auto", 1, &["--max-disparity", "too few matches"]),
+    ("M out.pfm --memory 2", 2, &["--memory <SIZE>", "'2'", "2GiB", "--help"]),
+    ("M out.pfm --memory 1.5GiB", 2, &["--memory <SIZE>", "'1.5GiB'", "whole number"]),
+    ("M out.pfm --memory 0MiB", 2, &["--memory <SIZE>", "from 1MiB to 16TiB"]),
+    ("M out.pfm --memory 17TiB", 2, &["--memory <SIZE>", "from 1MiB to 16TiB"]),
+    ("M out.pfm --memory 99999999999999999999TiB", 2, &["--memory <SIZE>", "from 1MiB to 16TiB"]),
+    ("M out.pfm --set memory=0", 1, &["--set memory", "0 is outside 1 to 16777216"]),
+    (
+        "match left.png right.png out.pfm --max-disparity 900 --memory 1MiB",
+        1,
+        &["--memory", "1 MiB", "60 x 40", "at least", "smaller"],
+    ),
+    ("M out.pfm --intermediates folder/full", 1, &["folder/full", "not empty"]),
+    ("M out.pfm --intermediates left.png", 1, &["left.png", "is a file"]),
+    ("M out.pfm --intermediates none/steps", 1, &["none/steps", "no folder none", "create it"]),
+    ("M out.pfm --intermediates out.pfm", 1, &["--intermediates", "out.pfm is OUTPUT", "another name"]),
+    ("match damaged/left.png right.png out.pfm", 1, &["calib.txt", "line 1", "ndisp"]),
+    ("match huge/left.png right.png out.pfm", 1, &["calib.txt", "ndisp=100000", "at most 16384"]),
+    ("M out.pfm --max-disparity 9", 2, &["--max-disparity", "multiple times"]),
+    (
+        "match left.png right.png out.pfm --max-disparity many",
+        2,
+        &["many", "--max-disparity", "whole number"],
+    ),
+    ("match left.png right.png out.pfm --max-disparity 3.5", 2, &["3.5", "--max-disparity", "whole number"]),
+    ("match left.png right.png out.pfm --max-disparity 99999999999", 2, &["--max-disparity", "1048576"]),
+    ("match left.png right.png out.pfm --max-disparity 2000000", 1, &["--max-disparity", "out of reach"]),
+    ("match left.png right.png out.pfm --max-disparity 50000", 1, &["--max-disparity", "narrow the range"]),
+    ("match left.png right.png out.pfm --max-disparity -1", 1, &["--max-disparity", "-1", "--min-disparity"]),
+    ("M out.pfm --min-disparity 10", 1, &["--max-disparity", "below the minimum disparity 10", "raise it"]),
+    ("M out.pfm --min-disparity -2000000", 1, &["--min-disparity", "out of reach"]),
+    ("M out.pfm --min-disparity few", 2, &["few", "--min-disparity", "whole number"]),
+    (
+        "match left.png right.png out.pfm --min-disparity 60 --max-disparity 70",
+        1,
+        &["--max-disparity", "60 to 70", "60 pixels wide"],
+    ),
+    // The method.
+    ("M out.pfm --preset best", 1, &["--preset", "`best`", "default, paper"]),
+    ("M out.pfm --set colour=red", 1, &["--set colour", "no such key", "mrfgs presets"]),
+    ("M out.pfm --set levels", 2, &["--set", "levels=4"]),
+    ("M out.pfm --set =4", 2, &["--set", "levels=4"]),
+    ("M out.pfm --set levels=many", 1, &["--set levels", "1 to 16", "\"many\""]),
+    ("M out.pfm --set levels=17", 1, &["--set levels", "17 is outside 1 to 16"]),
+    ("M out.pfm --set cost=ncc", 1, &["--set cost", "sad | census | ad-census", "ncc"]),
+    ("M out.pfm --set temperature=nan", 1, &["--set temperature", "outside"]),
+    ("M out.pfm --set sad-window=4", 1, &["--set sad-window", "odd", "3 or 5"]),
+    ("M out.pfm --config none.toml", 1, &["none.toml", "no such file", "check the name"]),
+    ("M out.pfm --config folder", 1, &["folder"]),
+    ("M out.pfm --config syntax.toml", 1, &["syntax.toml", "line 2"]),
+    ("M out.pfm --config key.toml", 1, &["key.toml", "line 2", "level", "mrfgs presets"]),
+    ("M out.pfm --config value.toml", 1, &["value.toml", "line 3", "temperature", "-1 is outside"]),
+    ("M out.pfm --config left.png", 1, &["left.png", "TOML"]),
+    // Where it runs.
+    ("M out.pfm --threads 0", 2, &["--threads", "1..=1024"]),
+    ("M out.pfm --threads -1", 2, &["-1"]),
+    ("M out.pfm --threads 1000000", 2, &["--threads", "1..=1024"]),
+    ("M out.pfm --threads two", 2, &["--threads", "two"]),
+    ("M out.pfm --backend tpu", 2, &["--backend", "auto, gpu, cpu"]),
+    ("M out.pfm --backend cpu --device 0", 1, &["--device", "--backend cpu"]),
+    // Evaluation.
+    ("evaluate", 2, &["DIR", "mrfgs evaluate --help"]),
+    ("evaluate none", 1, &["none/im0.png", "disp0GT.pfm, calib.txt"]),
+    ("evaluate left.png", 1, &["left.png/im0.png", "a folder to evaluate holds"]),
+    ("evaluate without-im0.png", 1, &["without-im0.png/im0.png", "a folder to evaluate holds"]),
+    ("evaluate without-im1.png", 1, &["without-im1.png/im1.png", "a folder to evaluate holds"]),
+    ("evaluate without-disp0GT.pfm", 1, &["without-disp0GT.pfm/disp0GT.pfm", "a folder to evaluate holds"]),
+    ("evaluate without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to evaluate holds"]),
+    ("evaluate misfit without-calib.txt", 1, &["without-calib.txt/calib.txt"]),
+    ("evaluate misfit", 1, &["disp0GT.pfm is 240 x 180", "im0.png is 60 x 40"]),
+    ("evaluate misfit --preset best", 1, &["--preset", "default, paper"]),
+    ("evaluate misfit --json none/a.json", 1, &["none/a.json", "create it"]),
+    ("evaluate misfit --json folder", 1, &["folder", "is a folder"]),
+    ("evaluate misfit --json misfit/calib.txt", 1, &["--json", "misfit/calib.txt", "another name"]),
+    ("evaluate --disparity unknown.pfm", 2, &["--truth"]),
+    ("evaluate --truth unknown.pfm", 2, &["--disparity"]),
+    ("evaluate misfit --disparity unknown.pfm --truth unknown.pfm", 2, &["DIR", "--disparity"]),
+    ("evaluate --levels 3 --disparity unknown.pfm --truth unknown.pfm", 2, &["--levels"]),
+    ("evaluate --preset paper --disparity unknown.pfm --truth unknown.pfm", 2, &["--preset", "--disparity"]),
+    ("evaluate --disparity none.pfm --truth unknown.pfm", 1, &["none.pfm", "check the name"]),
+    ("evaluate --disparity left.png --truth unknown.pfm", 1, &["left.png", "channel", "16-bit .png"]),
+    ("evaluate --disparity unknown.pfm --truth unknown.pfm", 1, &["unknown.pfm", "no known disparity"]),
+    (
+        "evaluate --disparity unknown.pfm --truth misfit/disp0GT.pfm",
+        1,
+        &["240 x 180", "unknown.pfm is 1 x 1"],
+    ),
+    (
+        "evaluate --disparity misfit/disp0GT.pfm --truth misfit/disp0GT.pfm --mask left.png",
+        1,
+        &["left.png is 60 x 40", "240 x 180"],
+    ),
+    // Benches.
+    ("bench none", 1, &["none/im0.png", "a folder to match holds im0.png, im1.png, calib.txt; or"]),
+    ("bench left.png", 1, &["left.png/im0.png", "a folder to match holds"]),
+    ("bench misfit without-im1.png", 1, &["without-im1.png/im1.png", "a folder to match holds im0.png"]),
+    ("bench misfit without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to match holds"]),
+    ("bench broken --backend cpu", 1, &["broken/im1.png", "not an image", "give PNG"]),
+    ("bench broken --backend cpu --preset fgs --json a.json", 1, &["broken/im1.png", "not an image"]),
+    ("bench misfit --repeats 0", 2, &["--repeats", "1..=1000"]),
+    ("bench misfit --repeats some", 2, &["--repeats", "some"]),
+    ("bench misfit --large", 2, &["--large", "DIR"]),
+    ("bench misfit --backend auto", 2, &["--backend", "cpu, gpu, both"]),
+    ("bench misfit --backend cpu --device 0", 1, &["--device", "--backend cpu"]),
+    ("bench misfit --backend both --threads 0", 2, &["--threads", "1..=1024"]),
+    ("bench misfit --preset best", 1, &["--preset", "default, paper"]),
+    ("bench misfit --set levels=17", 1, &["--set levels", "17 is outside 1 to 16"]),
+    ("bench misfit --config key.toml", 1, &["key.toml", "line 2", "mrfgs presets"]),
+    ("bench misfit --json none/a.json", 1, &["none/a.json", "create it"]),
+    ("bench misfit --json folder", 1, &["folder", "is a folder"]),
+    ("bench misfit --json misfit/im1.png", 1, &["--json", "misfit/im1.png", "another name"]),
+    ("presets best", 1, &["`best`", "default, paper"]),
+];
+
+#[test]
+fn every_failure_is_one_line_and_leaves_nothing() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    for (line, code, words) in FAILURES {
+        let words_of_line = line.replacen("M ", "match left.png right.png --max-disparity 9 ", 1);
+        let args: Vec<&str> = words_of_line.split_whitespace().collect();
+        run(folder.path(), &args).failed(*code, words, line);
+        assert!(listing(folder.path()) == before, "{line}: the folder has changed");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_without_permission_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = workshop();
+    let mut locked = folder.path().join("locked");
+    fs::create_dir(&locked).unwrap();
+    fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(locked.join("probe"), "").is_ok() {
+        // This is root, who may write anywhere but where the kernel says no.
+        locked = "/sys".into();
+    }
+    let output = locked.join("out.pfm");
+    let output = output.to_str().unwrap();
+    for outputs in [[output, "raw.pfm"], ["out.pfm", output]] {
+        let args =
+            ["match", "left.png", "right.png", outputs[0], "--raw", outputs[1], "--max-disparity", "9"];
+        run(folder.path(), &args).failed(1, &[output, "no file can be created"], "locked");
+        assert!(!folder.path().join("out.pfm").exists());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_was_written_before_a_failure_is_removed() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    // The disk that is always full lets itself be opened.
+    for full in ["--raw", "--validity", "--preview"] {
+        let args = ["match", "left.png", "right.png", "out.pfm", "--confidence", "c.png", full, "/dev/full"];
+        let args = [&args[..], &["--max-disparity", "9", "--quiet"]].concat();
+        run(folder.path(), &args).failed(1, &["/dev/full", "No space left"], full);
+        assert!(listing(folder.path()) == before, "{full}");
+    }
+    assert!(Path::new("/dev/full").exists());
+}
+
+#[cfg(not(target_os = "macos"))]
+#[test]
+fn without_a_driver_gpu_says_what_to_do() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "gpu"];
+    let told = run_with(folder.path(), &args, NO_DRIVER);
+    told.failed(1, &["driver", "install", "--backend cpu"], "--backend gpu without a driver");
+    let told = run_with(folder.path(), &[&args[..], &["--device", "0"]].concat(), NO_DRIVER);
+    told.failed(1, &["driver", "install", "--backend cpu"], "--device 0 without a driver");
+    for backend in ["gpu", "both"] {
+        let args = ["bench", "misfit", "--json", "a.json", "--backend", backend];
+        let told = run_with(folder.path(), &args, NO_DRIVER);
+        told.failed(1, &["driver", "install", "--backend cpu"], "bench without a driver");
+    }
+    assert!(listing(folder.path()) == before);
+}
+
+#[test]
+fn an_unknown_device_is_named() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    for device in ["no-such-device", "999"] {
+        if has_gpu() {
+            let args = ["bench", "misfit", "--device", device, "--json", "a.json"];
+            run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
+        }
+        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", device];
+        run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
+    }
+    assert!(listing(folder.path()) == before);
+}

@@ -1,0 +1,260 @@
+//! The command line, through the built program: what it writes, and how it fails.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
+mod bench;
+mod evaluate;
+mod failures;
+mod matching;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use mrfgs::backend::gpu;
+use mrfgs::maps::flag;
+use mrfgs::options::{self, Method};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// What a run of the program leaves.
+#[derive(Debug)]
+struct Run {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+/// Runs the program in `folder`.
+fn run(folder: &Path, args: &[&str]) -> Run {
+    run_with(folder, args, &[])
+}
+
+fn run_with(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Run {
+    let output = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .current_dir(folder)
+        .args(args)
+        // Without it the Vulkan loader complains on standard error.
+        .env("XDG_RUNTIME_DIR", std::env::temp_dir())
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+impl Run {
+    fn succeeded(self) -> Self {
+        assert_eq!(self.code, Some(0), "{self:?}");
+        self
+    }
+
+    /// Exactly one line on standard error, with all these words, and nothing on standard output.
+    fn failed(&self, code: i32, words: &[&str], what: &str) {
+        assert_eq!(self.code, Some(code), "{what}: {self:?}");
+        assert_eq!(self.stdout, "", "{what}");
+        assert!(self.stderr.starts_with("mrfgs: ") && self.stderr.ends_with('\n'), "{what}: {self:?}");
+        assert_eq!(self.stderr.lines().count(), 1, "{what}: {}", self.stderr);
+        assert!(!self.stderr.contains("panicked"), "{what}: {}", self.stderr);
+        for word in words {
+            assert!(self.stderr.contains(word), "{what}: no `{word}` in: {}", self.stderr);
+        }
+    }
+
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap()
+    }
+}
+
+/// Everything in a folder and below it: the content of files, `None` for folders.
+fn listing(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            all.extend(listing(&path));
+            all.insert(path, None);
+        } else {
+            let content = fs::read(&path).unwrap();
+            all.insert(path, Some(content));
+        }
+    }
+    all
+}
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
+}
+
+/// The path of a file of a scene, as an argument.
+fn scene_file(name: &str, file: &str) -> String {
+    scene(name).join(file).to_str().unwrap().to_owned()
+}
+
+/// A folder with a pair of 60 x 40 pixels without calib.txt, and with much that is wrong.
+fn workshop() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
+        let image = image::open(scene("slanted").join(from)).unwrap();
+        image.crop_imm(100, 80, 60, 40).save(at(to)).unwrap();
+    }
+    let left = fs::read(at("left.png")).unwrap();
+    image::open(at("left.png")).unwrap().crop_imm(0, 0, 30, 40).save(at("narrow.png")).unwrap();
+    fs::write(at("cut.png"), &left[..left.len() / 2]).unwrap();
+    fs::write(at("empty.png"), "").unwrap();
+    fs::write(at("text.png"), "a picture is worth a thousand words").unwrap();
+    fs::create_dir_all(at("folder/full")).unwrap();
+    fs::write(at("folder/full/of"), "something").unwrap();
+    image::GrayImage::from_pixel(60, 40, image::Luma([90])).save(at("flat.png")).unwrap();
+    fs::create_dir(at("taken.pfm")).unwrap();
+    fs::create_dir(at("taken.png")).unwrap();
+    fs::write(at("syntax.toml"), "levels = 3\ncost sad\n").unwrap();
+    fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
+    fs::write(at("value.toml"), "levels = 3\n\ntemperature = -1\n").unwrap();
+    for (name, calib) in [("damaged", "ndisp=many\n"), ("silent", "width=60\n"), ("huge", "ndisp=100000\n")] {
+        fs::create_dir(at(name)).unwrap();
+        fs::copy(at("left.png"), at(name).join("left.png")).unwrap();
+        fs::write(at(name).join("calib.txt"), calib).unwrap();
+    }
+    // Folders to evaluate, each with one thing wrong.
+    for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"] {
+        let to = at(&format!("without-{file}"));
+        fs::create_dir(&to).unwrap();
+        for other in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"].into_iter().filter(|f| *f != file) {
+            fs::copy(scene("slanted").join(other), to.join(other)).unwrap();
+        }
+    }
+    fs::create_dir(at("misfit")).unwrap();
+    for (from, to) in [("left.png", "im0.png"), ("right.png", "im1.png")] {
+        fs::copy(at(from), at("misfit").join(to)).unwrap();
+    }
+    for file in ["disp0GT.pfm", "calib.txt"] {
+        fs::copy(scene("slanted").join(file), at("misfit").join(file)).unwrap();
+    }
+    fs::create_dir(at("broken")).unwrap();
+    for (from, to) in [("left.png", "im0.png"), ("text.png", "im1.png"), ("misfit/calib.txt", "calib.txt")] {
+        fs::copy(at(from), at("broken").join(to)).unwrap();
+    }
+    fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
+    folder
+}
+
+/// A machine without any Vulkan driver; Metal is always there.
+const NO_DRIVER: &[(&str, &str)] =
+    &[("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent"), ("VK_ADD_DRIVER_FILES", "")];
+
+/// Whether there is a driver to run on; a panic where there is none and `MRFGS_REQUIRE_GPU` is set and not 0.
+fn has_gpu() -> bool {
+    let found = !gpu::devices().is_empty();
+    let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
+    assert!(found || !required, "MRFGS_REQUIRE_GPU is set and there is no driver");
+    if !found {
+        // Past the capture of the test harness: a test without its GPU must not look like one that passed.
+        let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: there is no driver");
+    }
+    found
+}
+
+#[test]
+fn devices_say_what_auto_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = run(folder.path(), &["devices"]).succeeded();
+    let last = told.stdout.lines().last().unwrap();
+    assert!(last.contains("`auto` takes "), "{}", told.stdout);
+}
+
+#[test]
+fn the_later_word_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("my.toml"),
+        "levels = 3\niterations = 2\ncost = \"ad-census\"\noutside-cost = 1\n",
+    )
+    .unwrap();
+    let dir = scene("wall").to_str().unwrap().to_owned();
+    let args = ["evaluate", &dir, "--json", "-", "--set", "levels=2", "--set", "levels=1"];
+    let told = run(folder.path(), &[&args[..], &["--preset", "paper", "--config", "my.toml"]].concat());
+    let method = &told.succeeded().json()["method"];
+    assert_eq!(method["levels"], 1, "--set after --config, the last --set last");
+    assert_eq!(method["iterations"], 2, "--config after --preset");
+    assert_eq!((&method["cost"], &method["outside-cost"]), (&"ad-census".into(), &1.0.into()));
+    assert_eq!(method["potential"], "hard", "--preset before all");
+}
+
+#[test]
+fn presets_can_be_pasted_into_a_config_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, _) in options::PRESETS {
+        let told = run(folder.path(), &["presets", name]).succeeded();
+        let path = folder.path().join("pasted.toml");
+        fs::write(&path, &told.stdout).unwrap();
+        for (other, _) in options::PRESETS {
+            let mut method = Method::preset(other).unwrap();
+            method.load(&path).unwrap();
+            assert_eq!(method, Method::preset(name).unwrap(), "{name} over {other}");
+        }
+    }
+    let listing = run(folder.path(), &["presets"]).succeeded().stdout;
+    for (key, unit, _) in options::keys() {
+        let line = listing.lines().find(|l| l.split(' ').next() == Some(&key)).unwrap();
+        assert!(line.contains(unit), "{line}");
+        for (name, _) in options::PRESETS {
+            let value = Method::preset(name).unwrap().table()[&key].to_string().replace('"', "");
+            assert!(line.split_whitespace().any(|word| word == value), "{value} in {line}");
+        }
+    }
+    assert!(listing.lines().all(|l| l.chars().count() <= 110), "lines fit a terminal");
+}
+
+#[test]
+fn help_teaches() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = |args: &[&str]| {
+        let told = run(folder.path(), args).succeeded();
+        assert_eq!(told.stderr, "");
+        // As it is wrapped depends on the terminal.
+        told.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let text = help(&["match", "--help"]);
+    for (bit, what) in [
+        (flag::OUTSIDE, "match outside the right image"),
+        (flag::OCCLUDED, "occluded"),
+        (flag::SMALL_REGION, "in a small region"),
+        (flag::LOW_CONFIDENCE, "low confidence"),
+        (flag::FILLED, "filled"),
+        (flag::MASKED, "masked"),
+    ] {
+        assert!(text.contains(&format!("{bit} {what}")), "{bit} {what}");
+    }
+    for words in ["Examples:", "[default: 0, or", "ndisp - 1", "in pixels"] {
+        assert!(text.contains(words), "{words}");
+    }
+    assert!(help(&["--help"]).contains("Exit status: 0"));
+    assert!(help(&["evaluate", "--help"]).contains("mask0nocc.png"));
+    assert!(help(&["presets", "--help"]).contains("Examples:"));
+    assert!(help(&["bench", "--help"]).contains("[default: default and paper,"));
+    assert_eq!(help(&["--version"]), format!("mrfgs {}", env!("CARGO_PKG_VERSION")));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_reader_that_leaves_early_is_no_failure() {
+    use std::process::Stdio;
+    let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .arg("presets")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{output:?}");
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_mrfgs")).arg("presets").stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("standard output") && text.lines().count() == 1, "{text}");
+}

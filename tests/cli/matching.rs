@@ -1,0 +1,287 @@
+//! `mrfgs match`: what it writes.
+
+use std::fs;
+
+use mrfgs::image::read;
+use mrfgs::maps::flag;
+
+use super::{NO_DRIVER, listing, run, run_with, scene, scene_file, workshop};
+
+#[test]
+fn match_writes_every_output_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("slanted", file));
+    let mask = image::GrayImage::from_fn(240, 180, |x, y| image::Luma([u8::from(x > 200 && y < 9) * 9]));
+    mask.save(at("mask.png")).unwrap();
+
+    let common = ["--mask", "mask.png", "--threads", "2", "--backend", "cpu"];
+    let first = ["match", &left, &right, "a.pfm", "--raw", "raw.tif", "--confidence", "confidence.png"];
+    let first = [&first[..], &["--validity", "validity.png", "--preview", "preview.png"], &common].concat();
+    let told = run(folder.path(), &first).succeeded();
+    assert_eq!(told.stdout, "");
+    assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
+    for words in ["mrfgs: 240 x 180, 32 labels, ", " s on the CPU path, 2 threads\n"] {
+        assert!(told.stderr.contains(words), "{}", told.stderr);
+    }
+
+    let map = read::read_disparity(&at("a.pfm")).unwrap();
+    let raw = read::read_disparity(&at("raw.tif")).unwrap();
+    let validity = read::grey8(&at("validity.png")).unwrap();
+    let confidence = read::grey8(&at("confidence.png")).unwrap();
+    assert_eq!([map.size(), raw.size(), validity.size(), confidence.size()], [(240, 180); 4]);
+    let preview = image::open(at("preview.png")).unwrap();
+    assert_eq!((preview.width(), preview.color()), (240, image::ColorType::Rgb8));
+    assert!(preview.height() > 180, "the scale is below the map");
+    let (mut measured, mut filled) = (0, 0);
+    for y in 0..180 {
+        for x in 0..240 {
+            let masked = x > 200 && y < 9;
+            let flags = validity[(x, y)];
+            assert_eq!(masked, flags & flag::MASKED != 0, "{x}, {y}");
+            assert_eq!(masked, !map[(x, y)].is_finite(), "all is filled but what is masked");
+            assert_eq!(masked, !raw[(x, y)].is_finite());
+            assert!(masked || (0.0..=31.0).contains(&map[(x, y)]), "{}", map[(x, y)]);
+            assert_eq!(flags & !(flag::INVALID | flag::LOW_CONFIDENCE | flag::FILLED), 0);
+            assert!(flags & flag::INVALID == 0 || confidence[(x, y)] == 0);
+            measured += usize::from(flags == 0);
+            filled += usize::from(flags & flag::FILLED != 0);
+        }
+    }
+    assert!(measured > 20_000 && filled > 500, "{measured} measured, {filled} filled");
+    assert!(confidence.data().iter().any(|&c| c > 100));
+    assert!(map != raw, "post-processing does something");
+
+    // The same map in the other formats; the number of threads changes nothing.
+    for (output, raw, step) in [("b.png", "raw.png", 256.0), ("c.tiff", "raw.PFM", f32::INFINITY)] {
+        let args = ["match", &left, &right, output, "--raw", raw, "--mask", "mask.png", "--threads", "1"];
+        let quiet = run(folder.path(), &[&args[..], &["--quiet", "--max-disparity", "31"]].concat());
+        let quiet = quiet.succeeded();
+        assert_eq!((quiet.stdout, quiet.stderr), (String::new(), String::new()));
+        for (name, expected) in [(output, &map), (raw, &read::read_disparity(&at("raw.tif")).unwrap())] {
+            let same = read::read_disparity(&at(name)).unwrap();
+            for (a, b) in same.data().iter().zip(expected.data()) {
+                // In 16-bit PNG a disparity of 0 is 1/256.
+                assert!(
+                    a.total_cmp(b).is_eq() || (a * step - 1.0).abs() < 1e-6 && *b == 0.0,
+                    "{name}: {a} and {b}"
+                );
+            }
+        }
+    }
+    let tiff = fs::read(at("c.tiff")).unwrap();
+    let mut decoder = tiff::decoder::Decoder::new(std::io::Cursor::new(tiff)).unwrap();
+    let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else { panic!("float") };
+    assert!(values[239].is_nan() && values[0].is_finite(), "invalid is NaN in TIFF");
+    let pfm = fs::read(at("a.pfm")).unwrap();
+    assert!(
+        pfm.ends_with(&f32::INFINITY.to_le_bytes()),
+        "invalid is +inf in PFM, whose last row is the top one"
+    );
+    let png = image::open(at("b.png")).unwrap().into_luma16();
+    assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
+
+    // Without the fill, what is invalid stays so.
+    let args = ["match", &left, &right, "d.pfm", "--no-fill", "--set", "fill=row", "--mask", "mask.png"];
+    run(folder.path(), &[&args[..], &["--validity", "v.png"]].concat()).succeeded();
+    let map = read::read_disparity(&at("d.pfm")).unwrap();
+    let validity = read::grey8(&at("v.png")).unwrap();
+    assert!(map.data().iter().zip(validity.data()).all(|(d, f)| d.is_finite() == (f & flag::INVALID == 0)));
+    assert!(map.data().iter().filter(|d| !d.is_finite()).count() > 1000);
+
+    let names: Vec<_> = listing(folder.path()).into_keys().collect();
+    assert_eq!(names.len(), 12, "nothing else is left: {names:?}");
+}
+
+#[test]
+fn ranges_may_be_negative() {
+    let folder = workshop();
+    // With the views swapped, every disparity has the other sign.
+    let args =
+        ["match", "right.png", "left.png", "out.tif", "--min-disparity", "-31", "--max-disparity", "-1"];
+    run(folder.path(), &args).succeeded();
+    let map = read::read_disparity(&folder.path().join("out.tif")).unwrap();
+    assert_eq!(map.size(), (60, 40));
+    assert!(map.data().iter().all(|d| (-31.0..=-1.0).contains(d)));
+}
+
+#[test]
+fn a_range_is_found_where_none_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png"), ("disp0GT.pfm", "truth.pfm")] {
+        fs::copy(scene("mixed").join(from), folder.path().join(to)).unwrap();
+    }
+    let truth = read::read_disparity(&folder.path().join("truth.pfm")).unwrap();
+    let finite = || truth.data().iter().copied().filter(|d| d.is_finite());
+    let (least, most) = (finite().fold(f32::MAX, f32::min), finite().fold(f32::MIN, f32::max));
+    for extra in [&[][..], &["--max-disparity", "auto"][..]] {
+        let args = [&["match", "left.png", "right.png", "out.pfm"], extra].concat();
+        let said = run(folder.path(), &args).succeeded().stderr;
+        let line = said.lines().find(|l| l.contains("by sparse matches")).expect("said on stderr");
+        let numbers: Vec<f32> =
+            line.split_whitespace().filter_map(|w| w.trim_end_matches(',').parse().ok()).collect();
+        assert!(numbers[0] <= least && numbers[1] >= most, "{line} and the truth is {least} to {most}");
+        assert!(numbers[1] - numbers[0] < 1.5 * (most - least), "{line} and the truth is {least} to {most}");
+    }
+    // What the user says counts.
+    let args =
+        ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "auto", "--min-disparity", "2"];
+    assert!(run(folder.path(), &args).succeeded().stderr.contains("disparities 2 to "));
+}
+
+#[test]
+fn a_pair_that_is_not_rectified_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "47"];
+    for (shift, warns) in [(0, false), (2, true)] {
+        for (from, to, top) in [("im0.png", "left.png", 0), ("im1.png", "right.png", shift)] {
+            let image = image::open(scene("mixed").join(from)).unwrap();
+            image.crop_imm(0, top, 320, 230).save(folder.path().join(to)).unwrap();
+        }
+        let said = run(folder.path(), &args).succeeded().stderr;
+        assert_eq!(said.contains("not rectified"), warns, "{said}");
+    }
+}
+
+#[test]
+fn intermediates_show_every_step() {
+    let folder = workshop();
+    let args =
+        "match left.png right.png out.pfm --max-disparity 20 --quiet --intermediates steps --set levels=3";
+    let args: Vec<&str> = args.split_whitespace().collect();
+    for (preset, more) in
+        [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "support-width"][..])]
+    {
+        run(folder.path(), &[&args[..], &["--preset", preset]].concat()).succeeded();
+        let steps = folder.path().join("steps");
+        let size = |name: &str| {
+            let picture = image::open(steps.join(format!("{name}.png"))).unwrap();
+            (picture.width(), picture.height())
+        };
+        assert_eq!(size("map-level-0").0, 60);
+        for name in
+            ["graph-degree-level-2", "map-level-2", "cost-level-0-disparity-10", "belief-entropy-nats"]
+        {
+            assert!(size(name).0 > 0);
+        }
+        for name in more {
+            assert!(size(name).0 >= 60, "{name}");
+        }
+        assert_eq!(steps.join("zones.png").exists(), preset == "paper");
+        let changes = fs::read_to_string(steps.join("change-per-iteration.csv")).unwrap();
+        assert!(changes.lines().count() > 5 && changes.starts_with("iteration,rms_change_px"), "{changes}");
+        assert!(listing(folder.path()).keys().all(|p| !p.to_str().unwrap().contains(".mrfgs-")));
+        fs::remove_dir_all(steps).unwrap();
+    }
+}
+
+#[test]
+fn files_in_the_way_are_replaced_and_devices_are_not() {
+    let folder = workshop();
+    fs::write(folder.path().join("out.pfm"), "old").unwrap();
+    let mut args = vec!["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
+    if cfg!(unix) {
+        args.extend(["--raw", "/dev/null", "--preview", "/dev/null"]);
+    }
+    run(folder.path(), &args).succeeded();
+    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (60, 40));
+}
+
+#[test]
+fn a_dry_run_prints_the_plan_and_leaves_nothing() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "20", "--dry-run"];
+    let plan = run(folder.path(), &[&args[..], &["--quiet", "--raw", "raw.pfm"]].concat()).succeeded();
+    assert_eq!(plan.stderr, "");
+    for words in [
+        "60 x 40 pixels, disparities 0 to 20 (21 labels)",
+        "0             60 x 40    0 to 20 (21)",
+        "5               2 x 2    0 to 1 (2)",
+        "messages   8 bits",
+        "3 iterations of levels 0 to 5",
+        "KiB",
+        "  all",
+    ] {
+        assert!(plan.stdout.contains(words), "no `{words}` in:\n{}", plan.stdout);
+    }
+    let paper = run(folder.path(), &[&args[..], &["--preset", "paper"]].concat()).succeeded();
+    for words in
+        ["16 bits", "30 iterations of levels 0 to 5", "or fewer, once the map changes by at most 0.1 px"]
+    {
+        assert!(paper.stdout.contains(words), "no `{words}` in:\n{}", paper.stdout);
+    }
+    // It finds what a real run would.
+    let args = ["match", "left.png", "right.png", "none/out.pfm", "--max-disparity", "20", "--dry-run"];
+    run(folder.path(), &args).failed(1, &["none", "create it"], "--dry-run");
+    assert!(listing(folder.path()) == before);
+}
+
+/// What `--memory` lets a match take decides on tiles, which are told.
+#[test]
+fn little_memory_makes_tiles() {
+    let folder = workshop();
+    let (left, right) = (scene_file("thin", "im0.png"), scene_file("thin", "im1.png"));
+    let args = ["match", &left, &right, "out.pfm", "--backend", "cpu"];
+    let with = |more: &[&str]| run(folder.path(), &[&args[..], more].concat());
+    let one = with(&["--dry-run"]).succeeded();
+    assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
+    let tiled = with(&["--dry-run", "--memory", "12MiB"]).succeeded();
+    for words in
+        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "  all"]
+    {
+        assert!(tiled.stdout.contains(words), "no `{words}` in:\n{}", tiled.stdout);
+    }
+    let told = with(&[]).succeeded();
+    assert!(told.stderr.contains("32 labels, 18 iterations"), "{told:?}");
+    let told = with(&["--memory", "12MiB", "--timings"]).succeeded();
+    assert!(told.stderr.contains("32 labels, 4 tiles, 18 iterations"), "{told:?}");
+    for (stage, runs) in [("cost", 4), ("right view", 4), ("visibility", 1), ("median", 1)] {
+        let row = told.stderr.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
+        assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
+    }
+    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (240, 180));
+    // Steps of one piece are what the folder shows.
+    let before = listing(folder.path());
+    let refused = with(&["--memory", "12MiB", "--intermediates", "steps"]);
+    refused.failed(1, &["--intermediates", "4 tiles", "give --memory"], "intermediates of tiles");
+    assert!(listing(folder.path()) == before);
+}
+
+#[test]
+fn timings_name_every_stage() {
+    let folder = workshop();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--timings"];
+    let table = run(folder.path(), &[&args[..], &["--backend", "cpu"]].concat()).succeeded().stderr;
+    let row = |name: &str| table.lines().find(|l| l.starts_with(name)).map(str::to_owned);
+    for stage in [
+        "stage ",
+        "graph ",
+        "cost ",
+        "pyramid, level 5",
+        "flood, level 0",
+        "region filter ",
+        "median ",
+        "download ",
+        "rest ",
+        "all ",
+    ] {
+        assert!(row(stage).is_some(), "no `{stage}` in:\n{table}");
+    }
+    assert!(row("all ").unwrap().ends_with(" 100.0 %"), "{table}");
+    assert!(row("flood, level 5").unwrap().split_whitespace().nth(3) == Some("18"), "{table}");
+    assert!(!table.contains("dispatches"), "{table}");
+    let told = run(folder.path(), &[&args[..], &["--quiet"]].concat());
+    told.failed(2, &["--timings", "--quiet"], "--quiet and --timings");
+}
+
+#[cfg(not(target_os = "macos"))]
+#[test]
+fn without_a_driver_auto_takes_the_cpu_path() {
+    let folder = workshop();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "auto"];
+    let told = run_with(folder.path(), &args, NO_DRIVER).succeeded();
+    assert!(told.stderr.contains(" on the CPU path, "), "{}", told.stderr);
+    let told = run_with(folder.path(), &["devices"], NO_DRIVER).succeeded();
+    assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` takes the CPU path\n");
+}

@@ -1,0 +1,199 @@
+//! Whole floods, against the twins on a schedule of their own.
+
+use crate::common::compare::compare_finest;
+use crate::common::devices::backends;
+use crate::common::random::{self, Random, State};
+use crate::common::twin;
+use crate::{MINIMA, on_all, resolve, same, twin_estimate};
+use mrfgs::backend::{Backend, Stage, Volume};
+use mrfgs::graph::{self, LevelGraph};
+use mrfgs::image::Pair;
+use mrfgs::options::{Cost, Method, PRESETS, Potential, Resolution, Schedule};
+use mrfgs::plan::Plan;
+use mrfgs::solver;
+use std::collections::HashSet;
+
+/// What was written must carry a flood on, whatever a backend stores beside the labels.
+#[test]
+fn a_flood_goes_on_from_a_written_state() {
+    on_all(|case, backend, random| {
+        for loose in [false, true] {
+            let mut state = random::state(random, &case.plan, &case.graphs, loose);
+            state.write(backend);
+            for _ in 0..2 {
+                for (z, graph) in case.graphs.iter().enumerate() {
+                    backend.run(Stage::Dependency(z)).unwrap();
+                    state.dependency[z] = twin::dependency::dependency(
+                        &case.plan,
+                        z,
+                        graph,
+                        &state.belief[z],
+                        &state.dependency[z],
+                    );
+                }
+                for z in 1..case.plan.levels.len() {
+                    backend.run(Stage::Resolution(z)).unwrap();
+                    resolve(&case.plan, &mut state, z);
+                }
+                for z in 0..case.plan.levels.len() {
+                    backend.run(Stage::Belief(z)).unwrap();
+                }
+                state.believe(&case.plan, &case.graphs);
+                for (volume, expected) in state.volumes() {
+                    same(&case.plan, backend, volume, expected)?;
+                }
+            }
+        }
+        Ok(())
+    });
+}
+
+/// The schedule once more, on the twins: coarse levels first or all together, and a new level and the
+/// one above hear of each other before the new one's own messages start.
+pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) -> u32 {
+    let last = plan.levels.len() - 1;
+    let method = &plan.method;
+    let additions: Vec<(usize, u32)> = match method.schedule {
+        Schedule::Together => vec![(0, method.iterations)],
+        Schedule::CoarseFirst => (0..=last)
+            .rev()
+            .map(|z| (z, if z == 0 { method.final_iterations } else { method.iterations }))
+            .collect(),
+    };
+    let mut total = 0;
+    let mut map = vec![0; plan.levels[0].pixels()];
+    for (finest, iterations) in additions {
+        if method.schedule == Schedule::CoarseFirst && finest < last {
+            resolve(plan, state, finest + 1);
+            state.believe_at(plan, graphs, finest);
+            state.believe_at(plan, graphs, finest + 1);
+        }
+        let watched = finest == 0 && method.tolerance > 0.0;
+        if watched {
+            twin::change::change(&state.belief[0], plan.levels[0].labels, &mut map);
+        }
+        for _ in 0..iterations {
+            total += 1;
+            for z in finest..=last {
+                state.dependency[z] =
+                    twin::dependency::dependency(plan, z, &graphs[z], &state.belief[z], &state.dependency[z]);
+            }
+            for z in finest + 1..=last {
+                resolve(plan, state, z);
+            }
+            for z in finest..=last {
+                state.believe_at(plan, graphs, z);
+            }
+            if watched {
+                let sum = twin::change::change(&state.belief[0], plan.levels[0].labels, &mut map);
+                if (sum as f64 / map.len() as f64).sqrt() <= method.tolerance {
+                    break;
+                }
+            }
+        }
+    }
+    total
+}
+
+/// From the pair to the estimate, on every backend and on the twins; the number of iterations.
+pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
+    let graphs = graph::build(pair.left(), plan);
+    let mut costs = vec![twin::cost::cost(plan, pair)];
+    for z in 1..plan.levels.len() {
+        costs.push(twin::pyramid::pyramid(plan, z, &costs[z - 1]));
+    }
+    let evidence =
+        costs.iter().enumerate().map(|(z, cost)| twin::evidence::evidence(plan, z, cost)).collect();
+    let mut state = State::fresh(plan, evidence);
+    let iterations = twin_flood(plan, &graphs, &mut state);
+    let mut maps = twin::Finest::zero(plan.size());
+    twin_estimate(plan, &costs[0], &state.belief[0], &mut maps);
+    for (name, mut backend) in backends() {
+        let backend = backend.as_mut();
+        backend.prepare(plan, pair, graphs.clone()).unwrap();
+        backend.run(Stage::Cost).unwrap();
+        for z in 1..plan.levels.len() {
+            backend.run(Stage::Pyramid(z)).unwrap();
+        }
+        for z in 0..plan.levels.len() {
+            backend.run(Stage::Evidence(z)).unwrap();
+        }
+        let check = |backend: &mut dyn Backend| -> Result<(), String> {
+            let actual = solver::flood(backend, plan).unwrap();
+            if actual != iterations {
+                return Err(format!("{actual} iterations but the twin did {iterations}"));
+            }
+            for (z, cost) in costs.iter().enumerate() {
+                same(plan, backend, Volume::Cost(z), cost)?;
+            }
+            for (volume, expected) in state.volumes() {
+                same(plan, backend, volume, expected)?;
+            }
+            twin::Finest::zero(plan.size()).write(backend);
+            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+                backend.run(stage).unwrap();
+            }
+            compare_finest(backend, &maps)
+        };
+        if let Err(e) = check(backend) {
+            panic!("{name}: {e}\n{:?}", plan.method);
+        }
+    }
+    iterations
+}
+
+#[test]
+fn floods_of_the_presets() {
+    for (i, (preset, _)) in PRESETS.iter().enumerate() {
+        let mut random = Random::new(i as u64);
+        let mut method = Method::preset(preset).unwrap();
+        method.iterations = method.iterations.min(8);
+        method.tolerance = 0.0;
+        let pair = random::pair(&mut random, 45, 27);
+        whole_flood(&random::plan((45, 27), -3, 19, &method), &pair);
+    }
+}
+
+#[test]
+fn floods_of_every_kind() {
+    let mut seed = 100;
+    for schedule in [Schedule::Together, Schedule::CoarseFirst] {
+        for potential in [Potential::Soft, Potential::Exact, Potential::Hard] {
+            for resolution in [Resolution::Strict, Resolution::Interpolating] {
+                for levels in [1, 3, 5] {
+                    seed += 1;
+                    let mut random = Random::new(seed);
+                    let mut method = random::method(&mut random, [2, 4, 8][seed as usize % 3]);
+                    (method.schedule, method.potential) = (schedule, potential);
+                    (method.resolution, method.levels) = (resolution, levels);
+                    let size = random.pick(&[(23, 14), (1, 30), (30, 1), (16, 16), (9, 21)]);
+                    let labels = random.pick(&[1, 2, 15, 16, 17, 33]);
+                    let pair = random::pair(&mut random, size.0, size.1);
+                    whole_flood(&random::plan(size, random.pick(MINIMA), labels, &method), &pair);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn floods_that_stop_by_themselves() {
+    let mut counts = HashSet::new();
+    for (i, tolerance) in [0.05, 0.3, 0.6, 1.0, 3.0, 1e6, 1e-9].into_iter().enumerate() {
+        for schedule in [Schedule::Together, Schedule::CoarseFirst] {
+            let mut random = Random::new(i as u64 + 7);
+            let mut method = random::method(&mut random, 4);
+            (method.cost, method.outside_cost, method.temperature) = (Cost::AdCensus, 0.8, 0.8);
+            (method.potential, method.dependency_cut, method.schedule) = (Potential::Soft, 2.0, schedule);
+            (method.levels, method.iterations, method.final_iterations) = (3, 5, 5);
+            method.tolerance = tolerance;
+            let pair = random::pair(&mut random, 24, 17);
+            let plan = random::plan((24, 17), 0, 12, &method);
+            let before: u32 =
+                plan.phases.iter().filter(|phase| phase.finest > 0).map(|phase| phase.iterations).sum();
+            counts.insert(whole_flood(&plan, &pair) - before);
+        }
+    }
+    // Some stop at once, some later, some never.
+    assert!(counts.contains(&1) && counts.contains(&5) && counts.len() > 2, "{counts:?}");
+}

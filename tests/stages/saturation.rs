@@ -1,0 +1,246 @@
+//! Sums at their largest, in 8 and in 16 bits.
+
+use crate::common::devices::backends;
+use crate::common::random::{self, Random, State};
+use crate::common::twin;
+use crate::common::twin::belief::belief_most;
+use crate::floods::twin_flood;
+use crate::{NEIGHBOURS, cells, resolve, same};
+use mrfgs::backend::{Stage, Volume, volume_shape};
+use mrfgs::graph::{self, LevelGraph};
+use mrfgs::options::{Method, Resolution};
+use mrfgs::plan::{Cut, CutRule, LevelPlan, Plan, VolumeWidth};
+use mrfgs::solver;
+use std::collections::HashSet;
+
+/// Graphs in which everyone is everyone's neighbour in every window: as many factors a pixel as there can be.
+fn full_graphs(plan: &Plan) -> Vec<LevelGraph> {
+    assert_eq!(plan.neighbours, 48);
+    let graph = |level: &LevelPlan| {
+        let mut codes = Vec::new();
+        for y in 0..level.height as i32 {
+            for x in 0..level.width as i32 {
+                codes.extend((0..49).filter(|&code| code != 24).map(|code| {
+                    let (nx, ny) = (x + code % 7 - 3, y + code / 7 - 3);
+                    let inside = nx >= 0 && ny >= 0 && nx < level.width as i32 && ny < level.height as i32;
+                    if inside { code as u8 } else { 255 }
+                }));
+            }
+        }
+        LevelGraph::new(level.width, level.height, 48, codes)
+    };
+    plan.levels.iter().map(graph).collect()
+}
+
+/// Evidence of everyone for label 0, as strong as it gets.
+fn sure(plan: &Plan) -> Vec<Vec<u32>> {
+    let evidence = |level: &LevelPlan| {
+        let cap = u32::from(level.evidence.cap);
+        (0..level.pixels() * level.labels).map(|i| if i % level.labels == 0 { 0 } else { cap }).collect()
+    };
+    plan.levels.iter().map(evidence).collect()
+}
+
+/// A flood on full graphs from sure evidence, on the twins and on every backend; the largest belief.
+fn flood_of_the_sure(plan: &Plan) -> u32 {
+    let (width, height) = plan.size();
+    let pair = random::pair(&mut Random::new(3), width, height);
+    let graphs = full_graphs(plan);
+    let mut state = State::fresh(plan, sure(plan));
+    let start = state.clone();
+    twin_flood(plan, &graphs, &mut state);
+    for (name, mut backend) in backends() {
+        backend.prepare(plan, &pair, graphs.clone()).unwrap();
+        start.write(backend.as_mut());
+        solver::flood(backend.as_mut(), plan).unwrap();
+        for (volume, expected) in state.volumes() {
+            if let Err(e) = same(plan, backend.as_mut(), volume, expected) {
+                panic!("{name}: {e}\n{plan:?}");
+            }
+        }
+    }
+    state.belief.iter().flatten().copied().max().unwrap()
+}
+
+/// The largest in-degree there is, the strongest potential, the largest evidence: 16 bits hold it.
+#[test]
+fn wide_beliefs_stay_below_their_largest() {
+    for (resolution, levels) in [(Resolution::Strict, 3), (Resolution::Interpolating, 2)] {
+        let mut method = Method::preset("paper").unwrap();
+        (method.percentile, method.resolution, method.levels) = (0.0, resolution, levels);
+        method.iterations = 6;
+        let plan = random::plan((15, 13), 0, 5, &method);
+        assert_eq!(plan.levels[0].evidence.cap, 255);
+        let largest = flood_of_the_sure(&plan);
+        assert!(largest < belief_most(&plan));
+        // The case is as bad as it gets: all 49 factors are at their cap.
+        assert!(largest >= 255 + 49 * 1023, "{largest}");
+    }
+}
+
+/// A plan of either width whose cuts are larger than a plan's own: beliefs exceed what it stores on full graphs.
+fn saturating(neighbours: usize, width: VolumeWidth, rule: CutRule, resolution: Resolution) -> Plan {
+    let mut method = Method::default();
+    method.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
+    method.evidence_cap = 10.0;
+    (method.levels, method.iterations, method.final_iterations) = (2, 2, 2);
+    method.resolution = resolution;
+    let mut plan = random::plan((15, 13), -3, 20, &method);
+    let tau = match width {
+        VolumeWidth::Narrow => 40,
+        VolumeWidth::Wide => 5000,
+    };
+    (plan.dependency, plan.resolution, plan.volume_width) = (Cut { tau, rule }, Cut { tau, rule }, width);
+    plan
+}
+
+#[test]
+fn beliefs_that_saturate() {
+    for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
+        for rule in [CutRule::Relative, CutRule::Absolute] {
+            for resolution in [Resolution::Strict, Resolution::Interpolating] {
+                let plan = saturating(48, width, rule, resolution);
+                assert_eq!(flood_of_the_sure(&plan), belief_most(&plan));
+            }
+        }
+    }
+}
+
+/// Negative control: where every label's sum saturates, a message says nothing, and a belief as little; one that did not
+/// saturate would.
+#[test]
+fn control_saturated_sums_say_nothing() {
+    for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
+        for resolution in [Resolution::Strict, Resolution::Interpolating] {
+            let plan = saturating(48, width, CutRule::Relative, resolution);
+            let pair = random::pair(&mut Random::new(3), 15, 13);
+            let graphs = full_graphs(&plan);
+            let tau = u32::from(plan.dependency.tau);
+            // Label 0 is a little better everywhere, in beliefs and in messages that are not at their minimum.
+            let better = |plan: &Plan, volume: Volume, most: u32| {
+                let (rows, labels, _) = volume_shape(plan, volume);
+                (0..rows * labels).map(|i| if i % labels == 0 { most - 5 } else { most }).collect::<Vec<_>>()
+            };
+            let zero = |plan: &Plan, volume: Volume| {
+                let (rows, labels, _) = volume_shape(plan, volume);
+                vec![0; rows * labels]
+            };
+            for (name, mut backend) in backends() {
+                let backend = backend.as_mut();
+                backend.prepare(&plan, &pair, graphs.clone()).unwrap();
+                for z in 0..2 {
+                    let belief = better(&plan, Volume::Belief(z), belief_most(&plan));
+                    backend.write(Volume::Belief(z), &belief).unwrap();
+                }
+                backend.run(Stage::Dependency(0)).unwrap();
+                let silent = zero(&plan, Volume::Dependency(0));
+                same(&plan, backend, Volume::Dependency(0), &silent)
+                    .unwrap_or_else(|e| panic!("{name}: {e}"));
+                backend.run(Stage::Resolution(1)).unwrap();
+                // The coarse pixel at the far corner has a single child, whose belief is no sum.
+                let up = backend.read(Volume::Up(1)).unwrap();
+                let silent: Vec<bool> =
+                    up.chunks(plan.levels[1].labels).map(|m| m.iter().all(|&m| m == 0)).collect();
+                let (corner, others) = silent.split_last().unwrap();
+                assert!(!corner && others.iter().all(|&silent| silent), "{name}: {silent:?}");
+
+                for volume in [Volume::Dependency(0), Volume::Down(0)] {
+                    backend.write(volume, &better(&plan, volume, tau)).unwrap();
+                }
+                backend.write(Volume::Evidence(0), &zero(&plan, Volume::Evidence(0))).unwrap();
+                backend.run(Stage::Belief(0)).unwrap();
+                // Away from the border every pixel is in 49 factors.
+                let belief = backend.read(Volume::Belief(0)).unwrap();
+                let labels = plan.levels[0].labels;
+                let inner = &belief[(6 * 15 + 7) * labels..][..labels];
+                assert!(inner.iter().all(|&b| b == belief_most(&plan)), "{name}: {inner:?}");
+            }
+        }
+    }
+}
+
+/// Negative control: what belongs to no label must not look better than labels that are all as bad as can be, even when its
+/// message is taken off it.
+#[test]
+fn control_padding_stays_behind_beliefs_that_saturate() {
+    for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
+        let plan = saturating(1, width, CutRule::Relative, Resolution::Interpolating);
+        let level = &plan.levels[0];
+        assert!(level.labels < level.stride);
+        let graphs: Vec<LevelGraph> = plan
+            .levels
+            .iter()
+            .map(|l| {
+                let codes = (0..l.pixels()).map(|i| if i % l.width == 0 { 255 } else { graph::code(-1, 0) });
+                LevelGraph::new(l.width, l.height, 1, codes.collect())
+            })
+            .collect();
+        let pair = random::pair(&mut Random::new(3), 15, 13);
+        let flat = |value| vec![value; cells(&plan, 0)];
+        let silent = vec![0; cells(&plan, 0) * plan.slots()];
+        for (name, mut backend) in backends() {
+            let backend = backend.as_mut();
+            backend.prepare(&plan, &pair, graphs.clone()).unwrap();
+            backend.write(Volume::Evidence(0), &flat(0)).unwrap();
+            backend.write(Volume::Belief(0), &flat(0)).unwrap();
+            for _ in 0..2 {
+                backend.run(Stage::Dependency(0)).unwrap();
+                same(&plan, backend, Volume::Dependency(0), &silent)
+                    .unwrap_or_else(|e| panic!("{name}: {e}"));
+                backend.write(Volume::Down(0), &flat(belief_most(&plan))).unwrap();
+                backend.run(Stage::Belief(0)).unwrap();
+                same(&plan, backend, Volume::Belief(0), &flat(belief_most(&plan))).unwrap();
+            }
+        }
+    }
+}
+
+/// Where nothing saturates even if a pixel is in more factors than usual, and where it may not.
+#[test]
+fn every_plan_leaves_room_for_its_beliefs() {
+    let mut random = Random::new(11);
+    let mut widths = HashSet::new();
+    for _ in 0..2000 {
+        let neighbours = random.pick(NEIGHBOURS);
+        let plan = random::plan((9, 9), 0, 9, &random::method(&mut random, neighbours));
+        let (dependency, resolution) = (u32::from(plan.dependency.tau), u32::from(plan.resolution.tau));
+        // As many as a factor has members in 8 bits, as many as there can be in 16.
+        let factors = match plan.volume_width {
+            VolumeWidth::Narrow => plan.neighbours as u32 + 1,
+            VolumeWidth::Wide => 49,
+        };
+        let cap = u32::from(plan.levels[0].evidence.cap);
+        assert!(plan.levels.iter().all(|l| u32::from(l.evidence.cap) == cap));
+        let usual = cap + factors * dependency + 2 * resolution;
+        assert!(usual <= belief_most(&plan), "{:?}", plan.method);
+        assert_eq!(belief_most(&plan), u32::from(plan.belief_most()));
+        widths.insert(format!("{:?}", plan.volume_width));
+    }
+    assert_eq!(widths.len(), 2);
+}
+
+/// Negative control: twins that saturate later than a narrow plan does give other volumes.
+#[test]
+fn control_saturation_in_8_bits_is_found() {
+    let plan = saturating(48, VolumeWidth::Narrow, CutRule::Relative, Resolution::Interpolating);
+    let mut wider = plan.clone();
+    wider.volume_width = VolumeWidth::Wide;
+    let graphs = full_graphs(&plan);
+    let mut random = Random::new(12);
+    let state = random::state(&mut random, &plan, &graphs, true);
+    let mut believed = state.clone();
+    believed.believe(&plan, &graphs);
+    let mut differ = believed.clone();
+    differ.believe(&wider, &graphs);
+    assert_ne!(believed.belief[0], differ.belief[0]);
+    let messages =
+        |plan| twin::dependency::dependency(plan, 0, &graphs[0], &state.belief[0], &state.dependency[0]);
+    assert_ne!(messages(&plan), messages(&wider));
+    let resolved = |plan| {
+        let mut state = state.clone();
+        resolve(plan, &mut state, 1);
+        (state.down, state.up)
+    };
+    let (narrow, wide) = (resolved(&plan), resolved(&wider));
+    assert!(narrow.0 != wide.0 && narrow.1 != wide.1);
+}
