@@ -128,7 +128,8 @@ pub enum Resolution {
 pub enum Schedule {
     /// All levels in every iteration (algorithm 1).
     Together,
-    /// The coarsest level first, then with each finer one added all levels so far.
+    /// The coarsest level first, then with each finer one added all levels so far; in the end level 0 and the coarser ones
+    /// in turns, as far as that still changes the result.
     CoarseFirst,
 }
 
@@ -217,10 +218,10 @@ method! {
     resolution_cut: f64, "nats, up to 255.75", "What disagreement costs in a resolution factor; not used by hard \
          potentials.";
     schedule: Schedule, "together | coarse-first", "Order of the flooding (algorithm 1: together).";
-    iterations: u32, "iterations, 1 to 1000", "Iterations of all levels together, or after each added level but the \
-         finest (section 3: 20 to 30).";
-    final_iterations: u32, "iterations, 0 to 1000", "Iterations once the finest level has joined; not used by the \
-         schedule together.";
+    iterations: u32, "iterations, 1 to 1000", "Iterations of all levels together, or of all levels so far after each \
+         added one but the finest (section 3: 20 to 30).";
+    final_iterations: u32, "iterations, 0 to 1000", "Iterations once the finest level has joined: every second one with the \
+         messages between levels, the others with those of the coarser levels; not used by the schedule together.";
     tolerance: f64, "pixels", "Stop when the RMS change of the finest map from one iteration to the next is at most \
          this; 0 runs all iterations (algorithm 1).";
     visibility: Visibility, "off | right-view | second-match", "Compare with the map of the right view, and call what \

@@ -10,8 +10,8 @@ use crate::front::zones::{self, Zones};
 use crate::graph::{self, LevelGraph};
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
-use crate::options::{Fill, Illumination, Median, Method, Visibility};
-use crate::plan::Plan;
+use crate::options::{Fill, Illumination, Median, Method, Schedule, Visibility};
+use crate::plan::{Phase, Plan};
 use crate::tiles::Tiles;
 use std::iter;
 use std::ops::ControlFlow;
@@ -241,12 +241,9 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
         if converges {
             backend.change()?;
         }
-        for _ in 0..phase.iterations {
+        for i in 0..phase.iterations {
             iterations += 1;
-            let levels = phase.finest..=coarsest;
-            // Every message is from old beliefs: those between levels first, then a level's own and its new beliefs.
-            let stages = levels.clone().skip(1).map(Stage::Resolution).chain(levels.map(Stage::Flood));
-            for stage in stages {
+            for stage in iteration(plan, phase, i) {
                 work.run(backend, plan, stage)?;
             }
             work.look(&mut Glimpse::Iteration(backend, iterations))?;
@@ -259,6 +256,25 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
         }
     }
     Ok(iterations)
+}
+
+/// The stages of iteration `i`, from 0 on, of a phase. Every message is from old beliefs: those between levels first, then a
+/// level's own and its new beliefs.
+fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> + use<> {
+    let (finest, coarsest) = (phase.finest, plan.levels.len() - 1);
+    // The coarsest levels that are resolved and that are flooded.
+    let (resolved, flooded) = match plan.method.schedule {
+        Schedule::Together => (coarsest, coarsest),
+        // What joining has just resolved would give the same messages again.
+        Schedule::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
+        // The coarser levels have settled: they and level 0 speak in turns. A level that is farther away than messages
+        // between levels still go has no say any more.
+        Schedule::CoarseFirst => {
+            let reach = coarsest.min((phase.iterations / 2 - i / 2) as usize);
+            if i % 2 == 0 { (0, reach) } else { (reach, 0) }
+        }
+    };
+    (finest + 1..=resolved).map(Stage::Resolution).chain((finest..=flooded).map(Stage::Flood))
 }
 
 /// What follows the estimate and looks at volumes still.
@@ -307,12 +323,7 @@ impl<'a, 'b> Work<'a, 'b> {
     }
 
     fn run(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
-        let cells = match stage {
-            Stage::Cost => cells(plan, 0),
-            Stage::Pyramid(z) | Stage::Flood(z) => cells(plan, z),
-            _ => 0.0,
-        };
-        self.begin(stage.name(), cells)?;
+        self.begin(stage.name(), work_of(plan, stage))?;
         backend.run(stage)?;
         self.look(&mut Glimpse::Stage(backend, stage))
     }
@@ -344,12 +355,17 @@ fn cells(plan: &Plan, level: usize) -> f64 {
     (plan.levels[level].pixels() * plan.levels[level].stride) as f64
 }
 
+fn work_of(plan: &Plan, stage: Stage) -> f64 {
+    match stage {
+        Stage::Cost => cells(plan, 0),
+        Stage::Pyramid(z) | Stage::Flood(z) => cells(plan, z),
+        _ => 0.0,
+    }
+}
+
 fn total_work(plan: &Plan) -> f64 {
     let all: f64 = (0..plan.levels.len()).map(|z| cells(plan, z)).sum();
-    let iterations: f64 = plan
-        .phases
-        .iter()
-        .map(|p| f64::from(p.iterations) * (p.finest..plan.levels.len()).map(|z| cells(plan, z)).sum::<f64>())
-        .sum();
-    all + iterations
+    let iterations = plan.phases.iter().flat_map(|phase| (0..phase.iterations).map(move |i| (phase, i)));
+    let stages = iterations.flat_map(|(phase, i)| iteration(plan, phase, i));
+    all + stages.map(|stage| work_of(plan, stage)).sum::<f64>()
 }

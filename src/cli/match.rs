@@ -278,10 +278,10 @@ fn describe(tiles: &Tiles) -> String {
     let _ = writeln!(out, "messages   {width} bits, factors of {} pixels and their centre", plan.neighbours);
     let last = plan.levels.len() - 1;
     for (i, phase) in plan.phases.iter().enumerate() {
-        let levels = if phase.finest == last {
-            format!("level {last}")
-        } else {
-            format!("levels {} to {last}", phase.finest)
+        let levels = match phase.finest {
+            z if z == last => format!("level {last}"),
+            0 if plan.method.schedule == Schedule::CoarseFirst => "level 0, the others in between".into(),
+            z => format!("levels {z} to {last}"),
         };
         let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
         let _ = writeln!(out, "{head:10} {n:>4} iteration{} of {levels}", plural(n as usize));

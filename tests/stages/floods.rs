@@ -48,8 +48,9 @@ fn a_flood_goes_on_from_a_written_state() {
     });
 }
 
-/// The schedule once more, on the twins: coarse levels first or all together, and a new level and the
-/// one above hear of each other before the new one's own messages start.
+/// The schedule once more, on the twins: all levels together, or coarse ones first. Then a new level and the one above hear
+/// of each other before the new one's own messages start, which spares the first iteration's exchange; in the end the
+/// coarser levels speak in every other iteration, and those that level 0 cannot hear any more do not.
 pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) -> u32 {
     let last = plan.levels.len() - 1;
     let method = &plan.method;
@@ -72,16 +73,29 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
         if watched {
             twin::change::change(&state.belief[0], plan.levels[0].labels, &mut map);
         }
-        for _ in 0..iterations {
+        for i in 0..iterations {
             total += 1;
-            for z in finest..=last {
+            // Levels that speak, and levels that hear from the next finer one.
+            let mut speak: Vec<usize> = (finest..=last).collect();
+            let mut hear: Vec<usize> = (finest + 1..=last).collect();
+            if method.schedule == Schedule::CoarseFirst {
+                if finest == 0 {
+                    // Messages between levels go one level at a time, in every second iteration.
+                    let exchanges = (i..iterations).filter(|j| j % 2 == 1).count();
+                    speak.retain(|&z| z == 0 || (i % 2 == 0 && z <= exchanges));
+                    hear.retain(|&z| i % 2 == 1 && z <= exchanges);
+                } else if i == 0 {
+                    hear.clear();
+                }
+            }
+            for &z in &speak {
                 state.dependency[z] =
                     twin::dependency::dependency(plan, z, &graphs[z], &state.belief[z], &state.dependency[z]);
             }
-            for z in finest + 1..=last {
+            for &z in &hear {
                 resolve(plan, state, z);
             }
-            for z in finest..=last {
+            for &z in &speak {
                 state.believe_at(plan, graphs, z);
             }
             if watched {
