@@ -2,7 +2,7 @@
 
 use super::units::{Blocks, Units, block, block_mut, padding};
 use crate::graph::LevelGraph;
-use crate::plan::Plan;
+use crate::plan::{LABEL_BLOCK, Plan};
 use rayon::prelude::*;
 use std::array::from_fn;
 
@@ -58,7 +58,15 @@ pub(super) fn row<U: Units>(
             padding,
             belief,
         };
-        sum.all(*stride);
+        let mut at = 0;
+        while at + 64 <= *stride {
+            sum.block::<64>(at);
+            at += 64;
+        }
+        while at < *stride {
+            sum.block::<LABEL_BLOCK>(at);
+            at += LABEL_BLOCK;
+        }
     }
 }
 

@@ -45,17 +45,14 @@ fn smooth_by<const LANES: usize>(
     let (radius, step) = (weights.radius(), 1 << weights.step_bits());
     let seen = Seen::new(weights, LANES, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
-    disparity.for_each_init(
-        || Window::<LANES>::new(radius),
-        |window, (y, row)| {
-            // The window's rows, in between those that it does not see.
-            let (apart, reach) = (step << weights.row_bits(), radius >> weights.row_bits());
-            let first = y - reach.min(y / apart) * apart;
-            let rows = (first..(y + reach * apart + 1).min(height)).step_by(apart);
-            window.open(rows.map(|ny| (ny * seen.pitch, weights.space_row(ny.abs_diff(y) / step))));
-            median_row(window, &seen, weights.doublings(), &|x| touched(flags[(x, y)]), y, row);
-        },
-    );
+    disparity.for_each_init(Window::<LANES>::new, |window, (y, row)| {
+        // The window's rows, in between those that it does not see.
+        let (apart, reach) = (step << weights.row_bits(), radius >> weights.row_bits());
+        let first = y - reach.min(y / apart) * apart;
+        let rows = (first..(y + reach * apart + 1).min(height)).step_by(apart);
+        window.open(rows.map(|ny| (ny * seen.pitch, weights.space_row(ny.abs_diff(y) / step))));
+        median_row(window, &seen, weights.doublings(), &|x| touched(flags[(x, y)]), y, row);
+    });
 }
 
 /// The medians of row `y`, where it is touched.
@@ -70,8 +67,18 @@ fn median_row_on<'a, S: pulp::Simd, const LANES: usize>(
     y: usize,
     row: &'a mut [i32],
 ) {
-    for (x, value) in row.iter_mut().enumerate().filter(|&(x, _)| touched(x)) {
-        *value = window.median(doublings, seen, seen.columns[x], y, *value);
+    let mut places = [0; GROUP];
+    let mut all = (0..row.len()).filter(|&x| touched(x));
+    loop {
+        let mut count = 0;
+        for (place, x) in places.iter_mut().zip(&mut all) {
+            *place = x;
+            count += 1;
+        }
+        if count == 0 {
+            return;
+        }
+        window.medians(doublings, seen, &places[..count], y, row);
     }
 }
 
@@ -135,29 +142,40 @@ const NEAR: i32 = 64;
 /// The values of a window are seen as far as this around a guess.
 const FAR: i32 = i16::MAX as i32;
 
+/// Pixels whose medians are sought side by side: each cut of an interval waits for the one before.
+const GROUP: usize = 4;
+/// Places of a window that are summed up side by side: what is left over would be summed up one by one.
+const SIDE: usize = 32;
 /// Sums of so many weights fit 16 bits.
 const PART: usize = 512;
 
-/// Values and weights of a window, row by row. What has no disparity has no weight.
+/// The windows of a group of pixels of one row.
 struct Window<const LANES: usize> {
-    /// Where its rows start in what it sees.
+    /// Where their rows start in what they see.
     rows: Vec<usize>,
     /// What distance takes off the weights.
     space: Vec<[u8; LANES]>,
+    contents: [Contents<LANES>; GROUP],
+}
+
+/// Values and weights of a window, row by row, in whole blocks of [`SIDE`]. What has no disparity has no weight.
+#[derive(Clone, Default)]
+struct Contents<const LANES: usize> {
+    column: usize,
+    /// Where the median is sought first.
+    guess: i32,
     /// Relative to the guess.
     values: Vec<[i16; LANES]>,
     weights: Vec<[u16; LANES]>,
+    total: u32,
+    /// The ends of the interval that the median is in, relative to the guess.
+    low: i32,
+    high: i32,
 }
 
 impl<const LANES: usize> Window<LANES> {
-    fn new(radius: usize) -> Self {
-        let rows = 2 * radius + 1;
-        Self {
-            rows: Vec::with_capacity(rows),
-            space: Vec::with_capacity(rows),
-            values: Vec::with_capacity(rows),
-            weights: Vec::with_capacity(rows),
-        }
+    fn new() -> Self {
+        Self { rows: Vec::new(), space: Vec::new(), contents: from_fn(|_| Contents::default()) }
     }
 
     /// Takes rows: where each starts in what is seen, and what distance takes off in it.
@@ -168,46 +186,100 @@ impl<const LANES: usize> Window<LANES> {
             self.rows.push(start);
             self.space.push(from_fn(|i| space.get(i).copied().unwrap_or(u8::MAX)));
         }
-        self.values.resize(self.rows.len(), [0; LANES]);
-        self.weights.resize(self.rows.len(), [0; LANES]);
-    }
-
-    /// The weighted median of the window whose rows start at `column`, around a pixel of row `y`; it is sought near `guess`
-    /// first.
-    #[inline(always)]
-    fn median(&mut self, doublings: u32, seen: &Seen, column: usize, y: usize, mut guess: i32) -> i32 {
-        self.weigh(doublings, seen, column, y);
-        loop {
-            for (values, &row) in self.values.iter_mut().zip(&self.rows) {
-                let seen: &[i32; LANES] = block(&seen.values, row + column);
-                *values = from_fn(|i| (seen[i] - guess).clamp(-FAR, FAR) as i16);
-            }
-            let found = self.search();
-            guess += found;
-            if found.abs() < FAR {
-                return guess;
-            }
+        let whole = self.rows.len().next_multiple_of(SIDE / LANES);
+        for Contents { values, weights, .. } in &mut self.contents {
+            values.resize(whole, [0; LANES]);
+            weights.clear();
+            weights.resize(whole, [0; LANES]);
         }
     }
 
+    /// Replaces the pixels at `places` of row `y` by the weighted medians of their windows, which are sought near what is
+    /// replaced first.
     #[inline(always)]
-    fn weigh(&mut self, doublings: u32, seen: &Seen, column: usize, y: usize) {
-        let centre = y * seen.pitch + column + seen.radius;
-        let [r, g, b] = &seen.guides;
-        let (cr, cg, cb) = (r[centre], g[centre], b[centre]);
+    fn medians(&mut self, doublings: u32, seen: &Seen, places: &[usize], y: usize, row: &mut [i32]) {
+        let Self { rows, space, contents } = self;
+        let contents = &mut contents[..places.len()];
+        for (window, &x) in contents.iter_mut().zip(places) {
+            (window.column, window.guess) = (seen.columns[x], row[x]);
+            window.weigh(doublings, seen, rows, space, y);
+            window.open(seen, rows);
+        }
+        while contents.iter().any(Contents::is_open) {
+            for window in contents.iter_mut().filter(|window| window.is_open()) {
+                window.cut();
+                if !window.is_open() && window.low.abs() == FAR {
+                    // Beyond what is seen from this guess.
+                    window.guess += window.low;
+                    window.open(seen, rows);
+                }
+            }
+        }
+        for (window, &x) in contents.iter().zip(places) {
+            row[x] = window.guess + window.low;
+        }
+    }
+}
+
+impl<const LANES: usize> Contents<LANES> {
+    #[inline(always)]
+    fn weigh(&mut self, doublings: u32, seen: &Seen, rows: &[usize], space: &[[u8; LANES]], y: usize) {
+        let centre = y * seen.pitch + self.column + seen.radius;
+        let centres = seen.guides.each_ref().map(|guide| guide[centre]);
         // What takes off all of the weight, doubled.
         let most = (MEDIAN_WEIGHT + 1) >> doublings;
-        for ((weights, space), &row) in self.weights.iter_mut().zip(&self.space).zip(&self.rows) {
-            let at = row + column;
-            let (r, g, b): (&[u8; LANES], &[u8; LANES], &[u8; LANES]) =
-                (block(r, at), block(g, at), block(b, at));
+        for ((weights, space), &row) in self.weights.iter_mut().zip(space).zip(rows) {
+            let at = row + self.column;
+            let mut apart = [0u8; LANES];
+            for (guide, centre) in seen.guides.iter().zip(centres) {
+                let guide: &[u8; LANES] = block(guide, at);
+                let above: [u8; LANES] = from_fn(|i| guide[i].saturating_sub(centre));
+                let below: [u8; LANES] = from_fn(|i| centre.saturating_sub(guide[i]));
+                apart = from_fn(|i| apart[i].saturating_add(above[i] | below[i]));
+            }
             let known: &[u8; LANES] = block(&seen.known, at);
-            let apart: [u8; LANES] = from_fn(|i| r[i].abs_diff(cr).saturating_add(g[i].abs_diff(cg)));
-            let apart: [u8; LANES] = from_fn(|i| apart[i].saturating_add(b[i].abs_diff(cb)));
-            let colour: [u8; LANES] = from_fn(|i| apart[i].min(most) << doublings);
+            let mut colour: [u8; LANES] = from_fn(|i| apart[i].min(most));
+            for _ in 0..doublings {
+                colour = from_fn(|i| colour[i].wrapping_add(colour[i]));
+            }
             let left: [u8; LANES] = from_fn(|i| MEDIAN_WEIGHT.saturating_sub(colour[i]));
-            *weights = from_fn(|i| u16::from(left[i].saturating_sub(space[i]) & known[i]));
+            let left: [u8; LANES] = from_fn(|i| left[i].saturating_sub(space[i]) & known[i]);
+            *weights = from_fn(|i| left[i].into());
         }
+    }
+
+    /// Looks at the values around the guess, and finds out in which of three intervals the median is.
+    #[inline(always)]
+    fn open(&mut self, seen: &Seen, rows: &[usize]) {
+        for (values, &row) in self.values.iter_mut().zip(rows) {
+            let seen: &[i32; LANES] = block(&seen.values, row + self.column);
+            *values = from_fn(|i| (seen[i] - self.guess).clamp(-FAR, FAR) as i16);
+        }
+        let [below_near, below_far, total] = self.below([-NEAR, NEAR, FAR]);
+        self.total = total;
+        [self.low, self.high] = if 2 * below_near >= total {
+            [-FAR, -NEAR]
+        } else if 2 * below_far >= total {
+            [1 - NEAR, NEAR]
+        } else {
+            [NEAR + 1, FAR]
+        };
+    }
+
+    /// Whether the median is not found yet.
+    #[inline(always)]
+    fn is_open(&self) -> bool {
+        self.low < self.high
+    }
+
+    /// Cuts the interval into four: that needs no sort.
+    #[inline(always)]
+    fn cut(&mut self) {
+        let share = (self.high - self.low + 4) / 4;
+        let ends = [1, 2, 3].map(|k| self.low + k * share - 1);
+        let short = self.below(ends).iter().filter(|&&below| 2 * below < self.total).count();
+        self.low += short as i32 * share;
+        self.high = self.high.min(self.low + share - 1);
     }
 
     /// The weights of values up to each of three.
@@ -226,27 +298,5 @@ impl<const LANES: usize> Window<LANES> {
             sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += u32::from(part));
         }
         sums
-    }
-
-    /// The smallest value at which half of the weight is reached.
-    #[inline(always)]
-    fn search(&self) -> i32 {
-        let [below_near, below_far, total] = self.below([-NEAR, NEAR, FAR]);
-        let [mut low, mut high] = if 2 * below_near >= total {
-            [-FAR, -NEAR]
-        } else if 2 * below_far >= total {
-            [1 - NEAR, NEAR]
-        } else {
-            [NEAR + 1, FAR]
-        };
-        // Cutting an interval into four needs no sort.
-        while low < high {
-            let share = (high - low + 4) / 4;
-            let ends = [1, 2, 3].map(|k| low + k * share - 1);
-            let short = self.below(ends).iter().filter(|&&below| 2 * below < total).count();
-            low += short as i32 * share;
-            high = high.min(low + share - 1);
-        }
-        low
     }
 }
