@@ -3,7 +3,6 @@
 
 use super::units::{Units, smallest};
 use super::{Finest, Peak};
-use crate::backend::NO_LABEL;
 use crate::plan::{LABEL_BLOCK, LevelPlan, Plan};
 use rayon::prelude::*;
 
@@ -31,19 +30,19 @@ fn peak_row_on<'a, S: pulp::Simd, U: Units>(
 pub(super) fn right_view<U: Units>(plan: &Plan, belief: &[U], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, labels, stride) = (level.width, level.labels, level.stride);
-    let names: Vec<u16> = (0..labels as u16).collect();
+    let names: Vec<u32> = (0..labels as u32).collect();
     let rows =
         maps.right.data_mut().par_chunks_mut(width).zip(maps.right_best.data_mut().par_chunks_mut(width));
     rows.zip(belief.par_chunks(width * stride)).for_each_init(
         // By the right pixel's place from the right, so that ascending labels are side by side.
-        || (vec![NO_LABEL; width], vec![U::MOST; width]),
-        |(found, smallest), ((right, best), row)| {
-            smallest.fill(U::MOST);
-            found.fill(NO_LABEL);
-            right_row(plan, &names, row, found, smallest);
-            right.iter_mut().zip(found.iter().rev()).for_each(|(right, &found)| *right = found);
-            for ((best, &least), &label) in best.iter_mut().zip(smallest.iter().rev()).zip(right.iter()) {
-                *best = if label == NO_LABEL { u16::MAX } else { least.into() };
+        // By the right pixel's place from the right, so that ascending labels are side by side: belief and label of the best
+        // so far, or as much as [`crate::backend::NO_LABEL`] says in both.
+        || vec![u32::MAX; width],
+        |found, ((right, best), row)| {
+            found.fill(u32::MAX);
+            right_row(plan, &names, row, found);
+            for ((right, best), &found) in right.iter_mut().zip(best).zip(found.iter().rev()) {
+                (*right, *best) = (found as u16, (found >> 16) as u16);
             }
         },
     );
@@ -54,16 +53,14 @@ pub(super) fn right_view<U: Units>(plan: &Plan, belief: &[U], maps: &mut Finest)
 fn right_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,
     plan: &'a Plan,
-    names: &'a [u16],
+    names: &'a [u32],
     row: &'a [U],
-    found: &'a mut [u16],
-    smallest: &'a mut [U],
+    found: &'a mut [u32],
 ) {
     let level = &plan.levels[0];
     let (width, labels) = (level.width, level.labels);
     for (x, belief) in row.chunks_exact(level.stride).enumerate().take(plan.core.end).skip(plan.core.start) {
-        // Label j of left pixel x is seen at right pixel x - min - j. For one right pixel x falls as j does, so
-        // labels arrive in ascending order and the first of equals stays.
+        // Label j of left pixel x is seen at right pixel x - min - j.
         let place = (width - 1 - x) as i64 + i64::from(level.min);
         let first = (-place).clamp(0, labels as i64) as usize;
         let end = (width as i64 - place).clamp(first as i64, labels as i64) as usize;
@@ -71,12 +68,11 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
             continue;
         }
         let seen = (place + first as i64) as usize..(place + end as i64) as usize;
-        let (found, smallest) = (&mut found[seen.clone()], &mut smallest[seen]);
         let beliefs = belief[first..end].iter().zip(&names[first..end]);
-        for ((found, least), (&b, &label)) in found.iter_mut().zip(smallest).zip(beliefs) {
-            // No label's belief is the largest there is.
-            *found = if b < *least { label } else { *found };
-            *least = b.min(*least);
+        for (found, (&b, &label)) in found[seen].iter_mut().zip(beliefs) {
+            // The smallest belief, and of those the lowest label.
+            let b: u32 = b.into();
+            *found = (*found).min(b << 16 | label);
         }
     }
 }
