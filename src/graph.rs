@@ -9,10 +9,13 @@
 use crate::image::{Image, Plane};
 use crate::plan::{GRAPH_WINDOW, Plan};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The code of a slot that no pixel fills: a neighbour outside the image, masked, or simply not there.
 pub const NO_MEMBER: u8 = u8::MAX;
 const RADIUS: i32 = GRAPH_WINDOW as i32 / 2;
+/// Rows of pixels whose factors are gathered together.
+const BAND: usize = 64;
 
 /// The dependency factors of one level.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +35,11 @@ pub struct LevelGraph {
 pub fn offset(code: u8) -> (i32, i32) {
     let code = i32::from(code);
     (code % GRAPH_WINDOW as i32 - RADIUS, code / GRAPH_WINDOW as i32 - RADIUS)
+}
+
+/// (dx, dy) of every code.
+fn offsets() -> impl Iterator<Item = (i32, i32)> {
+    (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8).map(offset)
 }
 
 /// The code of the member at (dx, dy), each -3 ..= 3.
@@ -55,47 +63,17 @@ impl LevelGraph {
             pixels * neighbours,
             "{neighbours} codes for each of {width} x {height} pixels"
         );
-        let steps = (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8)
-            .map(|code| {
-                let (dx, dy) = offset(code);
-                dy as isize * width as isize + dx as isize
-            })
-            .collect();
-        let mut graph = Self {
-            width,
-            height,
-            neighbours,
-            codes,
-            steps,
-            starts: vec![0; pixels + 1],
-            incoming: Vec::new(),
-        };
+        let step = |(dx, dy): (i32, i32)| dy as isize * width as isize + dx as isize;
+        let steps = offsets().map(step).collect();
+        let mut graph =
+            Self { width, height, neighbours, codes, steps, starts: vec![0], incoming: Vec::new() };
         graph.check();
-        for factor in 0..pixels {
-            graph.starts[factor + 1] += 1;
-            for i in factor * neighbours..(factor + 1) * neighbours {
-                if let Some(pixel) = graph.pixel(factor, graph.codes[i]) {
-                    graph.starts[pixel + 1] += 1;
-                }
-            }
-        }
-        for pixel in 0..pixels {
-            graph.starts[pixel + 1] += graph.starts[pixel];
-        }
-        let mut next = graph.starts.clone();
-        graph.incoming = vec![0; graph.starts[pixels] as usize];
-        let mut enter = |incoming: &mut [u32], pixel: usize, entry: usize| {
-            incoming[next[pixel] as usize] = entry as u32;
-            next[pixel] += 1;
-        };
-        for factor in 0..pixels {
-            let entry = factor * graph.slots();
-            enter(&mut graph.incoming, factor, entry);
-            for slot in 1..graph.slots() {
-                if let Some(pixel) = graph.pixel(factor, graph.codes[factor * neighbours + slot - 1]) {
-                    enter(&mut graph.incoming, pixel, entry + slot);
-                }
-            }
+        let bands: Vec<_> = (0..height).step_by(BAND).collect();
+        let bands: Vec<_> = bands.into_par_iter().map(|first| graph.transposed(first)).collect();
+        for (starts, incoming) in bands {
+            let before = graph.incoming.len() as u32;
+            graph.starts.extend(starts[1..].iter().map(|start| before + start));
+            graph.incoming.extend(incoming);
         }
         graph
     }
@@ -105,20 +83,51 @@ impl LevelGraph {
         if self.neighbours == 0 {
             return;
         }
-        let rows = self.codes.chunks_exact(self.width * self.neighbours);
-        for (y, row) in rows.enumerate() {
+        let offsets: Vec<(i32, i32)> = offsets().collect();
+        let rows = self.codes.par_chunks_exact(self.width * self.neighbours);
+        rows.enumerate().for_each(|(y, row)| {
             for (x, codes) in row.chunks_exact(self.neighbours).enumerate() {
                 for &code in codes.iter().filter(|&&code| code != NO_MEMBER) {
-                    let (dx, dy) = offset(code);
-                    let (px, py) = (x as i32 + dx, y as i32 + dy);
-                    assert!(
-                        px >= 0
-                            && py >= 0
-                            && px < self.width as i32
-                            && py < self.height as i32
-                            && dy <= RADIUS,
-                        "factor ({x}, {y}): member code {code} leads out of the image"
-                    );
+                    let inside = offsets.get(usize::from(code)).is_some_and(|&(dx, dy)| {
+                        x.wrapping_add_signed(dx as isize) < self.width
+                            && y.wrapping_add_signed(dy as isize) < self.height
+                    });
+                    assert!(inside, "factor ({x}, {y}): member code {code} leads out of the image");
+                }
+            }
+        });
+    }
+
+    /// Where the entries of each pixel start, and the entries, of [`BAND`] rows from `first` on.
+    fn transposed(&self, first: usize) -> (Vec<u32>, Vec<u32>) {
+        let pixels = first * self.width..(first + BAND).min(self.height) * self.width;
+        let mut starts = vec![0; pixels.len() + 1];
+        self.each_member(&pixels, |pixel, _| starts[pixel + 1] += 1);
+        for pixel in 0..pixels.len() {
+            starts[pixel + 1] += starts[pixel];
+        }
+        let (mut next, mut incoming) = (starts.clone(), vec![0; starts[pixels.len()] as usize]);
+        self.each_member(&pixels, |pixel, entry| {
+            incoming[next[pixel] as usize] = entry;
+            next[pixel] += 1;
+        });
+        (starts, incoming)
+    }
+
+    /// Calls `with` for every slot that holds one of `pixels`: which of them, and factor * slots + slot.
+    #[inline(always)]
+    fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, u32)) {
+        let reach = RADIUS as usize * self.width;
+        let factors = pixels.start.saturating_sub(reach)..(pixels.end + reach).min(self.width * self.height);
+        for factor in factors {
+            let entry = (factor * self.slots()) as u32;
+            if pixels.contains(&factor) {
+                with(factor - pixels.start, entry);
+            }
+            let codes = &self.codes[factor * self.neighbours..][..self.neighbours];
+            for (slot, &code) in (1..).zip(codes) {
+                if let Some(pixel) = self.pixel(factor, code).filter(|pixel| pixels.contains(pixel)) {
+                    with(pixel - pixels.start, entry + slot);
                 }
             }
         }
@@ -219,8 +228,7 @@ const NO_KEY: i32 = i32::MAX;
 fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let (width, height) = image.pixels.size();
     // By distance, then in raster order: the rank that breaks ties as promised.
-    let mut window: Vec<(i32, i32)> =
-        (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8).map(offset).filter(|&o| o != (0, 0)).collect();
+    let mut window: Vec<(i32, i32)> = offsets().filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
     let guide = Guide {
         window,

@@ -33,12 +33,13 @@ impl<'a, U: Units> Summands<'a, U> {
     }
 }
 
-/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on.
+/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on; none has spoken yet where there
+/// are no messages.
 pub(super) fn row<U: Units>(
     summands: &Summands<U>,
     y: usize,
     first: usize,
-    dependency: &[U],
+    dependency: Option<&[U]>,
     belief: &mut [U],
 ) {
     let Summands { graph, evidence, down, up, stride, most, padding } = summands;
@@ -51,26 +52,18 @@ pub(super) fn row<U: Units>(
             evidence: &evidence[start..][..*stride],
             down: down.get(start..start + stride),
             up: up.get(start..start + stride),
-            dependency,
+            dependency: dependency.unwrap_or_default(),
             base,
-            incoming: graph.incoming_of(pixel),
+            incoming: if dependency.is_some() { graph.incoming_of(pixel) } else { &[] },
             most: *most,
             padding,
             belief,
         };
-        let mut at = 0;
-        while at + 64 <= *stride {
-            sum.block::<64>(at);
-            at += 64;
-        }
-        while at < *stride {
-            sum.block::<LABEL_BLOCK>(at);
-            at += LABEL_BLOCK;
-        }
+        sum.all(*stride);
     }
 }
 
-pub(super) fn run<U: Units>(summands: &Summands<U>, dependency: &[U], belief: &mut [U]) {
+pub(super) fn run<U: Units>(summands: &Summands<U>, dependency: Option<&[U]>, belief: &mut [U]) {
     let cells = summands.graph.width() * summands.stride;
     belief.par_chunks_mut(cells).enumerate().for_each(|(y, belief)| row(summands, y, 0, dependency, belief));
 }
@@ -90,6 +83,8 @@ struct Sum<'a, U> {
 }
 
 impl<U: Units> Blocks for Sum<'_, U> {
+    const LONG: bool = true;
+
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
         let stride = self.evidence.len();

@@ -69,7 +69,7 @@ pub(super) fn run<U: Units>(
     let messages = &*messages;
     edges.into_par_iter().zip(&starts[1..count]).for_each(|(edge, &start)| {
         for (i, belief) in edge.chunks_exact_mut(cells).enumerate() {
-            belief::row(summands, start - REACH + i, 0, messages, belief);
+            belief::row(summands, start - REACH + i, 0, Some(messages), belief);
         }
     });
 }
@@ -100,7 +100,7 @@ impl<U: Units> Band<'_, U> {
             // All factors of this row's pixels have spoken.
             if let Some(done) = y.checked_sub(REACH).filter(|done| (self.first_own..end_own).contains(done)) {
                 let belief = &mut self.own[(done - self.first_own) * cells..][..cells];
-                belief::row(summands, done, self.first, self.messages, belief);
+                belief::row(summands, done, self.first, Some(&*self.messages), belief);
             }
         }
     }

@@ -186,6 +186,8 @@ struct Level<U> {
     cost: Zeroed<u16>,
     evidence: Zeroed<u8>,
     dependency: Zeroed<U>,
+    /// Whether a dependency message may be anything but 0.
+    spoken: bool,
     /// Empty at the coarsest level.
     down: Zeroed<U>,
     /// Empty at level 0.
@@ -206,6 +208,7 @@ impl<U: Units> Volumes<U> {
                     cost: Zeroed::new(if z == 0 { 0 } else { cells })?,
                     evidence: Zeroed::new(cells)?,
                     dependency: Zeroed::new(cells * graph.slots())?,
+                    spoken: false,
                     down: Zeroed::new(if z == last { 0 } else { cells })?,
                     up: Zeroed::new(if z == 0 { 0 } else { cells })?,
                     belief: Zeroed::new(cells)?,
@@ -232,7 +235,7 @@ impl<U: Units> Volumes<U> {
         self.pair = pair.clone();
         self.labels.fill(0);
         for (level, graph) in self.levels.iter_mut().zip(graphs) {
-            level.graph = graph;
+            (level.graph, level.spoken) = (graph, false);
             for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
                 messages.par_chunks_mut(1 << 20).for_each(|part| part.fill(U::default()));
             }
@@ -246,6 +249,7 @@ impl<U: Units> Volumes<U> {
         for level in &mut self.levels {
             level.cost.fill(wide);
             level.evidence.fill(byte);
+            level.spoken = true;
             level.belief.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
             for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
                 messages.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
@@ -285,6 +289,7 @@ impl<U: Units> Volumes<U> {
             }
             Stage::Dependency(z) => {
                 let l = &mut levels[z];
+                l.spoken = true;
                 dependency::run(plan, z, &l.graph, &l.belief, &mut l.dependency);
             }
             Stage::Resolution(z) => {
@@ -295,10 +300,11 @@ impl<U: Units> Volumes<U> {
             Stage::Belief(z) => {
                 let l = &mut levels[z];
                 let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&*l.down, &*l.up]);
-                belief::run(&summands, &l.dependency, &mut l.belief);
+                belief::run(&summands, l.spoken.then_some(&*l.dependency), &mut l.belief);
             }
             Stage::Flood(z) => {
                 let l = &mut levels[z];
+                l.spoken = true;
                 let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&*l.down, &*l.up]);
                 flood::run(plan, z, &summands, &mut l.dependency, &mut l.belief);
             }
@@ -335,7 +341,10 @@ impl<U: Units> Volumes<U> {
             Volume::Cost(0) => rows.fill(&mut self.fine_cost, |v| v as u8),
             Volume::Cost(_) => rows.fill(&mut self.levels[z].cost, |v| v as u16),
             Volume::Evidence(_) => rows.fill(&mut self.levels[z].evidence, |v| v as u8),
-            Volume::Dependency(_) => rows.fill(&mut self.levels[z].dependency, U::of),
+            Volume::Dependency(_) => {
+                self.levels[z].spoken = true;
+                rows.fill(&mut self.levels[z].dependency, U::of);
+            }
             Volume::Down(_) => rows.fill(&mut self.levels[z].down, U::of),
             Volume::Up(_) => rows.fill(&mut self.levels[z].up, U::of),
             Volume::Belief(_) => rows.fill(&mut self.levels[z].belief, U::of),

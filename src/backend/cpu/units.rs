@@ -91,6 +91,9 @@ pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values:
 
 /// What is done to rows of labels block by block.
 pub(super) trait Blocks {
+    /// Whether four vectors of each row that is worked on fit the registers.
+    const LONG: bool = false;
+
     /// Works on `N` labels from `at` on.
     fn block<const N: usize>(&mut self, at: usize);
 
@@ -98,6 +101,10 @@ pub(super) trait Blocks {
     #[inline(always)]
     fn all(&mut self, stride: usize) {
         let mut at = 0;
+        while Self::LONG && at + 4 * LABEL_BLOCK <= stride {
+            self.block::<{ 4 * LABEL_BLOCK }>(at);
+            at += 4 * LABEL_BLOCK;
+        }
         while at + 2 * LABEL_BLOCK <= stride {
             self.block::<{ 2 * LABEL_BLOCK }>(at);
             at += 2 * LABEL_BLOCK;
