@@ -154,25 +154,27 @@ fn factor<U: Units>(
 }
 
 /// The smallest q of the fine labels that agree with each coarse one; `around` holds those below, at and above the centres.
-/// (This function and the next are shuffles of vectors to the compiler on their own, and loops over bytes where they are
-/// inlined.)
-#[inline(never)]
+#[inline(always)]
 fn agreeing<U: Units>(around: &[U; 2 * LABEL_BLOCK + 1], interpolating: bool, best: &mut [U; LABEL_BLOCK]) {
-    *best = if interpolating {
-        from_fn(|i| around[2 * i].min(around[2 * i + 1]).min(around[2 * i + 2]))
+    let [below, at] = U::deinterleave(block(around, 0));
+    if interpolating {
+        let [_, above] = U::deinterleave(block(around, 1));
+        *best = from_fn(|i| below[i].min(at[i]).min(above[i]));
     } else {
-        from_fn(|i| around[2 * i + 1])
-    };
+        *best = at;
+    }
 }
 
 /// What fine labels take from the coarse ones that agree with them.
-#[inline(never)]
+#[inline(always)]
 fn spread<U: Units>(t: &[U; LABEL_BLOCK + 1], interpolating: bool, fine: &mut [U; 2 * LABEL_BLOCK]) {
-    *fine = if interpolating {
-        from_fn(|d| if d % 2 == 0 { t[d / 2] } else { t[d / 2].min(t[d / 2 + 1]) })
+    let at = *block(t, 0);
+    if interpolating {
+        let above: &[U; LABEL_BLOCK] = block(t, 1);
+        U::interleave(at, from_fn(|i| at[i].min(above[i])), fine);
     } else {
-        from_fn(|d| if d % 2 == 0 { t[d / 2] } else { U::MOST })
-    };
+        U::interleave(at, [U::MOST; LABEL_BLOCK], fine);
+    }
 }
 
 /// q: the belief less the factor's old message; infinite where there is no label.

@@ -18,10 +18,16 @@ pub(super) trait Units:
 
     /// A value, at most the largest.
     fn of(value: u32) -> Self;
+
+    /// The even and the odd ones of `values`. (In words of two, as compilers know how to take apart and put together.)
+    fn deinterleave(values: &[Self; 2 * LABEL_BLOCK]) -> [[Self; LABEL_BLOCK]; 2];
+
+    /// `even` and `odd` by turns.
+    fn interleave(even: [Self; LABEL_BLOCK], odd: [Self; LABEL_BLOCK], out: &mut [Self; 2 * LABEL_BLOCK]);
 }
 
 macro_rules! units {
-    ($type:ty) => {
+    ($type:ty, $word:ty) => {
         impl Units for $type {
             const MOST: Self = Self::MAX;
 
@@ -38,12 +44,33 @@ macro_rules! units {
             fn of(value: u32) -> Self {
                 Self::try_from(value).unwrap_or(Self::MOST)
             }
+
+            #[inline(always)]
+            fn deinterleave(values: &[Self; 2 * LABEL_BLOCK]) -> [[Self; LABEL_BLOCK]; 2] {
+                let pairs: &[[Self; 2]] = values.as_chunks().0;
+                let words: [$word; LABEL_BLOCK] =
+                    from_fn(|i| <$word>::from(pairs[i][0]) | <$word>::from(pairs[i][1]) << Self::BITS);
+                [words.map(|word| word as Self), words.map(|word| (word >> Self::BITS) as Self)]
+            }
+
+            #[inline(always)]
+            fn interleave(
+                even: [Self; LABEL_BLOCK],
+                odd: [Self; LABEL_BLOCK],
+                out: &mut [Self; 2 * LABEL_BLOCK],
+            ) {
+                let words: [$word; LABEL_BLOCK] =
+                    from_fn(|i| <$word>::from(even[i]) | <$word>::from(odd[i]) << Self::BITS);
+                for (out, word) in out.as_chunks_mut().0.iter_mut().zip(words) {
+                    *out = [word as Self, (word >> Self::BITS) as Self];
+                }
+            }
         }
     };
 }
 
-units!(u8);
-units!(u16);
+units!(u8, u16);
+units!(u16, u32);
 
 /// The smallest of a row, the largest there is for an empty one.
 #[inline(always)]
