@@ -67,22 +67,36 @@ pub(super) fn row<U: Units>(
     scratch: &mut Scratch<U>,
 ) {
     let (cut, stride, slots) = (plan.dependency, plan.levels[level].stride, graph.slots());
+    // Row and way of every code.
+    let places: [(usize, isize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
+        let (dx, dy) = offset(code as u8);
+        (REACH.wrapping_add_signed(dy as isize), dx as isize * stride as isize)
+    });
     for (x, messages) in messages.chunks_exact_mut(slots * stride).enumerate() {
-        let members = &mut scratch.members;
-        members.clear();
-        members.push((0, REACH, x * stride));
-        let neighbours = graph.neighbours_of(x, y).iter().enumerate().filter(|(_, code)| **code != NO_MEMBER);
-        members.extend(neighbours.map(|(i, &code)| {
-            let (dx, dy) = offset(code);
-            (i + 1, REACH.wrapping_add_signed(dy as isize), x.wrapping_add_signed(dx as isize) * stride)
-        }));
-        let belief = |&(_, row, start): &(usize, usize, usize)| &around[row][start..][..stride];
-        match &members[..] {
-            [_] => {}
-            [first, second, third] if slots == 3 && cut.rule == CutRule::Relative => {
-                three(cut, [belief(first), belief(second), belief(third)], messages, &mut scratch.sums);
+        let own = x * stride;
+        let place = |code: u8| {
+            let (row, way) = places[usize::from(code)];
+            (row, own.wrapping_add_signed(way))
+        };
+        let belief = |(row, start): (usize, usize)| &around[row][start..][..stride];
+        match *graph.neighbours_of(x, y) {
+            [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == CutRule::Relative => {
+                let beliefs = [belief((REACH, own)), belief(place(a)), belief(place(b))];
+                three(cut, beliefs, messages, &mut scratch.sums);
             }
-            _ => any(cut, stride, around, messages, scratch),
+            ref codes => {
+                let members = &mut scratch.members;
+                members.clear();
+                members.push((0, REACH, own));
+                let slots = (1..).zip(codes).filter(|(_, code)| **code != NO_MEMBER);
+                members.extend(slots.map(|(slot, &code)| {
+                    let (row, start) = place(code);
+                    (slot, row, start)
+                }));
+                if members.len() > 1 {
+                    any(cut, stride, around, messages, scratch);
+                }
+            }
         }
     }
 }
@@ -128,9 +142,9 @@ fn three<U: Units>(cut: Cut, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut 
     let stride = beliefs[0].len();
     let mut factor = Three { beliefs, messages: &*messages, sums, least: [[U::MOST; LABEL_BLOCK]; 3] };
     factor.all(stride);
-    let least = factor.least;
+    let least = least_of(&factor.least);
     for ((out, sums), least) in messages.chunks_exact_mut(stride).zip(sums.chunks_exact(stride)).zip(least) {
-        Cutting::new(sums, least_of(&least), cut, out).all(stride);
+        Cutting::new(sums, least, cut, out).all(stride);
     }
 }
 

@@ -111,7 +111,7 @@ fn factor<U: Units>(
         }
     }
     // Sums that saturate cannot be taken off again: each is of the others.
-    let mut least = [[U::MOST; LABEL_BLOCK]; 5];
+    let mut least = [U::MOST; LABEL_BLOCK];
     for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
         let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
         let parent = *block::<U, LABEL_BLOCK>(parent, z);
@@ -126,13 +126,13 @@ fn factor<U: Units>(
             add(u3, with_upper),
             add(u2, with_upper),
         ];
-        for ((sums, all), least) in sums.iter_mut().zip(all).zip(&mut least) {
+        keep_least(&mut least, &all[0]);
+        for (sums, all) in sums.iter_mut().zip(all) {
             *block_mut(sums, z) = all;
-            keep_least(least, &all);
         }
     }
     // The padding of the sums to the parent is infinite, as all that agrees with it is.
-    Cutting::new(&sums[0], least_of(&least[0]), cut, up).all(coarse_stride);
+    Cutting::new(&sums[0], least_of(&[least])[0], cut, up).all(coarse_stride);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
             for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
@@ -140,16 +140,18 @@ fn factor<U: Units>(
             }
         }
     }
-    for (place, fine) in children.into_iter().zip(fine.iter()) {
-        let Some(at) = place else { continue };
-        let fine = &fine[lead..][..fine_stride];
-        let mut least = [U::MOST; LABEL_BLOCK];
-        for d in (0..fine_stride).step_by(LABEL_BLOCK) {
-            let (sums, padding) =
-                (block::<U, LABEL_BLOCK>(fine, d), block::<U, LABEL_BLOCK>(&between.fine_padding, d));
-            keep_least(&mut least, &from_fn::<U, LABEL_BLOCK, _>(|i| sums[i].max(padding[i])));
+    let fine = fine.each_ref().map(|fine| &fine[lead..][..fine_stride]);
+    let mut least = [[U::MOST; LABEL_BLOCK]; 4];
+    for d in (0..fine_stride).step_by(LABEL_BLOCK) {
+        let padding = block::<U, LABEL_BLOCK>(&between.fine_padding, d);
+        for (least, fine) in least.iter_mut().zip(fine) {
+            let sums = block::<U, LABEL_BLOCK>(fine, d);
+            keep_least(least, &from_fn::<U, LABEL_BLOCK, _>(|i| sums[i].max(padding[i])));
         }
-        Cutting::new(fine, least_of(&least), cut, &mut down[at..][..fine_stride]).all(fine_stride);
+    }
+    for ((place, fine), least) in children.into_iter().zip(fine).zip(least_of(&least)) {
+        let Some(at) = place else { continue };
+        Cutting::new(fine, least, cut, &mut down[at..][..fine_stride]).all(fine_stride);
     }
 }
 

@@ -98,13 +98,10 @@ pub(super) fn block_mut<T, const N: usize>(row: &mut [T], at: usize) -> &mut [T;
 /// The smallest of each of `LABEL_BLOCK` lanes.
 pub(super) type Least<U> = [U; LABEL_BLOCK];
 
-/// The smallest of all lanes.
-#[inline(always)]
-pub(super) fn least_of<U: Units>(lanes: &Least<U>) -> U {
-    let pairs: [U; 8] = from_fn(|i| lanes[i].min(lanes[i + 8]));
-    let quads: [U; 4] = from_fn(|i| pairs[i].min(pairs[i + 4]));
-    let halves: [U; 2] = from_fn(|i| quads[i].min(quads[i + 2]));
-    halves[0].min(halves[1])
+/// The smallest of all lanes, of each. (On its own, for inlined it is a chain of single bytes to the compiler.)
+#[inline(never)]
+pub(super) fn least_of<U: Units, const N: usize>(each: &[Least<U>; N]) -> [U; N] {
+    each.map(|lanes| smallest(&lanes))
 }
 
 /// Lane by lane, the smaller of `least` and all of `values`.
