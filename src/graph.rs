@@ -233,7 +233,10 @@ fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let guide = Guide {
         window,
         weight,
-        channels: [0, 1, 2].map(|c| image.pixels.map(|pixel| pixel[c])),
+        channels: [0, 1, 2].map(|c| {
+            let channel = image.pixels.data().par_iter().map(|pixel| pixel[c]);
+            Plane::new(width, height, channel.collect())
+        }),
         masked: image.masked.map(|&masked| if masked { NO_KEY } else { 0 }),
     };
     let mut codes = vec![NO_MEMBER; width * height * neighbours];

@@ -2,6 +2,7 @@
 
 use super::Finest;
 use crate::maps::flag;
+use rayon::prelude::*;
 
 pub(super) fn run(maps: &mut Finest) {
     let Finest { disparity, validity: flags, .. } = maps;
@@ -12,18 +13,19 @@ pub(super) fn run(maps: &mut Finest) {
         return;
     }
     let filled_rows: Vec<Vec<i32>> =
-        valid_rows.iter().map(|&y| fill_row(disparity.row(y), flags.row(y))).collect();
-    for y in 0..height {
-        let nearest = (0..valid_rows.len()).min_by_key(|&i| valid_rows[i].abs_diff(y)).unwrap_or(0);
-        let source = &filled_rows[nearest];
-        for x in 0..width {
-            let flags = &mut flags[(x, y)];
+        valid_rows.par_iter().map(|&y| fill_row(disparity.row(y), flags.row(y))).collect();
+    let rows = disparity.data_mut().par_chunks_mut(width).zip(flags.data_mut().par_chunks_mut(width));
+    rows.enumerate().for_each(|(y, (disparity, flags))| {
+        let below = valid_rows.partition_point(|&row| row < y);
+        let either = below.saturating_sub(1)..valid_rows.len().min(below + 1);
+        let nearest = either.min_by_key(|&i| valid_rows[i].abs_diff(y)).unwrap_or(0);
+        for ((disparity, flags), &source) in disparity.iter_mut().zip(flags).zip(&filled_rows[nearest]) {
             if *flags & flag::INVALID != 0 && *flags & flag::MASKED == 0 {
-                disparity[(x, y)] = source[x];
+                *disparity = source;
                 *flags |= flag::FILLED;
             }
         }
-    }
+    });
 }
 
 /// A row with at least one valid pixel, its invalid ones filled.

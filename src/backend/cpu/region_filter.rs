@@ -6,9 +6,20 @@ use crate::maps::flag;
 pub(super) fn run(size: usize, maps: &mut Finest) {
     let Finest { peaks, validity, .. } = maps;
     let (width, height) = peaks.size();
-    let labels = peaks.data();
     let flags = validity.data_mut();
-    let mut seen: Vec<bool> = flags.iter().map(|&f| f != 0).collect();
+    // With a border of what belongs to no region, so that every pixel has four neighbours.
+    let pitch = width + 2;
+    let mut labels = vec![0; pitch * (height + 2)];
+    let mut seen = vec![true; labels.len()];
+    for y in 0..height {
+        let inside = (y + 1) * pitch + 1..(y + 2) * pitch - 1;
+        let pixels = peaks.row(y).iter().zip(&flags[y * width..]);
+        for ((label, seen), (peak, &flags)) in
+            labels[inside.clone()].iter_mut().zip(&mut seen[inside]).zip(pixels)
+        {
+            (*label, *seen) = (peak.label, flags != 0);
+        }
+    }
     let mut region = Vec::new();
     for start in 0..labels.len() {
         if seen[start] {
@@ -20,15 +31,8 @@ pub(super) fn run(size: usize, maps: &mut Finest) {
         let mut next = 0;
         while let Some(&at) = region.get(next) {
             next += 1;
-            let (x, y) = (at % width, at / width);
-            let neighbours = [
-                (x > 0).then(|| at - 1),
-                (x + 1 < width).then(|| at + 1),
-                (y > 0).then(|| at - width),
-                (y + 1 < height).then(|| at + width),
-            ];
-            for to in neighbours.into_iter().flatten() {
-                if !seen[to] && labels[at].label.abs_diff(labels[to].label) <= 1 {
+            for to in [at - 1, at + 1, at - pitch, at + pitch] {
+                if !seen[to] && labels[at].abs_diff(labels[to]) <= 1 {
                     seen[to] = true;
                     region.push(to);
                 }
@@ -36,7 +40,7 @@ pub(super) fn run(size: usize, maps: &mut Finest) {
         }
         if region.len() < size {
             for &at in &region {
-                flags[at] |= flag::SMALL_REGION;
+                flags[(at / pitch - 1) * width + at % pitch - 1] |= flag::SMALL_REGION;
             }
         }
     }
