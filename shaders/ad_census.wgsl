@@ -16,9 +16,9 @@ const MOST_COLOUR: u32 = 64u;
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     let width = params.level.width;
-    let x = id.x / params.level.quads;
-    let quad = id.x - x * params.level.quads;
-    if x >= width || id.y >= params.rows {
+    let quad = id.x / width;
+    let x = id.x - quad * width;
+    if quad >= params.level.quads || id.y >= params.rows {
         return;
     }
     let row = id.y * params.level.pixel_pitch;

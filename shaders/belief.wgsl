@@ -18,20 +18,23 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let id = place(group, lane);
     let quads = params.level.quads;
     let blocks = quads / QUADS;
-    let x = id.x / blocks;
-    let first = (id.x - x * blocks) * QUADS;
-    if x >= params.level.width || id.y >= params.rows {
+    let width = params.level.width;
+    let block = id.x / width;
+    let x = id.x - block * width;
+    let first = block * QUADS;
+    if block >= blocks || id.y >= params.rows {
         return;
     }
-    let at = id.y * params.level.pitch + x * quads + first;
+    let row = id.y * params.level.pitch;
     var sums: array<vec4<u32>, QUADS>;
     for (var i = 0u; i < QUADS; i++) {
-        sums[i] = unpack_narrow(evidence[at + i]);
+        let at = row + place_of(first + i, x);
+        sums[i] = unpack_narrow(evidence[at]);
         if HAS_DOWN {
-            sums[i] += unpack(down[at + i]);
+            sums[i] += unpack(down[at]);
         }
         if HAS_UP {
-            sums[i] += unpack(up[at + i]);
+            sums[i] += unpack(up[at]);
         }
     }
     let y = params.first_row + id.y;
@@ -43,13 +46,13 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let entry = incoming[e];
         let fx = x + (entry & 7u) - RADIUS;
         let fy = y + ((entry >> 3u) & 7u) - RADIUS - top;
-        let message = fy * params.level.dependency_pitch + (fx * SLOTS + (entry >> 6u)) * quads + first;
+        let message = fy * params.level.dependency_pitch + place_of((entry >> 6u) * quads + first, fx);
         for (var i = 0u; i < QUADS; i++) {
-            sums[i] += unpack(dependency[message + i]);
+            sums[i] += unpack(dependency[message + i * width]);
         }
     }
     for (var i = 0u; i < QUADS; i++) {
         let sum = min(sums[i], vec4(params.belief_most));
-        belief[at + i] = pack(select(vec4(MOST), sum, are_labels(first + i)));
+        belief[row + place_of(first + i, x)] = pack(select(vec4(MOST), sum, are_labels(first + i)));
     }
 }

@@ -10,11 +10,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }
-    let first = id.y * params.level.pitch + id.x * params.level.quads;
+    let first = id.y * params.level.pitch;
     var least = vec4(0xffffffffu);
     for (var quad = 0u; quad < params.level.quads; quad++) {
         // Belief and label in one key; padding's beliefs are above all others.
-        least = min(least, (unpack(belief[first + quad]) << vec4(16u)) | labels_of(quad));
+        least = min(least, (unpack(belief[first + place_of(quad, id.x)]) << vec4(16u)) | labels_of(quad));
     }
     let label = smallest(least) & 0xffffu;
     let pixel = id.y * params.level.pixel_pitch + id.x;

@@ -29,10 +29,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let quads = params.level.quads;
     let y = params.first_row + id.y;
     let top = halo_start(RADIUS);
+    let width = params.level.width;
     // First quad of the factor's messages, and of each member's belief.
-    let own = id.y * params.level.dependency_pitch + id.x * SLOTS * quads;
+    let own = id.y * params.level.dependency_pitch + id.x;
     var bases: array<u32, SLOTS>;
-    bases[0] = (y - top) * params.level.pitch + id.x * quads;
+    bases[0] = (y - top) * params.level.pitch + id.x;
     var present = 1u;
     let codes = id.y * params.level.member_pitch + id.x * ((SLOTS + 2u) / 4u);
     for (var slot = 1u; slot < SLOTS; slot++) {
@@ -41,7 +42,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         if code != NO_MEMBER {
             let px = id.x + code % WINDOW - RADIUS;
             let py = y + code / WINDOW - RADIUS;
-            bases[slot] = (py - top) * params.level.pitch + px * quads;
+            bases[slot] = (py - top) * params.level.pitch + px;
             present += 1u;
         }
     }
@@ -57,7 +58,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             if bases[slot] != ABSENT {
                 var least = vec4(MOST);
                 for (var quad = 0u; quad < quads; quad++) {
-                    least = min(least, to_factor(bases[slot] + quad, own + slot * quads + quad, 0u));
+                    least = min(least, to_factor(bases[slot] + quad * width, own + (slot * quads + quad) * width, 0u));
                 }
                 floors[slot] = smallest(least);
             }
@@ -74,7 +75,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                q[slot] = to_factor(bases[slot] + quad, own + slot * quads + quad, floors[slot]);
+                q[slot] = to_factor(bases[slot] + quad * width, own + (slot * quads + quad) * width, floors[slot]);
                 total += q[slot];
             }
         }
@@ -97,14 +98,14 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                q[slot] = to_factor(bases[slot] + quad, own + slot * quads + quad, floors[slot]);
+                q[slot] = to_factor(bases[slot] + quad * width, own + (slot * quads + quad) * width, floors[slot]);
                 total += q[slot];
             }
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
                 let sum = min(total - q[slot], vec4(high[slot]));
-                messages[own + slot * quads + quad] = pack(sum - vec4(low[slot]));
+                messages[own + (slot * quads + quad) * width] = pack(sum - vec4(low[slot]));
             }
         }
     }

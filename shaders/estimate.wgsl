@@ -6,8 +6,8 @@
 
 const NONE: u32 = 0xffffu;
 
-fn load(first: u32, quad: u32) -> vec4<u32> {
-    return select(vec4(NONE), unpack(belief[first + quad]), are_labels(quad));
+fn load(index: u32, quad: u32) -> vec4<u32> {
+    return select(vec4(NONE), unpack(belief[index]), are_labels(quad));
 }
 
 @compute @workgroup_size(64)
@@ -16,18 +16,18 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }
-    let first = id.y * params.level.pitch + id.x * params.level.quads;
+    let row = id.y * params.level.pitch;
     // Belief and label in one key: the smallest key is the smallest belief at its lowest label.
     var least = vec4(0xffffffffu);
     for (var quad = 0u; quad < params.level.quads; quad++) {
-        least = min(least, (load(first, quad) << vec4(16u)) | labels_of(quad));
+        least = min(least, (load(row + place_of(quad, id.x), quad) << vec4(16u)) | labels_of(quad));
     }
     let key = smallest(least);
     let label = i32(key & 0xffffu);
     var rival = vec4(NONE);
     for (var quad = 0u; quad < params.level.quads; quad++) {
         let away = abs(vec4<i32>(labels_of(quad)) - vec4(label)) > vec4(1);
-        rival = min(rival, select(vec4(NONE), load(first, quad), away));
+        rival = min(rival, select(vec4(NONE), load(row + place_of(quad, id.x), quad), away));
     }
     peaks[id.y * params.level.pixel_pitch + id.x] = vec2(u32(label) | (key & 0xffff0000u), smallest(rival));
 }

@@ -27,18 +27,18 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let quads = params.level.quads;
     let pitch = params.level.pitch;
     let row = id.y * select(2u * pitch, pitch, FINE_NARROW);
-    let first = id.x * quads;
     var least = vec4(1u << 16u);
     for (var quad = 0u; quad < quads; quad++) {
-        least = min(least, load_cost(row, first + quad, quad));
+        least = min(least, load_cost(row, place_of(quad, id.x), quad));
     }
     let base = vec4(smallest(least));
     for (var quad = 0u; quad < quads; quad++) {
-        let difference = min(load_cost(row, first + quad, quad) - base, vec4(params.evidence_limit));
+        let index = place_of(quad, id.x);
+        let difference = min(load_cost(row, index, quad) - base, vec4(params.evidence_limit));
         let product = ((difference << vec4(params.evidence_up)) * params.evidence_multiplier) >> vec4(16u);
         let scaled = (product + vec4((1u << params.evidence_down) >> 1u)) >> vec4(params.evidence_down);
         let e = min(scaled, vec4(params.evidence_cap));
-        evidence[id.y * pitch + first + quad] = pack_narrow(select(vec4(PADDING), e, are_labels(quad)));
-        belief[id.y * pitch + first + quad] = pack(select(vec4(MOST), e, are_labels(quad)));
+        evidence[id.y * pitch + index] = pack_narrow(select(vec4(PADDING), e, are_labels(quad)));
+        belief[id.y * pitch + index] = pack(select(vec4(MOST), e, are_labels(quad)));
     }
 }

@@ -16,12 +16,12 @@ fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
         let v = u32(clamp(2 * y + j - 2, 0, i32(params.fine.height) - 1)) - top;
         for (var i = 0; i < 5; i++) {
             let u = u32(clamp(2 * x + i - 2, 0, i32(params.fine.width) - 1));
-            let start = v * pitch + u * params.fine.quads * words;
+            let quad = v * pitch + words * (label / 4u * params.fine.width + u);
             var c: u32;
             if FINE_NARROW {
-                c = ((fine_cost[start + label / 4u] >> (8u * (label % 4u))) & 0xffu) << 8u;
+                c = ((fine_cost[quad] >> (8u * (label % 4u))) & 0xffu) << 8u;
             } else {
-                c = (fine_cost[start + label / 2u] >> (16u * (label % 2u))) & 0xffffu;
+                c = (fine_cost[quad + label % 4u / 2u] >> (16u * (label % 2u))) & 0xffffu;
             }
             sum += WEIGHTS[i] * WEIGHTS[j] * c;
         }
@@ -34,15 +34,14 @@ var<private> WEIGHTS: array<u32, 5> = array(1u, 4u, 6u, 4u, 1u);
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    let pairs = 2u * params.level.quads;
-    let x = id.x / pairs;
-    let pair = id.x - x * pairs;
-    if x >= params.level.width || id.y >= params.rows {
+    let quad = id.x / 2u / params.level.width;
+    let x = id.x / 2u - quad * params.level.width;
+    if quad >= params.level.quads || id.y >= params.rows {
         return;
     }
     let y = params.first_row + id.y;
     // Smoothed costs at the fine labels from two below the first coarse label to two above the second.
-    let base = i32(4u * pair) + params.label_offset - 2;
+    let base = i32(8u * quad + 4u * (id.x % 2u)) + params.label_offset - 2;
     var s: array<u32, 7>;
     for (var i = 0; i < 7; i++) {
         if LOW_PASS || (i >= 1 && i <= 5) {

@@ -21,7 +21,7 @@ fn from_children(index: i32) -> vec4<u32> {
         return vec4(MOST);
     }
     let label = u32(index);
-    let at = children_at + vec4(label / PER_WORD);
+    let at = children_at + vec4(word_of(label, params.fine.width));
     let beliefs = vec4(
         pick(fine_belief[at.x], label), pick(fine_belief[at.y], label),
         pick(fine_belief[at.z], label), pick(fine_belief[at.w], label));
@@ -31,7 +31,7 @@ fn from_children(index: i32) -> vec4<u32> {
 }
 
 fn from_parent(label: u32) -> u32 {
-    let at = parent_at + label / PER_WORD;
+    let at = parent_at + word_of(label, params.level.width);
     return pick(coarse_belief[at], label) - pick(up[at], label) - parent_floor;
 }
 
@@ -72,7 +72,7 @@ var<private> down_words: vec4<u32>;
 fn emit_up(label: u32, message: u32) {
     up_word |= message << (BITS * (label % PER_WORD));
     if label % PER_WORD == PER_WORD - 1u {
-        up[parent_at + label / PER_WORD] = up_word;
+        up[parent_at + word_of(label, params.level.width)] = up_word;
         up_word = 0u;
     }
 }
@@ -90,7 +90,7 @@ fn emit_down(index: i32, sums: vec4<u32>, least: vec4<u32>) {
     }
     down_words |= message << vec4(BITS * (label % PER_WORD));
     if label % PER_WORD == PER_WORD - 1u {
-        let at = children_at + vec4(label / PER_WORD);
+        let at = children_at + vec4(word_of(label, params.fine.width));
         // The first child last: those outside the image wrote to its place.
         if exists.w {
             down[at.w] = down_words.w;
@@ -121,8 +121,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     exists = vec4(true, right, below, right && below);
     let rows = vec4(y) + select(vec4<u32>(), vec4(0u, 0u, 1u, 1u), exists);
     let columns = vec4(x) + select(vec4<u32>(), vec4(0u, 1u, 0u, 1u), exists);
-    children_at = QUAD_WORDS * (rows * fine.pitch + columns * fine.quads);
-    parent_at = QUAD_WORDS * (id.y * params.level.pitch + id.x * params.level.quads);
+    children_at = QUAD_WORDS * (rows * fine.pitch + columns);
+    parent_at = QUAD_WORDS * (id.y * params.level.pitch + id.x);
     child_floor = vec4<u32>();
     parent_floor = 0u;
     let labels = params.level.labels;

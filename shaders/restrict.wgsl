@@ -10,10 +10,9 @@ const COST_MAX: u32 = 254u;
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    let quads = params.level.quads;
-    let x = id.x / quads;
-    let quad = id.x - x * quads;
-    if x >= params.level.width || id.y >= params.rows {
+    let quad = id.x / params.level.width;
+    let x = id.x - quad * params.level.width;
+    if quad >= params.level.quads || id.y >= params.rows {
         return;
     }
     let ends = support[id.y * params.level.pixel_pitch + x];

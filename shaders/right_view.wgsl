@@ -10,7 +10,6 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if id.x >= params.level.width || id.y >= params.rows {
         return;
     }
-    let words = params.level.quads * QUAD_WORDS;
     let row = id.y * params.level.pitch * QUAD_WORDS;
     // Label j is seen from left pixel x + low + j.
     let shift = i32(id.x) + params.level.low;
@@ -20,7 +19,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var least = 0xffffffffu;
     for (var j = start; j < end; j++) {
         let label = u32(j);
-        let b = pick(belief[row + u32(shift + j) * words + label / PER_WORD], label);
+        let b = pick(belief[row + QUAD_WORDS * u32(shift + j) + word_of(label, params.level.width)], label);
         least = min(least, (b << 16u) | label);
     }
     labels[id.y * params.level.pixel_pitch + id.x] = least;

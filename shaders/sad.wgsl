@@ -12,10 +12,10 @@ const COST_MAX: u32 = 254u;
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     let width = i32(params.level.width);
-    let run = id.x / params.level.quads;
-    let quad = id.x - run * params.level.quads;
-    let x0 = i32(run) * RUN;
-    if x0 >= width || id.y >= params.rows {
+    let runs = u32((width + RUN - 1) / RUN);
+    let quad = id.x / runs;
+    let x0 = i32(id.x - quad * runs) * RUN;
+    if quad >= params.level.quads || id.y >= params.rows {
         return;
     }
     let pitch = i32(params.level.pixel_pitch);
@@ -67,7 +67,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
                 }
                 costs[j] = c;
             }
-            cost[id.y * params.level.pitch + u32(x) * params.level.quads + quad] = pack_narrow(costs);
+            cost[id.y * params.level.pitch + place_of(quad, u32(x))] = pack_narrow(costs);
         }
     }
 }

@@ -24,10 +24,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
             for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {
                 if abs(i32(peaks[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 1 {
-                    let start = u32(v - top) * params.level.pitch + u32(u) * params.level.quads;
+                    let row = u32(v - top) * params.level.pitch;
                     for (var i = 0; i < 3; i++) {
                         let at = u32(label - 1 + i);
-                        sums[i] += i32((cost[start + at / 4u] >> (8u * (at % 4u))) & 0xffu);
+                        sums[i] += i32((cost[row + place_of(at / 4u, u32(u))] >> (8u * (at % 4u))) & 0xffu);
                     }
                 }
             }

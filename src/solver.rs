@@ -271,7 +271,7 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
         // between levels still go has no say any more.
         Schedule::CoarseFirst => {
             let reach = coarsest.min((phase.iterations / 2 - i / 2) as usize);
-            if i % 2 == 0 { (0, reach) } else { (reach, 0) }
+            if i.is_multiple_of(2) { (0, reach) } else { (reach, 0) }
         }
     };
     (finest + 1..=resolved).map(Stage::Resolution).chain((finest..=flooded).map(Stage::Flood))

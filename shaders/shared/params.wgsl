@@ -124,6 +124,17 @@ fn are_labels(quad: u32) -> vec4<bool> {
     return labels_of(quad) < vec4(params.level.labels);
 }
 
+// A row of a volume holds the first quad of all its pixels, then their second, and so on (and of dependency messages all
+// of one slot, then all of the next), so that neighbouring invocations touch neighbouring words. Where a pixel's quad is:
+fn place_of(quad: u32, x: u32) -> u32 {
+    return quad * params.level.width + x;
+}
+
+// How far the word of a label is from the first word of its pixel, in volumes of messages and beliefs of that width.
+fn word_of(label: u32, width: u32) -> u32 {
+    return QUAD_WORDS * (label / 4u) * width + (label % 4u) / PER_WORD;
+}
+
 fn labels_of(quad: u32) -> vec4<u32> {
     return vec4(4u * quad) + vec4(0u, 1u, 2u, 3u);
 }

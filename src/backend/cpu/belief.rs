@@ -2,7 +2,7 @@
 
 use super::units::{Blocks, Units, block, block_mut, padding};
 use crate::graph::LevelGraph;
-use crate::plan::{LABEL_BLOCK, Plan};
+use crate::plan::Plan;
 use rayon::prelude::*;
 use std::array::from_fn;
 

@@ -20,6 +20,9 @@
 //! | `right_view` | 1 | 4 | 20 | words of four labels of which it wants one |
 //! | `median` | 28 a pixel | 3,000 a pixel and pass | 2,500 a pixel and pass | the 105 places, in up to nine passes |
 //!
+//! Neighbouring invocations work on neighbouring pixels, and a row of a volume holds the first four labels of all its pixels,
+//! then the next four: what a group of invocations asks for at once is side by side.
+//!
 //! What they ask more than once is near, and left to the caches. [`crate::roofline`] adds the least bytes of the message stages
 //! up for a plan, and `mrfgs bench` holds them against the rate at which the device copies.
 

@@ -326,6 +326,18 @@ impl Gpu {
     }
 }
 
+/// The word of a row of `volume` that holds a label of its line \[x\]\[slot\]: the shaders keep the first four labels of all
+/// pixels together, then the next four, and so on, and the same of each slot.
+fn word_places(plan: &Plan, volume: Volume, per_word: usize) -> impl Fn(usize, usize) -> usize + use<> {
+    let level = &plan.levels[volume.level()];
+    let slots = volume_shape(plan, volume).0 / level.pixels();
+    let (width, quads) = (level.width, level.stride / 4);
+    move |line, label| {
+        let quad = (line % slots * quads + label / 4) * width + line / slots;
+        quad * (4 / per_word) + label % 4 / per_word
+    }
+}
+
 impl Backend for Gpu {
     fn describe(&self) -> String {
         self.device.name.clone()
@@ -438,13 +450,13 @@ impl Backend for Gpu {
         let (buffer, pitch, per_word) = self.volume(volume);
         let words = self.rows(&[&buffer])?.remove(0);
         let plan = &self.state().plan;
-        let (rows, labels, stride) = volume_shape(plan, volume);
+        let (rows, labels, _) = volume_shape(plan, volume);
+        let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
         let lines = rows / plan.levels[volume.level()].height;
-        let bits = 32 / per_word;
         let mut values = Vec::with_capacity(rows * labels);
         for line in words.chunks_exact(pitch) {
-            for i in (0..lines).flat_map(|i| i * stride..i * stride + labels) {
-                let word = line[i / per_word] >> (bits * (i % per_word));
+            for (i, label) in (0..lines).flat_map(|i| (0..labels).map(move |label| (i, label))) {
+                let word = line[place(i, label)] >> (bits * (label % per_word));
                 values.push(word & (u32::MAX >> (32 - bits)));
             }
         }
@@ -458,13 +470,12 @@ impl Backend for Gpu {
         let height = plan.levels[volume.level()].height;
         let rows = PaddedRows::new(plan, volume, values);
         let per_line = volume_shape(plan, volume).0 / height;
-        let bits = 32 / per_word;
+        let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
         let mut words = vec![0u32; pitch * height];
         for (i, row) in rows.iter().enumerate() {
             let line = &mut words[i / per_line * pitch..];
-            for (d, value) in row.into_iter().enumerate() {
-                let at = i % per_line * rows.stride + d;
-                line[at / per_word] |= value << (bits * (at % per_word));
+            for (label, value) in row.into_iter().enumerate() {
+                line[place(i % per_line, label)] |= value << (bits * (label % per_word));
             }
         }
         buffer.write(&mut self.device, &words)
