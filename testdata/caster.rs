@@ -36,6 +36,20 @@ pub struct Scene {
     pub sensors: [Sensor; 2],
 }
 
+impl Scene {
+    /// What `calib.txt` holds: the cameras, in world units, and the labels to search.
+    pub fn calibration(&self) -> String {
+        let (width, height) = self.left.size();
+        // An image is one unit high at depth 1.
+        let camera = format!("[{height} 0 {}; 0 {height} {}; 0 0 1]", middle(width), middle(height));
+        let baseline = REACH * f64::from(self.labels - 1) / height as f64;
+        format!(
+            "cam0={camera}\ncam1={camera}\ndoffs=0\nbaseline={baseline}\nwidth={width}\nheight={height}\nndisp={}\n",
+            self.labels
+        )
+    }
+}
+
 // ---------------------------------------------------------------------------------------------- the two cameras
 
 /// Disparity at depth 1, as a part of the largest label.
@@ -142,7 +156,12 @@ impl Rig<'_> {
 /// Where the point (x, y) of an image is, from its middle, when the image is one unit high.
 fn place((width, height): (usize, usize), x: f64, y: f64) -> [f64; 2] {
     let scale = height as f64;
-    [(x - 0.5 * (width - 1) as f64) / scale, (y - 0.5 * (height - 1) as f64) / scale]
+    [(x - middle(width)) / scale, (y - middle(height)) / scale]
+}
+
+/// The middle of so many pixels.
+fn middle(pixels: usize) -> f64 {
+    0.5 * (pixels - 1) as f64
 }
 
 /// What turns light (1 is white) into bytes.

@@ -42,8 +42,7 @@ fn save(scene: &scenes::Scene, folder: &Path) -> Result<()> {
     write_png(&folder.join("im1.png"), size, scene.right.data().as_flattened(), ExtendedColorType::Rgb8)?;
     write_png(&folder.join("mask0nocc.png"), size, scene.mask.data(), ExtendedColorType::L8)?;
     write_pfm(&folder.join("disp0GT.pfm"), &scene.truth)?;
-    let calib = format!("width={}\nheight={}\nndisp={}\n", size.0, size.1, scene.labels);
-    fs::write(folder.join("calib.txt"), calib)?;
+    fs::write(folder.join("calib.txt"), scene.calibration())?;
     println!("{}", folder.display());
     Ok(())
 }

@@ -50,7 +50,7 @@ fn the_files_are_a_fresh_rendering() {
         let truth = fs::read(folder.join("disp0GT.pfm")).unwrap();
         assert!(truth == pfm(&scene.truth), "{name}/disp0GT.pfm: render the scenes again");
         let calib = fs::read_to_string(folder.join("calib.txt")).unwrap();
-        assert_eq!(calib, format!("width={width}\nheight={height}\nndisp={}\n", scene.labels), "{name}");
+        assert_eq!(calib, scene.calibration(), "{name}: render the scenes again");
     }
 }
 
