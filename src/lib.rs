@@ -40,12 +40,14 @@
 //! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
 //! - [`roofline`] counts what the messages cost at least, to hold a machine against.
 //! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.
+//! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
 
 pub mod backend;
+pub mod depth;
 pub mod error;
 pub mod evaluation;
 pub mod front;

@@ -27,6 +27,8 @@ pub struct Matched {
     pub tiles: Tiles,
     /// What ran the stages, for people.
     pub ran_on: String,
+    /// The driver of the device that did, as far as it says; `None` for the CPU path.
+    pub driver: Option<String>,
     /// Why it is not the device that was hoped for, where that is so.
     pub note: Option<String>,
     /// The time of every stage, in the order of their first run; empty unless [`Execution::timings`] asks.
@@ -217,6 +219,7 @@ fn timed(
         plan: tiles.whole().clone(),
         tiles: tiles.clone(),
         ran_on: backend.describe(),
+        driver: backend.driver(),
         note: None,
     })
 }

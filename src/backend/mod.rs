@@ -265,6 +265,11 @@ pub trait Backend {
     /// What runs the stages, for people: "CPU path, 2 threads", "llvmpipe (Vulkan)".
     fn describe(&self) -> String;
 
+    /// The driver of the device and its version, as far as it says; `None` where there is no device.
+    fn driver(&self) -> Option<String> {
+        None
+    }
+
     /// Takes the pair and the graphs of all levels of `plan`, and sets all messages, and the map that
     /// [`Stage::Change`] compares with, to 0. All that the stages need is allocated here, from the plan alone; a second
     /// pair whose plan [fits](Plan::fits) goes into the same buffers.

@@ -178,7 +178,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         methods,
         pairs,
     };
-    outputs::deliver(args.json.as_deref(), &findings, &findings.text(), || Ok(()))
+    outputs::deliver(args.json.as_deref(), &findings, &findings.text(), |_| Ok(()))
 }
 
 /// Finds out before any computing whether the output can be written.

@@ -1,6 +1,8 @@
 //! `mrfgs evaluate`.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use mrfgs::evaluation::{Breakdown, Detection, Report, Row, Sparsification, mean, table};
 use mrfgs::image::{read, write};
@@ -14,6 +16,7 @@ use super::breakdown;
 use super::folder::{self, Folder, Scene};
 use super::outputs;
 use super::report::{self, Destination, Picture};
+use super::submission::Submission;
 use super::tables::{self, Comparison};
 use super::{ExecutionArgs, MethodArgs};
 
@@ -26,6 +29,7 @@ Examples:
   mrfgs evaluate HalfSize/Art --truth-scale 2
   mrfgs evaluate Teddy Cones --breakdown
   mrfgs evaluate Teddy Cones --ablations --json ablations.json
+  mrfgs evaluate MiddEval3/trainingQ/* --submission results/trainingQ MRFGS
   mrfgs evaluate --disparity mine.pfm --truth Teddy/disp0GT.pfm --mask Teddy/mask0nocc.png";
 
 /// Match pairs with known truth, or take a finished map, and print its errors
@@ -54,6 +58,19 @@ pub(super) struct Args {
     /// nothing but an earlier report (its index.html names mrfgs as its generator), which is replaced.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
+    /// Writes the final maps as the Middlebury evaluation (version 3) takes them, into a new folder: of each pair
+    /// DIR/PAIR/disp0METHOD.pfm and DIR/PAIR/timeMETHOD.txt
+    ///
+    /// PAIR is the name of the pair's folder, METHOD of letters, digits, - and _; DIR is to be called trainingF, trainingH or
+    /// trainingQ after the size of the pairs. The map has +infinity where there is no disparity; without a fill (--set
+    /// fill=none) it counts as sparse, and METHOD is followed by _s. The time is that of the match in seconds.
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["DIR", "METHOD"],
+        conflicts_with_all = ["tables", "ablations", "disparity"]
+    )]
+    submission: Option<Vec<OsString>>,
     /// Prints the two tables of the paper instead, its figures beside those of the presets fgs, paper and default
     ///
     /// Pairs are known by the names of their folders (Teddy, Cones, Dolls, Rocks1, Motorcycle); others have dashes in the
@@ -183,7 +200,7 @@ fn over<T>(pairs: &[Figures], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) ->
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let destination = check_outputs(args)?;
+    let (destination, submission) = check_outputs(args)?;
     if args.tables {
         return compare(args);
     }
@@ -198,7 +215,10 @@ pub(super) fn run(args: &Args) -> Result<()> {
         let method = args.method.method()?;
         let folders = folders(args)?;
         let mut matcher = Matcher::new(&args.execution.execution()?)?;
-        match_all(args, &folders, &mut matcher, method, None, |scene, maps| {
+        match_all(args, &folders, &mut matcher, method, None, |scene, maps, time| {
+            if let Some(submission) = &submission {
+                submission.add(&scene.name, &maps.final_map(), time)?;
+            }
             if wanted {
                 let (truth, estimate) = (scene.ground.truth(), maps.final_map());
                 let matched = Some((&scene.pair, maps));
@@ -213,20 +233,39 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.breakdown {
         text.push_str(&breakdown::text(&findings));
     }
-    outputs::deliver(args.json.as_deref(), &findings, &text, || match destination {
-        Some(destination) => report::write(&destination, &findings, &pictures),
-        None => Ok(()),
+    outputs::deliver(args.json.as_deref(), &findings, &text, |written| {
+        if let Some(submission) = submission {
+            let place = submission.place().to_owned();
+            written.note(&place, submission.publish())?;
+        }
+        match destination {
+            Some(destination) => report::write(&destination, &findings, &pictures),
+            None => Ok(()),
+        }
     })
 }
 
-/// Finds out before any computing whether the outputs can be written.
-fn check_outputs(args: &Args) -> Result<Option<Destination<'_>>> {
+/// Finds out before any computing whether the outputs can be written, and begins the folders among them.
+fn check_outputs(args: &Args) -> Result<(Option<Destination<'_>>, Option<Submission>)> {
     let destination = args.report.as_deref().map(Destination::check).transpose()?;
+    let submission = match args.submission.as_deref() {
+        Some([dir, method]) => {
+            let names = args.dirs.iter().map(|dir| folder::name(dir)).collect::<Vec<_>>();
+            let fill = args.method.method()?.fill;
+            Some(Submission::new(Path::new(dir), method, &names, fill)?)
+        }
+        _ => None,
+    };
+    let report = destination.as_ref().map(|report| ("--report", report.place()));
+    let submitted = submission.as_ref().map(|submission| ("--submission", submission.place()));
+    if let (Some(report), Some(submitted)) = (report, submitted) {
+        outputs::outside(report, submitted)?;
+        outputs::outside(submitted, report)?;
+    }
     if let Some(path) = outputs::json_file(args.json.as_deref()) {
         write::check_path(path)?;
-        if destination.as_ref().is_some_and(|report| report.holds(path)) {
-            let reason = format!("{} lies in the folder of --report; give another name", path.display());
-            return Err(Error::option("--json", reason));
+        for folder in report.into_iter().chain(submitted) {
+            outputs::outside(folder, ("--json", path))?;
         }
         let mut inputs: Vec<PathBuf> = args.dirs.iter().flat_map(|dir| folder::inputs(dir)).collect();
         inputs.extend(
@@ -235,7 +274,7 @@ fn check_outputs(args: &Args) -> Result<Option<Destination<'_>>> {
         let inputs: Vec<_> = inputs.iter().map(|path| ("an input", path.as_path())).collect();
         outputs::distinct(&inputs, &[("--json", path)])?;
     }
-    Ok(destination)
+    Ok((destination, submission))
 }
 
 /// The figures of a map that is there already.
@@ -274,14 +313,15 @@ fn folders(args: &Args) -> Result<Vec<Folder<'_>>> {
     Ok(folders)
 }
 
-/// Matches every folder by `method`, called `called` where there are several; `see` gets every pair with its maps.
+/// Matches every folder by `method`, called `called` where there are several; `see` gets every pair with its maps and their
+/// time.
 fn match_all(
     args: &Args,
     folders: &[Folder],
     matcher: &mut Matcher,
     method: Method,
     called: Option<&str>,
-    mut see: impl FnMut(&Scene, &Maps) -> Result<()>,
+    mut see: impl FnMut(&Scene, &Maps, Duration) -> Result<()>,
 ) -> Result<Findings> {
     let mut figures = Vec::new();
     let mut ran_on = None;
@@ -290,7 +330,7 @@ fn match_all(
         let name = called.map_or(scene.name.clone(), |called| format!("{}, {called}", scene.name));
         let (matched, time) =
             super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;
-        see(&scene, &matched.maps)?;
+        see(&scene, &matched.maps, time)?;
         let (ground, maps, estimate) = (&scene.ground, &matched.maps, matched.maps.final_map());
         figures.push(Figures {
             raw: Some(ground.evaluate(&maps.raw_map())?),
@@ -313,10 +353,11 @@ fn compare(args: &Args) -> Result<()> {
     let mut found = Vec::new();
     for preset in tables::COMPARED {
         let method = Method::preset(preset)?.validated()?;
-        found.push((preset, match_all(args, &folders, &mut matcher, method, Some(preset), |_, _| Ok(()))?));
+        found
+            .push((preset, match_all(args, &folders, &mut matcher, method, Some(preset), |_, _, _| Ok(()))?));
     }
     let comparison = Comparison::new(&found);
-    outputs::deliver(args.json.as_deref(), &comparison, &comparison.text(), || Ok(()))
+    outputs::deliver(args.json.as_deref(), &comparison, &comparison.text(), |_| Ok(()))
 }
 
 /// Prints what the default is without each of its parts.
@@ -324,7 +365,7 @@ fn ablate(args: &Args) -> Result<()> {
     let folders = folders(args)?;
     let mut matcher = Matcher::new(&args.execution.execution()?)?;
     let mut run = |row: &ablations::Row, called: &str| {
-        match_all(args, &folders, &mut matcher, ablations::method(row)?, Some(called), |_, _| Ok(()))
+        match_all(args, &folders, &mut matcher, ablations::method(row)?, Some(called), |_, _, _| Ok(()))
     };
     // The first run of all prepares what the others find prepared, so its time is not the default's.
     run(&ablations::DEFAULT, "warm-up")?;
@@ -333,5 +374,5 @@ fn ablate(args: &Args) -> Result<()> {
         found.push((*row, run(row, row.0)?));
     }
     let ablations = Ablations::new(&found);
-    outputs::deliver(args.json.as_deref(), &ablations, &ablations.text(), || Ok(()))
+    outputs::deliver(args.json.as_deref(), &ablations, &ablations.text(), |_| Ok(()))
 }

@@ -3,14 +3,15 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use mrfgs::Result;
 use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::front::matches::Match;
 use mrfgs::front::zones::Zones;
 use mrfgs::graph::LevelGraph;
-use mrfgs::image::{Image, Pair, Plane, colour, write};
+use mrfgs::image::colour::{self, ColourMap};
+use mrfgs::image::{Pair, Plane, write};
 use mrfgs::plan::{Plan, UNITS_PER_NAT};
 use mrfgs::solver::Glimpse;
-use mrfgs::{Error, Result};
 
 use super::outputs::StagedFolder;
 
@@ -29,7 +30,7 @@ impl Intermediates {
     /// # Errors
     /// [`Error::Write`] when `target` is there and not an empty folder, or its parent cannot be written to.
     pub(super) fn new(target: &Path, plan: Plan) -> Result<Self> {
-        Ok(Self { folder: folder(target)?, plan, changes: String::new(), last: None })
+        Ok(Self { folder: StagedFolder::new_or_empty(target)?, plan, changes: String::new(), last: None })
     }
 
     /// Takes what a match shows on its way.
@@ -68,19 +69,20 @@ impl Intermediates {
 
     /// A map in colours.
     fn map(&self, name: &str, map: &Plane<f32>, min: f32, max: f32) -> Result<()> {
-        write::rgb8(&self.path(&format!("{name}.png")), &colour::preview(map, min, max))
+        let picture = colour::preview(map, min, max, ColourMap::default());
+        write::rgb8(&self.path(&format!("{name}.png")), &picture)
     }
 
     fn corrected(&self, pair: &Pair) -> Result<()> {
-        write::rgb8(&self.path("corrected-left.png"), &rgb(pair.left()))?;
-        write::rgb8(&self.path("corrected-right.png"), &rgb(pair.right()))
+        write::rgb8(&self.path("corrected-left.png"), &pair.left().to_rgb8())?;
+        write::rgb8(&self.path("corrected-right.png"), &pair.right().to_rgb8())
     }
 
     fn zones(&self, pair: &Pair, zones: &Zones, matches: &[Match]) -> Result<()> {
         let (width, height) = pair.size();
         write::rgb8(&self.path("zones.png"), &zones.map.map(|&zone| colour::zone(zone)))?;
         // Both views side by side, a line from each corner to its match.
-        let (left, right) = (rgb(pair.left()), rgb(pair.right()));
+        let (left, right) = (pair.left().to_rgb8(), pair.right().to_rgb8());
         let mut both = Plane::from_fn(2 * width, height, |x, y| {
             let [r, g, b] = if x < width { left[(x, y)] } else { right[(x - width, y)] };
             [r / 2 + 64, g / 2 + 64, b / 2 + 64]
@@ -159,24 +161,6 @@ impl Intermediates {
         self.last = Some(map);
         Ok(())
     }
-}
-
-/// Begins the folder `target`: a new one or an empty one.
-fn folder(target: &Path) -> Result<StagedFolder> {
-    let folder = StagedFolder::new(target)?;
-    match std::fs::read_dir(folder.place()).map(|mut entries| entries.next().is_none()) {
-        Ok(false) => Err(Error::write(target, "the folder is not empty; name a new one")),
-        _ => Ok(folder),
-    }
-}
-
-/// Finds out before any computing whether `target` can become a folder of intermediates.
-pub(super) fn check(target: &Path) -> Result<()> {
-    folder(target).map(drop)
-}
-
-fn rgb(image: &Image) -> Plane<[u8; 3]> {
-    image.pixels.map(|&[r, g, b, _]| [r, g, b].map(|v| (v >> 8) as u8))
 }
 
 /// Index of the smallest belief, the lowest on ties.

@@ -3,17 +3,19 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use mrfgs::depth::Rig;
 use mrfgs::front::check;
-use mrfgs::image::{Pair, calib::Calibration, colour, read, write};
-use mrfgs::maps::Maps;
+use mrfgs::image::calib::Calibration;
+use mrfgs::image::{Pair, read};
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
 use mrfgs::plan::Plan;
-use mrfgs::solver::Glimpse;
+use mrfgs::solver::{Glimpse, Inspector};
 use mrfgs::tiles::Tiles;
 use mrfgs::{Error, Matcher, Result};
 
-use super::intermediates::{self, Intermediates};
-use super::outputs::{self, Written};
+use super::intermediates::Intermediates;
+use super::match_outputs::{MoreOutputs, Outcome};
+use super::sidecar::{Files, Sidecar};
 use super::{ExecutionArgs, MethodArgs, bytes, plural};
 
 const EXAMPLES: &str = "\
@@ -22,6 +24,8 @@ Examples:
   mrfgs match im0.png im1.png disparity.tif                     (with calib.txt beside im0.png)
   mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25 --mask clouds.png
   mrfgs match l.png r.png d.png --max-disparity 90 --no-fill --confidence c.png --preview p.png
+  mrfgs match im0.png im1.png d.pfm --depth z.tif --point-cloud cloud.ply      (cameras from calib.txt)
+  mrfgs match im0.png im1.png - --json match.json | other-program
   mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run   (levels and memory, without running)";
 
 /// Match a rectified pair and write its disparity map
@@ -30,8 +34,12 @@ Examples:
 /// content; pixels that are transparent or not finite are ignored.
 ///
 /// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels,
-/// .tif or .tiff as float with NaN, .png as 16 bits with disparity times 256 and 0 for invalid ones (ranges within 0 to
-/// 255 only).
+/// .tif or .tiff as float with NaN, .png as 16 bits with disparity times 256 and 0 for invalid ones, as KITTI has it (ranges
+/// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output.
+///
+/// Depth and points take the cameras from a calibration file in Middlebury's format: cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels),
+/// doffs (cx1 - cx0, pixels) and baseline. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the unit of the
+/// baseline (Middlebury: millimetres); where d + doffs is not above 0 there is none.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -39,16 +47,19 @@ pub(super) struct Args {
     left: PathBuf,
     /// Right image, of the same size and rectified, so that matches are on the same row
     right: PathBuf,
-    /// Disparity map to write: .pfm, .tif, .tiff or .png
+    /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: PathBuf,
 
     /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
-    /// - 1 of a calib.txt beside LEFT, else auto]
+    /// - 1 of the calibration file, else auto]
     #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = pixels_or_auto)]
     max_disparity: Option<Largest>,
     /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
     min_disparity: Option<i32>,
+    /// Calibration file: the range (ndisp), and the cameras for depth and points [default: a calib.txt beside LEFT]
+    #[arg(long, value_name = "FILE")]
+    calib: Option<PathBuf>,
     /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
@@ -68,23 +79,8 @@ pub(super) struct Args {
     #[command(flatten)]
     execution: ExecutionArgs,
 
-    /// Writes the map before post-processing too, as OUTPUT by extension
-    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
-    raw: Option<PathBuf>,
-    /// Writes the confidence too: 8-bit PNG, 0 to 255, how far the best rival is behind in 1/8 nat
-    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
-    confidence: Option<PathBuf>,
-    /// Writes why each pixel is what it is: 8-bit PNG, the sum of 1 match outside the right image, 2 occluded, 4 in a
-    /// small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted
-    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
-    validity: Option<PathBuf>,
-    /// Writes every step as a picture or a small table into a new folder: corrected images, zones, matches, supports, costs,
-    /// graphs, a map for each level, the change of each iteration. Takes a multiple of the time
-    #[arg(long, value_name = "DIR", help_heading = "More outputs")]
-    intermediates: Option<PathBuf>,
-    /// Writes the map in colours too, far cold and near warm, with a scale: PNG
-    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
-    preview: Option<PathBuf>,
+    #[command(flatten)]
+    more: MoreOutputs,
 }
 
 fn pixels(text: &str) -> std::result::Result<i32, String> {
@@ -109,40 +105,110 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let execution = args.execution.execution()?;
     let pair = read::pair(&args.left, &args.right, args.mask.as_deref())?;
-    let range = range(args, &pair)?;
-    check_outputs(args, range)?;
+    let calibration = calibration(args)?;
+    let range = range(args, &pair, calibration.as_ref())?;
+    let rig = rig(args, &pair, calibration.as_ref())?;
+    let inputs = [
+        ("LEFT", Some(&args.left)),
+        ("RIGHT", Some(&args.right)),
+        ("the mask", args.mask.as_ref()),
+        ("the config file", args.method.config.as_ref()),
+        ("the calibration file", calibration.as_ref().map(|(path, _)| path)),
+    ];
+    let inputs = inputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
+    args.more.check(&args.output, &inputs.collect::<Vec<_>>(), range)?;
     if !args.quiet {
         for warning in check::warnings(&pair, Some(range)) {
             super::say(&format!("warning: {warning}"));
         }
     }
+    let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     if args.dry_run {
-        let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
         return super::print(&describe(&Tiles::new(&plan)?));
     }
     let mut matcher = Matcher::new(&execution)?;
-    let Some(folder) = &args.intermediates else {
-        let (matched, _) =
-            super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, None)?;
-        // Outputs take memory too.
-        drop((matcher, pair));
-        return write_outputs(args, range, &matched.maps, None);
+    let steps = args.more.intermediates.as_deref().map(|folder| Intermediates::new(folder, plan));
+    let mut steps = steps.transpose()?;
+    let mut look = steps.as_mut().map(|steps| |glimpse: &mut Glimpse| steps.look(glimpse));
+    let look: Option<Inspector> = match &mut look {
+        Some(look) => Some(look),
+        None => None,
     };
-    let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
-    let mut steps = Intermediates::new(folder, plan)?;
-    let mut look = |glimpse: &mut Glimpse| steps.look(glimpse);
-    let (matched, _) =
-        super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, Some(&mut look))?;
-    write_outputs(args, range, &matched.maps, Some(steps))
+    let (matched, time) = super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, look)?;
+    // Outputs take memory too.
+    drop(matcher);
+    let pair = Some(pair).filter(|_| args.more.show_left());
+    let path = |path: &Path| path.display().to_string();
+    let files = Files {
+        left: path(&args.left),
+        right: path(&args.right),
+        mask: args.mask.as_deref().map(path),
+        calibration: calibration.as_ref().map(|(file, _)| path(file)),
+        output: path(&args.output),
+    };
+    let outcome = Outcome {
+        left: pair.as_ref().map(Pair::left),
+        rig,
+        maps: &matched.maps,
+        range,
+        sidecar: Sidecar::new(&files, &matched, time),
+    };
+    let said = args.more.write(&args.output, &outcome, steps)?;
+    if let Some((file, _)) = calibration.filter(|_| !args.quiet && !said.is_empty()) {
+        super::say(&format!("{said}; unit: that of the baseline in {}", file.display()));
+    }
+    Ok(())
+}
+
+/// A calibration file and what it says.
+type Calibrated = (PathBuf, Calibration);
+
+/// The calibration file, where one is asked for or there is a need of it.
+fn calibration(args: &Args) -> Result<Option<Calibrated>> {
+    if let Some(path) = &args.calib {
+        return Ok(Some((path.clone(), Calibration::read(path)?)));
+    }
+    if args.max_disparity.is_some() && args.more.take_cameras().is_none() {
+        return Ok(None);
+    }
+    let found = Calibration::beside(&args.left)?;
+    Ok(found.map(|calibration| (args.left.with_file_name("calib.txt"), calibration)))
+}
+
+/// The cameras, where depth or points are asked for.
+fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Option<Rig>> {
+    let Some(flag) = args.more.take_cameras() else { return Ok(None) };
+    let Some((path, calibration)) = calibration else {
+        let left = args.left.display();
+        let reason =
+            format!("takes the cameras, and there is no calib.txt beside {left}; give one with --calib");
+        return Err(Error::option(flag, reason));
+    };
+    let (width, height) = pair.size();
+    let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
+    if size != (width as u32, height as u32) {
+        return Err(Error::Mismatch(format!(
+            "{} is for images of {} x {} and {} is {width} x {height}: depth takes the calibration of this size",
+            path.display(),
+            size.0,
+            size.1,
+            args.left.display()
+        )));
+    }
+    match Rig::new(calibration) {
+        Err(Error::Option { reason, .. }) => Err(Error::read(path, reason)),
+        rig => rig.map(Some),
+    }
 }
 
 /// The range to search.
-fn range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
+fn range(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<DisparityRange> {
     let min = args.min_disparity.unwrap_or(0);
+    let calibrated = || calibration.map_or(Ok(None), |(path, c)| super::calibrated_range(path, c, min));
     let range = match args.max_disparity {
         Some(Largest::Pixels(max)) => DisparityRange::new(min, max)?,
         Some(Largest::Auto) => found_range(args, pair)?,
-        None => match beside(&args.left, min)? {
+        None => match calibrated()? {
             Some(range) => range,
             None => found_range(args, pair)?,
         },
@@ -170,77 +236,6 @@ fn found_range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
         super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
     }
     Ok(range)
-}
-
-/// The range that a calib.txt beside the left image gives.
-fn beside(left: &Path, min: i32) -> Result<Option<DisparityRange>> {
-    match Calibration::beside(left)? {
-        Some(calibration) => super::calibrated_range(&left.with_file_name("calib.txt"), &calibration, min),
-        None => Ok(None),
-    }
-}
-
-/// Finds out before any computing whether all outputs can be written.
-fn check_outputs(args: &Args, range: DisparityRange) -> Result<()> {
-    fn given<'a>((name, path): (&'static str, Option<&'a PathBuf>)) -> Option<(&'static str, &'a Path)> {
-        Some((name, path?))
-    }
-    let maps = [("OUTPUT", Some(&args.output)), ("--raw", args.raw.as_ref())];
-    let pictures = [
-        ("--confidence", args.confidence.as_ref()),
-        ("--validity", args.validity.as_ref()),
-        ("--preview", args.preview.as_ref()),
-    ];
-    args.intermediates.as_deref().map_or(Ok(()), intermediates::check)?;
-    for (_, path) in maps {
-        path.map_or(Ok(()), |p| write::check_disparity_path(p, range.min, range.max))?;
-    }
-    for (_, path) in pictures {
-        path.map_or(Ok(()), |p| write::check_png_path(p))?;
-    }
-    let inputs = [
-        ("LEFT", Some(&args.left)),
-        ("RIGHT", Some(&args.right)),
-        ("the mask", args.mask.as_ref()),
-        ("the config file", args.method.config.as_ref()),
-    ];
-    outputs::distinct(
-        &inputs.into_iter().filter_map(given).collect::<Vec<_>>(),
-        &maps
-            .into_iter()
-            .chain(pictures)
-            .chain([("--intermediates", args.intermediates.as_ref())])
-            .filter_map(given)
-            .collect::<Vec<_>>(),
-    )
-}
-
-/// Writes all outputs or leaves none of them.
-fn write_outputs(
-    args: &Args,
-    range: DisparityRange,
-    maps: &Maps,
-    steps: Option<Intermediates>,
-) -> Result<()> {
-    let map = maps.final_map();
-    let mut written = Written::default();
-    written.note(&args.output, write::disparity(&args.output, &map))?;
-    if let Some(path) = &args.raw {
-        written.note(path, write::disparity(path, &maps.raw_map()))?;
-    }
-    if let Some(path) = &args.confidence {
-        written.note(path, write::grey8(path, &maps.confidence))?;
-    }
-    if let Some(path) = &args.validity {
-        written.note(path, write::grey8(path, &maps.validity))?;
-    }
-    if let Some(path) = &args.preview {
-        let picture = colour::preview(&map, range.min as f32, range.max as f32);
-        written.note(path, write::rgb8(path, &picture))?;
-    }
-    steps.map_or(Ok(()), Intermediates::finish)?;
-    written.keep();
-    Ok(())
 }
 
 /// The plan for people.

@@ -8,11 +8,14 @@ mod evaluate;
 mod folder;
 mod intermediates;
 mod r#match;
+mod match_outputs;
 mod outputs;
 mod presets;
 mod process;
 mod progress;
 mod report;
+mod sidecar;
+mod submission;
 mod synthetic;
 mod tables;
 

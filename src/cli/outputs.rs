@@ -1,6 +1,7 @@
 //! Outputs: all checked before any computing, all written or none left behind.
 
 use std::fs;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use mrfgs::image::write;
@@ -28,14 +29,24 @@ fn place(path: &Path) -> Option<PathBuf> {
     if let Ok(place) = fs::canonicalize(path) {
         return place.is_file().then_some(place);
     }
-    let folder = match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    Some(fs::canonicalize(folder).ok()?.join(path.file_name()?))
+    Some(fs::canonicalize(parent(path)).ok()?.join(path.file_name()?))
 }
 
-/// The files written so far: gone again when dropped, unless kept.
+/// Where a path leads without its last part.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."))
+}
+
+/// Refuses a file or folder in a folder that is replaced as a whole; each comes with the name of its flag.
+pub(super) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
+    if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
+        let reason = format!("{} lies in the folder of {folder_name}; give another place", path.display());
+        return Err(Error::option(name, reason));
+    }
+    Ok(())
+}
+
+/// The files and folders written so far: gone again when dropped, unless kept.
 #[derive(Default)]
 pub(super) struct Written(Vec<PathBuf>);
 
@@ -43,7 +54,7 @@ impl Written {
     /// Notes that `path` has been written, if that went well.
     pub(super) fn note(&mut self, path: &Path, result: Result<()>) -> Result<()> {
         result?;
-        self.0.extend(place(path));
+        self.0.extend(place(path).or_else(|| fs::canonicalize(path).ok().filter(|folder| folder.is_dir())));
         Ok(())
     }
 
@@ -56,14 +67,44 @@ impl Written {
 impl Drop for Written {
     fn drop(&mut self) {
         for path in &self.0 {
-            let _ = fs::remove_file(path);
+            let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
         }
     }
 }
 
+/// Whether an output goes to standard output.
+pub(super) fn is_printed(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Refuses to send a map to a terminal.
+pub(super) fn check_standard_output() -> Result<()> {
+    if std::io::stdout().is_terminal() {
+        let reason = "is a terminal, which shows no map; redirect it, or give the name of a file";
+        return Err(Error::write("standard output", reason));
+    }
+    Ok(())
+}
+
+/// Writes data to standard output. A reader that leaves before the end has no whole map, so unlike with text that is a
+/// failure.
+pub(super) fn print_data(bytes: &[u8]) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
+        ErrorKind::BrokenPipe => Error::write("standard output", "its reader left before the end of the map"),
+        _ => Error::write("standard output", e),
+    })
+}
+
 /// The file that the JSON goes to, unless it is printed.
 pub(super) fn json_file(json: Option<&Path>) -> Option<&Path> {
-    json.filter(|path| *path != Path::new("-"))
+    json.filter(|path| !is_printed(path))
+}
+
+/// The text of a JSON file at `path`.
+pub(super) fn json_text(path: &Path, findings: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
+    Ok(text + "\n")
 }
 
 /// Hands out findings: as JSON where it is asked for, what `more` writes, and for people unless the JSON is printed.
@@ -71,19 +112,18 @@ pub(super) fn deliver(
     json: Option<&Path>,
     findings: &impl Serialize,
     text: &str,
-    more: impl FnOnce() -> Result<()>,
+    more: impl FnOnce(&mut Written) -> Result<()>,
 ) -> Result<()> {
     let mut written = Written::default();
     let mut printed = text.to_owned();
     if let Some(path) = json {
-        let mut json = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
-        json.push('\n');
+        let json = json_text(path, findings)?;
         match json_file(Some(path)) {
             Some(file) => written.note(file, write::save(file, json.as_bytes()))?,
             None => printed = json,
         }
     }
-    more()?;
+    more(&mut written)?;
     written.keep();
     super::print(&printed)
 }
@@ -104,7 +144,7 @@ impl StagedFolder {
             Ok(place) if !place.is_dir() => return error("is a file; give the name of a folder".into()),
             Ok(place) => place,
             Err(_) => {
-                let parent = name.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
+                let parent = parent(name);
                 match (fs::canonicalize(parent), name.file_name()) {
                     (Ok(parent), Some(last)) if parent.is_dir() => parent.join(last),
                     _ => return error(format!("there is no folder {}; create it first", parent.display())),
@@ -120,6 +160,15 @@ impl StagedFolder {
         let staged = Self { name: name.to_owned(), place, staging };
         fs::create_dir(staged.path()).map_err(|e| Error::write(name, e))?;
         Ok(staged)
+    }
+
+    /// Begins the folder `name`, which must be new or empty.
+    pub(super) fn new_or_empty(name: &Path) -> Result<Self> {
+        let staged = Self::new(name)?;
+        match fs::read_dir(&staged.place).map(|mut entries| entries.next().is_none()) {
+            Ok(false) => Err(Error::write(name, "the folder is not empty; name a new one")),
+            _ => Ok(staged),
+        }
     }
 
     /// Where it will be.

@@ -8,7 +8,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use mrfgs::evaluation::{Metrics, Report};
 use mrfgs::front::zones;
-use mrfgs::image::{Pair, Plane, colour, write};
+use mrfgs::image::colour::{self, ColourMap};
+use mrfgs::image::{Pair, Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::{Error, Result};
 
@@ -69,7 +70,7 @@ pub(super) fn pictures(
 
     let mut all = Vec::new();
     if let Some((pair, _)) = matched {
-        let left = pair.left().pixels.map(|[r, g, b, _]| [r, g, b].map(|v| (v >> 8) as u8));
+        let left = pair.left().to_rgb8();
         let alt = format!("{name}: the left view");
         all.push(Picture::new("left", "Left view", alt, "The reference view.".into(), &left)?);
         let zones = zones::segment(pair.left(), &zones::Options::default());
@@ -86,14 +87,14 @@ pub(super) fn pictures(
         "Disparity",
         format!("{name}: estimated disparity, {scale}"),
         format!("{scale}; black: none. The same scale as the truth."),
-        &colour::preview(estimate, min, max),
+        &colour::preview(estimate, min, max, ColourMap::default()),
     )?);
     all.push(Picture::new(
         "truth",
         "Ground truth",
         format!("{name}: true disparity, {scale}"),
         format!("{scale}; black: unknown."),
-        &colour::preview(truth, min, max),
+        &colour::preview(truth, min, max, ColourMap::default()),
     )?);
     all.push(Picture::new(
         "error",
@@ -161,10 +162,9 @@ impl<'a> Destination<'a> {
         Ok(destination)
     }
 
-    /// Whether a file would lie in the report's folder.
-    pub(super) fn holds(&self, file: &Path) -> bool {
-        let parent = file.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
-        fs::canonicalize(parent).is_ok_and(|parent| parent.starts_with(&self.place))
+    /// Where it will be.
+    pub(super) fn place(&self) -> &Path {
+        &self.place
     }
 
     /// Refuses a folder with files that no report has written: they would be lost.

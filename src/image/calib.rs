@@ -1,6 +1,6 @@
 //! `calib.txt`, the calibration file of the Middlebury benchmark.
 
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -14,8 +14,8 @@ const MAX_BYTES: u64 = 1 << 20;
 pub struct Calibration {
     /// Bound on the number of disparity levels: disparities are in `0 .. ndisp`, in pixels.
     pub ndisp: Option<u32>,
-    /// Focal length of the left camera in pixels (the first entry of `cam0`).
-    pub focal_length: Option<f64>,
+    /// The left camera (`cam0`).
+    pub camera: Option<Camera>,
     /// Horizontal offset of the principal points, `cx1 - cx0`, in pixels.
     pub doffs: Option<f64>,
     /// Distance of the cameras, in the unit of the file (Middlebury: millimetres).
@@ -28,6 +28,15 @@ pub struct Calibration {
     pub vmin: Option<f64>,
     /// Tight upper bound of the disparities, in pixels.
     pub vmax: Option<f64>,
+}
+
+/// What the matrix `[fx 0 cx; 0 fy cy; 0 0 1]` of a rectified camera says, all in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Focal length across and down (fx, fy), above 0; of rectified images mostly the same.
+    pub focal_length: [f64; 2],
+    /// Principal point (cx, cy): where the optical axis meets the image, counted from the centre of the top left pixel.
+    pub principal_point: [f64; 2],
 }
 
 impl Calibration {
@@ -46,9 +55,12 @@ impl Calibration {
     /// [`Error::Read`] when the file cannot be read, or names the line and the key whose value makes no sense.
     pub fn read(path: &Path) -> Result<Self> {
         let mut bytes = Vec::new();
-        std::fs::File::open(path)
-            .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
-            .map_err(|e| Error::read(path, e))?;
+        std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(
+            |e| match e.kind() {
+                ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
+                _ => Error::read(path, e),
+            },
+        )?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(Error::read(path, "larger than any calibration file; is it one?"));
         }
@@ -78,8 +90,8 @@ impl Calibration {
                 "baseline" => number(value).map(|v| calibration.baseline = Some(v)),
                 "vmin" => number(value).map(|v| calibration.vmin = Some(v)),
                 "vmax" => number(value).map(|v| calibration.vmax = Some(v)),
-                "cam0" => focal_length(value).map(|v| calibration.focal_length = Some(v)),
-                "cam1" => focal_length(value).map(|_| ()),
+                "cam0" => camera(value).map(|v| calibration.camera = Some(v)),
+                "cam1" => camera(value).map(|_| ()),
                 _ => Ok(()),
             };
             put.map_err(|reason| at(key, reason))?;
@@ -100,8 +112,8 @@ fn count(text: &str) -> std::result::Result<u32, String> {
     text.parse().ok().filter(|&v| v > 0).ok_or_else(|| format!("{} is no whole number from 1", quoted(text)))
 }
 
-/// The first entry of a camera matrix `[f 0 cx; 0 f cy; 0 0 1]`.
-fn focal_length(text: &str) -> std::result::Result<f64, String> {
+/// A camera matrix `[fx 0 cx; 0 fy cy; 0 0 1]`.
+fn camera(text: &str) -> std::result::Result<Camera, String> {
     let wrong = || format!("{} is no camera matrix like [f 0 cx; 0 f cy; 0 0 1]", quoted(text));
     let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).ok_or_else(wrong)?;
     let mut entries = Vec::new();
@@ -117,7 +129,9 @@ fn focal_length(text: &str) -> std::result::Result<f64, String> {
         entries.extend(row);
     }
     match entries[..] {
-        [f, _, _, _, _, _, _, _, _] if f > 0.0 => Ok(f),
+        [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] if fx > 0.0 && fy > 0.0 => {
+            Ok(Camera { focal_length: [fx, fy], principal_point: [cx, cy] })
+        }
         _ => Err(wrong()),
     }
 }
@@ -138,7 +152,7 @@ mod tests {
     fn expected() -> Calibration {
         Calibration {
             ndisp: Some(280),
-            focal_length: Some(3979.911),
+            camera: Some(Camera { focal_length: [3979.911; 2], principal_point: [1244.772, 1019.507] }),
             doffs: Some(124.343),
             baseline: Some(193.001),
             width: Some(2964),
@@ -178,6 +192,8 @@ mod tests {
             ("cam0=[1 0 2; 0 1 2; 0 0 1", ["line 1", "cam0"]),
             ("cam0=[1 0 2; 0 1 x; 0 0 1]", ["line 1", "cam0"]),
             ("cam0=[1 0; 2 0 1 2; 0 0 1]", ["line 1", "cam0"]),
+            ("cam0=[1 0 2; 0 0 2; 0 0 1]", ["line 1", "cam0"]),
+            ("cam0=[1 9 2; 0 1 2; 0 0 1]", ["line 1", "cam0"]),
             ("cam1=[-1 0 2; 0 1 2; 0 0 1]", ["line 1", "cam1"]),
         ] {
             let reason = Calibration::parse(text).unwrap_err();

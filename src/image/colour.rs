@@ -9,19 +9,50 @@ const BLACK: Rgb = [0, 0, 0];
 const WHITE: Rgb = [255, 255, 255];
 const GREY: Rgb = [128, 128, 128];
 
-/// Stops of the colour map at equal steps, far to near: from cold to warm, with lightness rising to the middle
-/// and falling after it, and nowhere as dark as the black of invalid pixels.
-const STOPS: [Rgb; 9] = [
-    [66, 44, 122],
-    [70, 107, 227],
-    [40, 187, 236],
-    [49, 242, 153],
-    [162, 252, 60],
-    [237, 208, 58],
-    [251, 128, 34],
-    [214, 54, 10],
-    [150, 14, 6],
-];
+/// The colours of a map from far to near. None is as dark as the black of invalid pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColourMap {
+    /// From cold to warm, with lightness rising to the middle and falling after it: Google's Turbo (Mikhailov 2019), with
+    /// lighter ends.
+    #[default]
+    Turbo,
+    /// From violet to yellow, with even steps of lightness, for the colour-blind and for grey print: that of Matplotlib
+    /// (Smith and van der Walt 2015).
+    Viridis,
+    /// From dark to bright.
+    Grey,
+}
+
+impl ColourMap {
+    /// Its colours at equal steps, far to near.
+    fn stops(self) -> &'static [Rgb] {
+        match self {
+            Self::Turbo => &[
+                [66, 44, 122],
+                [70, 107, 227],
+                [40, 187, 236],
+                [49, 242, 153],
+                [162, 252, 60],
+                [237, 208, 58],
+                [251, 128, 34],
+                [214, 54, 10],
+                [150, 14, 6],
+            ],
+            Self::Viridis => &[
+                [68, 1, 84],
+                [71, 45, 123],
+                [59, 82, 139],
+                [44, 114, 142],
+                [33, 145, 140],
+                [40, 174, 128],
+                [94, 201, 98],
+                [173, 220, 48],
+                [253, 231, 37],
+            ],
+            Self::Grey => &[[56; 3], [255; 3]],
+        }
+    }
+}
 
 /// Stops of the colours of a signed error at equal steps: as dark on either side, and never as grey or as black as
 /// what has no error.
@@ -51,19 +82,30 @@ const GLYPHS: [[u8; 5]; 12] = [
     [0, 0, 0, 0, 2],
 ];
 
-/// A disparity map in colours, near (large disparity) warm and far cold, with a scale bar below it.
+/// A disparity map in `colours`, with a scale bar below it.
 ///
-/// Colours run from `min` to `max` (pixels of disparity); values beyond take the colour of the nearer end, and
+/// They run from `min` to `max` (pixels of disparity); values beyond take the colour of the nearer end, and
 /// what is not finite is black. The result is as wide as the map, and higher by the bar: 16 rows, or more for
 /// maps from 400 pixels wide.
 #[must_use]
-pub fn preview(map: &Plane<f32>, min: f32, max: f32) -> Plane<[u8; 3]> {
+pub fn preview(map: &Plane<f32>, min: f32, max: f32, colours: ColourMap) -> Plane<[u8; 3]> {
     let (min, max) = (min as f64, max as f64);
+    let colour = |t| between(colours.stops(), t);
     let pixel = |x, y| {
         let d: f32 = map[(x, y)];
         if d.is_finite() { colour((d as f64 - min) / (max - min)) } else { BLACK }
     };
     with_scale(map.size(), pixel, min, max, colour)
+}
+
+/// Two pictures side by side from the top; black where one ends above the other.
+#[must_use]
+pub fn side_by_side(left: &Plane<[u8; 3]>, right: &Plane<[u8; 3]>) -> Plane<[u8; 3]> {
+    let (width, height) = (left.width() + right.width(), left.height().max(right.height()));
+    Plane::from_fn(width, height, |x, y| {
+        let (picture, x) = if x < left.width() { (left, x) } else { (right, x - left.width()) };
+        if y < picture.height() { picture[(x, y)] } else { BLACK }
+    })
 }
 
 /// The signed error `estimate` - `truth` in colours, with a scale bar below it as in [`preview`]: blue where the estimate
@@ -191,14 +233,8 @@ fn unit(w: usize) -> usize {
     (w / 200).clamp(1, 16)
 }
 
-/// Colour of the position `t` between far (0) and near (1); anything else goes to the nearer end, and what is
-/// no number (an empty range) to the middle.
-fn colour(t: f64) -> Rgb {
-    between(&STOPS, t)
-}
-
 /// Colour of the position `t` from 0 to 1 between `stops` at equal steps; anything else goes to the nearer end, and
-/// what is no number to the middle.
+/// what is no number (an empty range) to the middle.
 fn between(stops: &[Rgb], t: f64) -> Rgb {
     let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) } * (stops.len() - 1) as f64;
     let i = (t as usize).min(stops.len() - 2);
@@ -281,10 +317,12 @@ fn fill(picture: &mut Plane<Rgb>, x: usize, y: usize, w: usize, h: usize, f: imp
 mod tests {
     use super::*;
 
+    const MAPS: [ColourMap; 3] = [ColourMap::Turbo, ColourMap::Viridis, ColourMap::Grey];
+
     #[test]
     fn near_is_warm_far_is_cold_and_invalid_black() {
         let map = Plane::new(4, 1, vec![0.0, 64.0, f32::INFINITY, f32::NAN]);
-        let picture = preview(&map, 0.0, 64.0);
+        let picture = preview(&map, 0.0, 64.0, ColourMap::default());
         let [far, near, infinite, nan] = [0, 1, 2, 3].map(|x| picture[(x, 0)]);
         assert!(far[2] > far[0] && near[0] > near[2]);
         assert_eq!((infinite, nan), (BLACK, BLACK));
@@ -293,19 +331,42 @@ mod tests {
     #[test]
     fn values_beyond_the_range_take_the_colour_of_its_end() {
         let map = Plane::new(4, 1, vec![-1e30, 2.0, 5.0, 1e30]);
-        let picture = preview(&map, 2.0, 5.0);
-        assert_eq!(picture[(0, 0)], picture[(1, 0)]);
-        assert_eq!(picture[(3, 0)], picture[(2, 0)]);
+        for colours in MAPS {
+            let picture = preview(&map, 2.0, 5.0, colours);
+            assert_eq!(picture[(0, 0)], picture[(1, 0)]);
+            assert_eq!(picture[(3, 0)], picture[(2, 0)]);
+            assert_ne!(picture[(1, 0)], picture[(2, 0)]);
+        }
     }
 
     #[test]
     fn no_valid_colour_is_near_black_and_neighbours_differ_little() {
-        for i in 0..=1000 {
-            let c = colour(i as f64 / 1000.0);
-            assert!(c.iter().map(|v| *v as u32).sum::<u32>() > 150, "{i}: {c:?}");
-            let next = colour((i + 1) as f64 / 1000.0);
-            assert!(c.iter().zip(next).all(|(a, b)| a.abs_diff(b) <= 2), "{i}");
+        for (colours, i) in MAPS.into_iter().flat_map(|colours| (0..=1000).map(move |i| (colours, i))) {
+            let at = |i| between(colours.stops(), i as f64 / 1000.0);
+            let (c, next) = (at(i), at(i + 1));
+            assert!(c.iter().map(|v| *v as u32).sum::<u32>() > 150, "{colours:?}, {i}: {c:?}");
+            assert!(c.iter().zip(next).all(|(a, b)| a.abs_diff(b) <= 2), "{colours:?}, {i}");
         }
+    }
+
+    #[test]
+    fn lightness_rises_where_it_says_so() {
+        for colours in [ColourMap::Viridis, ColourMap::Grey] {
+            let light = |i| {
+                let [r, g, b] = between(colours.stops(), i as f64 / 100.0).map(f64::from);
+                0.2126 * r + 0.7152 * g + 0.0722 * b
+            };
+            assert!((0..100).all(|i| light(i) <= light(i + 1) + 0.5) && light(100) > 3.0 * light(0));
+        }
+    }
+
+    #[test]
+    fn pictures_stand_side_by_side() {
+        let (left, right) = (Plane::filled(2, 1, WHITE), Plane::filled(1, 3, GREY));
+        let both = side_by_side(&left, &right);
+        assert_eq!(both.size(), (3, 3));
+        assert_eq!(both.row(0), [WHITE, WHITE, GREY]);
+        assert_eq!(both.row(2), [BLACK, BLACK, GREY]);
     }
 
     #[test]
@@ -316,7 +377,7 @@ mod tests {
         {
             for min in values {
                 for max in values {
-                    let picture = preview(&Plane::filled(w, h, 7.0), min, max);
+                    let picture = preview(&Plane::filled(w, h, 7.0), min, max, ColourMap::default());
                     assert_eq!(picture.width(), w);
                     assert!(picture.height() > h);
                 }

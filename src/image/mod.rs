@@ -4,6 +4,7 @@ pub mod calib;
 pub mod colour;
 mod decode;
 pub mod pfm;
+pub mod ply;
 pub mod read;
 pub mod write;
 
@@ -208,6 +209,12 @@ impl Image {
         });
         let masked = Plane::filled(rgb.width(), rgb.height(), false);
         Self { pixels, masked }
+    }
+
+    /// The colours in 8 bits, rounded down.
+    #[must_use]
+    pub fn to_rgb8(&self) -> Plane<[u8; 3]> {
+        self.pixels.map(|&[r, g, b, _]| [r, g, b].map(|v| (v >> 8) as u8))
     }
 
     /// The image with left and right exchanged.

@@ -32,8 +32,9 @@ pub fn write(path: &Path, plane: &Plane<f32>) -> Result<()> {
     write::save(path, &encode(plane))
 }
 
-/// The file's bytes for a plane.
-pub(super) fn encode(plane: &Plane<f32>) -> Vec<u8> {
+/// The bytes of the file that [`write`] would write.
+#[must_use]
+pub fn encode(plane: &Plane<f32>) -> Vec<u8> {
     let mut bytes = format!("Pf\n{} {}\n-1.0\n", plane.width(), plane.height()).into_bytes();
     bytes.reserve_exact(plane.data().len() * 4);
     for y in (0..plane.height()).rev() {

@@ -27,8 +27,8 @@ enum Format {
 ///
 /// - `.pfm`: float, invalid is +infinity;
 /// - `.tif`, `.tiff`: float, invalid is NaN;
-/// - `.png`: 16 bits, disparity times 256, invalid is 0. Disparities from 0 to below 256 only; a valid one that
-///   would round to 0 becomes 1.
+/// - `.png`: 16 bits, disparity times 256, invalid is 0, as in the KITTI benchmark. Disparities from 0 to below 256 only; a
+///   valid one that would round to 0 becomes 1.
 ///
 /// What exists and is no regular file (`/dev/null`, a pipe) is written to directly, as PFM when its name has
 /// no known extension.
@@ -48,6 +48,16 @@ pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
     save(path, &bytes)
 }
 
+/// Writes a depth map (what is not finite is invalid) as [`disparity`] writes disparities, but not as PNG, which holds no
+/// unit.
+///
+/// # Errors
+/// [`Error::Write`] for an extension other than `.pfm`, `.tif` and `.tiff`, or a file that cannot be written.
+pub fn depth(path: &Path, map: &Plane<f32>) -> Result<()> {
+    check_float(path)?;
+    disparity(path, map)
+}
+
 /// Says before any computing whether [`disparity`] will be able to write a map with disparities from
 /// `min_disparity` to `max_disparity` (pixels, both inclusive) to `path`. A file that is there stays untouched.
 ///
@@ -62,6 +72,25 @@ pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32)
         );
         return Err(Error::write(path, reason));
     }
+    Target::of(path)?.check(path)
+}
+
+/// Says before any computing whether [`depth`] will be able to write a map to `path`.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is none of `.pfm`, `.tif` and `.tiff`, or the path is a folder or lies in none that
+/// can be written to.
+pub fn check_depth_path(path: &Path) -> Result<()> {
+    check_float(path)?;
+    Target::of(path)?.check(path)
+}
+
+/// Says before any computing whether a point cloud can be written to `path`.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is not `.ply`, or the path is a folder or lies in none that can be written to.
+pub fn check_ply_path(path: &Path) -> Result<()> {
+    check_ply_extension(path)?;
     Target::of(path)?.check(path)
 }
 
@@ -107,6 +136,20 @@ pub fn rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<()> {
 /// [`Error::Write`] when PNG holds no picture of this size.
 pub fn encode_rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<Vec<u8>> {
     png(path, plane.data().as_flattened(), plane.size(), ExtendedColorType::Rgb8)
+}
+
+fn check_float(path: &Path) -> Result<()> {
+    match format(path) {
+        Ok(Format::Pfm | Format::Tiff) => Ok(()),
+        _ => Err(Error::write(path, "depth maps end in .pfm or .tif (float)")),
+    }
+}
+
+pub(super) fn check_ply_extension(path: &Path) -> Result<()> {
+    if extension(path).as_deref() == Some("ply") || is_special(path) {
+        return Ok(());
+    }
+    Err(Error::write(path, "point clouds are written as PLY; give a name that ends in .ply"))
 }
 
 fn png_extension(path: &Path) -> Result<()> {

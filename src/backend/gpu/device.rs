@@ -67,6 +67,11 @@ fn api(backend: wgpu::Backend) -> &'static str {
     }
 }
 
+/// Driver and version, as far as the adapter says.
+fn driver(info: &wgpu::AdapterInfo) -> String {
+    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
+}
+
 /// How much a kind of device is preferred, the least first.
 fn preference(device_type: wgpu::DeviceType) -> u8 {
     match device_type {
@@ -102,7 +107,7 @@ pub fn devices() -> Vec<DeviceInfo> {
                 index,
                 kind: kind(info.device_type),
                 api: api(info.backend),
-                driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+                driver: driver(&info),
                 max_buffer: limits.max_buffer_size,
                 max_binding: limits.max_storage_buffer_binding_size,
                 software: info.device_type == wgpu::DeviceType::Cpu,
@@ -190,6 +195,7 @@ pub(super) struct Device {
     /// Gone once the device hangs.
     open: Option<(wgpu::Device, wgpu::Queue)>,
     pub(super) name: String,
+    pub(super) driver: String,
     /// Whether its memory is the machine's own.
     pub(super) software: bool,
     pub(super) max_binding: u64,
@@ -279,6 +285,7 @@ impl Device {
             failure,
             traffic: Traffic::default(),
             open: Some((device, queue)),
+            driver: driver(&info),
             name,
         })
     }

@@ -343,6 +343,10 @@ impl Backend for Gpu {
         self.device.name.clone()
     }
 
+    fn driver(&self) -> Option<String> {
+        Some(self.device.driver.clone())
+    }
+
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
         (self.encoder, self.passes, self.work) = (None, 0, 0);
         self.device.traffic = Traffic::default();

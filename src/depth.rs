@@ -1,0 +1,159 @@
+//! From disparities to depths and points, where the cameras are known.
+//!
+//! Two parallel cameras see a point at depth Z with a disparity d of d + doffs = baseline * f / Z: f is the focal length
+//! in pixels, doffs the distance of the principal points along the row (cx1 - cx0). Depth has the unit of the baseline.
+
+use crate::error::{Error, Result};
+use crate::image::calib::{Calibration, Camera};
+use crate::image::ply::Point;
+use crate::image::{Image, Plane};
+use crate::maps::{FRACTION, Maps};
+
+/// A calibrated pair of cameras, rectified.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rig {
+    camera: Camera,
+    doffs: f64,
+    baseline: f64,
+}
+
+impl Rig {
+    /// The rig that a calibration file describes.
+    ///
+    /// # Errors
+    /// [`Error::Option`] that names what the file lacks of `cam0`, `doffs` and `baseline`, or a baseline that is not
+    /// above 0.
+    pub fn new(calibration: &Calibration) -> Result<Self> {
+        let error = |reason: String| Err(Error::option("calibration", reason));
+        let &Calibration { camera, doffs, baseline, .. } = calibration;
+        let (Some(camera), Some(doffs), Some(baseline)) = (camera, doffs, baseline) else {
+            let known =
+                [("cam0", camera.is_some()), ("doffs", doffs.is_some()), ("baseline", baseline.is_some())];
+            let missing: Vec<_> = known.iter().filter(|(_, known)| !known).map(|(key, _)| *key).collect();
+            return error(format!(
+                "does not say {}; depth takes cam0=[f 0 cx; 0 f cy; 0 0 1], doffs=N and baseline=N",
+                missing.join(" and ")
+            ));
+        };
+        if baseline <= 0.0 {
+            return error(format!("baseline={baseline} is not above 0; give the distance of the cameras"));
+        }
+        Ok(Self { camera, doffs, baseline })
+    }
+
+    /// The depth of disparity `d` (pixels), along the optical axis and in the unit of the baseline. `None` where `d` is
+    /// not finite, and where d + doffs is not above 0: such a point is no nearer than infinity.
+    #[must_use]
+    pub fn depth(&self, d: f64) -> Option<f64> {
+        let apart = d + self.doffs;
+        let depth = self.baseline * self.camera.focal_length[0] / apart;
+        (apart > 0.0 && d.is_finite() && depth.is_finite()).then_some(depth)
+    }
+
+    /// The point that the left pixel (x, y) shows at disparity `d`, in the frame of the left camera: x to the right, y
+    /// down, z forward, in the unit of the baseline. `None` where [`Rig::depth`] has none.
+    #[must_use]
+    pub fn point(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
+        let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
+        self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])
+    }
+
+    /// The depths of a map of disparities in pixels, +infinity where there is none.
+    #[must_use]
+    pub fn depths(&self, disparities: &Plane<f32>) -> Plane<f32> {
+        disparities.map(|&d| self.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32))
+    }
+
+    /// The points that were measured and are trusted (a validity of 0), row by row, with the colours of the `left` image.
+    /// What is filled in, or of low confidence, is a guess from its surroundings and no point.
+    ///
+    /// # Panics
+    /// When maps and image differ in size.
+    #[must_use]
+    pub fn points(&self, maps: &Maps, left: &Image) -> Vec<Point> {
+        assert_eq!(maps.disparity.size(), left.pixels.size(), "the maps of this image");
+        let (width, height) = maps.disparity.size();
+        let colours = left.to_rgb8();
+        let mut points = Vec::new();
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            if maps.validity[(x, y)] != 0 {
+                continue;
+            }
+            let d = f64::from(maps.disparity[(x, y)]) / f64::from(FRACTION);
+            points.extend(self.point(x as f64, y as f64, d).map(|position| Point {
+                position: position.map(|v| v as f32),
+                colour: colours[(x, y)],
+                confidence: maps.confidence[(x, y)],
+            }));
+        }
+        points
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::maps::flag;
+
+    fn calibration() -> Calibration {
+        let mut calibration = Calibration::default();
+        calibration.camera = Some(Camera { focal_length: [1000.0, 500.0], principal_point: [2.0, 1.0] });
+        calibration.doffs = Some(20.0);
+        calibration.baseline = Some(160.0);
+        calibration
+    }
+
+    #[test]
+    fn depth_is_baseline_times_focal_length_over_disparity() {
+        let rig = Rig::new(&calibration()).unwrap();
+        // 160 * 1000 / (60 + 20), and so on.
+        for (d, depth) in [(60.0, 2000.0), (-4.0, 10_000.0), (12.0, 5000.0)] {
+            assert_eq!(rig.depth(d), Some(depth));
+        }
+        // A disparity of -doffs is that of infinity, and beyond it there is nothing.
+        for d in [-20.0, -20.5, -1e9, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(rig.depth(d), None, "{d}");
+        }
+        let map = Plane::new(3, 1, vec![60.0, -20.0, f32::INFINITY]);
+        assert_eq!(rig.depths(&map).data(), [2000.0, f32::INFINITY, f32::INFINITY]);
+    }
+
+    #[test]
+    fn points_are_right_down_and_forward_of_the_left_camera() {
+        let rig = Rig::new(&calibration()).unwrap();
+        assert_eq!(rig.point(2.0, 1.0, 60.0), Some([0.0, 0.0, 2000.0]));
+        assert_eq!(rig.point(3.0, 2.0, 60.0), Some([2.0, 4.0, 2000.0]));
+        assert_eq!(rig.point(3.0, 2.0, -20.0), None);
+    }
+
+    #[test]
+    fn only_what_is_measured_and_trusted_is_a_point() {
+        let rig = Rig::new(&calibration()).unwrap();
+        let validity = vec![0, flag::LOW_CONFIDENCE, flag::OCCLUDED | flag::FILLED, flag::MASKED, 0, 0];
+        let maps = Maps {
+            disparity: Plane::new(6, 1, vec![60, 60, 60, 60, -20, 12].iter().map(|d| d * FRACTION).collect()),
+            raw: Plane::filled(6, 1, 0),
+            confidence: Plane::new(6, 1, vec![200, 3, 0, 0, 70, 255]),
+            validity: Plane::new(6, 1, validity),
+        };
+        let left = Image::from_rgb8(&Plane::from_fn(6, 1, |x, _| [x as u8, 10, 20]));
+        let points = rig.points(&maps, &left);
+        let point = |position, red, confidence| Point { position, colour: [red, 10, 20], confidence };
+        // The fifth is at infinity.
+        assert_eq!(points, [point([-4.0, -4.0, 2000.0], 0, 200), point([15.0, -10.0, 5000.0], 5, 255)]);
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let refused = |change: fn(&mut Calibration), words: &[&str]| {
+            let mut calibration = calibration();
+            change(&mut calibration);
+            let error = Rig::new(&calibration).unwrap_err().to_string();
+            assert!(words.iter().all(|word| error.contains(word)), "{error}");
+        };
+        refused(|c| c.camera = None, &["does not say cam0;"]);
+        refused(|c| c.doffs = None, &["does not say doffs;"]);
+        refused(|c| (c.camera, c.baseline) = (None, None), &["does not say cam0 and baseline;"]);
+        refused(|c| c.baseline = Some(0.0), &["baseline=0 is not above 0"]);
+    }
+}

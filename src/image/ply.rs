@@ -1,0 +1,92 @@
+//! Point clouds as PLY files, which `MeshLab`, `CloudCompare` and most others open.
+
+use std::path::Path;
+
+use super::write;
+use crate::error::Result;
+
+/// A point of a cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Where it is: x, y, z.
+    pub position: [f32; 3],
+    /// Red, green, blue.
+    pub colour: [u8; 3],
+    /// Confidence 0 ..= 255.
+    pub confidence: u8,
+}
+
+/// Writes points as binary little-endian PLY, whole or not at all: one element `vertex` with `x`, `y`, `z` (float), `red`,
+/// `green`, `blue` (uchar) and `confidence` (float, the type under which `MeshLab` takes it for a vertex quality).
+///
+/// # Errors
+/// [`crate::Error::Write`] when the name does not end in `.ply` or the file cannot be written.
+pub fn write(path: &Path, points: &[Point]) -> Result<()> {
+    write::check_ply_extension(path)?;
+    write::save(path, &encode(points))
+}
+
+/// The file's bytes.
+fn encode(points: &[Point]) -> Vec<u8> {
+    let header = format!(
+        "ply\n\
+         format binary_little_endian 1.0\n\
+         comment frame of the left camera: x right, y down, z forward; unit that of the baseline\n\
+         element vertex {}\n\
+         property float x\n\
+         property float y\n\
+         property float z\n\
+         property uchar red\n\
+         property uchar green\n\
+         property uchar blue\n\
+         property float confidence\n\
+         end_header\n",
+        points.len()
+    );
+    let mut bytes = header.into_bytes();
+    bytes.reserve_exact(points.len() * 19);
+    for point in points {
+        bytes.extend(point.position.iter().flat_map(|v| v.to_le_bytes()));
+        bytes.extend(point.colour);
+        bytes.extend(f32::from(point.confidence).to_le_bytes());
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_header_says_what_the_bytes_are() {
+        let point = Point { position: [1.5, -2.0, 1e6], colour: [7, 8, 9], confidence: 200 };
+        let other = Point { position: [0.0; 3], colour: [0; 3], confidence: 0 };
+        let bytes = encode(&[point, other]);
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
+        let header: Vec<_> = std::str::from_utf8(&bytes[..start]).unwrap().lines().collect();
+        assert_eq!(header[..2], ["ply", "format binary_little_endian 1.0"]);
+        assert_eq!(header[3], "element vertex 2");
+        assert!(header[2].starts_with("comment ") && header[2].contains("y down"));
+        let size = |kind: &str| if kind == "float" { 4 } else { 1 };
+        let properties: Vec<_> = header.iter().filter_map(|line| line.strip_prefix("property ")).collect();
+        let bytes_a_point: usize = properties.iter().map(|p| size(p.split(' ').next().unwrap())).sum();
+        assert_eq!(bytes.len(), start + 2 * bytes_a_point);
+        let names: Vec<_> = properties.iter().map(|p| p.split(' ').next_back().unwrap()).collect();
+        assert_eq!(names, ["x", "y", "z", "red", "green", "blue", "confidence"]);
+        let mut first = [1.5_f32, -2.0, 1e6].map(f32::to_le_bytes).concat();
+        first.extend([7, 8, 9]);
+        first.extend(200.0_f32.to_le_bytes());
+        assert_eq!(bytes[start..][..bytes_a_point], first);
+    }
+
+    #[test]
+    fn another_name_is_refused_and_no_point_is_a_cloud() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = write(&folder.path().join("a.pcd"), &[]).unwrap_err().to_string();
+        assert!(error.contains("a.pcd") && error.contains(".ply"), "{error}");
+        write(&folder.path().join("a.PLY"), &[]).unwrap();
+        assert!(std::fs::read(folder.path().join("a.PLY")).unwrap().ends_with(b"end_header\n"));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
