@@ -61,6 +61,46 @@ const FAILURES: &[Failure] = &[
     ("M left.png", 1, &["OUTPUT", "left.png is LEFT already", "another name"]),
     ("M out.pfm --preview folder/../right.png", 1, &["--preview", "is RIGHT already", "another name"]),
     ("M narrow.png --mask left.png --preview left.png", 1, &["--preview", "LEFT", "another name"]),
+    ("M out.pfm --json none/a.json", 1, &["none/a.json", "create it"]),
+    ("M out.pfm --json folder", 1, &["folder", "is a folder"]),
+    ("M out.pfm --json right.png", 1, &["--json", "right.png is RIGHT", "another name"]),
+    ("M - --json -", 1, &["--json", "- is OUTPUT already", "another name"]),
+    ("M out.pfm --raw -", 1, &["-:", ".pfm"]),
+    ("M out.pfm --side-by-side", 2, &["--preview", "--help"]),
+    ("M out.pfm --colours grey", 2, &["--preview", "--help"]),
+    ("M out.pfm --preview p.png --colours jet", 2, &["--colours", "'jet'", "turbo, viridis, grey"]),
+    ("M taken.pfm/out.pfm --intermediates taken.pfm", 1, &["OUTPUT", "folder of --intermediates"]),
+    // Cameras.
+    ("M out.pfm --depth z.pfm", 1, &["--depth", "no calib.txt beside left.png", "--calib"]),
+    ("M out.pfm --point-cloud c.ply", 1, &["--point-cloud", "no calib.txt beside left.png", "--calib"]),
+    (
+        "match silent/left.png right.png out.pfm --max-disparity 9 --depth z.pfm",
+        1,
+        &["silent/calib.txt", "does not say cam0 and doffs and baseline", "cam0=[f 0 cx; 0 f cy; 0 0 1]"],
+    ),
+    (
+        "M out.pfm --calib half/calib.txt --point-cloud c.ply",
+        1,
+        &["half/calib.txt", "say doffs and baseline"],
+    ),
+    ("M out.pfm --calib zero/calib.txt --depth z.tif", 1, &["zero/calib.txt", "baseline=0 is not above 0"]),
+    (
+        "M out.pfm --calib larger/calib.txt --depth z.tif",
+        1,
+        &["larger/calib.txt is for images of 120 x 80", "left.png is 60 x 40"],
+    ),
+    ("M out.pfm --calib none.txt", 1, &["none.txt", "no such file", "check the name"]),
+    ("M out.pfm --calib damaged/calib.txt", 1, &["damaged/calib.txt", "line 1", "ndisp"]),
+    ("M out.pfm --calib camera/calib.txt --depth z.png", 1, &["z.png", ".pfm or .tif (float)"]),
+    ("M out.pfm --calib camera/calib.txt --depth none/z.pfm", 1, &["none/z.pfm", "create it"]),
+    ("M out.pfm --calib camera/calib.txt --depth ./out.pfm", 1, &["--depth", "OUTPUT", "another name"]),
+    ("M out.pfm --calib camera/calib.txt --point-cloud c.pcd", 1, &["c.pcd", "ends in .ply"]),
+    ("M out.pfm --calib camera/calib.txt --point-cloud none/c.ply", 1, &["none/c.ply", "create it"]),
+    (
+        "M out.pfm --calib camera/calib.txt --json camera/calib.txt",
+        1,
+        &["--json", "the calibration file", "another name"],
+    ),
     // The range.
     ("match flat.png flat.png out.pfm", 1, &["--max-disparity", "too few matches"]),
     ("match flat.png flat.png out.pfm --max-disparity auto", 1, &["--max-disparity", "too few matches"]),
@@ -137,6 +177,19 @@ const FAILURES: &[Failure] = &[
     ("evaluate misfit --json none/a.json", 1, &["none/a.json", "create it"]),
     ("evaluate misfit --json folder", 1, &["folder", "is a folder"]),
     ("evaluate misfit --json misfit/calib.txt", 1, &["--json", "misfit/calib.txt", "another name"]),
+    ("evaluate misfit --submission subs", 2, &["--submission <DIR> <METHOD>", "2 values"]),
+    ("evaluate misfit --submission subs a.b", 1, &["--submission", "a.b is no METHOD", "letters, digits"]),
+    ("evaluate misfit --submission subs X_s", 1, &["--submission", "X_s", "sparse", "another METHOD"]),
+    ("evaluate misfit --submission none/subs X", 1, &["none/subs", "create it"]),
+    ("evaluate misfit --submission folder/full X", 1, &["folder/full", "not empty"]),
+    ("evaluate misfit ./misfit --submission subs X", 1, &["two pairs are called misfit", "rename"]),
+    ("evaluate misfit --submission subs X --tables", 2, &["--submission", "--tables"]),
+    ("evaluate misfit --submission subs X --report subs", 1, &["--submission", "folder of --report"]),
+    (
+        "evaluate misfit --submission taken.png X --json taken.png/a.json",
+        1,
+        &["--json", "folder of --submission"],
+    ),
     ("evaluate --disparity unknown.pfm", 2, &["--truth"]),
     ("evaluate --truth unknown.pfm", 2, &["--disparity"]),
     ("evaluate misfit --disparity unknown.pfm --truth unknown.pfm", 2, &["DIR", "--disparity"]),
@@ -217,9 +270,10 @@ fn what_was_written_before_a_failure_is_removed() {
     let folder = workshop();
     let before = listing(folder.path());
     // The disk that is always full lets itself be opened.
-    for full in ["--raw", "--validity", "--preview"] {
+    for full in ["--raw", "--validity", "--preview", "--depth", "--point-cloud", "--json"] {
         let args = ["match", "left.png", "right.png", "out.pfm", "--confidence", "c.png", full, "/dev/full"];
-        let args = [&args[..], &["--max-disparity", "9", "--quiet"]].concat();
+        let args =
+            [&args[..], &["--calib", "camera/calib.txt", "--intermediates", "steps", "--quiet"]].concat();
         run(folder.path(), &args).failed(1, &["/dev/full", "No space left"], full);
         assert!(listing(folder.path()) == before, "{full}");
     }

@@ -6,6 +6,7 @@ mod bench;
 mod evaluate;
 mod failures;
 mod matching;
+mod outputs;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -114,7 +115,15 @@ fn workshop() -> TempDir {
     fs::write(at("syntax.toml"), "levels = 3\ncost sad\n").unwrap();
     fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
     fs::write(at("value.toml"), "levels = 3\n\ntemperature = -1\n").unwrap();
-    for (name, calib) in [("damaged", "ndisp=many\n"), ("silent", "width=60\n"), ("huge", "ndisp=100000\n")] {
+    for (name, calib) in [
+        ("damaged", "ndisp=many\n"),
+        ("silent", "width=60\n"),
+        ("huge", "ndisp=100000\n"),
+        ("half", "cam0=[100 0 30; 0 100 20; 0 0 1]\n"),
+        ("zero", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=0\n"),
+        ("larger", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=1\nwidth=120\nheight=80\n"),
+        ("camera", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=1\nwidth=60\nheight=40\nndisp=17\n"),
+    ] {
         fs::create_dir(at(name)).unwrap();
         fs::copy(at("left.png"), at(name).join("left.png")).unwrap();
         fs::write(at(name).join("calib.txt"), calib).unwrap();

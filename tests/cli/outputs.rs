@@ -1,0 +1,431 @@
+//! What `mrfgs match` and `mrfgs evaluate` write besides maps and figures: depth, points, JSON, pictures, submissions.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use mrfgs::image::{Plane, pfm, read};
+use mrfgs::maps::{flag, has_disparity};
+use mrfgs::options::Method;
+use serde_json::Value;
+
+use super::{listing, run, scene, scene_file, workshop};
+
+/// Focal length and baseline of the scenes of 240 x 180 pixels and 32 labels, and the middle of their images.
+const FOCAL_LENGTH: f64 = 180.0;
+const BASELINE: f64 = 0.95 * 31.0 / 180.0;
+const MIDDLE: [f64; 2] = [119.5, 89.5];
+
+/// Matches a scene in `folder`; what it says on standard error.
+fn matched(folder: &Path, name: &str, more: &[&str]) -> String {
+    let (left, right) = (scene_file(name, "im0.png"), scene_file(name, "im1.png"));
+    let told = run(folder, &[&["match", &left, &right], more, &["--backend", "cpu"]].concat()).succeeded();
+    told.stderr
+}
+
+fn map(path: impl AsRef<Path>) -> Plane<f32> {
+    let pfm::Pfm::Grey(map) = pfm::read(path.as_ref()).unwrap() else { panic!("one channel") };
+    map
+}
+
+fn json(path: impl AsRef<Path>) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// The largest relative error of `depths` against baseline * f / (d + doffs); infinite where one of the two has a pixel that
+/// the other should not have.
+fn depth_error(depths: &Plane<f32>, disparities: &Plane<f32>, doffs: f64) -> f64 {
+    assert_eq!(depths.size(), disparities.size());
+    let pairs = depths.data().iter().zip(disparities.data());
+    let errors = pairs.map(|(&z, &d)| {
+        let apart = f64::from(d) + doffs;
+        match (z.is_finite(), d.is_finite() && apart > 0.0) {
+            (true, true) => (f64::from(z) * apart / (BASELINE * FOCAL_LENGTH) - 1.0).abs(),
+            (false, false) => 0.0,
+            _ => f64::INFINITY,
+        }
+    });
+    errors.fold(0.0, f64::max)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[test]
+fn depth_is_that_of_the_cameras() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let said = matched(folder.path(), "repetitive", &["d.pfm", "--depth", "z.pfm", "--no-fill"]);
+    let told = said.lines().find(|line| line.contains("depths ")).unwrap();
+    assert!(told.contains("unit: that of the baseline in ") && told.ends_with("calib.txt"), "{told}");
+    let (disparities, depths) = (map(at("d.pfm")), map(at("z.pfm")));
+    assert!(depth_error(&depths, &disparities, 0.0) < 1e-6);
+    assert!(depth_error(&depths, &disparities, 0.1) > 1e-3, "the comparison sees a tenth of a pixel");
+    assert!(depths.data().contains(&f32::INFINITY), "what has no disparity has no depth");
+
+    // The wall behind is parallel to the images, at depth 2.8.
+    let truth = map(scene("repetitive").join("disp0GT.pfm"));
+    let wall = (BASELINE * FOCAL_LENGTH / 2.8) as f32;
+    let known = depths.data().iter().zip(truth.data()).filter(|(z, t)| z.is_finite() && **t == wall);
+    let known: Vec<f64> = known.map(|(z, _)| f64::from(*z)).collect();
+    assert!(known.len() > 1000, "{} pixels", known.len());
+    assert!((median(known.clone()) - 2.8).abs() < 0.02, "{}", median(known));
+}
+
+#[test]
+fn offset_principal_points_move_the_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let calib = fs::read_to_string(scene("slanted").join("calib.txt")).unwrap();
+    for doffs in [2.5, -12.0] {
+        fs::write(at("other.txt"), calib.replace("doffs=0", &format!("doffs={doffs}"))).unwrap();
+        let args = ["d.pfm", "--calib", "other.txt", "--quiet", "--depth"];
+        matched(folder.path(), "slanted", &[&args[..], &["z.pfm"]].concat());
+        matched(folder.path(), "slanted", &[&args[..], &["z.tif"]].concat());
+        let (disparities, depths) = (map(at("d.pfm")), map(at("z.pfm")));
+        assert!(depth_error(&depths, &disparities, doffs) < 1e-6, "{doffs}");
+        let beyond = depths.data().iter().filter(|z| !z.is_finite()).count();
+        assert_eq!(beyond > 1000, doffs < 0.0, "{beyond} pixels are at infinity or beyond");
+        assert!(disparities.data().iter().all(|d| d.is_finite()), "the map is what it was");
+        let bytes = fs::read(at("z.tif")).unwrap();
+        let mut decoder = tiff::decoder::Decoder::new(std::io::Cursor::new(bytes)).unwrap();
+        let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
+            panic!("float")
+        };
+        let same = |(a, b): (&f32, &f32)| if b.is_finite() { a == b } else { a.is_nan() };
+        assert!(values.iter().zip(depths.data()).all(same), "NaN in TIFF, +inf in PFM");
+    }
+}
+
+#[test]
+fn a_calibration_file_elsewhere_gives_the_range() {
+    let folder = workshop();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt"];
+    let told = run(folder.path(), &args).succeeded();
+    assert!(told.stderr.contains(", 17 labels, "), "{told:?}");
+    // It may hold less than depth takes, as long as nobody asks for depth.
+    let args =
+        ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--calib", "half/calib.txt"];
+    run(folder.path(), &args).succeeded();
+}
+
+/// A point of a cloud: position, colour, confidence.
+type Point = ([f64; 3], [u8; 3], f32);
+
+/// Reads a cloud by nothing but what its header says.
+fn cloud(path: &Path) -> Vec<Point> {
+    let bytes = fs::read(path).unwrap();
+    let end = b"end_header\n";
+    let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
+    let header = std::str::from_utf8(&bytes[..start]).unwrap();
+    assert!(header.starts_with("ply\nformat binary_little_endian 1.0\n"), "{header}");
+    assert_eq!(header.matches("\nelement ").count(), 1, "{header}");
+    let count: usize =
+        header.lines().find_map(|line| line.strip_prefix("element vertex ")).unwrap().parse().unwrap();
+    let (mut offset, mut places) = (0, std::collections::BTreeMap::new());
+    for property in header.lines().filter_map(|line| line.strip_prefix("property ")) {
+        let (kind, name) = property.split_once(' ').unwrap();
+        places.insert(name, offset);
+        offset += match kind {
+            "float" => 4,
+            "uchar" => 1,
+            kind => panic!("{kind}"),
+        };
+    }
+    assert_eq!(bytes.len(), start + count * offset, "{header}");
+    let points = bytes[start..].chunks_exact(offset);
+    let points = points.map(|point| {
+        let float = |name| f32::from_le_bytes(point[places[name]..][..4].try_into().unwrap());
+        (
+            ["x", "y", "z"].map(|name| f64::from(float(name))),
+            ["red", "green", "blue"].map(|name| point[places[name]]),
+            float("confidence"),
+        )
+    });
+    points.collect()
+}
+
+#[test]
+fn points_are_what_is_measured_and_trusted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let args = ["d.pfm", "--point-cloud", "c.ply", "--confidence", "c.png", "--validity", "v.png"];
+    let said = matched(folder.path(), "slanted", &[&args[..], &["--depth", "z.pfm"]].concat());
+    let points = cloud(&at("c.ply"));
+    assert!(said.contains(&format!("; {} points; unit: ", points.len())), "{said}");
+    let (depths, confidence) = (map(at("z.pfm")), read::grey8(&at("c.png")).unwrap());
+    let validity = read::grey8(&at("v.png")).unwrap();
+    let trusted = validity.data().iter().filter(|&&v| v == 0).count();
+    assert_eq!(points.len(), trusted);
+    assert!(trusted > 20_000 && trusted < 240 * 180 - 1000, "some are left out: {trusted}");
+    assert!(validity.data().iter().any(|v| v & flag::LOW_CONFIDENCE != 0));
+
+    // Each is where its pixel looks, in the order of the pixels.
+    let image = image::open(scene("slanted").join("im0.png")).unwrap().into_rgb8();
+    let pixels = (0..180).flat_map(|y| (0..240).map(move |x| (x, y)));
+    for ((x, y), (position, colour, sure)) in pixels.filter(|&at| validity[at] == 0).zip(&points) {
+        let z = f64::from(depths[(x, y)]);
+        let ray = [(x as f64 - MIDDLE[0]) / FOCAL_LENGTH, (y as f64 - MIDDLE[1]) / FOCAL_LENGTH, 1.0];
+        for (found, along) in position.iter().zip(ray) {
+            assert!((found - along * z).abs() < 1e-5, "{x}, {y}: {position:?}");
+        }
+        assert_eq!(*colour, image.get_pixel(x as u32, y as u32).0, "{x}, {y}");
+        assert_eq!(*sure, f32::from(confidence[(x, y)]));
+    }
+}
+
+/// The floor of `repetitive`, as the scene has it, in the frame of the left camera: half a baseline left of the middle.
+fn above_the_floor([_, y, z]: [f64; 3]) -> f64 {
+    (0.6 - y) - 0.1 * (z - 1.2)
+}
+
+#[test]
+fn points_of_a_plane_lie_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    matched(folder.path(), "repetitive", &["d.pfm", "--point-cloud", "c.ply", "--quiet"]);
+    let truth = map(scene("repetitive").join("disp0GT.pfm"));
+    let on_floor: Vec<_> = cloud(&folder.path().join("c.ply"))
+        .into_iter()
+        .filter(|(p, ..)| {
+            let pixel = [0, 1].map(|i| (p[i] / p[2] * FOCAL_LENGTH + MIDDLE[i]).round());
+            let z = BASELINE * FOCAL_LENGTH / f64::from(truth[(pixel[0] as usize, pixel[1] as usize)]);
+            let there = [0, 1].map(|i| (pixel[i] - MIDDLE[i]) / FOCAL_LENGTH * z);
+            above_the_floor([there[0], there[1], z]).abs() < 1e-4
+        })
+        .map(|(p, ..)| p)
+        .collect();
+    assert!(on_floor.len() > 2000, "{} points", on_floor.len());
+    let off = median(on_floor.iter().map(|p| above_the_floor(*p).abs()).collect());
+    assert!(off < 0.01, "{off} world units above or below the floor");
+    let flipped = median(on_floor.iter().map(|p| above_the_floor([p[0], -p[1], p[2]]).abs()).collect());
+    assert!(flipped > 0.5, "the check sees a frame with y up: {flipped}");
+}
+
+#[test]
+fn json_tells_what_ran_and_what_came_of_it() {
+    let folder = workshop();
+    let at = |name: &str| folder.path().join(name);
+    let args =
+        ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt", "--backend", "cpu"];
+    let args =
+        [&args[..], &["--mask", "flat-mask.png", "--confidence", "c.png", "--validity", "v.png"]].concat();
+    let mask = image::GrayImage::from_fn(60, 40, |x, _| image::Luma([u8::from(x < 6)]));
+    mask.save(at("flat-mask.png")).unwrap();
+    let told = run(folder.path(), &[&args[..], &["--json", "m.json", "--threads", "1"]].concat()).succeeded();
+    assert_eq!(told.stdout, "");
+    let found = json(at("m.json"));
+    let text = fs::read_to_string(at("m.json")).unwrap();
+    assert!(text.ends_with("}\n"));
+
+    assert_eq!(found["version"], env!("CARGO_PKG_VERSION"));
+    let files = &found["files"];
+    for (key, file) in [
+        ("left", "left.png"),
+        ("right", "right.png"),
+        ("mask", "flat-mask.png"),
+        ("calibration", "camera/calib.txt"),
+        ("output", "out.pfm"),
+    ] {
+        assert_eq!(files[key], file);
+    }
+    assert_eq!([&found["width"], &found["height"], &found["labels"]], [60, 40, 17]);
+    assert_eq!([&found["range"]["min"], &found["range"]["max"]], [0, 16]);
+    assert_eq!(found["method"], serde_json::to_value(Method::default()).unwrap());
+    assert_eq!(found["ran_on"], "the CPU path, 1 thread");
+    assert_eq!([&found["driver"], &found["note"]], [&Value::Null; 2]);
+    assert_eq!([&found["tiles"], &found["iterations"]], [1, 18]);
+    let seconds = found["seconds"].as_f64().unwrap();
+    assert!(seconds > 0.0 && told.stderr.contains(&format!("in {seconds:.2} s")), "{}", told.stderr);
+    assert!(found["stages"].as_object().unwrap().is_empty());
+
+    // Shares of all pixels, in percent.
+    let (validity, confidence) = (read::grey8(&at("v.png")).unwrap(), read::grey8(&at("c.png")).unwrap());
+    let share = |of: &dyn Fn(u8) -> bool| {
+        100.0 * validity.data().iter().filter(|&&v| of(v)).count() as f64 / (60.0 * 40.0)
+    };
+    let filled = |v: u8| v & flag::FILLED != 0;
+    let measured = |v: u8| has_disparity(v) && !filled(v);
+    let sure: Vec<f64> = validity
+        .data()
+        .iter()
+        .zip(confidence.data())
+        .filter(|(v, _)| measured(**v))
+        .map(|(_, c)| f64::from(*c))
+        .collect();
+    for (key, expected) in [
+        ("density", 90.0),
+        ("measured", share(&measured)),
+        ("filled", share(&filled)),
+        ("mean_confidence", sure.iter().sum::<f64>() / sure.len() as f64),
+    ] {
+        assert!((found[key].as_f64().unwrap() - expected).abs() < 1e-9, "{key}: {} {expected}", found[key]);
+    }
+    assert!(share(&measured) > 20.0 && share(&filled) > 1.0, "neither is nothing");
+
+    // Printed, standard output holds nothing else.
+    let told = run(folder.path(), &[&args[..], &["--json", "-", "--timings"]].concat()).succeeded();
+    let printed = told.json();
+    assert_eq!(printed["measured"], found["measured"]);
+    let stages = printed["stages"].as_object().unwrap();
+    assert!(stages["flood, level 0"].as_f64().unwrap() > 0.0, "{stages:?}");
+    let sum: f64 = stages.values().map(|ms| ms.as_f64().unwrap()).sum();
+    assert!(sum < 1000.0 * printed["seconds"].as_f64().unwrap());
+
+    // A map without a pixel has no confidence.
+    let all = image::GrayImage::from_pixel(60, 40, image::Luma([1]));
+    all.save(at("flat-mask.png")).unwrap();
+    let none = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded().json();
+    assert_eq!([&none["density"], &none["mean_confidence"]], [&Value::from(0.0), &Value::Null]);
+}
+
+#[test]
+fn the_colours_of_a_preview_can_be_chosen() {
+    let folder = workshop();
+    let picture = |name: &str, more: &[&str]| {
+        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
+        run(folder.path(), &[&args[..], &["--preview", name], more].concat()).succeeded();
+        image::open(folder.path().join(name)).unwrap().into_rgb8()
+    };
+    let usual = picture("a.png", &[]);
+    assert_eq!(usual, picture("b.png", &["--colours", "turbo"]));
+    let [viridis, grey] = ["viridis", "grey"].map(|name| picture("c.png", &["--colours", name]));
+    assert!(usual != viridis && viridis != grey && usual != grey);
+    let even = |p: &image::Rgb<u8>| p.0[0] == p.0[1] && p.0[1] == p.0[2];
+    assert!(grey.pixels().all(even) && !viridis.pixels().all(even));
+
+    let both = picture("d.png", &["--side-by-side", "--colours", "viridis"]);
+    assert_eq!(both.dimensions(), (2 * 60, viridis.height()));
+    let left = image::open(folder.path().join("left.png")).unwrap().into_rgb8();
+    for (x, y, pixel) in both.enumerate_pixels() {
+        let expected = match (x < 60, y < 40) {
+            (true, true) => *left.get_pixel(x, y),
+            (true, false) => image::Rgb([0; 3]),
+            _ => *viridis.get_pixel(x - 60, y),
+        };
+        assert_eq!(*pixel, expected, "{x}, {y}");
+    }
+}
+
+#[test]
+fn png_holds_disparities_as_kitti_reads_them() {
+    let folder = workshop();
+    let at = |name: &str| folder.path().join(name);
+    let mask = image::GrayImage::from_fn(60, 40, |x, y| image::Luma([u8::from(x < 5 && y > 30)]));
+    mask.save(at("mask.png")).unwrap();
+    // A pair of the same image twice is at infinity: disparity 0, but valid.
+    for (right, most) in [("right.png", 15), ("left.png", 3)] {
+        for output in ["out.pfm", "out.png"] {
+            let args =
+                ["match", "left.png", right, output, "--mask", "mask.png", "--quiet", "--max-disparity"];
+            run(folder.path(), &[&args[..], &[&most.to_string()]].concat()).succeeded();
+        }
+        let disparities = map(at("out.pfm"));
+        let png = image::open(at("out.png")).unwrap();
+        assert_eq!(png.color(), image::ColorType::L16);
+        let png = png.into_luma16();
+        for (x, y, level) in png.enumerate_pixels() {
+            let (d, level) = (disparities[(x as usize, y as usize)], level.0[0]);
+            assert_eq!(d.is_finite(), level > 0, "{x}, {y}: 0 is invalid and nothing else is");
+            assert_eq!(level == 0, x < 5 && y > 30);
+            // KITTI divides by 256.
+            assert!(
+                level == 0 || (f32::from(level) / 256.0 - d).abs() <= 1.0 / 256.0,
+                "{x}, {y}: {level}, {d}"
+            );
+        }
+        let nearly_none = png.pixels().filter(|level| level.0[0] == 1).count();
+        assert_eq!(nearly_none > 2000, right == "left.png", "{nearly_none} are 1/256");
+    }
+}
+
+/// The program with its standard output as it is given.
+fn with_output(folder: &Path, args: &[&str], stdout: impl Into<Stdio>) -> std::process::Child {
+    Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .current_dir(folder)
+        .args(args)
+        .env("XDG_RUNTIME_DIR", std::env::temp_dir())
+        .stdout(stdout)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+#[test]
+fn standard_output_takes_the_map_and_nothing_else() {
+    let folder = workshop();
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9"];
+    run(folder.path(), &args).succeeded();
+    let before = listing(folder.path());
+    let args = ["match", "left.png", "right.png", "-", "--max-disparity", "9"];
+    let output = with_output(folder.path(), &args, Stdio::piped()).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stdout == fs::read(folder.path().join("out.pfm")).unwrap(), "the bytes of the file");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("60 x 40, 10 labels"), "{said}");
+    assert!(listing(folder.path()) == before);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_map_that_does_not_reach_its_reader_is_a_failure() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let args = ["match", "left.png", "right.png", "-", "--max-disparity", "9", "--quiet"];
+    let args = [&args[..], &["--raw", "raw.pfm", "--json", "m.json", "--intermediates", "steps"]].concat();
+    for (closed, words) in [(true, "its reader left"), (false, "No space left")] {
+        let stdout = if closed {
+            Stdio::piped()
+        } else {
+            fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into()
+        };
+        let mut child = with_output(folder.path(), &args, stdout);
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("standard output") && said.contains(words), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+        assert!(listing(folder.path()) == before, "{words}: something is left");
+    }
+}
+
+#[test]
+fn submissions_have_the_layout_of_the_benchmark() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let dirs = ["slanted", "thin"].map(|name| scene(name).to_str().unwrap().to_owned());
+    let args = ["evaluate", &dirs[0], &dirs[1], "--backend", "cpu", "--json", "a.json", "--submission"];
+    // A folder that is there and empty will do.
+    fs::create_dir(at("trainingQ")).unwrap();
+    run(folder.path(), &[&args[..], &["trainingQ", "MR-FGS_2"]].concat()).succeeded();
+    run(folder.path(), &[&args[..], &["sparse", "X", "--set", "fill=none"]].concat()).succeeded();
+    let names: Vec<_> = listing(folder.path()).into_keys().collect();
+    let mut expected = vec![at("a.json"), at("sparse"), at("trainingQ")];
+    for pair in ["slanted", "thin"] {
+        expected.extend([at("trainingQ").join(pair), at("sparse").join(pair)]);
+        expected
+            .extend(["disp0MR-FGS_2.pfm", "timeMR-FGS_2.txt"].map(|f| at("trainingQ").join(pair).join(f)));
+        expected.extend(["disp0X_s.pfm", "timeX.txt"].map(|f| at("sparse").join(pair).join(f)));
+    }
+    expected.sort();
+    assert_eq!(names, expected);
+
+    let figures = json(at("a.json"));
+    for (i, pair) in ["slanted", "thin"].into_iter().enumerate() {
+        matched(folder.path(), pair, &["d.pfm", "--quiet"]);
+        let [dense, sparse] = [("trainingQ", "MR-FGS_2"), ("sparse", "X_s")]
+            .map(|(dir, method)| fs::read(at(dir).join(pair).join(format!("disp0{method}.pfm"))).unwrap());
+        assert!(dense == fs::read(at("d.pfm")).unwrap(), "{pair}: the map of a match");
+        matched(folder.path(), pair, &["d.pfm", "--quiet", "--no-fill"]);
+        assert!(
+            sparse == fs::read(at("d.pfm")).unwrap() && sparse != dense,
+            "{pair}: the map without a fill"
+        );
+        assert!(map(at("d.pfm")).data().contains(&f32::INFINITY));
+        let time = fs::read_to_string(at("sparse").join(pair).join("timeX.txt")).unwrap();
+        let seconds = figures["pairs"][i]["seconds"].as_f64().unwrap();
+        assert!(seconds > 0.0 && time == format!("{seconds:.3}\n"), "{time} and {seconds}");
+    }
+}
