@@ -96,11 +96,12 @@ mod tests {
     use crate::maps::flag;
 
     fn calibration() -> Calibration {
-        let mut calibration = Calibration::default();
-        calibration.camera = Some(Camera { focal_length: [1000.0, 500.0], principal_point: [2.0, 1.0] });
-        calibration.doffs = Some(20.0);
-        calibration.baseline = Some(160.0);
-        calibration
+        Calibration {
+            camera: Some(Camera { focal_length: [1000.0, 500.0], principal_point: [2.0, 1.0] }),
+            doffs: Some(20.0),
+            baseline: Some(160.0),
+            ..Calibration::default()
+        }
     }
 
     #[test]
@@ -131,7 +132,7 @@ mod tests {
         let rig = Rig::new(&calibration()).unwrap();
         let validity = vec![0, flag::LOW_CONFIDENCE, flag::OCCLUDED | flag::FILLED, flag::MASKED, 0, 0];
         let maps = Maps {
-            disparity: Plane::new(6, 1, vec![60, 60, 60, 60, -20, 12].iter().map(|d| d * FRACTION).collect()),
+            disparity: Plane::new(6, 1, [60, 60, 60, 60, -20, 12].map(|d| d * FRACTION).to_vec()),
             raw: Plane::filled(6, 1, 0),
             confidence: Plane::new(6, 1, vec![200, 3, 0, 0, 70, 255]),
             validity: Plane::new(6, 1, validity),

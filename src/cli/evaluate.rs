@@ -29,7 +29,7 @@ Examples:
   mrfgs evaluate HalfSize/Art --truth-scale 2
   mrfgs evaluate Teddy Cones --breakdown
   mrfgs evaluate Teddy Cones --ablations --json ablations.json
-  mrfgs evaluate MiddEval3/trainingQ/* --submission results/trainingQ MRFGS
+  mrfgs evaluate MiddEval3/trainingQ/* --submission trainingQ MRFGS
   mrfgs evaluate --disparity mine.pfm --truth Teddy/disp0GT.pfm --mask Teddy/mask0nocc.png";
 
 /// Match pairs with known truth, or take a finished map, and print its errors

@@ -9,7 +9,7 @@ use mrfgs::maps::{flag, has_disparity};
 use mrfgs::options::Method;
 use serde_json::Value;
 
-use super::{listing, run, scene, scene_file, workshop};
+use super::{has_gpu, listing, run, scene, scene_file, workshop};
 
 /// Focal length and baseline of the scenes of 240 x 180 pixels and 32 labels, and the middle of their images.
 const FOCAL_LENGTH: f64 = 180.0;
@@ -68,7 +68,8 @@ fn depth_is_that_of_the_cameras() {
     // The wall behind is parallel to the images, at depth 2.8.
     let truth = map(scene("repetitive").join("disp0GT.pfm"));
     let wall = (BASELINE * FOCAL_LENGTH / 2.8) as f32;
-    let known = depths.data().iter().zip(truth.data()).filter(|(z, t)| z.is_finite() && **t == wall);
+    let known =
+        depths.data().iter().zip(truth.data()).filter(|(z, t)| z.is_finite() && t.total_cmp(&wall).is_eq());
     let known: Vec<f64> = known.map(|(z, _)| f64::from(*z)).collect();
     assert!(known.len() > 1000, "{} pixels", known.len());
     assert!((median(known.clone()) - 2.8).abs() < 0.02, "{}", median(known));
@@ -94,7 +95,7 @@ fn offset_principal_points_move_the_depth() {
         let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
             panic!("float")
         };
-        let same = |(a, b): (&f32, &f32)| if b.is_finite() { a == b } else { a.is_nan() };
+        let same = |(a, b): (&f32, &f32)| if b.is_finite() { a.total_cmp(b).is_eq() } else { a.is_nan() };
         assert!(values.iter().zip(depths.data()).all(same), "NaN in TIFF, +inf in PFM");
     }
 }
@@ -112,7 +113,13 @@ fn a_calibration_file_elsewhere_gives_the_range() {
 }
 
 /// A point of a cloud: position, colour, confidence.
-type Point = ([f64; 3], [u8; 3], f32);
+type Point = ([f64; 3], [u8; 3], u8);
+
+/// A level that a float holds.
+fn whole(value: f32) -> u8 {
+    assert!((0.0..=255.0).contains(&value) && value.fract() == 0.0, "{value}");
+    value as u8
+}
 
 /// Reads a cloud by nothing but what its header says.
 fn cloud(path: &Path) -> Vec<Point> {
@@ -141,7 +148,7 @@ fn cloud(path: &Path) -> Vec<Point> {
         (
             ["x", "y", "z"].map(|name| f64::from(float(name))),
             ["red", "green", "blue"].map(|name| point[places[name]]),
-            float("confidence"),
+            whole(float("confidence")),
         )
     });
     points.collect()
@@ -157,7 +164,8 @@ fn points_are_what_is_measured_and_trusted() {
     assert!(said.contains(&format!("; {} points; unit: ", points.len())), "{said}");
     let (depths, confidence) = (map(at("z.pfm")), read::grey8(&at("c.png")).unwrap());
     let validity = read::grey8(&at("v.png")).unwrap();
-    let trusted = validity.data().iter().filter(|&&v| v == 0).count();
+    let is_trusted = |v: u8| v == 0;
+    let trusted = validity.data().iter().filter(|v| is_trusted(**v)).count();
     assert_eq!(points.len(), trusted);
     assert!(trusted > 20_000 && trusted < 240 * 180 - 1000, "some are left out: {trusted}");
     assert!(validity.data().iter().any(|v| v & flag::LOW_CONFIDENCE != 0));
@@ -165,14 +173,14 @@ fn points_are_what_is_measured_and_trusted() {
     // Each is where its pixel looks, in the order of the pixels.
     let image = image::open(scene("slanted").join("im0.png")).unwrap().into_rgb8();
     let pixels = (0..180).flat_map(|y| (0..240).map(move |x| (x, y)));
-    for ((x, y), (position, colour, sure)) in pixels.filter(|&at| validity[at] == 0).zip(&points) {
+    for ((x, y), (position, colour, sure)) in pixels.filter(|&at| is_trusted(validity[at])).zip(&points) {
         let z = f64::from(depths[(x, y)]);
         let ray = [(x as f64 - MIDDLE[0]) / FOCAL_LENGTH, (y as f64 - MIDDLE[1]) / FOCAL_LENGTH, 1.0];
         for (found, along) in position.iter().zip(ray) {
             assert!((found - along * z).abs() < 1e-5, "{x}, {y}: {position:?}");
         }
         assert_eq!(*colour, image.get_pixel(x as u32, y as u32).0, "{x}, {y}");
-        assert_eq!(*sure, f32::from(confidence[(x, y)]));
+        assert_eq!(*sure, confidence[(x, y)]);
     }
 }
 
@@ -272,6 +280,16 @@ fn json_tells_what_ran_and_what_came_of_it() {
     assert!(stages["flood, level 0"].as_f64().unwrap() > 0.0, "{stages:?}");
     let sum: f64 = stages.values().map(|ms| ms.as_f64().unwrap()).sum();
     assert!(sum < 1000.0 * printed["seconds"].as_f64().unwrap());
+
+    // A device has a driver.
+    if has_gpu() {
+        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "gpu"];
+        let told = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded();
+        let (found, listed) = (told.json(), run(folder.path(), &["devices"]).succeeded().stdout);
+        assert!(told.stderr.contains(&format!(" on {}", found["ran_on"].as_str().unwrap())), "{told:?}");
+        let driver = found["driver"].as_str().unwrap();
+        assert!(!driver.is_empty() && listed.contains(&format!("driver: {driver}")), "{driver} in {listed}");
+    }
 
     // A map without a pixel has no confidence.
     let all = image::GrayImage::from_pixel(60, 40, image::Luma([1]));
