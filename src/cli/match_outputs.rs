@@ -25,8 +25,8 @@ pub(super) struct MoreOutputs {
     /// Writes the depth of every disparity too, as float: .pfm (+infinity where there is none) or .tif (NaN)
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
-    /// Writes points with the colours of LEFT and their confidence too: binary PLY, x to the right, y down, z forward of the
-    /// left camera. What is invalid, filled in or of low confidence is left out
+    /// Writes points with the colours of LEFT and their confidence (`quality`) too: binary PLY, x to the right, y down, z
+    /// forward of the left camera. What is invalid, filled in or of low confidence is left out
     #[arg(long, value_name = "FILE")]
     point_cloud: Option<PathBuf>,
     /// Writes the confidence too: 8-bit PNG, 0 to 255, how far the best rival is behind in 1/8 nat

@@ -32,7 +32,7 @@ pub fn write(path: &Path, plane: &Plane<f32>) -> Result<()> {
     write::save(path, &encode(plane))
 }
 
-/// The bytes of the file that [`write`] would write.
+/// The bytes of the file that [`write()`] would write.
 #[must_use]
 pub fn encode(plane: &Plane<f32>) -> Vec<u8> {
     let mut bytes = format!("Pf\n{} {}\n-1.0\n", plane.width(), plane.height()).into_bytes();

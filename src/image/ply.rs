@@ -17,7 +17,8 @@ pub struct Point {
 }
 
 /// Writes points as binary little-endian PLY, whole or not at all: one element `vertex` with `x`, `y`, `z` (float), `red`,
-/// `green`, `blue` (uchar) and `confidence` (float, the type under which `MeshLab` takes it for a vertex quality).
+/// `green`, `blue` (uchar) and `quality` (float), which is the confidence. Under this name and type `MeshLab` shows it;
+/// a float called `confidence` it misreads, and of any other it says nothing.
 ///
 /// # Errors
 /// [`crate::Error::Write`] when the name does not end in `.ply` or the file cannot be written.
@@ -32,6 +33,7 @@ fn encode(points: &[Point]) -> Vec<u8> {
         "ply\n\
          format binary_little_endian 1.0\n\
          comment frame of the left camera: x right, y down, z forward; unit that of the baseline\n\
+         comment quality is the confidence, 0 to 255\n\
          element vertex {}\n\
          property float x\n\
          property float y\n\
@@ -39,7 +41,7 @@ fn encode(points: &[Point]) -> Vec<u8> {
          property uchar red\n\
          property uchar green\n\
          property uchar blue\n\
-         property float confidence\n\
+         property float quality\n\
          end_header\n",
         points.len()
     );
@@ -66,14 +68,16 @@ mod tests {
         let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
         let header: Vec<_> = std::str::from_utf8(&bytes[..start]).unwrap().lines().collect();
         assert_eq!(header[..2], ["ply", "format binary_little_endian 1.0"]);
-        assert_eq!(header[3], "element vertex 2");
-        assert!(header[2].starts_with("comment ") && header[2].contains("y down"));
+        let about: String = header.iter().filter_map(|line| line.strip_prefix("comment ")).collect();
+        assert!(about.contains("y down") && about.contains("confidence"), "{about}");
+        let elements: Vec<_> = header.iter().filter_map(|line| line.strip_prefix("element ")).collect();
+        assert_eq!(elements, ["vertex 2"]);
         let size = |kind: &str| if kind == "float" { 4 } else { 1 };
         let properties: Vec<_> = header.iter().filter_map(|line| line.strip_prefix("property ")).collect();
         let bytes_a_point: usize = properties.iter().map(|p| size(p.split(' ').next().unwrap())).sum();
         assert_eq!(bytes.len(), start + 2 * bytes_a_point);
         let names: Vec<_> = properties.iter().map(|p| p.split(' ').next_back().unwrap()).collect();
-        assert_eq!(names, ["x", "y", "z", "red", "green", "blue", "confidence"]);
+        assert_eq!(names, ["x", "y", "z", "red", "green", "blue", "quality"]);
         let mut first = [1.5_f32, -2.0, 1e6].map(f32::to_le_bytes).concat();
         first.extend([7, 8, 9]);
         first.extend(200.0_f32.to_le_bytes());

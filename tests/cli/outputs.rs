@@ -148,7 +148,7 @@ fn cloud(path: &Path) -> Vec<Point> {
         (
             ["x", "y", "z"].map(|name| f64::from(float(name))),
             ["red", "green", "blue"].map(|name| point[places[name]]),
-            whole(float("confidence")),
+            whole(float("quality")),
         )
     });
     points.collect()
