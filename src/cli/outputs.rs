@@ -40,7 +40,7 @@ fn parent(path: &Path) -> &Path {
 /// Refuses a file or folder in a folder that is replaced as a whole; each comes with the name of its flag.
 pub(super) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
     if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
-        let reason = format!("{} lies in the folder of {folder_name}; give another place", path.display());
+        let reason = format!("{} lies in the folder of {folder_name}; give another name", path.display());
         return Err(Error::option(name, reason));
     }
     Ok(())
