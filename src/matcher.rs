@@ -8,7 +8,7 @@ use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
-use crate::solver::{self, Inspector, Observer, Solution};
+use crate::solver::{self, Inspector, Observer, Solution, Started};
 use crate::tiles::Tiles;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -158,29 +158,123 @@ impl Matcher {
             );
             return Err(Error::option("--intermediates", reason));
         }
-        let Self { pool, cpu, gpu, checked, falls_back, given_up, timings } = self;
-        pool.install(|| {
-            let mut note = given_up.clone();
-            if let Some(device) = gpu {
-                let served = check(device, &plan.method, checked).and_then(|()| {
-                    timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector))
-                });
-                match served {
-                    // The bits are the same on the CPU path, so a device that fails costs time and nothing else.
-                    Err(e @ (Error::Device(_) | Error::Memory(_))) if *falls_back => {
-                        note = Some(e.to_string());
-                        // What is too large for it this time may fit the next.
-                        if matches!(e, Error::Device(_)) {
-                            *gpu = None;
-                            given_up.clone_from(&note);
-                        }
+        let Self { pool, gpu, checked, timings, .. } = self;
+        let mut note = None;
+        if let Some(device) = gpu {
+            let served = pool.install(|| {
+                check(device, &plan.method, checked)?;
+                timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector))
+            });
+            match served {
+                Err(e) => note = Some(self.without_device(e)?),
+                served => return served,
+            }
+        }
+        let Self { pool, cpu, given_up, timings, .. } = self;
+        let note = note.or_else(|| given_up.clone());
+        let matched = pool.install(|| timed(cpu, *timings, &tiles, pair, observer, inspector))?;
+        Ok(Matched { note, ..matched })
+    }
+
+    /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks. While a
+    /// device is at one pair, the next one's graphs are built and go up, and the maps of the one before come down. (Not with
+    /// [`Execution::timings`], nor where a pair is cut into tiles.)
+    ///
+    /// # Errors
+    /// Those of [`Matcher::run`]; the results of all pairs before have been handed out then.
+    pub fn run_all(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        method: &Method,
+        observer: Observer,
+        take: &mut dyn FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        let mut last: Option<Flight> = None;
+        for (pair, range) in pairs {
+            let started = self.start(&pair, range, method, &mut *observer);
+            if let Some(last) = last.take()
+                && take(self.land(last, method, &mut *observer)?).is_break()
+            {
+                return Ok(());
+            }
+            match started? {
+                Some((tiles, started)) => last = Some(Flight { pair, range, tiles, started }),
+                None => {
+                    if take(self.run(&pair, range, method, &mut *observer)?).is_break() {
+                        return Ok(());
                     }
-                    served => return served,
                 }
             }
-            timed(cpu, *timings, &tiles, pair, observer, inspector).map(|matched| Matched { note, ..matched })
-        })
+        }
+        if let Some(last) = last {
+            let _ = take(self.land(last, method, observer)?);
+        }
+        Ok(())
     }
+
+    /// Starts a match on the device, where it can be left to itself.
+    fn start(
+        &mut self,
+        pair: &Pair,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer,
+    ) -> Result<Option<(Tiles, Started)>> {
+        let Self { pool, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?;
+        let tiles = Tiles::new(&plan)?;
+        if tiles.count() > 1 {
+            return Ok(None);
+        }
+        let started = pool.install(|| {
+            check(device, &plan.method, checked)?;
+            device.keep_time(false)?;
+            solver::start(device, &plan, pair, observer)
+        });
+        match started {
+            Ok(started) => Ok(Some((tiles, started))),
+            Err(e) => self.without_device(e).map(|_| None),
+        }
+    }
+
+    /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
+    fn land(&mut self, flight: Flight, method: &Method, observer: Observer) -> Result<Matched> {
+        let Flight { pair, range, tiles, started } = flight;
+        if let Some(device) = &mut self.gpu {
+            match self.pool.install(|| solver::finish(device, started)) {
+                Ok(solution) => return Ok(matched(device, &tiles, solution, Vec::new())),
+                Err(e) => self.without_device(e)?,
+            };
+        }
+        self.run(&pair, range, method, observer)
+    }
+
+    /// What to tell of a device that failed, where the CPU path may step in: the bits are the same there, so it costs time and
+    /// nothing else.
+    ///
+    /// # Errors
+    /// The failure, where it may not.
+    fn without_device(&mut self, failure: Error) -> Result<String> {
+        if !self.falls_back || !matches!(failure, Error::Device(_) | Error::Memory(_)) {
+            return Err(failure);
+        }
+        let note = failure.to_string();
+        // What is too large for it this time may fit the next.
+        if matches!(failure, Error::Device(_)) {
+            self.gpu = None;
+            self.given_up = Some(note.clone());
+        }
+        Ok(note)
+    }
+}
+
+/// A match that was started on a device.
+struct Flight {
+    pair: Pair,
+    range: DisparityRange,
+    tiles: Tiles,
+    started: Started,
 }
 
 /// Matches `pair` over `range` by `method`, where `execution` says; `observer` hears of progress and can stop it.
@@ -211,8 +305,13 @@ fn timed(
     } else {
         solver::solve_tiles(backend, tiles, pair, observer)?
     };
-    Ok(Matched {
-        timings: if timings { summed(&solution, &backend.times()?) } else { Vec::new() },
+    let timings = if timings { summed(&solution, &backend.times()?) } else { Vec::new() };
+    Ok(matched(backend, tiles, solution, timings))
+}
+
+fn matched(backend: &dyn Backend, tiles: &Tiles, solution: Solution, timings: Vec<Timing>) -> Matched {
+    Matched {
+        timings,
         traffic: solution.traffic,
         maps: solution.maps,
         iterations: solution.iterations,
@@ -221,7 +320,7 @@ fn timed(
         ran_on: backend.describe(),
         driver: backend.driver(),
         note: None,
-    })
+    }
 }
 
 /// The same inspector once more, for a shorter time.

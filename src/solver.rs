@@ -1,7 +1,7 @@
 //! The only place that knows levels, iterations, convergence and the order of what follows.
 
 use crate::backend::cpu::Mosaic;
-use crate::backend::{Backend, Map, Stage, Traffic};
+use crate::backend::{Backend, Map, Requested, Stage, Traffic};
 use crate::error::{Error, Result};
 use crate::front::illumination::homomorphic;
 use crate::front::matches::{self, Match};
@@ -85,30 +85,64 @@ pub fn inspect(
     observer: Observer,
     inspector: Option<Inspector>,
 ) -> Result<Solution> {
-    check_size(plan, pair)?;
     let mut work = Work::new(observer, inspector, matchings(plan) as f64 * total_work(plan));
+    let iterations = run(backend, plan, pair, &mut work)?;
+    backend.wait()?;
+    let maps = work.host("download", || backend.request_maps().and_then(|maps| backend.maps(maps)))?;
+    let traffic = backend.traffic();
+    Ok(Solution { maps, iterations, around: work.around, finish: Vec::new(), traffic })
+}
+
+/// A match whose stages may still run, or whose maps are on their way.
+pub struct Started {
+    requested: Requested,
+    iterations: u32,
+    around: Vec<(&'static str, Duration)>,
+    traffic: Traffic,
+}
+
+/// As [`solve`], but does not wait for a device: the next match may be started on it before [`finish`] ends this one.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Started> {
+    let mut work = Work::new(observer, None, matchings(plan) as f64 * total_work(plan));
+    let iterations = run(backend, plan, pair, &mut work)?;
+    let requested = backend.request_maps()?;
+    Ok(Started { requested, iterations, around: work.around, traffic: backend.traffic() })
+}
+
+/// Ends a match that was started on `backend`.
+///
+/// # Errors
+/// Whatever the backend reports.
+pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
+    let Started { requested, iterations, around, traffic } = started;
+    Ok(Solution { maps: backend.maps(requested)?, iterations, around, finish: Vec::new(), traffic })
+}
+
+/// All stages of a match in one piece; the number of iterations.
+fn run(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work) -> Result<u32> {
+    check_size(plan, pair)?;
     let right_labels = if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = work.inspector.take();
-        let mirrored = corrected(plan, pair.mirrored(), &mut work)?;
-        estimate(backend, plan, &mirrored, &mut work)?;
+        let mirrored = corrected(plan, pair.mirrored(), work)?;
+        estimate(backend, plan, &mirrored, work)?;
         work.inspector = inspector;
         Some(backend.read_map(Map::Label)?.mirrored())
     } else {
         None
     };
-    let pair = corrected(plan, pair.clone(), &mut work)?;
-    let iterations = estimate(backend, plan, &pair, &mut work)?;
+    let pair = corrected(plan, pair.clone(), work)?;
+    let iterations = estimate(backend, plan, &pair, work)?;
     if let Some(labels) = right_labels {
         backend.write_map(Map::RightLabel, &labels)?;
     }
-    for stage in read_out(&plan.method).into_iter().chain(finish(&plan.method)) {
+    for stage in read_out(&plan.method).into_iter().chain(post_processing(&plan.method)) {
         work.run(backend, plan, stage)?;
     }
-    backend.wait()?;
-    let maps = work.host("download", || backend.maps())?;
-    let traffic = backend.traffic();
-    Ok(Solution { maps, iterations, around: work.around, finish: Vec::new(), traffic })
+    Ok(iterations)
 }
 
 /// Matches `pair` tile by tile on `backend`, and finishes the maps of all tiles together on the CPU path; `observer` hears
@@ -153,7 +187,7 @@ pub fn solve_tiles(
     }
     work.tile = None;
     let mut times = Vec::new();
-    for stage in finish(&whole.method) {
+    for stage in post_processing(&whole.method) {
         work.begin(stage.name(), 0.0)?;
         let clock = Instant::now();
         mosaic.run(stage);
@@ -284,7 +318,7 @@ fn read_out(method: &Method) -> Vec<Stage> {
 }
 
 /// What follows that, and looks at maps alone.
-fn finish(method: &Method) -> Vec<Stage> {
+fn post_processing(method: &Method) -> Vec<Stage> {
     let mut stages = vec![Stage::Visibility];
     if method.region_size > 1 {
         stages.push(Stage::RegionFilter);

@@ -171,7 +171,8 @@ fn poisoned_buffers() {
 
 /// The maps as they stand.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
-    let (maps, traffic) = (backend.maps().unwrap(), backend.traffic());
+    let requested = backend.request_maps().unwrap();
+    let (maps, traffic) = (backend.maps(requested).unwrap(), backend.traffic());
     Solution { maps, iterations: 0, around: Vec::new(), finish: Vec::new(), traffic }
 }
 

@@ -259,6 +259,14 @@ impl std::ops::AddAssign for Traffic {
     }
 }
 
+/// Maps on their way from what computes them.
+pub enum Requested {
+    /// They are here.
+    Here(Maps),
+    /// A device sends them.
+    Device(gpu::RequestedMaps),
+}
+
 /// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Backend {
@@ -291,8 +299,11 @@ pub trait Backend {
     /// Waits until every stage has run.
     fn wait(&mut self) -> Result<()>;
 
-    /// The maps, once all stages before have run.
-    fn maps(&mut self) -> Result<Maps>;
+    /// Asks for the maps as they are once all stages before have run. The next pair may be prepared before they arrive.
+    fn request_maps(&mut self) -> Result<Requested>;
+
+    /// The maps that this backend was asked for, once they have arrived.
+    fn maps(&mut self, requested: Requested) -> Result<Maps>;
 
     /// Starts to take the time of every stage, or stops.
     fn keep_time(&mut self, on: bool) -> Result<()>;

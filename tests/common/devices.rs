@@ -3,7 +3,7 @@
 use mrfgs::Result;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{Gpu, Handicap};
-use mrfgs::backend::{Backend, Map, Stage, Traffic, Volume};
+use mrfgs::backend::{Backend, Map, Requested, Stage, Traffic, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Pair, Plane};
 use mrfgs::maps::Maps;
@@ -90,8 +90,12 @@ impl Backend for Pooled {
         self.gpu().wait()
     }
 
-    fn maps(&mut self) -> Result<Maps> {
-        self.gpu().maps()
+    fn request_maps(&mut self) -> Result<Requested> {
+        self.gpu().request_maps()
+    }
+
+    fn maps(&mut self, requested: Requested) -> Result<Maps> {
+        self.gpu().maps(requested)
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

@@ -19,7 +19,7 @@ mod units;
 mod visibility;
 mod zeroed;
 
-use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
+use super::{Backend, Map, PaddedRows, Requested, Stage, Traffic, Volume, volume_shape};
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane, Rect};
@@ -408,14 +408,21 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn maps(&mut self) -> Result<Maps> {
+    fn request_maps(&mut self) -> Result<Requested> {
         let Finest { raw, disparity, validity, confidence, .. } = on_volumes!(self, v => &v.maps);
-        Ok(Maps {
+        Ok(Requested::Here(Maps {
             disparity: disparity.clone(),
             raw: raw.clone(),
             confidence: confidence.clone(),
             validity: validity.clone(),
-        })
+        }))
+    }
+
+    fn maps(&mut self, requested: Requested) -> Result<Maps> {
+        match requested {
+            Requested::Here(maps) => Ok(maps),
+            Requested::Device(_) => unreachable!("maps of a device"),
+        }
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

@@ -3,6 +3,7 @@
 use crate::backend::Traffic;
 use crate::error::{Error, Result};
 use std::collections::VecDeque;
+use std::sync::mpsc;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -207,6 +208,8 @@ pub(super) struct Device {
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<wgpu::SubmissionIndex>,
+    /// Submissions so far, those under way included.
+    submitted: u64,
     failure: Arc<Mutex<Option<Error>>>,
     pub(super) traffic: Traffic,
 }
@@ -282,6 +285,7 @@ impl Device {
             patience: handicap.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
             lost_after: handicap.lost_after,
             under_way: VecDeque::new(),
+            submitted: 0,
             failure,
             traffic: Traffic::default(),
             open: Some((device, queue)),
@@ -322,6 +326,7 @@ impl Device {
         }
         let index = self.queue()?.submit([encoder.finish()]);
         self.under_way.push_back(index);
+        self.submitted += 1;
         self.traffic.submissions += 1;
         self.check()
     }
@@ -353,27 +358,35 @@ impl Device {
         }
     }
 
-    /// The words of each staging buffer, once what was submitted has filled them.
-    pub(super) fn mapped(&mut self, staged: &[wgpu::Buffer]) -> Result<Vec<Vec<u32>>> {
-        let (sender, receiver) = std::sync::mpsc::channel();
-        for buffer in staged {
+    /// Asks for buffers that what has been submitted so far fills.
+    pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Requested {
+        let (sender, mapped) = mpsc::channel();
+        for buffer in &buffers {
+            self.traffic.bytes_down += buffer.size();
             let sender = sender.clone();
-            buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
-                // Nobody listens when the wait below failed.
-                let _ = sender.send(mapped);
+            buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+                // Nobody listens when the wait for it failed.
+                let _ = sender.send(result);
             });
         }
-        self.wait()?;
+        Requested { buffers, mapped, submitted: self.submitted }
+    }
+
+    /// The words of each buffer that was asked for; what was submitted later may still be under way.
+    pub(super) fn collect(&mut self, requested: Requested) -> Result<Vec<Vec<u32>>> {
+        while self.submitted - (self.under_way.len() as u64) < requested.submitted {
+            self.wait_for_one()?;
+        }
+        self.check()?;
         // What was submitted long ago is mapped by any poll.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
-        for _ in staged {
-            let mapped = receiver.try_recv().map_err(|e| failed(&self.name, &e))?;
+        let mut all = Vec::new();
+        for _ in &requested.buffers {
+            let mapped = requested.mapped.try_recv().map_err(|e| failed(&self.name, &e))?;
             mapped.map_err(|e| failed(&self.name, &e))?;
         }
-        let mut all = Vec::new();
-        for buffer in staged {
+        for buffer in &requested.buffers {
             let view = buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?;
-            self.traffic.bytes_down += view.len() as u64;
             all.push(bytemuck::pod_collect_to_vec(&view));
         }
         self.check()?;
@@ -393,6 +406,14 @@ impl Device {
             }
         }
     }
+}
+
+/// Buffers on their way from the device.
+pub(super) struct Requested {
+    buffers: Vec<wgpu::Buffer>,
+    mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+    /// Submissions after which they are filled.
+    submitted: u64,
 }
 
 /// The failure of the device called `name`, in one line.

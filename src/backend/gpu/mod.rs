@@ -13,7 +13,7 @@ mod stages;
 mod timer;
 mod upload;
 
-use super::{Backend, Map, PaddedRows, Stage, Traffic, Volume, volume_shape};
+use super::{Backend, Map, PaddedRows, Requested, Stage, Traffic, Volume, volume_shape};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
@@ -224,8 +224,8 @@ impl Gpu {
         self.device.check()
     }
 
-    /// The words of each range of bytes, after everything recorded so far.
-    fn download(&mut self, ranges: &[(wgpu::Buffer, std::ops::Range<u64>)]) -> Result<Vec<Vec<u32>>> {
+    /// Asks for each range of bytes, after everything recorded so far.
+    fn request(&mut self, ranges: &[(wgpu::Buffer, std::ops::Range<u64>)]) -> Result<device::Requested> {
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;
@@ -239,15 +239,26 @@ impl Gpu {
             staged.push(staging);
         }
         self.submit()?;
-        self.device.mapped(&staged)
+        Ok(self.device.request(staged))
+    }
+
+    /// Asks for the words of all rows.
+    fn request_rows(&mut self, rows: &[&Rows]) -> Result<RequestedRows> {
+        let parts: Vec<_> = rows.iter().flat_map(|r| r.own()).collect();
+        let counts = rows.iter().map(|r| r.own().len()).collect();
+        Ok(RequestedRows { counts, parts: self.request(&parts)? })
+    }
+
+    /// The words of all rows that were asked for.
+    fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
+        let mut words = self.device.collect(rows.parts)?.into_iter();
+        Ok(rows.counts.into_iter().map(|n| words.by_ref().take(n).collect::<Vec<_>>().concat()).collect())
     }
 
     /// The words of all rows.
     fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
-        let counts: Vec<usize> = rows.iter().map(|r| r.own().len()).collect();
-        let parts: Vec<_> = rows.iter().flat_map(|r| r.own()).collect();
-        let mut words = self.download(&parts)?.into_iter();
-        Ok(counts.into_iter().map(|n| words.by_ref().take(n).collect::<Vec<_>>().concat()).collect())
+        let requested = self.request_rows(rows)?;
+        self.collect_rows(requested)
     }
 
     fn state(&self) -> &State {
@@ -324,6 +335,18 @@ impl Gpu {
         let (width, height) = self.state().plan.size();
         (width, height, self.state().buffers.levels[0].params.pixel_pitch as usize)
     }
+}
+
+/// Rows on their way from the device, each in so many parts.
+struct RequestedRows {
+    counts: Vec<usize>,
+    parts: device::Requested,
+}
+
+/// Maps on their way from the device.
+pub struct RequestedMaps {
+    rows: RequestedRows,
+    shape: (usize, usize, usize),
 }
 
 /// The word of a row of `volume` that holds a label of its line \[x\]\[slot\]: the shaders keep the first four labels of all
@@ -416,7 +439,8 @@ impl Backend for Gpu {
         self.run(Stage::Change)?;
         let sums = self.state().buffers.change_sums.clone();
         let rows = self.state().plan.levels[0].height;
-        let words = self.download(&[(sums, 0..8 * rows as u64)])?;
+        let requested = self.request(&[(sums, 0..8 * rows as u64)])?;
+        let words = self.device.collect(requested)?;
         Ok(words[0].chunks_exact(2).map(|half| u64::from(half[1]) << 32 | u64::from(half[0])).sum())
     }
 
@@ -425,11 +449,19 @@ impl Backend for Gpu {
         self.device.wait()
     }
 
-    fn maps(&mut self) -> Result<Maps> {
+    fn request_maps(&mut self) -> Result<Requested> {
         let b = &self.state().buffers;
         let (disparity, raw, flags) = (b.disparity.clone(), b.raw.clone(), b.flags.clone());
-        let words = self.rows(&[&disparity, &raw, &flags])?;
-        let (width, height, pitch) = self.map_shape();
+        let rows = self.request_rows(&[&disparity, &raw, &flags])?;
+        Ok(Requested::Device(RequestedMaps { rows, shape: self.map_shape() }))
+    }
+
+    fn maps(&mut self, requested: Requested) -> Result<Maps> {
+        let RequestedMaps { rows, shape: (width, height, pitch) } = match requested {
+            Requested::Here(maps) => return Ok(maps),
+            Requested::Device(requested) => requested,
+        };
+        let words = self.collect_rows(rows)?;
         let plane = |i: usize| Plane::from_fn(width, height, |x, y| words[i][y * pitch + x].cast_signed());
         let byte =
             |bit: u32| Plane::from_fn(width, height, |x, y| (words[2][y * pitch + x] >> bit & 0xff) as u8);

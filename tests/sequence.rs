@@ -1,0 +1,144 @@
+//! Pair after pair through one matcher: the same maps as one by one, in order, while a device is kept busy.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
+mod common;
+
+use common::devices::open as device;
+use common::random::{self, Random};
+use mrfgs::backend::gpu::Handicap;
+use mrfgs::image::Pair;
+use mrfgs::maps::Maps;
+use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::{Error, Matched, Matcher, Result};
+use std::cell::RefCell;
+use std::fmt::Write;
+use std::ops::ControlFlow;
+
+/// Pairs of several sizes and ranges; the same ones meet again, and one needs tiles under [`method`].
+fn pairs() -> Vec<(Pair, DisparityRange)> {
+    let mut random = Random::new(5);
+    [(40, 24, 15), (40, 24, 15), (33, 50, 21), (300, 260, 40), (40, 24, 15), (33, 50, 21)]
+        .map(|(width, height, most)| {
+            (random::pair(&mut random, width, height), DisparityRange::new(-2, most).unwrap())
+        })
+        .into()
+}
+
+fn method() -> Method {
+    let mut method = Method::default();
+    method.set("memory", "24").unwrap();
+    method
+}
+
+fn one_by_one() -> Vec<Maps> {
+    let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+    let mut matcher = Matcher::new(&execution).unwrap();
+    let mut run = |(pair, range): (Pair, DisparityRange)| {
+        let matched = matcher.run(&pair, range, &method(), &mut |_| ControlFlow::Continue(())).unwrap();
+        (matched.maps, matched.tiles.count())
+    };
+    let (maps, tiles): (Vec<_>, Vec<_>) = pairs().into_iter().map(&mut run).unzip();
+    assert_eq!(tiles.iter().filter(|&&count| count > 1).count(), 1, "{tiles:?}");
+    // Control: were two of them confused, it would be seen.
+    assert!((1..maps.len()).all(|i| maps[..i].iter().all(|other| *other != maps[i])));
+    maps
+}
+
+/// What `matcher` makes of `pairs`, and the order in which they were asked for and handed out.
+fn all(
+    matcher: &mut Matcher,
+    pairs: Vec<(Pair, DisparityRange)>,
+    stop_after: usize,
+) -> (Result<()>, Vec<Matched>, String) {
+    let log = RefCell::new(String::new());
+    let asked = pairs.into_iter().enumerate().map(|(i, pair)| {
+        write!(log.borrow_mut(), "ask {i}, ").unwrap();
+        pair
+    });
+    let mut found = Vec::new();
+    let result = matcher.run_all(asked, &method(), &mut |_| ControlFlow::Continue(()), &mut |matched| {
+        write!(log.borrow_mut(), "take {}, ", found.len()).unwrap();
+        found.push(matched);
+        if found.len() == stop_after { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    (result, found, log.into_inner())
+}
+
+fn assert_same(found: Vec<Matched>, expected: &[Maps]) {
+    assert_eq!(found.len(), expected.len());
+    for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+        assert!(found.maps == *expected, "pair {i} on {}", found.ran_on);
+    }
+}
+
+#[test]
+fn a_sequence_is_its_pairs() {
+    let expected = one_by_one();
+    let cpu = Execution { backend: Choice::Cpu, ..Execution::default() };
+    let (result, found, log) = all(&mut Matcher::new(&cpu).unwrap(), pairs(), usize::MAX);
+    result.unwrap();
+    assert!(log.starts_with("ask 0, take 0, ask 1, take 1, "), "{log}");
+    assert_same(found, &expected);
+
+    let Some(gpu) = device(Handicap::default()) else { return };
+    let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
+    let (result, found, log) = all(&mut matcher, pairs(), usize::MAX);
+    result.unwrap();
+    // A device is given the next pair before the last one's maps are awaited, but for the one in tiles.
+    let order = "ask 0, ask 1, take 0, ask 2, take 1, ask 3, take 2, take 3, ask 4, ask 5, take 4, take 5, ";
+    assert_eq!(log, order);
+    for matched in &found {
+        assert!(!matched.ran_on.contains("CPU path") && matched.traffic.bytes_up > 0, "{}", matched.ran_on);
+        // Three maps of four bytes a pixel, and nothing of the pair after it.
+        let (width, height) = matched.plan.size();
+        let down = matched.traffic.bytes_down as usize;
+        assert!(down >= 12 * width * height && (matched.tiles.count() > 1 || down < 60 * width * height));
+    }
+    assert_same(found, &expected);
+    // What was left in the air does not turn up in the next sequence.
+    let (result, found, log) = all(&mut matcher, pairs(), 2);
+    result.unwrap();
+    assert_eq!(log, "ask 0, ask 1, take 0, ask 2, take 1, ");
+    assert_same(found, &expected[..2]);
+    let (result, found, _) = all(&mut matcher, pairs(), usize::MAX);
+    result.unwrap();
+    assert_same(found, &expected);
+}
+
+/// Wherever in the sequence a device is lost, the CPU path takes over and no pair is lost or twice there.
+#[test]
+fn a_device_lost_on_the_way_costs_no_pair() {
+    let expected = one_by_one();
+    let (mut by_device, mut by_cpu) = (false, false);
+    for stages in [0, 30, 200, 250, 300, 400, 500, 700] {
+        let Some(gpu) = device(Handicap { lost_after: Some(stages), ..Handicap::default() }) else { return };
+        let mut matcher = Matcher::on(Ok(gpu), true, &Execution::default()).unwrap();
+        let (result, found, _) = all(&mut matcher, pairs(), usize::MAX);
+        result.unwrap();
+        by_device |= found.iter().any(|matched| matched.note.is_none());
+        by_cpu |= found.iter().any(|matched| matched.note.is_some());
+        assert_same(found, &expected);
+    }
+    assert!(by_device && by_cpu);
+}
+
+/// A pair that cannot be matched ends the sequence, once those before it are handed out.
+#[test]
+fn results_before_a_failure_are_handed_out() {
+    let expected = one_by_one();
+    let mut with_a_bad_one = pairs();
+    // No tile is small enough for the method's memory.
+    with_a_bad_one[2].1 = DisparityRange::new(0, 16_000).unwrap();
+    let mut matchers =
+        vec![Matcher::new(&Execution { backend: Choice::Cpu, ..Execution::default() }).unwrap()];
+    matchers.extend(
+        device(Handicap::default()).map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap()),
+    );
+    for mut matcher in matchers {
+        let (result, found, _) = all(&mut matcher, with_a_bad_one.clone(), usize::MAX);
+        let error = result.unwrap_err();
+        assert!(matches!(error, Error::Option { .. }), "{error}");
+        assert_same(found, &expected[..2]);
+    }
+}
