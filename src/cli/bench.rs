@@ -23,7 +23,7 @@ use super::folder::{self, Folder};
 use super::process::{peak_memory, processor_time};
 use super::synthetic::{LARGE, SMALL, Synthetic};
 use super::tables::figure;
-use super::{MethodArgs, ResourceArgs, outputs};
+use super::{MethodArgs, ReadArgs, ResourceArgs, outputs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -70,6 +70,8 @@ pub(super) struct Args {
     /// Writes all figures as JSON; `-` prints them instead of the table
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadArgs,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -257,6 +259,7 @@ impl Case<'_> {
         flag("--preset=", &self.preset);
         flag("--backend=", &self.backend);
         flag("--repeats=", &args.repeats.to_string());
+        flag("--max-pixels=", &args.reading.max_pixels.to_string());
         if let Some(config) = &args.method.config {
             flag("--config=", config);
         }
@@ -284,7 +287,7 @@ impl Case<'_> {
     /// Measures here.
     fn measure(&self, args: &Args) -> Result<Row> {
         let (pair, range) = if let Some(dir) = self.dir {
-            Folder::to_match(dir)?.read_pair()?
+            Folder::to_match(dir)?.read_pair(args.reading.reader())?
         } else {
             let made_up = made_up(args);
             (made_up.pair()?, made_up.range()?)

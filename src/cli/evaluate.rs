@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use mrfgs::evaluation::{Breakdown, Detection, Report, Row, Sparsification, mean, table};
-use mrfgs::image::{read, write};
+use mrfgs::image::write;
 use mrfgs::maps::Maps;
 use mrfgs::options::Method;
 use mrfgs::{Error, Matcher, Result};
@@ -18,7 +18,7 @@ use super::outputs;
 use super::report::{self, Destination, Picture};
 use super::submission::Submission;
 use super::tables::{self, Comparison};
-use super::{ExecutionArgs, MethodArgs};
+use super::{ExecutionArgs, MethodArgs, ReadArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -117,6 +117,8 @@ pub(super) struct Args {
     /// the third size 3.
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
     truth_scale: Option<f32>,
+    #[command(flatten)]
+    reading: ReadArgs,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -284,8 +286,10 @@ fn finished_map(
     args: &Args,
     pictures: Option<&mut Vec<Vec<Picture>>>,
 ) -> Result<Findings> {
-    let estimate = read::read_disparity(map)?;
-    let ground = folder::ground_truth(truth, args.truth_scale, args.mask.as_deref(), map, estimate.size())?;
+    let reader = args.reading.reader();
+    let estimate = reader.disparity(map)?;
+    let (scale, mask) = (args.truth_scale, args.mask.as_deref());
+    let ground = folder::ground_truth(reader, truth, scale, mask, map, estimate.size())?;
     let name = map.file_stem().unwrap_or(map.as_os_str()).to_string_lossy().into_owned();
     let finished = ground.evaluate(&estimate)?;
     if let Some(pictures) = pictures {
@@ -326,7 +330,7 @@ fn match_all(
     let mut figures = Vec::new();
     let mut ran_on = None;
     for folder in folders {
-        let scene = folder.read(args.truth_scale)?;
+        let scene = folder.read(args.reading.reader(), args.truth_scale)?;
         let name = called.map_or(scene.name.clone(), |called| format!("{}, {called}", scene.name));
         let (matched, time) =
             super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;

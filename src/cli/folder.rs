@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::evaluation::GroundTruth;
-use mrfgs::image::{Pair, Plane, calib::Calibration, read};
+use mrfgs::image::{Pair, Plane, calib::Calibration, read::Reader};
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 
@@ -77,21 +77,21 @@ impl<'a> Folder<'a> {
         self.layout.scale.is_some()
     }
 
-    /// Reads it all; `scale` replaces that of the layout.
-    pub(super) fn read(&self, scale: Option<f32>) -> Result<Scene> {
+    /// Reads it all by `reader`; `scale` replaces that of the layout.
+    pub(super) fn read(&self, reader: Reader, scale: Option<f32>) -> Result<Scene> {
         let calibrated = self.calibrated()?;
-        let pair = self.views()?;
-        let ground = self.ground(scale, pair.size())?;
+        let pair = self.views(reader)?;
+        let ground = self.ground(reader, scale, pair.size())?;
         let range = calibrated.map_or_else(|| range_of(&ground), Ok)?;
         Ok(Scene { name: name(self.dir), pair, range, ground })
     }
 
     /// Reads the pair and the range, and of the truth no more than the range takes.
-    pub(super) fn read_pair(&self) -> Result<(Pair, DisparityRange)> {
+    pub(super) fn read_pair(&self, reader: Reader) -> Result<(Pair, DisparityRange)> {
         let calibrated = self.calibrated()?;
-        let pair = self.views()?;
-        let range =
-            calibrated.map_or_else(|| self.ground(None, pair.size()).and_then(|g| range_of(&g)), Ok)?;
+        let pair = self.views(reader)?;
+        let known = || range_of(&self.ground(reader, None, pair.size())?);
+        let range = calibrated.map_or_else(known, Ok)?;
         Ok((pair, range))
     }
 
@@ -106,16 +106,16 @@ impl<'a> Folder<'a> {
         range.ok_or_else(silent).map(Some)
     }
 
-    fn views(&self) -> Result<Pair> {
+    fn views(&self, reader: Reader) -> Result<Pair> {
         let [left, right, _] = self.layout.files.map(|file| self.dir.join(file));
-        read::pair(&left, &right, None)
+        reader.pair(&left, &right, None)
     }
 
-    fn ground(&self, scale: Option<f32>, size: (usize, usize)) -> Result<GroundTruth> {
+    fn ground(&self, reader: Reader, scale: Option<f32>, size: (usize, usize)) -> Result<GroundTruth> {
         let [left, _, truth] = self.layout.files.map(|file| self.dir.join(file));
         let mask = Some(self.dir.join(MASK)).filter(|m| m.exists());
         let scale = self.layout.scale.map(|usual| scale.unwrap_or(usual));
-        ground_truth(&truth, scale, mask.as_deref(), &left, size)
+        ground_truth(reader, &truth, scale, mask.as_deref(), &left, size)
     }
 }
 
@@ -146,6 +146,7 @@ fn range_of(ground: &GroundTruth) -> Result<DisparityRange> {
 
 /// The truth, of 8 bits where it has a `scale`, and the mask for `what`, which is of the given size.
 pub(super) fn ground_truth(
+    reader: Reader,
     truth: &Path,
     scale: Option<f32>,
     mask: Option<&Path>,
@@ -166,13 +167,13 @@ pub(super) fn ground_truth(
         )))
     }
     let plane = match scale {
-        Some(scale) => read::scaled_disparity(truth, scale)?,
-        None => read::read_disparity(truth)?,
+        Some(scale) => reader.scaled_disparity(truth, scale)?,
+        None => reader.disparity(truth)?,
     };
     let plane = fits(plane, truth, what, size)?;
     if !plane.data().iter().any(|d| d.is_finite()) {
         return Err(Error::read(truth, "holds no known disparity; nothing can be compared with it"));
     }
-    let mask = mask.map(|path| fits(read::grey8(path)?, path, what, size)).transpose()?;
+    let mask = mask.map(|path| fits(reader.grey8(path)?, path, what, size)).transpose()?;
     GroundTruth::new(plane, mask)
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use mrfgs::depth::Rig;
 use mrfgs::front::check;
+use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::image::{Pair, read};
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
 use mrfgs::plan::Plan;
 use mrfgs::solver::{Glimpse, Inspector};
@@ -16,7 +16,7 @@ use mrfgs::{Error, Matcher, Result};
 use super::intermediates::Intermediates;
 use super::match_outputs::{MoreOutputs, Outcome};
 use super::sidecar::{Files, Sidecar};
-use super::{ExecutionArgs, MethodArgs, bytes, plural};
+use super::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -63,6 +63,8 @@ pub(super) struct Args {
     /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadArgs,
     /// Checks everything and prints the plan (levels, schedule, memory), but runs and writes nothing
     #[arg(long)]
     dry_run: bool,
@@ -104,7 +106,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         method.fill = Fill::None;
     }
     let execution = args.execution.execution()?;
-    let pair = read::pair(&args.left, &args.right, args.mask.as_deref())?;
+    let pair = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
     let calibration = calibration(args)?;
     let range = range(args, &pair, calibration.as_ref())?;
     let rig = rig(args, &pair, calibration.as_ref())?;

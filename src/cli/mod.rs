@@ -29,6 +29,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
+use mrfgs::image::read::{MAX_PIXELS, Reader};
 use mrfgs::options::{Choice, DisparityRange, Execution, MAX_MEMORY, Method};
 use mrfgs::solver::Inspector;
 use mrfgs::{Error, Matched, Matcher, Result, Timing};
@@ -187,6 +188,20 @@ fn mebibytes(text: &str) -> std::result::Result<u32, String> {
     });
     let size = size.filter(|size| (1..=MAX_MEMORY).contains(size));
     size.ok_or_else(|| "give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB".into())
+}
+
+/// How images, masks and maps are read.
+#[derive(clap::Args)]
+struct ReadArgs {
+    /// Most pixels that an image may have; a file that claims more is refused before it takes memory
+    #[arg(long, value_name = "N", default_value_t = MAX_PIXELS, value_parser = clap::value_parser!(u64).range(1..))]
+    max_pixels: u64,
+}
+
+impl ReadArgs {
+    fn reader(&self) -> Reader {
+        Reader { max_pixels: self.max_pixels }
+    }
 }
 
 fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {

@@ -11,18 +11,27 @@ use tiff::tags::Tag;
 use super::{Plane, pfm};
 use crate::error::{Error, Result};
 
-/// The most pixels that one image may have.
-pub const MAX_PIXELS: u64 = 1 << 30;
+/// Bytes of a pixel at most: four channels of the widest kind.
+const PIXEL_BYTES: u64 = 32;
 
-/// The most bytes that one file may have: four channels of the widest kind for every pixel.
-const MAX_BYTES: u64 = 32 * MAX_PIXELS;
+/// Bytes of a file that are no pixels, at most: headers, profiles, previews.
+const EXTRA_BYTES: u64 = 1 << 26;
 
 /// No codec here packs more pixels than this into a byte; a header that claims more lies, and believing it
 /// would cost memory in vain.
 const MAX_PIXELS_PER_BYTE: u64 = 10_000;
 
-/// The bytes of a file that begins like an image.
-pub(super) fn load(path: &Path) -> Result<Vec<u8>> {
+/// The same for files that do not compress, whose smallest pixel is a bit.
+const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;
+
+/// Bytes that `pixels` pixels take at most, in a file or decoded, and whatever comes with them.
+fn most_bytes(pixels: u64) -> u64 {
+    pixels.saturating_mul(PIXEL_BYTES).saturating_add(EXTRA_BYTES)
+}
+
+/// The bytes of a file that begins like an image and is not too large for one of `max_pixels` pixels.
+pub(super) fn load(path: &Path, max_pixels: u64) -> Result<Vec<u8>> {
+    let max_bytes = most_bytes(max_pixels);
     let error = |reason: &str| Err(Error::read(path, reason));
     let io = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
@@ -32,8 +41,11 @@ pub(super) fn load(path: &Path) -> Result<Vec<u8>> {
     if metadata.is_dir() {
         return error("is a folder; give the image file");
     }
-    if metadata.len() > MAX_BYTES {
-        return error("too large for an image; crop or tile it");
+    if metadata.len() > max_bytes {
+        return Err(Error::read(
+            path,
+            format!("has more bytes than {max_pixels} pixels can take; raise --max-pixels or crop it"),
+        ));
     }
     let mut file = File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
@@ -45,27 +57,34 @@ pub(super) fn load(path: &Path) -> Result<Vec<u8>> {
     if Kind::of(&bytes).is_none() {
         return Err(Error::read(path, unknown(&bytes)));
     }
-    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(io)?;
+    file.take(max_bytes).read_to_end(&mut bytes).map_err(io)?;
     Ok(bytes)
 }
 
-/// Errors when an image of this size will not be read.
-pub(super) fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
+/// Errors when an image of this size will not be read: it has no pixel, or more than `max_pixels`.
+pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> std::result::Result<(), String> {
     if width == 0 || height == 0 {
         return Err(format!("is {width} x {height} and holds no pixel"));
     }
-    if width.checked_mul(height).is_none_or(|n| n > MAX_PIXELS) {
+    if width.checked_mul(height).is_none_or(|n| n > max_pixels) {
         return Err(format!(
-            "claims {width} x {height} pixels and at most {MAX_PIXELS} are read; crop or tile it, if that is true"
+            "claims {width} x {height} pixels and at most {max_pixels} are read; if that is true, raise --max-pixels \
+             or crop it"
         ));
     }
     Ok(())
 }
 
-/// As [`check_size`], for formats that compress.
-fn check_claim(width: u64, height: u64, bytes: &[u8]) -> std::result::Result<(), String> {
-    check_size(width, height)?;
-    if width * height > MAX_PIXELS_PER_BYTE * bytes.len() as u64 {
+/// As [`check_size`], and errors when `bytes` cannot hold so many pixels.
+fn check_claim(
+    width: u64,
+    height: u64,
+    max_pixels: u64,
+    per_byte: u64,
+    bytes: &[u8],
+) -> std::result::Result<(), String> {
+    check_size(width, height, max_pixels)?;
+    if width * height > per_byte * bytes.len() as u64 {
         return Err(format!(
             "claims {width} x {height} pixels in {} bytes: truncated or damaged; get the file again",
             bytes.len()
@@ -200,23 +219,24 @@ pub(super) fn stretched(v: u8) -> u16 {
     v as u16 * 257
 }
 
-pub(super) fn raster(path: &Path) -> Result<Raster> {
-    decode(&load(path)?).map_err(|reason| Error::read(path, reason))
+pub(super) fn raster(path: &Path, max_pixels: u64) -> Result<Raster> {
+    decode(&load(path, max_pixels)?, max_pixels).map_err(|reason| Error::read(path, reason))
 }
 
-/// Decodes a whole file; the error says in one line what is wrong with it.
-pub(super) fn decode(bytes: &[u8]) -> std::result::Result<Raster, String> {
+/// Decodes a whole file; the error says in one line what is wrong with it. Memory for pixels is taken once the header
+/// is known to claim no more than `max_pixels`, and what the file can hold.
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
     let raster = match Kind::of(bytes) {
-        Some(Kind::Pfm) => decode_pfm(bytes),
-        Some(Kind::Tiff) => decode_tiff(bytes),
-        Some(Kind::Coded(format)) => decode_coded(bytes, format),
+        Some(Kind::Pfm) => decode_pfm(bytes, max_pixels),
+        Some(Kind::Tiff) => decode_tiff(bytes, max_pixels),
+        Some(Kind::Coded(format)) => decode_coded(bytes, format, max_pixels),
         None => Err(unknown(bytes)),
     };
     raster.map_err(|reason| reason.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
-fn decode_pfm(bytes: &[u8]) -> std::result::Result<Raster, String> {
-    let (width, height, channels, samples) = match pfm::decode(bytes)? {
+fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
+    let (width, height, channels, samples) = match pfm::decode(bytes, max_pixels)? {
         pfm::Pfm::Grey(p) => (p.width(), p.height(), 1, p.into_data()),
         pfm::Pfm::Colour(p) => (p.width(), p.height(), 3, p.into_data().into_flattened()),
     };
@@ -228,18 +248,28 @@ fn damaged(e: impl std::fmt::Display) -> String {
     format!("{e}; truncated or damaged? get the file again, or convert it to PNG")
 }
 
-fn decode_coded(bytes: &[u8], format: ImageFormat) -> std::result::Result<Raster, String> {
+fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> std::result::Result<Raster, String> {
     // The decoder fills up what is missing of a JPEG file with grey and says nothing.
     if format == ImageFormat::Jpeg && !jpeg_is_whole(bytes) {
         return Err(damaged("the JPEG data has no end"));
     }
+    // What else is in a PNG file, compressed as well, is unpacked before the decoder tells the size.
+    let claimed = if format == ImageFormat::Png {
+        let (width, height) = png_size(bytes)?;
+        check_size(width, height, max_pixels)?;
+        width * height
+    } else {
+        max_pixels
+    };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(MAX_BYTES);
+    limits.max_alloc = Some(most_bytes(claimed));
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
-    check_claim(width as u64, height as u64, bytes)?;
+    let plain = format == ImageFormat::Pnm;
+    let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
+    check_claim(width as u64, height as u64, max_pixels, per_byte, bytes)?;
     let image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     let (channels, samples) = match image {
         DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw())),
@@ -259,6 +289,16 @@ fn decode_coded(bytes: &[u8], format: ImageFormat) -> std::result::Result<Raster
     Ok(Raster { width: width as usize, height: height as usize, channels, samples })
 }
 
+/// (width, height) that a PNG file claims, by the header that must come first.
+fn png_size(bytes: &[u8]) -> std::result::Result<(u64, u64), String> {
+    match bytes.get(8..24) {
+        Some([0, 0, 0, 13, b'I', b'H', b'D', b'R', a, b, c, d, e, f, g, h]) => {
+            Ok((u32::from_be_bytes([*a, *b, *c, *d]).into(), u32::from_be_bytes([*e, *f, *g, *h]).into()))
+        }
+        _ => Err(damaged("the PNG file does not begin with its header")),
+    }
+}
+
 /// Whether the last scan of a JPEG file is followed by an end mark. Within a scan, 0xff 0xd9 cannot occur.
 fn jpeg_is_whole(bytes: &[u8]) -> bool {
     let last = |mark: u8| bytes.windows(2).rposition(|w| w == [0xff, mark]);
@@ -267,12 +307,12 @@ fn jpeg_is_whole(bytes: &[u8]) -> bool {
 
 /// Integer and float TIFF. What is packed into less than a byte, or is neither grey nor RGB, is left to the
 /// general decoder.
-fn decode_tiff(bytes: &[u8]) -> std::result::Result<Raster, String> {
+fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(damaged)?;
     let (width, height) = decoder.dimensions().map_err(damaged)?;
-    check_claim(width as u64, height as u64, bytes)?;
+    check_claim(width as u64, height as u64, max_pixels, MAX_PIXELS_PER_BYTE, bytes)?;
     // Sixteen samples of the widest kind for a pixel, and room for a strip of a small picture.
-    let most = width as usize * height as usize * 128 + (1 << 26);
+    let most = (width as usize * height as usize).saturating_mul(128).saturating_add(1 << 26);
     let mut limits = tiff::decoder::Limits::unlimited();
     limits.decoding_buffer_size = most;
     limits.intermediate_buffer_size = most;
@@ -293,7 +333,7 @@ fn decode_tiff(bytes: &[u8]) -> std::result::Result<Raster, String> {
             }
             2
         }
-        _ => return decode_coded(bytes, ImageFormat::Tiff),
+        _ => return decode_coded(bytes, ImageFormat::Tiff, max_pixels),
     };
 
     let mut result = DecodingResult::U8(Vec::new());

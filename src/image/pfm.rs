@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::read::MAX_PIXELS;
 use super::{Plane, decode as files, write};
 use crate::error::{Error, Result};
 
@@ -19,9 +20,9 @@ pub enum Pfm {
 /// the stereo benchmarks do. Comments in the header are skipped.
 ///
 /// # Errors
-/// [`Error::Read`] when there is no such file or it is no complete PFM file.
+/// [`Error::Read`] when there is no such file, it is no complete PFM file, or has more than [`MAX_PIXELS`].
 pub fn read(path: &Path) -> Result<Pfm> {
-    decode(&files::load(path)?).map_err(|reason| Error::read(path, reason))
+    decode(&files::load(path, MAX_PIXELS)?, MAX_PIXELS).map_err(|reason| Error::read(path, reason))
 }
 
 /// Writes a plane as single-channel PFM, little endian with scale -1.0, whole or not at all.
@@ -48,8 +49,8 @@ pub(super) fn is_pfm(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'F' | b'f', c, ..] if c.is_ascii_whitespace() || *c == b'#')
 }
 
-/// Parses a whole file; the error says what is wrong with it.
-pub(super) fn decode(bytes: &[u8]) -> std::result::Result<Pfm, String> {
+/// Parses a whole file of at most `max_pixels` pixels; the error says what is wrong with it.
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Pfm, String> {
     if !is_pfm(bytes) {
         return Err("not a PFM file: it does not begin with Pf or PF".into());
     }
@@ -57,7 +58,7 @@ pub(super) fn decode(bytes: &[u8]) -> std::result::Result<Pfm, String> {
     let mut at = 2;
     let width = dimension(bytes, &mut at, "width")?;
     let height = dimension(bytes, &mut at, "height")?;
-    files::check_size(width as u64, height as u64)?;
+    files::check_size(width as u64, height as u64, max_pixels)?;
     let word = token(bytes, &mut at).ok_or("the PFM header ends before the scale")?;
     let scale = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
     let Some(scale) = scale else {
@@ -65,9 +66,9 @@ pub(super) fn decode(bytes: &[u8]) -> std::result::Result<Pfm, String> {
     };
 
     let channels = if colour { 3 } else { 1 };
-    let need = width * height * channels * 4;
+    let need = (width * height).saturating_mul(channels * 4);
     // Exactly one byte ends the header, but some writers end lines with two: the length tells.
-    let two = bytes[at..].starts_with(b"\r\n") && bytes.len() - at == need + 2;
+    let two = bytes[at..].starts_with(b"\r\n") && (bytes.len() - at).checked_sub(2) == Some(need);
     at += if two { 2 } else { 1 };
     let data = bytes.get(at..).unwrap_or_default();
     if data.len() < need {
@@ -116,6 +117,10 @@ fn dimension(bytes: &[u8], at: &mut usize, name: &str) -> std::result::Result<us
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn decode(bytes: &[u8]) -> std::result::Result<Pfm, String> {
+        super::decode(bytes, MAX_PIXELS)
+    }
 
     fn plane() -> Plane<f32> {
         Plane::new(3, 2, vec![1.5, -2.0, f32::INFINITY, 0.0, 1e-30, 7.25])
@@ -180,7 +185,11 @@ mod tests {
         refused(b"Pf\n1 1\nNaN\n\0\0\0\0", "scale");
         refused(b"Pf\n1 1\n-1", "scale");
         refused(b"Pf\n1 1\n-1\n\0\0\0", "truncated");
-        refused(b"Pf\n30000 30000\n-1\n\0\0\0", "truncated");
+        refused(b"Pf\n16384 16384\n-1\n\0\0\0", "truncated");
+        refused(b"Pf\n16385 16384\n-1\n\0\0\0", "--max-pixels");
+        // No limit of the caller's makes the arithmetic overflow.
+        let reason = super::decode(b"PF\n4294967295 4294967295\n-1\n\0", u64::MAX).unwrap_err();
+        assert!(reason.contains("truncated"), "{reason}");
         refused(&[b"Pf\n".as_slice(), &[b'7'; 5000]].concat(), "width");
         refused(b"Pf\n\xff\xfe 1\n-1\n", "width");
     }

@@ -10,6 +10,10 @@ use tiff::tags::{ExtraSamples, Tag};
 use super::*;
 use crate::image::pfm;
 
+fn decode(bytes: &[u8]) -> std::result::Result<Raster, String> {
+    super::decode(bytes, MAX_PIXELS)
+}
+
 const W: u32 = 4;
 const H: u32 = 3;
 const N: usize = 12;
@@ -364,7 +368,11 @@ fn files_that_are_no_images_are_refused() {
     bad(&f.bytes("a.png", b"GIF89a....................."), &["gif", "PNG, JPEG, PNM, TIFF or PFM"]);
     bad(&f.bytes("huge.pgm", b"P5\n4000000000 4000000000\n255\n"), &["huge.pgm", "at most"]);
     bad(&f.bytes("none.pgm", b"P5\n0 5\n255\n"), &["none.pgm"]);
-    bad(&f.bytes("lie.pgm", b"P5\n30000 30000\n255\n"), &["lie.pgm", "get the file again"]);
+    bad(&f.bytes("lie.pgm", b"P5\n16384 16384\n255\n"), &["lie.pgm", "get the file again"]);
+    bad(
+        &f.bytes("large.pgm", b"P5\n16385 16384\n255\n"),
+        &["large.pgm", "at most 268435456", "--max-pixels"],
+    );
     bad(&f.bytes("short.pgm", b"P5\n30 30\n255\n1234"), &["short.pgm"]);
     bad(&f.bytes("huge.pfm", b"Pf\n2000000000 2000000000\n-1\n"), &["huge.pfm", "at most"]);
     #[cfg(target_os = "linux")]

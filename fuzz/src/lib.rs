@@ -1,0 +1,109 @@
+//! What the fuzz targets do with an input, which is the content of a file. `tests/corpus.rs` replays the corpus through the
+//! same functions.
+//!
+//! A file is read or refused: a refusal is one line that fits a screen, and what is read keeps its promises.
+
+use mrfgs::image::calib::Calibration;
+use mrfgs::image::pfm::{self, Pfm};
+use mrfgs::image::read::Reader;
+use mrfgs::options::{Method, PRESETS};
+use mrfgs::{Error, Result};
+use std::io::Write;
+use std::path::Path;
+
+/// Pixels of an image at most: few, so that an input takes little time.
+pub const MAX_PIXELS: u64 = 1 << 16;
+
+/// A PFM file.
+pub fn pfm(bytes: &[u8]) {
+    with_file(bytes, |path| {
+        let map = Reader { max_pixels: MAX_PIXELS }.disparity(path);
+        match told(pfm::read(path)) {
+            Some(Pfm::Grey(plane)) if (plane.data().len() as u64) <= MAX_PIXELS => {
+                let map = map.expect("a plane is a map of disparities");
+                assert_eq!(map.size(), plane.size());
+                for (disparity, value) in map.data().iter().zip(plane.data()) {
+                    assert!(disparity.to_bits() == value.to_bits() || !value.is_finite() && *disparity == f32::INFINITY);
+                }
+            }
+            _ => assert!(told(map).is_none()),
+        }
+    });
+}
+
+/// A calib.txt.
+pub fn calib(bytes: &[u8]) {
+    with_file(bytes, |path| {
+        let Some(c) = told(Calibration::read(path)) else { return };
+        assert!([c.ndisp, c.width, c.height].iter().flatten().all(|&count| count > 0));
+        assert!([c.doffs, c.baseline, c.vmin, c.vmax].iter().flatten().all(|value| value.is_finite()));
+        assert!(c.focal_length.is_none_or(|f| f.is_finite() && f > 0.0));
+    });
+}
+
+/// An image of any kind: as both views and the mask of a pair, as levels, and as a map of disparities.
+pub fn image(bytes: &[u8]) {
+    with_file(bytes, |path| {
+        let reader = Reader { max_pixels: MAX_PIXELS };
+        let pair = told(reader.pair(path, path, None));
+        let levels = told(reader.grey8(path));
+        let map = told(reader.disparity(path));
+        let Some(pair) = pair else {
+            assert!(levels.is_none() && map.is_none());
+            return;
+        };
+        let (width, height) = pair.size();
+        assert!((1..=MAX_PIXELS).contains(&(width as u64 * height as u64)));
+        assert_eq!(pair.left(), pair.right());
+        let mut pixels = pair.left().pixels.data().iter().zip(pair.left().masked.data());
+        assert!(pixels.all(|(pixel, masked)| !masked || *pixel == [0; 4]));
+        assert!(levels.is_none_or(|levels| levels.size() == pair.size()));
+        assert!(map.is_none_or(|map| map.size() == pair.size()));
+        let masked = told(reader.pair(path, path, Some(path))).expect("the same files");
+        let mask = told(reader.mask(path)).expect("the same file");
+        let mut masks = masked.left().masked.data().iter().zip(pair.left().masked.data()).zip(mask.data());
+        assert!(masks.all(|((both, own), mask)| *both == (*own || *mask)));
+    });
+}
+
+/// A method in TOML; also the value of a key on the command line.
+pub fn config(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    for (preset, _) in PRESETS {
+        let before = Method::preset(preset).expect("it is listed");
+        let kept = |method: &Method, changed: Option<()>| match changed {
+            Some(()) => {
+                let table = method.table().to_string();
+                assert_eq!(with_file(table.as_bytes(), |path| Method::default().load(path)).ok(), Some(()));
+                assert!(method.clone().validated().is_ok());
+            }
+            None => assert_eq!(*method, before),
+        };
+        let mut method = before.clone();
+        let changed = told(with_file(bytes, |path| method.load(path)));
+        kept(&method, changed);
+        if let Some((key, value)) = text.split_once('=') {
+            let mut method = before.clone();
+            let changed = told(method.set(key.trim(), value.trim()));
+            kept(&method, changed);
+        }
+    }
+}
+
+/// Does `f` with a file that holds `bytes`.
+fn with_file<T>(bytes: &[u8], f: impl FnOnce(&Path) -> T) -> T {
+    let memory = Path::new("/dev/shm");
+    let folder = if memory.is_dir() { memory.into() } else { std::env::temp_dir() };
+    let mut file = tempfile::NamedTempFile::new_in(folder).expect("a file can be made");
+    file.write_all(bytes).expect("it can be written");
+    f(file.path())
+}
+
+/// What was read; else the refusal is one line that can be shown.
+fn told<T>(result: Result<T>) -> Option<T> {
+    let refused = |error: Error| {
+        let text = error.to_string();
+        assert!(text.chars().count() <= 500 && !text.chars().any(char::is_control), "{text:?}");
+    };
+    result.map_err(refused).ok()
+}
