@@ -355,8 +355,9 @@ impl Method {
             .into_iter()
             .map(|(key, text)| (key.to_owned(), value(text).unwrap_or_else(|| text.into())))
             .collect();
-        *self =
-            self.merged(changes).map_err(|(key, reason)| Error::option(format!("--set {key}"), reason))?;
+        *self = self
+            .merged(changes)
+            .map_err(|(key, reason)| Error::option(format!("--set {}", one_line(&key)), reason))?;
         Ok(())
     }
 
@@ -389,7 +390,7 @@ impl Method {
                     .is_some_and(|rest| rest.trim_start().starts_with(['=', '.']))
             });
             let place = place.map(|n| format!("line {}: ", n + 1));
-            Error::read(path, format!("{}{key}: {reason}", place.unwrap_or_default()))
+            Error::read(path, format!("{}{}: {reason}", place.unwrap_or_default(), one_line(&key)))
         })?;
         Ok(())
     }
@@ -484,9 +485,15 @@ impl Method {
     }
 }
 
-/// A text in one line, as errors must be.
+/// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
 fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    const MOST: usize = 120;
+    let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
+    let line = words.collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
 }
 
 /// Which backend runs the stages.
@@ -560,6 +567,8 @@ mod tests {
             ("levels", "3\ncost = \"sad\"", "--set levels: expected"),
             ("temperature", "nan", "--set temperature: NaN is outside 0.001 to 1000000"),
             ("median-window", "4", "--set median-window: 4 is not odd; take 3 or 5"),
+            ("two\nlines\u{1b}[2J", "4", "--set two lines [2J: there is no such key"),
+            (&"key".repeat(99), "4", &format!("--set {}...: there is no such key", "key".repeat(40))),
         ] {
             let mut method = Method::default();
             let error = method.set(key, value).unwrap_err().to_string();

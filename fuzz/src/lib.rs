@@ -23,7 +23,10 @@ pub fn pfm(bytes: &[u8]) {
                 let map = map.expect("a plane is a map of disparities");
                 assert_eq!(map.size(), plane.size());
                 for (disparity, value) in map.data().iter().zip(plane.data()) {
-                    assert!(disparity.to_bits() == value.to_bits() || !value.is_finite() && *disparity == f32::INFINITY);
+                    assert!(
+                        disparity.to_bits() == value.to_bits()
+                            || !value.is_finite() && *disparity == f32::INFINITY
+                    );
                 }
             }
             _ => assert!(told(map).is_none()),
@@ -100,7 +103,7 @@ fn with_file<T>(bytes: &[u8], f: impl FnOnce(&Path) -> T) -> T {
 }
 
 /// What was read; else the refusal is one line that can be shown.
-fn told<T>(result: Result<T>) -> Option<T> {
+pub fn told<T>(result: Result<T>) -> Option<T> {
     let refused = |error: Error| {
         let text = error.to_string();
         assert!(text.chars().count() <= 500 && !text.chars().any(char::is_control), "{text:?}");

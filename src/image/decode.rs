@@ -4,7 +4,8 @@ use std::fs::{self, File};
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use tiff::TiffError;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
@@ -243,9 +244,24 @@ fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Stri
     Ok(Raster { width, height, channels, samples: Samples::Float(samples) })
 }
 
-/// The decoder's error with what to do about it.
+/// What is wrong with a file that does not decode, and what to do about it.
 fn damaged(e: impl std::fmt::Display) -> String {
     format!("{e}; truncated or damaged? get the file again, or convert it to PNG")
+}
+
+/// What a decoder does not know, and what to do about it.
+fn unsupported(e: impl std::fmt::Display) -> String {
+    format!("{e}; convert it to PNG")
+}
+
+/// The error of the general decoder.
+fn coded_reason(e: ImageError) -> String {
+    if matches!(e, ImageError::Unsupported(_)) { unsupported(e) } else { damaged(e) }
+}
+
+/// The error of the TIFF decoder.
+fn tiff_reason(e: TiffError) -> String {
+    if matches!(e, TiffError::UnsupportedError(_)) { unsupported(e) } else { damaged(e) }
 }
 
 fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> std::result::Result<Raster, String> {
@@ -265,12 +281,12 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> std::resu
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(most_bytes(claimed));
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(damaged)?;
+    let decoder = reader.into_decoder().map_err(coded_reason)?;
     let (width, height) = decoder.dimensions();
     let plain = format == ImageFormat::Pnm;
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
     check_claim(width as u64, height as u64, max_pixels, per_byte, bytes)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(coded_reason)?;
     let (channels, samples) = match image {
         DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw())),
         DynamicImage::ImageLumaA8(i) => (2, Samples::Byte(i.into_raw())),
@@ -308,8 +324,8 @@ fn jpeg_is_whole(bytes: &[u8]) -> bool {
 /// Integer and float TIFF. What is packed into less than a byte, or is neither grey nor RGB, is left to the
 /// general decoder.
 fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(damaged)?;
-    let (width, height) = decoder.dimensions().map_err(damaged)?;
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(tiff_reason)?;
+    let (width, height) = decoder.dimensions().map_err(tiff_reason)?;
     check_claim(width as u64, height as u64, max_pixels, MAX_PIXELS_PER_BYTE, bytes)?;
     // Sixteen samples of the widest kind for a pixel, and room for a strip of a small picture.
     let most = (width as usize * height as usize).saturating_mul(128).saturating_add(1 << 26);
@@ -319,14 +335,14 @@ fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Str
     limits.ifd_value_size = bytes.len();
     decoder = decoder.with_limits(limits);
 
-    let colour = decoder.colortype().map_err(damaged)?;
+    let colour = decoder.colortype().map_err(tiff_reason)?;
     let channels = match colour {
         tiff::ColorType::Gray(n) if n >= 8 => 1,
         tiff::ColorType::RGB(_) => 3,
         tiff::ColorType::RGBA(_) => 4,
         tiff::ColorType::Multiband { num_samples, .. } => {
             let extra: Vec<u16> =
-                decoder.find_tag_unsigned_vec(Tag::ExtraSamples).map_err(damaged)?.unwrap_or_default();
+                decoder.find_tag_unsigned_vec(Tag::ExtraSamples).map_err(tiff_reason)?.unwrap_or_default();
             // 1 and 2 are the two kinds of alpha.
             if num_samples != 2 || !matches!(extra[..], [1 | 2]) {
                 return Err(format!("has {num_samples} bands; extract one, or red, green and blue"));
@@ -337,7 +353,7 @@ fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Str
     };
 
     let mut result = DecodingResult::U8(Vec::new());
-    let layout = decoder.read_image_to_buffer(&mut result).map_err(damaged)?;
+    let layout = decoder.read_image_to_buffer(&mut result).map_err(tiff_reason)?;
     let samples = match result {
         DecodingResult::U8(v) => Samples::Byte(v),
         DecodingResult::U16(v) => Samples::Word(v),

@@ -1,0 +1,128 @@
+//! Image files byte by byte, for what no encoder at hand writes: small bit depths, palettes, interlacing, and headers that
+//! lie.
+
+#![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of it")]
+
+/// A PNG file whose header claims `size`; `rows` are its filtered rows, of every pass where it is interlaced.
+pub struct Png<'a> {
+    pub size: (u32, u32),
+    /// Bits of a sample.
+    pub depth: u8,
+    /// 0 grey, 2 colour, 3 palette, 4 grey and alpha, 6 colour and alpha.
+    pub colour: u8,
+    pub interlaced: bool,
+    /// Chunks between header and pixels, each with its name.
+    pub chunks: &'a [(&'a [u8; 4], &'a [u8])],
+    pub rows: &'a [u8],
+}
+
+impl Png<'_> {
+    pub fn bytes(&self) -> Vec<u8> {
+        let (width, height) = self.size;
+        let mut header = [width.to_be_bytes(), height.to_be_bytes()].concat();
+        header.extend([self.depth, self.colour, 0, 0, u8::from(self.interlaced)]);
+        let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
+        out.extend(chunk(b"IHDR", &header));
+        for (name, data) in self.chunks {
+            out.extend(chunk(name, data));
+        }
+        out.extend(chunk(b"IDAT", &stored(self.rows)));
+        out.extend(chunk(b"IEND", &[]));
+        out
+    }
+}
+
+fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let named = [name, data].concat();
+    [&(data.len() as u32).to_be_bytes()[..], &named, &crc32(&named).to_be_bytes()].concat()
+}
+
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 * (crc & 1)))
+    })
+}
+
+/// A zlib stream that holds `data`, at most 65,535 bytes, as they are.
+fn stored(data: &[u8]) -> Vec<u8> {
+    let length = u16::try_from(data.len()).expect("one block");
+    let (a, b) = data.iter().fold((1, 0), |(a, b), byte| {
+        let a = (a + u32::from(*byte)) % 65_521;
+        (a, (b + a) % 65_521)
+    });
+    let lengths = [length.to_le_bytes(), (!length).to_le_bytes()].concat();
+    [&[0x78, 1, 1][..], &lengths, data, &(b << 16 | a).to_be_bytes()].concat()
+}
+
+/// A TIFF file, little endian: its one directory at byte 8, then `data`. An entry is tag, type (3 for 16 bits, 4 for 32),
+/// count, and value or place.
+pub fn tiff(entries: &[(u16, u16, u32, u32)], data: &[u8]) -> Vec<u8> {
+    let mut out = b"II*\0\x08\0\0\0".to_vec();
+    out.extend((entries.len() as u16).to_le_bytes());
+    for &(tag, kind, count, value) in entries {
+        out.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+        out.extend([count.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    out.extend([0; 4]);
+    out.extend(data);
+    out
+}
+
+/// Where the data of a [`tiff`] with so many entries begin.
+pub fn tiff_data(entries: usize) -> u32 {
+    8 + 2 + 12 * entries as u32 + 4
+}
+
+/// A JPEG file of 8 x 8 pixels, baseline, whose components all have one value each. `adobe` is the colour transform of its
+/// Adobe mark, without which four components say nothing of their colours; `exif` what its Exif mark holds.
+pub fn jpeg(components: &[u8], adobe: Option<u8>, exif: Option<&[u8]>) -> Vec<u8> {
+    let segment = |mark: u8, data: &[u8]| {
+        let length = (data.len() as u16 + 2).to_be_bytes();
+        [&[0xff, mark][..], &length, data].concat()
+    };
+    let count = components.len() as u8;
+    let mut out = vec![0xff, 0xd8];
+    if let Some(exif) = exif {
+        out.extend(segment(0xe1, &[b"Exif\0\0", exif].concat()));
+    }
+    if let Some(transform) = adobe {
+        out.extend(segment(0xee, &[b"Adobe\0d\0\0\0\0".as_slice(), &[transform]].concat()));
+    }
+    // The mean of a block counts 8 times in its first coefficient.
+    out.extend(segment(0xdb, &[&[0, 8][..], &[1; 63]].concat()));
+    let frame = (1..=count).flat_map(|i| [i, 0x11, 0]);
+    out.extend(segment(0xc0, &[8, 0, 8, 0, 8, count].into_iter().chain(frame).collect::<Vec<_>>()));
+    // The first coefficient: 8 codes of 4 bits, for numbers of 0 to 7 bits; the others: a code of 1 bit, for no more.
+    out.extend(segment(0xc4, &[&[0, 0, 0, 0, 8][..], &[0; 12], &[0, 1, 2, 3, 4, 5, 6, 7]].concat()));
+    out.extend(segment(0xc4, &[&[0x10, 1][..], &[0; 15], &[0]].concat()));
+    let scan = (1..=count).flat_map(|i| [i, 0]);
+    let scan: Vec<u8> = [count].into_iter().chain(scan).chain([0, 63, 0]).collect();
+    out.extend(segment(0xda, &scan));
+    let mut bits = String::new();
+    for value in components {
+        let difference = i32::from(*value) - 128;
+        let width = (32 - difference.unsigned_abs().leading_zeros()) as usize;
+        bits += &format!("{width:04b}");
+        if width > 0 {
+            let code = if difference < 0 { difference + (1 << width) - 1 } else { difference };
+            bits += &format!("{code:0width$b}");
+        }
+        bits += "0";
+    }
+    while !bits.len().is_multiple_of(8) {
+        bits += "1";
+    }
+    for i in (0..bits.len()).step_by(8) {
+        let byte = u8::from_str_radix(&bits[i..i + 8], 2).expect("eight bits");
+        out.push(byte);
+        // A byte of ones is told from a mark by the zero after it.
+        out.extend((byte == 0xff).then_some(0));
+    }
+    out.extend([0xff, 0xd9]);
+    out
+}
+
+/// Exif data that say how the camera was held: 1 upright, 6 turned by a quarter.
+pub fn exif_orientation(value: u8) -> Vec<u8> {
+    [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".as_slice(), &[value, 0, 0, 0], &[0; 4]].concat()
+}
