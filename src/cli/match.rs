@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use mrfgs::depth::Rig;
-use mrfgs::front::check;
+use mrfgs::front::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
@@ -120,9 +120,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let inputs = inputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
     args.more.check(&args.output, &inputs.collect::<Vec<_>>(), range)?;
     if !args.quiet {
-        for warning in check::warnings(&pair, Some(range)) {
-            super::say(&format!("warning: {warning}"));
-        }
+        warn(&check::warnings(&pair, Some(range)));
     }
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     if args.dry_run {
@@ -137,6 +135,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
         None => None,
     };
     let (matched, time) = super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, look)?;
+    if !args.quiet {
+        warn(&check::clipped(&matched.maps, range));
+    }
     // Outputs take memory too.
     drop(matcher);
     let pair = Some(pair).filter(|_| args.more.show_left());
@@ -238,6 +239,13 @@ fn found_range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
         super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
     }
     Ok(range)
+}
+
+/// Says on standard error what is probably wrong.
+fn warn(warnings: &[Warning]) {
+    for warning in warnings {
+        super::say(&format!("warning: {warning}"));
+    }
 }
 
 /// The plan for people.

@@ -1,0 +1,172 @@
+//! What is told of a pair or a match that is probably wrong, on rendered scenes always, on real pairs where
+//! `MRFGS_MIDDLEBURY` names their folder: nothing where nothing is wrong, and each defect once it is made.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
+use mrfgs::front::check::{self, Warning};
+use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
+use mrfgs::maps::Maps;
+use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+struct Case {
+    name: String,
+    pair: Pair,
+    range: DisparityRange,
+    /// Known true disparities, the smallest first.
+    truths: Vec<f32>,
+}
+
+impl Case {
+    fn load(folder: &Path) -> Self {
+        let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
+        let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
+        let truth = read::read_disparity(&folder.join("disp0GT.pfm")).unwrap();
+        let mut truths: Vec<f32> = truth.data().iter().copied().filter(|d| d.is_finite()).collect();
+        truths.sort_by(f32::total_cmp);
+        Self {
+            name: folder.display().to_string(),
+            pair: read::pair(&left, &right, None).unwrap(),
+            range: DisparityRange::new(0, ndisp as i32 - 1).unwrap(),
+            truths,
+        }
+    }
+
+    /// The true disparity that `percent` of the pixels are below.
+    fn truth(&self, percent: usize) -> f32 {
+        self.truths[(self.truths.len() - 1) * percent / 100]
+    }
+
+    fn maps(&self, range: DisparityRange) -> Maps {
+        let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+        let go_on = &mut |_| ControlFlow::Continue(());
+        mrfgs::match_pair(&self.pair, range, &Method::default(), &execution, go_on).unwrap().maps
+    }
+
+    /// The warnings where the right view has `change` applied to each 8-bit level.
+    fn exposed(&self, change: impl Fn(f64) -> f64) -> Vec<Warning> {
+        let right = self.pair.right();
+        let level = |v: u16| (change(f64::from(v >> 8)).round().clamp(0.0, 255.0) as u16) << 8;
+        let pixels = right.pixels.map(|&[r, g, b, _]| {
+            let [r, g, b] = [r, g, b].map(level);
+            [r, g, b, grey(r, g, b)]
+        });
+        let right = Image { pixels, masked: right.masked.clone() };
+        check::warnings(&Pair::new(self.pair.left().clone(), right).unwrap(), Some(self.range))
+    }
+}
+
+/// All scenes, and all real pairs there are.
+fn cases() -> Vec<Case> {
+    let scenes = ["slanted", "thin", "wall", "repetitive", "exposure", "light", "steep", "mixed"];
+    let mut folders: Vec<PathBuf> = scenes.iter().map(|scene| Path::new("testdata").join(scene)).collect();
+    if let Some(folder) = std::env::var_os("MRFGS_MIDDLEBURY") {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        folders.extend(entries.filter(|path| path.join("im0.png").is_file()));
+    } else {
+        let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
+    }
+    folders.iter().map(|folder| Case::load(folder)).collect()
+}
+
+#[test]
+fn nothing_is_said_where_nothing_is_wrong() {
+    for case in cases() {
+        assert_eq!(check::warnings(&case.pair, Some(case.range)), [], "{}", case.name);
+        assert_eq!(check::clipped(&case.maps(case.range), case.range), [], "{}", case.name);
+        // A little darker or brighter does no harm.
+        for (gain, offset) in [(0.72, 14.0), (0.5, 0.0), (1.0, 20.0), (1.0, -20.0)] {
+            assert_eq!(case.exposed(|v| gain * v + offset), [], "{}, {gain} {offset}", case.name);
+        }
+    }
+}
+
+#[test]
+fn exposures_far_apart_are_told() {
+    for case in cases() {
+        let dark = case.exposed(|v| v * 0.15);
+        assert!(
+            dark.iter().any(|w| matches!(w, Warning::Contrast { percent: 8..=20 })),
+            "{}: {dark:?}",
+            case.name
+        );
+        let bright = case.exposed(|v| v * 3.0);
+        let told =
+            |w: &Warning| matches!(w, Warning::Saturated { percent: [left, right] } if left + 10 <= *right);
+        assert!(bright.iter().any(told), "{}: {bright:?}", case.name);
+    }
+}
+
+#[test]
+fn a_view_of_one_colour_is_told() {
+    let case = Case::load(Path::new("testdata/mixed"));
+    let (width, height) = case.pair.size();
+    let noise = |x: usize, y: usize| ((x * x * 31 + y * y * 17 + x * y * 13) % 3) as u8;
+    let plain = Image::from_rgb8(&Plane::from_fn(width, height, |x, y| [90 + noise(x, y), 120, 30]));
+    let told =
+        |left: &Image, right: &Image| check::warnings(&Pair::new(left.clone(), right.clone()).unwrap(), None);
+    let [left, right] = ["left", "right"].map(|view| Warning::Plain { view });
+    assert_eq!(told(&plain, case.pair.right()), [left]);
+    assert_eq!(told(case.pair.left(), &plain), [right]);
+    assert_eq!(told(&plain, &plain), [left, right]);
+    // What a mask hides has no colour; where it hides all, there is nothing to say.
+    let mut mostly = case.pair.left().clone();
+    for y in 0..height {
+        for x in 0..width {
+            mostly.masked[(x, y)] = x > 9;
+            if x <= 9 {
+                mostly.pixels[(x, y)] = plain.pixels[(x, y)];
+            }
+        }
+    }
+    assert_eq!(told(&mostly, case.pair.right()), [left]);
+    mostly.masked = Plane::filled(width, height, true);
+    assert_eq!(told(&mostly, case.pair.right()), []);
+}
+
+#[test]
+fn a_range_that_cuts_off_the_scene_is_told() {
+    for case in cases() {
+        // A tenth of the truth is beyond the end, or a third; some surfaces end just there.
+        let told = |range: DisparityRange| check::clipped(&case.maps(range), range);
+        let ends = |warnings: &[Warning], at_top: bool| {
+            warnings.iter().any(|w| matches!(w, Warning::Clipped { upper, .. } if *upper == at_top))
+        };
+        let least = case.truth(0).floor() as i32 - 1;
+        let cut = [90, 66]
+            .map(|percent| told(DisparityRange::new(least.min(0), case.truth(percent) as i32).unwrap()));
+        assert!(cut.iter().any(|warnings| ends(warnings, true)), "{}: {cut:?}", case.name);
+        let cut = [10, 33].map(|percent| {
+            told(DisparityRange::new(case.truth(percent).ceil() as i32, case.range.max).unwrap())
+        });
+        assert!(cut.iter().any(|warnings| ends(warnings, false)), "{}: {cut:?}", case.name);
+    }
+    // 0 is the horizon and no end; of ranges that are all ends nothing is said.
+    let case = Case::load(Path::new("testdata/mixed"));
+    let mut maps = case.maps(case.range);
+    maps.raw = Plane::filled(case.pair.size().0, case.pair.size().1, 0);
+    assert_eq!(check::clipped(&maps, case.range), []);
+    assert_eq!(check::clipped(&maps, DisparityRange::new(0, 0).unwrap()), []);
+    let told = check::clipped(&maps, DisparityRange::new(-9, 0).unwrap());
+    assert_eq!(told, [Warning::Clipped { end: 0, upper: true, percent: 100 }]);
+}
+
+#[test]
+fn warnings_are_one_line_with_the_remedy() {
+    for (warning, words) in [
+        (Warning::Plain { view: "left" }, ["the left view is all one colour", "right file"]),
+        (Warning::Contrast { percent: 12 }, ["12 % of the other's contrast", "expose both alike"]),
+        (
+            Warning::Saturated { percent: [1, 37] },
+            ["1 % of the left view and 37 % of the right", "expose both"],
+        ),
+        (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["9 %", "at disparity 63"]),
+        (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["cuts off", "raise --max-disparity"]),
+        (Warning::Clipped { end: -5, upper: false, percent: 9 }, ["-5", "lower --min-disparity"]),
+    ] {
+        let line = warning.to_string();
+        assert!(!line.contains('\n') && words.iter().all(|w| line.contains(w)), "{line}");
+    }
+}
