@@ -63,3 +63,14 @@ impl Error {
         Self::Option { name: name.into(), reason: reason.into() }
     }
 }
+
+/// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
+pub(crate) fn one_line(text: &str) -> String {
+    const MOST: usize = 160;
+    let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
+    let line = words.collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
+}

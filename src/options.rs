@@ -6,7 +6,7 @@
 //! Correspondence Algorithm*; where a meaning says "open", the paper leaves the matter open and the choice is
 //! this project's.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::Path;
@@ -485,17 +485,6 @@ impl Method {
     }
 }
 
-/// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
-fn one_line(text: &str) -> String {
-    const MOST: usize = 120;
-    let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
-    let line = words.collect::<Vec<_>>().join(" ");
-    match line.char_indices().nth(MOST) {
-        Some((end, _)) => format!("{}...", &line[..end]),
-        None => line,
-    }
-}
-
 /// Which backend runs the stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Choice {
@@ -568,7 +557,7 @@ mod tests {
             ("temperature", "nan", "--set temperature: NaN is outside 0.001 to 1000000"),
             ("median-window", "4", "--set median-window: 4 is not odd; take 3 or 5"),
             ("two\nlines\u{1b}[2J", "4", "--set two lines [2J: there is no such key"),
-            (&"key".repeat(99), "4", &format!("--set {}...: there is no such key", "key".repeat(40))),
+            (&"keys".repeat(99), "4", &format!("--set {}...: there is no such key", "keys".repeat(40))),
         ] {
             let mut method = Method::default();
             let error = method.set(key, value).unwrap_err().to_string();

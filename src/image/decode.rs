@@ -10,7 +10,7 @@ use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
 use super::{Plane, pfm};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 
 /// Bytes of a pixel at most: four channels of the widest kind.
 const PIXEL_BYTES: u64 = 32;
@@ -227,13 +227,12 @@ pub(super) fn raster(path: &Path, max_pixels: u64) -> Result<Raster> {
 /// Decodes a whole file; the error says in one line what is wrong with it. Memory for pixels is taken once the header
 /// is known to claim no more than `max_pixels`, and what the file can hold.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
-    let raster = match Kind::of(bytes) {
+    match Kind::of(bytes) {
         Some(Kind::Pfm) => decode_pfm(bytes, max_pixels),
         Some(Kind::Tiff) => decode_tiff(bytes, max_pixels),
         Some(Kind::Coded(format)) => decode_coded(bytes, format, max_pixels),
         None => Err(unknown(bytes)),
-    };
-    raster.map_err(|reason| reason.split_whitespace().collect::<Vec<_>>().join(" "))
+    }
 }
 
 fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
@@ -246,12 +245,12 @@ fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Stri
 
 /// What is wrong with a file that does not decode, and what to do about it.
 fn damaged(e: impl std::fmt::Display) -> String {
-    format!("{e}; truncated or damaged? get the file again, or convert it to PNG")
+    format!("{}; truncated or damaged? get the file again, or convert it to PNG", one_line(&e.to_string()))
 }
 
 /// What a decoder does not know, and what to do about it.
 fn unsupported(e: impl std::fmt::Display) -> String {
-    format!("{e}; convert it to PNG")
+    format!("{}; convert it to PNG", one_line(&e.to_string()))
 }
 
 /// The error of the general decoder.
