@@ -40,7 +40,10 @@ pub fn calib(bytes: &[u8]) {
         let Some(c) = told(Calibration::read(path)) else { return };
         assert!([c.ndisp, c.width, c.height].iter().flatten().all(|&count| count > 0));
         assert!([c.doffs, c.baseline, c.vmin, c.vmax].iter().flatten().all(|value| value.is_finite()));
-        assert!(c.focal_length.is_none_or(|f| f.is_finite() && f > 0.0));
+        assert!(c.camera.is_none_or(|camera| {
+            camera.focal_length.iter().all(|f| f.is_finite() && *f > 0.0)
+                && camera.principal_point.iter().all(|c| c.is_finite())
+        }));
     });
 }
 

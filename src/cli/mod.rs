@@ -194,7 +194,13 @@ fn mebibytes(text: &str) -> std::result::Result<u32, String> {
 #[derive(clap::Args)]
 struct ReadArgs {
     /// Most pixels that an image may have; a file that claims more is refused before it takes memory
-    #[arg(long, value_name = "N", default_value_t = MAX_PIXELS, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = MAX_PIXELS,
+        value_parser = clap::value_parser!(u64).range(1..)
+    )]
     max_pixels: u64,
 }
 

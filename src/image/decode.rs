@@ -323,6 +323,7 @@ fn jpeg_is_whole(bytes: &[u8]) -> bool {
 /// Integer and float TIFF. What is packed into less than a byte, or is neither grey nor RGB, is left to the
 /// general decoder.
 fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
+    check_tiff_counts(bytes)?;
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(tiff_reason)?;
     let (width, height) = decoder.dimensions().map_err(tiff_reason)?;
     check_claim(width as u64, height as u64, max_pixels, MAX_PIXELS_PER_BYTE, bytes)?;
@@ -375,6 +376,31 @@ fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Str
         Samples::Double(v) => Samples::Double(interleaved(v, width * height, channels, planar)?),
     };
     Ok(Raster { width, height, channels, samples })
+}
+
+/// Errors when an entry of the first directory claims more values than the file has bytes: the decoder takes memory for
+/// them before it reads them. What else is wrong with a directory the decoder finds.
+fn check_tiff_counts(bytes: &[u8]) -> std::result::Result<(), String> {
+    let big = bytes[2..4].contains(&43);
+    let number = |at: usize, size: usize| {
+        let field = bytes.get(at..at.checked_add(size)?)?;
+        let append = |n: usize, byte: &u8| n << 8 | usize::from(*byte);
+        Some(if bytes[0] == b'I' { field.iter().rev().fold(0, append) } else { field.iter().fold(0, append) })
+    };
+    // Sizes of places and counts, of the number of entries, and of an entry.
+    let (wide, head, entry) = if big { (8, 8, 20) } else { (4, 2, 12) };
+    let count = |start: usize, i: usize| {
+        let at = start.checked_add(head)?.checked_add(i * entry)?;
+        number(at + 4, wide)
+    };
+    let Some(start) = number(wide, wide) else { return Ok(()) };
+    let entries = number(start, head).unwrap_or(0).min(bytes.len() / entry);
+    match (0..entries).map_while(|i| count(start, i)).find(|count| *count > bytes.len()) {
+        Some(count) => {
+            Err(damaged(format!("the TIFF directory claims {count} values in {} bytes", bytes.len())))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The samples with all channels of a pixel next to each other, from those or from one plane after the other.

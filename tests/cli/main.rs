@@ -5,6 +5,9 @@
 mod bench;
 mod evaluate;
 mod failures;
+#[path = "../common/files.rs"]
+mod files;
+mod hostile;
 mod matching;
 mod outputs;
 
@@ -148,6 +151,16 @@ fn workshop() -> TempDir {
         fs::copy(at(from), at("broken").join(to)).unwrap();
     }
     fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
+    // Files that are nearly images.
+    image::GrayImage::new(1, 1).save(at("dot.png")).unwrap();
+    fs::write(at("a.gif"), b"GIF89a\x01\0\x01\0\0\0\0").unwrap();
+    fs::write(at("a.jpg"), &files::jpeg(&[9], None, None)[..90]).unwrap();
+    fs::write(at("a.pgm"), b"P5\n60 40\n255\n1234").unwrap();
+    fs::write(at("a.pfm"), b"Pf\n60 40\n0\n1234").unwrap();
+    fs::write(at("a.tif"), b"II*\0\x08\0\0\0\x01\0").unwrap();
+    let size = [(256, 4, 1, 1), (257, 4, 1, 1), (258, 3, 1, 8), (262, 3, 1, 3), (277, 3, 1, 1)];
+    let strip = [(273, 4, 1, 8), (278, 4, 1, 1), (279, 4, 1, 1)];
+    fs::write(at("palette.tif"), files::tiff(&[&size[..], &strip].concat(), &[])).unwrap();
     folder
 }
 
