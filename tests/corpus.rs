@@ -8,8 +8,11 @@ mod targets;
 
 use std::path::{Path, PathBuf};
 
+/// What a target does with an input.
+type Target = fn(&[u8]);
+
 /// Every target with its name, which is that of its folder.
-const TARGETS: [(&str, fn(&[u8])); 4] = [
+const TARGETS: [(&str, Target); 4] = [
     ("pfm", targets::pfm),
     ("calib", targets::calib),
     ("image", targets::image),

@@ -91,13 +91,13 @@ fn palettes_are_looked_up_and_their_alpha_masks() {
     let rows = [0, 0b0001_1000];
     let indexed = Png { size: (3, 1), depth: 2, colour: 3, rows: &rows, ..GREY };
     let expected = [[10, 20, 30], [40, 50, 60], [70, 80, 90]];
-    assert_eq!(colours(&Png { chunks: &[(b"PLTE", palette)], ..indexed }.bytes()), expected.map(Some));
-    let chunks: &[(&[u8; 4], &[u8])] = &[(b"PLTE", palette), (b"tRNS", &[1, 0])];
+    assert_eq!(colours(&Png { chunks: &[(*b"PLTE", palette)], ..indexed }.bytes()), expected.map(Some));
+    let chunks: &[([u8; 4], &[u8])] = &[(*b"PLTE", palette), (*b"tRNS", &[1, 0])];
     let indexed = Png { size: (3, 1), depth: 2, colour: 3, rows: &rows, ..GREY };
     let masked = [Some(expected[0]), None, Some(expected[2])];
     assert_eq!(colours(&Png { chunks, ..indexed }.bytes()), masked);
     // One grey level may be the transparent one.
-    let png = Png { size: (3, 1), chunks: &[(b"tRNS", &[0, 7])], rows: &[0, 6, 7, 8], ..GREY };
+    let png = Png { size: (3, 1), chunks: &[(*b"tRNS", &[0, 7])], rows: &[0, 6, 7, 8], ..GREY };
     assert_eq!(greys(&png.bytes()), [Some(6), None, Some(8)]);
 }
 
@@ -155,7 +155,7 @@ fn jpeg_of_every_colour_model() {
 fn exif_orientation_turns_nothing() {
     let turned = exif_orientation(6);
     let png = |chunks| Png { size: (3, 1), rows: &[0, 1, 2, 3], chunks, ..GREY }.bytes();
-    let (plain, noted) = (png(&[]), png(&[(b"eXIf", &turned)]));
+    let (plain, noted) = (png(&[]), png(&[(*b"eXIf", &turned)]));
     assert_ne!(plain, noted);
     assert_eq!((left(&noted).width(), left(&noted)), (3, left(&plain)));
     assert_eq!(left(&jpeg(&[9], None, Some(&turned))), left(&jpeg(&[9], None, None)));
@@ -177,7 +177,7 @@ fn float_values_beyond_all_bounds() {
     assert_eq!(greys(&pfm(&[-3.0, -2.0, -1.0])), [0, 127, 255].map(Some));
     assert_eq!(greys(&pfm(&[nan, infinite, -infinite])), [None; 3]);
     // A colour is masked where any of its channels is not finite.
-    let data = [1.0, 2.0, nan, 1.0, 2.0, 3.0_f32].into_iter().flat_map(|v| v.to_le_bytes());
+    let data = [1.0, 2.0, nan, 1.0, 2.0, 3.0_f32].into_iter().flat_map(f32::to_le_bytes);
     let colour: Vec<u8> = b"PF\n2 1\n-1\n".iter().copied().chain(data).collect();
     assert_eq!(colours(&colour), [None, Some([0, 127, 255])]);
 }

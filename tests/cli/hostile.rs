@@ -204,7 +204,7 @@ mod memory {
             depth: 8,
             colour: 0,
             interlaced: false,
-            chunks: &[(b"tEXt", &filler)],
+            chunks: &[(*b"tEXt", &filler)],
             rows: &[0],
         };
         fs::write(folder.path().join("claim.png"), png.bytes()).unwrap();

@@ -144,6 +144,29 @@ fn a_pair_that_is_not_rectified_is_named() {
 }
 
 #[test]
+fn a_range_that_cuts_off_the_scene_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
+    let said = |more: &[&str]| {
+        let args = ["match", &left, &right, "out.pfm", "--backend", "cpu"];
+        run(folder.path(), &[&args[..], more].concat()).succeeded().stderr
+    };
+    let warning = "warning: ";
+    assert!(!said(&["--max-disparity", "47"]).contains(warning));
+    let told = said(&["--max-disparity", "25"]);
+    assert!(
+        told.lines().last().unwrap().ends_with("raise --max-disparity") && told.contains(warning),
+        "{told}"
+    );
+    let told = said(&["--max-disparity", "47", "--min-disparity", "19"]);
+    assert!(
+        told.lines().last().unwrap().ends_with("lower --min-disparity") && told.contains(warning),
+        "{told}"
+    );
+    assert_eq!(said(&["--max-disparity", "25", "--quiet"]), "");
+}
+
+#[test]
 fn intermediates_show_every_step() {
     let folder = workshop();
     let args =

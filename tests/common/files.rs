@@ -12,7 +12,7 @@ pub struct Png<'a> {
     pub colour: u8,
     pub interlaced: bool,
     /// Chunks between header and pixels, each with its name.
-    pub chunks: &'a [(&'a [u8; 4], &'a [u8])],
+    pub chunks: &'a [([u8; 4], &'a [u8])],
     pub rows: &'a [u8],
 }
 
@@ -22,18 +22,18 @@ impl Png<'_> {
         let mut header = [width.to_be_bytes(), height.to_be_bytes()].concat();
         header.extend([self.depth, self.colour, 0, 0, u8::from(self.interlaced)]);
         let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
-        out.extend(chunk(b"IHDR", &header));
-        for (name, data) in self.chunks {
+        out.extend(chunk(*b"IHDR", &header));
+        for &(name, data) in self.chunks {
             out.extend(chunk(name, data));
         }
-        out.extend(chunk(b"IDAT", &stored(self.rows)));
-        out.extend(chunk(b"IEND", &[]));
+        out.extend(chunk(*b"IDAT", &stored(self.rows)));
+        out.extend(chunk(*b"IEND", &[]));
         out
     }
 }
 
-fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
-    let named = [name, data].concat();
+fn chunk(name: [u8; 4], data: &[u8]) -> Vec<u8> {
+    let named = [&name, data].concat();
     [&(data.len() as u32).to_be_bytes()[..], &named, &crc32(&named).to_be_bytes()].concat()
 }
 
@@ -98,22 +98,19 @@ pub fn jpeg(components: &[u8], adobe: Option<u8>, exif: Option<&[u8]>) -> Vec<u8
     let scan = (1..=count).flat_map(|i| [i, 0]);
     let scan: Vec<u8> = [count].into_iter().chain(scan).chain([0, 63, 0]).collect();
     out.extend(segment(0xda, &scan));
-    let mut bits = String::new();
+    let mut bits = Vec::new();
+    let mut put = |code: i32, width: u32| bits.extend((0..width).rev().map(|i| (code >> i & 1) as u8));
     for value in components {
         let difference = i32::from(*value) - 128;
-        let width = (32 - difference.unsigned_abs().leading_zeros()) as usize;
-        bits += &format!("{width:04b}");
-        if width > 0 {
-            let code = if difference < 0 { difference + (1 << width) - 1 } else { difference };
-            bits += &format!("{code:0width$b}");
-        }
-        bits += "0";
+        let width = 32 - difference.unsigned_abs().leading_zeros();
+        put(width as i32, 4);
+        put(if difference < 0 { difference + (1 << width) - 1 } else { difference }, width);
+        put(0, 1);
     }
-    while !bits.len().is_multiple_of(8) {
-        bits += "1";
-    }
-    for i in (0..bits.len()).step_by(8) {
-        let byte = u8::from_str_radix(&bits[i..i + 8], 2).expect("eight bits");
+    put(0xff, 7);
+    // What is left of the last byte are ones.
+    for byte in bits.chunks_exact(8) {
+        let byte = byte.iter().fold(0, |byte, bit| byte << 1 | bit);
         out.push(byte);
         // A byte of ones is told from a mark by the zero after it.
         out.extend((byte == 0xff).then_some(0));
