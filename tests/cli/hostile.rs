@@ -62,6 +62,8 @@ fn hostile() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
             tiff(&[(256, 4, 1, 9), (257, 4, 1, 9), (258, 3, 0x0080_0000, 8), (277, 3, 1, 1)], &[]),
             &["claims 8388608 values", "get the file again"],
         ),
+        // The decoder prints a line of its own for such a text.
+        ("text.tif", tiff(&[(256, 2, u32::MAX, 9), (257, 4, 1, 9)], &[]), &["claims 4294967295 values"]),
         ("strips.tif", image(9, 9, &[(273, 4, u32::MAX, 8), (278, 4, 1, 1), (279, 4, u32::MAX, 8)]), DAMAGED),
         (
             "tiles.tif",
