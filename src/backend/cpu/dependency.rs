@@ -41,12 +41,23 @@ pub(super) const REACH: usize = GRAPH_WINDOW / 2;
 /// Beliefs of the rows around a factor's, [`REACH`] above to as many below; empty outside the image.
 pub(super) type Around<'a, U> = [&'a [U]; GRAPH_WINDOW];
 
-pub(super) fn run<U: Units>(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[U], messages: &mut [U]) {
+/// Messages that are `fresh` are 0 before, whatever is stored.
+pub(super) fn run<U: Units>(
+    plan: &Plan,
+    level: usize,
+    graph: &LevelGraph,
+    belief: &[U],
+    messages: &mut [U],
+    fresh: bool,
+) {
     let l = &plan.levels[level];
     let cells = l.width * l.stride;
     messages.par_chunks_mut(cells * graph.slots()).enumerate().for_each_init(
         || Scratch::new(l.stride, graph.slots()),
         |scratch, (y, messages)| {
+            if fresh {
+                messages.fill(U::default());
+            }
             let around: Around<U> = from_fn(|k| {
                 let ny = (y + k).checked_sub(REACH).filter(|&ny| ny < l.height);
                 ny.map_or(&[][..], |ny| &belief[ny * cells..][..cells])

@@ -31,6 +31,7 @@ pub(super) fn run<U: Units>(
     summands: &Summands<U>,
     messages: &mut [U],
     belief: &mut [U],
+    fresh: bool,
 ) {
     let l = &plan.levels[level];
     let (cells, height) = (l.width * l.stride, l.height);
@@ -63,7 +64,7 @@ pub(super) fn run<U: Units>(
     bands.into_par_iter().enumerate().for_each(|(i, mut band)| {
         let above = if i == 0 { &[][..] } else { shared[i - 1] };
         let below = shared.get(i).copied().unwrap_or_default();
-        band.sweep(plan, level, summands, [above, below]);
+        band.sweep(plan, level, summands, [above, below], fresh);
     });
 
     let messages = &*messages;
@@ -75,8 +76,9 @@ pub(super) fn run<U: Units>(
 }
 
 impl<U: Units> Band<'_, U> {
-    /// Sweeps the band; `edges` are the beliefs around its borders.
-    fn sweep(&mut self, plan: &Plan, level: usize, summands: &Summands<U>, edges: [&[U]; 2]) {
+    /// Sweeps the band; `edges` are the beliefs around its borders. Messages that are `fresh` are 0 before, whatever is stored:
+    /// nothing has to come from memory for them.
+    fn sweep(&mut self, plan: &Plan, level: usize, summands: &Summands<U>, edges: [&[U]; 2], fresh: bool) {
         let l = &plan.levels[level];
         let (cells, slots) = (l.width * l.stride, summands.graph.slots());
         let mut scratch = Scratch::new(l.stride, slots);
@@ -95,6 +97,9 @@ impl<U: Units> Band<'_, U> {
                         .map_or(&[][..], |rows| rows.get(..cells).unwrap_or_default()),
                 });
                 let messages = &mut self.messages[(y - self.first) * cells * slots..][..cells * slots];
+                if fresh {
+                    messages.fill(U::default());
+                }
                 dependency::row(plan, level, summands.graph, y, &around, messages, &mut scratch);
             }
             // All factors of this row's pixels have spoken.

@@ -30,6 +30,7 @@ use belief::Summands;
 pub use mosaic::Mosaic;
 use rayon::prelude::*;
 use std::hint::black_box;
+use std::mem;
 use std::time::{Duration, Instant};
 use units::Units;
 use zeroed::Zeroed;
@@ -186,8 +187,10 @@ struct Level<U> {
     cost: Zeroed<u16>,
     evidence: Zeroed<u8>,
     dependency: Zeroed<U>,
-    /// Whether a dependency message may be anything but 0.
+    /// Whether a dependency factor has spoken yet: until then all messages are 0, whatever is stored.
     spoken: bool,
+    /// The same of the resolution factors between this level and the next finer one: of its `up` and that one's `down`.
+    resolved: bool,
     /// Empty at the coarsest level.
     down: Zeroed<U>,
     /// Empty at level 0.
@@ -209,6 +212,7 @@ impl<U: Units> Volumes<U> {
                     evidence: Zeroed::new(cells)?,
                     dependency: Zeroed::new(cells * graph.slots())?,
                     spoken: false,
+                    resolved: false,
                     down: Zeroed::new(if z == last { 0 } else { cells })?,
                     up: Zeroed::new(if z == 0 { 0 } else { cells })?,
                     belief: Zeroed::new(cells)?,
@@ -235,10 +239,7 @@ impl<U: Units> Volumes<U> {
         self.pair = pair.clone();
         self.labels.fill(0);
         for (level, graph) in self.levels.iter_mut().zip(graphs) {
-            (level.graph, level.spoken) = (graph, false);
-            for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
-                messages.par_chunks_mut(1 << 20).for_each(|part| part.fill(U::default()));
-            }
+            (level.graph, level.spoken, level.resolved) = (graph, false, false);
         }
     }
 
@@ -249,7 +250,7 @@ impl<U: Units> Volumes<U> {
         for level in &mut self.levels {
             level.cost.fill(wide);
             level.evidence.fill(byte);
-            level.spoken = true;
+            (level.spoken, level.resolved) = (true, true);
             level.belief.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
             for messages in [&mut level.dependency, &mut level.down, &mut level.up] {
                 messages.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
@@ -289,24 +290,29 @@ impl<U: Units> Volumes<U> {
             }
             Stage::Dependency(z) => {
                 let l = &mut levels[z];
-                l.spoken = true;
-                dependency::run(plan, z, &l.graph, &l.belief, &mut l.dependency);
+                let fresh = !mem::replace(&mut l.spoken, true);
+                dependency::run(plan, z, &l.graph, &l.belief, &mut l.dependency, fresh);
             }
             Stage::Resolution(z) => {
                 let (finer, coarser) = levels.split_at_mut(z);
                 let (fine, coarse) = (&mut finer[z - 1], &mut coarser[0]);
-                resolution::run(plan, z, &fine.belief, &coarse.belief, &mut fine.down, &mut coarse.up);
+                let fresh = !mem::replace(&mut coarse.resolved, true);
+                let beliefs = [&*fine.belief, &*coarse.belief];
+                resolution::run(plan, z, beliefs, &mut fine.down, &mut coarse.up, fresh);
             }
-            Stage::Belief(z) => {
+            Stage::Belief(z) | Stage::Flood(z) => {
+                let above = levels.get(z + 1).is_some_and(|above| above.resolved);
                 let l = &mut levels[z];
-                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&*l.down, &*l.up]);
-                belief::run(&summands, l.spoken.then_some(&*l.dependency), &mut l.belief);
-            }
-            Stage::Flood(z) => {
-                let l = &mut levels[z];
-                l.spoken = true;
-                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [&*l.down, &*l.up]);
-                flood::run(plan, z, &summands, &mut l.dependency, &mut l.belief);
+                // What holds nothing yet is no summand.
+                let down: &[U] = if above { &l.down } else { &[] };
+                let up: &[U] = if l.resolved { &l.up } else { &[] };
+                let summands = Summands::new(plan, z, &l.graph, &l.evidence, [down, up]);
+                if matches!(stage, Stage::Belief(_)) {
+                    belief::run(&summands, l.spoken.then_some(&*l.dependency), &mut l.belief);
+                } else {
+                    let fresh = !mem::replace(&mut l.spoken, true);
+                    flood::run(plan, z, &summands, &mut l.dependency, &mut l.belief, fresh);
+                }
             }
             Stage::Change => *change = estimate::change(plan, &levels[0].belief, labels),
             Stage::Estimate => estimate::run(plan, &levels[0].belief, maps),
@@ -321,15 +327,26 @@ impl<U: Units> Volumes<U> {
         }
     }
 
+    /// Stores the messages between level `z` and the next finer one, if they are but known to be 0.
+    fn resolve(&mut self, z: usize) {
+        if !mem::replace(&mut self.levels[z].resolved, true) {
+            self.levels[z].up.fill(U::default());
+            self.levels[z - 1].down.fill(U::default());
+        }
+    }
+
     fn read(&self, volume: Volume) -> Vec<u32> {
-        let (_, labels, stride) = volume_shape(&self.plan, volume);
+        let (rows, labels, stride) = volume_shape(&self.plan, volume);
         match volume {
             Volume::Cost(0) => gather(&self.fine_cost, labels, stride),
             Volume::Cost(z) => gather(&self.levels[z].cost, labels, stride),
             Volume::Evidence(z) => gather(&self.levels[z].evidence, labels, stride),
-            Volume::Dependency(z) => gather(&self.levels[z].dependency, labels, stride),
-            Volume::Down(z) => gather(&self.levels[z].down, labels, stride),
-            Volume::Up(z) => gather(&self.levels[z].up, labels, stride),
+            Volume::Dependency(z) if self.levels[z].spoken => {
+                gather(&self.levels[z].dependency, labels, stride)
+            }
+            Volume::Down(z) if self.levels[z + 1].resolved => gather(&self.levels[z].down, labels, stride),
+            Volume::Up(z) if self.levels[z].resolved => gather(&self.levels[z].up, labels, stride),
+            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => vec![0; rows * labels],
             Volume::Belief(z) => gather(&self.levels[z].belief, labels, stride),
         }
     }
@@ -345,8 +362,14 @@ impl<U: Units> Volumes<U> {
                 self.levels[z].spoken = true;
                 rows.fill(&mut self.levels[z].dependency, U::of);
             }
-            Volume::Down(_) => rows.fill(&mut self.levels[z].down, U::of),
-            Volume::Up(_) => rows.fill(&mut self.levels[z].up, U::of),
+            Volume::Down(_) => {
+                self.resolve(z + 1);
+                rows.fill(&mut self.levels[z].down, U::of);
+            }
+            Volume::Up(_) => {
+                self.resolve(z);
+                rows.fill(&mut self.levels[z].up, U::of);
+            }
             Volume::Belief(_) => rows.fill(&mut self.levels[z].belief, U::of),
         }
     }

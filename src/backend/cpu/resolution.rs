@@ -32,13 +32,14 @@ struct Between<U> {
     coarse_padding: Vec<U>,
 }
 
+/// Messages that are `fresh` are 0 before, whatever is stored.
 pub(super) fn run<U: Units>(
     plan: &Plan,
     level: usize,
-    fine_belief: &[U],
-    coarse_belief: &[U],
+    [fine_belief, coarse_belief]: [&[U]; 2],
     down: &mut [U],
     up: &mut [U],
+    fresh: bool,
 ) {
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
     let between = Between {
@@ -67,6 +68,10 @@ pub(super) fn run<U: Units>(
             }
         },
         |scratch, (y, (up, down))| {
+            if fresh {
+                up.fill(U::default());
+                down.fill(U::default());
+            }
             let coarse = coarse_belief[y * cl.width * cl.stride..].chunks_exact(cl.stride);
             let fine = &fine_belief[2 * y * fl.width * fl.stride..];
             for (x, (up, belief)) in up.chunks_exact_mut(cl.stride).zip(coarse).enumerate() {
