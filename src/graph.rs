@@ -9,6 +9,7 @@
 use crate::image::{Image, Plane};
 use crate::plan::{GRAPH_WINDOW, Plan};
 use rayon::prelude::*;
+use std::iter;
 use std::ops::Range;
 
 /// The code of a slot that no pixel fills: a neighbour outside the image, masked, or simply not there.
@@ -66,15 +67,9 @@ impl LevelGraph {
         let step = |(dx, dy): (i32, i32)| dy as isize * width as isize + dx as isize;
         let steps = offsets().map(step).collect();
         let mut graph =
-            Self { width, height, neighbours, codes, steps, starts: vec![0], incoming: Vec::new() };
+            Self { width, height, neighbours, codes, steps, starts: Vec::new(), incoming: Vec::new() };
         graph.check();
-        let bands: Vec<_> = (0..height).step_by(BAND).collect();
-        let bands: Vec<_> = bands.into_par_iter().map(|first| graph.transposed(first)).collect();
-        for (starts, incoming) in bands {
-            let before = graph.incoming.len() as u32;
-            graph.starts.extend(starts[1..].iter().map(|start| before + start));
-            graph.incoming.extend(incoming);
-        }
+        (graph.starts, graph.incoming) = graph.transposed();
         graph
     }
 
@@ -98,18 +93,32 @@ impl LevelGraph {
         });
     }
 
-    /// Where the entries of each pixel start, and the entries, of [`BAND`] rows from `first` on.
-    fn transposed(&self, first: usize) -> (Vec<u32>, Vec<u32>) {
-        let pixels = first * self.width..(first + BAND).min(self.height) * self.width;
-        let mut starts = vec![0; pixels.len() + 1];
-        self.each_member(&pixels, |pixel, _| starts[pixel + 1] += 1);
-        for pixel in 0..pixels.len() {
+    /// Where the entries of each pixel start, and the entries: [`Self::starts`] and [`Self::incoming`].
+    fn transposed(&self) -> (Vec<u32>, Vec<u32>) {
+        let (pixels, band) = (self.width * self.height, BAND * self.width);
+        let of_band = |i: usize| i * band..((i + 1) * band).min(pixels);
+        let mut starts = vec![0; pixels + 1];
+        starts[1..].par_chunks_mut(band).enumerate().for_each(|(i, counts)| {
+            self.each_member(&of_band(i), |pixel, _| counts[pixel] += 1);
+        });
+        for pixel in 0..pixels {
             starts[pixel + 1] += starts[pixel];
         }
-        let (mut next, mut incoming) = (starts.clone(), vec![0; starts[pixels.len()] as usize]);
-        self.each_member(&pixels, |pixel, entry| {
-            incoming[next[pixel] as usize] = entry;
-            next[pixel] += 1;
+        let mut incoming = vec![0; starts[pixels] as usize];
+        let mut rest = &mut incoming[..];
+        let mut bands = Vec::new();
+        for own in (0..pixels.div_ceil(band)).map(of_band) {
+            let (entries, after) = rest.split_at_mut((starts[own.end] - starts[own.start]) as usize);
+            bands.push((own, entries));
+            rest = after;
+        }
+        bands.into_par_iter().for_each(|(own, entries)| {
+            let first = starts[own.start];
+            let mut next: Vec<u32> = starts[own.clone()].iter().map(|start| start - first).collect();
+            self.each_member(&own, |pixel, entry| {
+                entries[next[pixel] as usize] = entry;
+                next[pixel] += 1;
+            });
         });
         (starts, incoming)
     }
@@ -202,15 +211,12 @@ impl LevelGraph {
 #[must_use]
 pub fn build(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
     let weight = spatial_weight(plan.method.sigma_space, plan.method.sigma_range);
-    let mut graphs = Vec::with_capacity(plan.levels.len());
-    let mut level = image.clone();
-    for z in 0..plan.levels.len() {
-        if z > 0 {
-            level = downsample(&level);
-        }
-        graphs.push(level_graph(&level, plan.neighbours, weight));
+    let mut coarser: Vec<Image> = Vec::new();
+    for _ in 1..plan.levels.len() {
+        coarser.push(downsample(coarser.last().unwrap_or(image)));
     }
-    graphs
+    let levels: Vec<&Image> = iter::once(image).chain(&coarser).collect();
+    levels.into_par_iter().map(|level| level_graph(level, plan.neighbours, weight)).collect()
 }
 
 /// What a squared pixel of distance weighs against a squared quarter level of colour difference.
@@ -237,7 +243,10 @@ fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
             let channel = image.pixels.data().par_iter().map(|pixel| pixel[c]);
             Plane::new(width, height, channel.collect())
         }),
-        masked: image.masked.map(|&masked| if masked { NO_KEY } else { 0 }),
+        masked: {
+            let keys = image.masked.data().par_iter().map(|&masked| if masked { NO_KEY } else { 0 });
+            Plane::new(width, height, keys.collect())
+        },
     };
     let mut codes = vec![NO_MEMBER; width * height * neighbours];
     if neighbours > 0 {
