@@ -34,7 +34,6 @@ pub(super) fn right_view<U: Units>(plan: &Plan, belief: &[U], maps: &mut Finest)
     let rows =
         maps.right.data_mut().par_chunks_mut(width).zip(maps.right_best.data_mut().par_chunks_mut(width));
     rows.zip(belief.par_chunks(width * stride)).for_each_init(
-        // By the right pixel's place from the right, so that ascending labels are side by side.
         // By the right pixel's place from the right, so that ascending labels are side by side: belief and label of the best
         // so far, or as much as [`crate::backend::NO_LABEL`] says in both.
         || vec![u32::MAX; width],
