@@ -96,6 +96,9 @@ impl Matcher {
     fn build(gpu: Option<Result<Gpu>>, falls_back: bool, execution: &Execution) -> Result<Self> {
         let mut pool = rayon::ThreadPoolBuilder::new();
         if let Some(threads) = execution.threads {
+            if threads == 0 {
+                return Err(Error::option("--threads", "give a whole number from 1 on"));
+            }
             pool = pool.num_threads(threads);
         }
         let pool = pool.build().map_err(|e| Error::option("--threads", e.to_string()))?;

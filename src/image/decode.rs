@@ -9,7 +9,8 @@ use tiff::TiffError;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
-use super::{Plane, pfm};
+use super::pfm;
+use super::raster::{Raster, Samples};
 use crate::error::{Error, Result, one_line};
 
 /// Bytes of a pixel at most: four channels of the widest kind.
@@ -130,103 +131,13 @@ fn unknown(bytes: &[u8]) -> String {
     }
 }
 
-/// Samples as a file holds them, all channels of a pixel next to each other.
-pub(super) enum Samples {
-    Byte(Vec<u8>),
-    Word(Vec<u16>),
-    Float(Vec<f32>),
-    /// Also the integers that do not fit a word.
-    Double(Vec<f64>),
-}
-
-impl Samples {
-    pub(super) fn is_float(&self) -> bool {
-        matches!(self, Self::Float(_) | Self::Double(_))
-    }
-}
-
-/// An image as a file holds it.
-pub(super) struct Raster {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
-    pub(super) channels: usize,
-    pub(super) samples: Samples,
-}
-
-impl Raster {
-    pub(super) fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
-    }
-
-    /// `f` of the grey or colour samples of each pixel.
-    pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
-        let colours = if self.channels < 3 { 1 } else { 3 };
-        let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
-        Plane::new(self.width, self.height, values)
-    }
-
-    /// `true` where alpha is 0 or a value is not finite.
-    pub(super) fn masked(&self) -> Plane<bool> {
-        fn masked<S: Copy>(
-            raster: &Raster,
-            samples: &[S],
-            clear: impl Fn(S) -> bool,
-            ok: impl Fn(S) -> bool,
-        ) -> Plane<bool> {
-            let n = raster.channels;
-            let colours = if n < 3 { 1 } else { 3 };
-            let pixel = |p: &[S]| (n > colours && clear(p[colours])) || !p[..colours].iter().all(|&v| ok(v));
-            Plane::new(raster.width, raster.height, samples.chunks_exact(n).map(pixel).collect())
-        }
-        match &self.samples {
-            Samples::Byte(v) => masked(self, v, |a| a == 0, |_| true),
-            Samples::Word(v) => masked(self, v, |a| a == 0, |_| true),
-            Samples::Float(v) => masked(self, v, |a| a == 0.0, f32::is_finite),
-            Samples::Double(v) => masked(self, v, |a| a == 0.0, f64::is_finite),
-        }
-    }
-
-    /// Calls `f` with the grey or colour samples of every pixel that is not masked.
-    pub(super) fn each<S: Copy>(&self, samples: &[S], masked: &Plane<bool>, mut f: impl FnMut(S)) {
-        let colours = if self.channels < 3 { 1 } else { 3 };
-        for (pixel, _) in samples.chunks_exact(self.channels).zip(masked.data()).filter(|(_, m)| !**m) {
-            pixel[..colours].iter().for_each(|&v| f(v));
-        }
-    }
-
-    pub(super) fn each_word(&self, masked: &Plane<bool>, f: impl FnMut(u16)) {
-        match &self.samples {
-            Samples::Byte(v) => {
-                let mut f = f;
-                self.each(v, masked, |v| f(stretched(v)));
-            }
-            Samples::Word(v) => self.each(v, masked, f),
-            Samples::Float(_) | Samples::Double(_) => {}
-        }
-    }
-
-    pub(super) fn each_double(&self, masked: &Plane<bool>, mut f: impl FnMut(f64)) {
-        match &self.samples {
-            Samples::Float(v) => self.each(v, masked, |v| f(v as f64)),
-            Samples::Double(v) => self.each(v, masked, f),
-            Samples::Byte(_) | Samples::Word(_) => {}
-        }
-    }
-}
-
-/// An 8-bit level on the 16-bit scale.
-pub(super) fn stretched(v: u8) -> u16 {
-    v as u16 * 257
-}
-
-pub(super) fn raster(path: &Path, max_pixels: u64) -> Result<Raster> {
+pub(super) fn decode_file(path: &Path, max_pixels: u64) -> Result<Raster<'static>> {
     decode(&load(path, max_pixels)?, max_pixels).map_err(|reason| Error::read(path, reason))
 }
 
 /// Decodes a whole file; the error says in one line what is wrong with it. Memory for pixels is taken once the header
 /// is known to claim no more than `max_pixels`, and what the file can hold.
-pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'static>, String> {
     match Kind::of(bytes) {
         Some(Kind::Pfm) => decode_pfm(bytes, max_pixels),
         Some(Kind::Tiff) => decode_tiff(bytes, max_pixels),
@@ -235,12 +146,12 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raste
     }
 }
 
-fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
+fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'static>, String> {
     let (width, height, channels, samples) = match pfm::decode(bytes, max_pixels)? {
         pfm::Pfm::Grey(p) => (p.width(), p.height(), 1, p.into_data()),
         pfm::Pfm::Colour(p) => (p.width(), p.height(), 3, p.into_data().into_flattened()),
     };
-    Ok(Raster { width, height, channels, samples: Samples::Float(samples) })
+    Ok(Raster { width, height, channels, samples: Samples::Float(samples.into()) })
 }
 
 /// What is wrong with a file that does not decode, and what to do about it.
@@ -263,7 +174,11 @@ fn tiff_reason(e: TiffError) -> String {
     if matches!(e, TiffError::UnsupportedError(_)) { unsupported(e) } else { damaged(e) }
 }
 
-fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> std::result::Result<Raster, String> {
+fn decode_coded(
+    bytes: &[u8],
+    format: ImageFormat,
+    max_pixels: u64,
+) -> std::result::Result<Raster<'static>, String> {
     // The decoder fills up what is missing of a JPEG file with grey and says nothing.
     if format == ImageFormat::Jpeg && !jpeg_is_whole(bytes) {
         return Err(damaged("the JPEG data has no end"));
@@ -287,16 +202,16 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> std::resu
     check_claim(width as u64, height as u64, max_pixels, per_byte, bytes)?;
     let image = DynamicImage::from_decoder(decoder).map_err(coded_reason)?;
     let (channels, samples) = match image {
-        DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw())),
-        DynamicImage::ImageLumaA8(i) => (2, Samples::Byte(i.into_raw())),
-        DynamicImage::ImageRgb8(i) => (3, Samples::Byte(i.into_raw())),
-        DynamicImage::ImageRgba8(i) => (4, Samples::Byte(i.into_raw())),
-        DynamicImage::ImageLuma16(i) => (1, Samples::Word(i.into_raw())),
-        DynamicImage::ImageLumaA16(i) => (2, Samples::Word(i.into_raw())),
-        DynamicImage::ImageRgb16(i) => (3, Samples::Word(i.into_raw())),
-        DynamicImage::ImageRgba16(i) => (4, Samples::Word(i.into_raw())),
-        DynamicImage::ImageRgb32F(i) => (3, Samples::Float(i.into_raw())),
-        DynamicImage::ImageRgba32F(i) => (4, Samples::Float(i.into_raw())),
+        DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw().into())),
+        DynamicImage::ImageLumaA8(i) => (2, Samples::Byte(i.into_raw().into())),
+        DynamicImage::ImageRgb8(i) => (3, Samples::Byte(i.into_raw().into())),
+        DynamicImage::ImageRgba8(i) => (4, Samples::Byte(i.into_raw().into())),
+        DynamicImage::ImageLuma16(i) => (1, Samples::Word(i.into_raw().into())),
+        DynamicImage::ImageLumaA16(i) => (2, Samples::Word(i.into_raw().into())),
+        DynamicImage::ImageRgb16(i) => (3, Samples::Word(i.into_raw().into())),
+        DynamicImage::ImageRgba16(i) => (4, Samples::Word(i.into_raw().into())),
+        DynamicImage::ImageRgb32F(i) => (3, Samples::Float(i.into_raw().into())),
+        DynamicImage::ImageRgba32F(i) => (4, Samples::Float(i.into_raw().into())),
         other => {
             return Err(format!("pixels of the kind {:?} are not read; convert it to PNG", other.color()));
         }
@@ -322,7 +237,7 @@ fn jpeg_is_whole(bytes: &[u8]) -> bool {
 
 /// Integer and float TIFF. What is packed into less than a byte, or is neither grey nor RGB, is left to the
 /// general decoder.
-fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, String> {
+fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'static>, String> {
     check_tiff_counts(bytes)?;
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(tiff_reason)?;
     let (width, height) = decoder.dimensions().map_err(tiff_reason)?;
@@ -355,10 +270,10 @@ fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Str
     let mut result = DecodingResult::U8(Vec::new());
     let layout = decoder.read_image_to_buffer(&mut result).map_err(tiff_reason)?;
     let samples = match result {
-        DecodingResult::U8(v) => Samples::Byte(v),
-        DecodingResult::U16(v) => Samples::Word(v),
-        DecodingResult::F32(v) => Samples::Float(v),
-        DecodingResult::F64(v) => Samples::Double(v),
+        DecodingResult::U8(v) => Samples::Byte(v.into()),
+        DecodingResult::U16(v) => Samples::Word(v.into()),
+        DecodingResult::F32(v) => Samples::Float(v.into()),
+        DecodingResult::F64(v) => Samples::Double(v.into()),
         DecodingResult::F16(v) => Samples::Float(v.into_iter().map(f32::from).collect()),
         DecodingResult::I8(v) => Samples::Float(v.into_iter().map(f32::from).collect()),
         DecodingResult::I16(v) => Samples::Float(v.into_iter().map(f32::from).collect()),
@@ -370,10 +285,18 @@ fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster, Str
     let (width, height) = (width as usize, height as usize);
     let planar = layout.planes > 1;
     let samples = match samples {
-        Samples::Byte(v) => Samples::Byte(interleaved(v, width * height, channels, planar)?),
-        Samples::Word(v) => Samples::Word(interleaved(v, width * height, channels, planar)?),
-        Samples::Float(v) => Samples::Float(interleaved(v, width * height, channels, planar)?),
-        Samples::Double(v) => Samples::Double(interleaved(v, width * height, channels, planar)?),
+        Samples::Byte(v) => {
+            Samples::Byte(interleaved(v.into_owned(), width * height, channels, planar)?.into())
+        }
+        Samples::Word(v) => {
+            Samples::Word(interleaved(v.into_owned(), width * height, channels, planar)?.into())
+        }
+        Samples::Float(v) => {
+            Samples::Float(interleaved(v.into_owned(), width * height, channels, planar)?.into())
+        }
+        Samples::Double(v) => {
+            Samples::Double(interleaved(v.into_owned(), width * height, channels, planar)?.into())
+        }
     };
     Ok(Raster { width, height, channels, samples })
 }

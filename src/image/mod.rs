@@ -5,6 +5,7 @@ pub mod colour;
 mod decode;
 pub mod pfm;
 pub mod ply;
+pub mod raster;
 pub mod read;
 pub mod write;
 

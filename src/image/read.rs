@@ -6,12 +6,10 @@ use std::path::Path;
 
 use image::ImageFormat;
 
-use super::decode::{Kind, Raster, Samples, decode, load, raster, stretched};
-use super::{Image, Pair, Pixel, Plane, grey};
+use super::decode::{Kind, decode, decode_file, load};
+use super::raster::{self, Samples};
+use super::{Pair, Plane, grey};
 use crate::error::{Error, Result};
-
-/// Float values and the wider integers end here: 255 in 1/256 of an 8-bit level.
-const LINEAR_TOP: f64 = 65280.0;
 
 /// Most pixels of an image unless a [`Reader`] says otherwise: as many as 16,384 x 16,384.
 pub const MAX_PIXELS: u64 = 1 << 28;
@@ -57,7 +55,7 @@ impl Reader {
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
-        let images = [raster(left, self.max_pixels)?, raster(right, self.max_pixels)?];
+        let images = [decode_file(left, self.max_pixels)?, decode_file(right, self.max_pixels)?];
         let [l, r] = &images;
         if l.size() != r.size() {
             return Err(Error::Mismatch(format!(
@@ -78,30 +76,22 @@ impl Reader {
                 whole.display()
             )));
         }
-        let mut masks = [l.masked(), r.masked()];
-        if let Some(path) = mask {
-            let ignored = self.mask(path)?;
-            if ignored.size() != l.size() {
-                return Err(Error::Mismatch(format!(
-                    "the mask {} is {} x {} and {} is {} x {}: a mask has the size of the left image",
-                    path.display(),
-                    ignored.width(),
-                    ignored.height(),
-                    left.display(),
-                    l.width,
-                    l.height
-                )));
-            }
-            for (masked, ignored) in masks[0].data_mut().iter_mut().zip(ignored.data()) {
-                *masked |= ignored;
-            }
+        let ignored = mask.map(|path| self.mask(path)).transpose()?;
+        if let (Some(path), Some(ignored)) = (mask, &ignored)
+            && ignored.size() != l.size()
+        {
+            return Err(Error::Mismatch(format!(
+                "the mask {} is {} x {} and {} is {} x {}: a mask has the size of the left image",
+                path.display(),
+                ignored.width(),
+                ignored.height(),
+                left.display(),
+                l.width,
+                l.height
+            )));
         }
-        let scale = Scale::of(&images, &masks);
         let [l, r] = images;
-        let [lm, rm] = masks;
-        let left = scale.apply(&l, lm);
-        drop(l);
-        Pair::new(left, scale.apply(&r, rm))
+        raster::pair(l, r, ignored.as_ref())
     }
 
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).
@@ -109,7 +99,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`].
     pub fn mask(self, path: &Path) -> Result<Plane<bool>> {
-        let raster = raster(path, self.max_pixels)?;
+        let raster = decode_file(path, self.max_pixels)?;
         let plane = match &raster.samples {
             Samples::Byte(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0)),
             Samples::Word(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0)),
@@ -125,7 +115,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`], and for float values.
     pub fn grey8(self, path: &Path) -> Result<Plane<u8>> {
-        let raster = raster(path, self.max_pixels)?;
+        let raster = decode_file(path, self.max_pixels)?;
         let level = |c: &[u16]| match c {
             [r, g, b] => (grey(*r, *g, *b) >> 8) as u8,
             [v, ..] => (v >> 8) as u8,
@@ -160,10 +150,10 @@ impl Reader {
         }
         let valid = |d: f32| if d.is_finite() { d } else { f32::INFINITY };
         let values: Vec<f32> = match (kind, raster.samples) {
-            (Some(Kind::Pfm | Kind::Tiff), Samples::Float(v)) => v.into_iter().map(valid).collect(),
-            (Some(Kind::Tiff), Samples::Double(v)) => v.into_iter().map(|d| valid(d as f32)).collect(),
+            (Some(Kind::Pfm | Kind::Tiff), Samples::Float(v)) => v.iter().copied().map(valid).collect(),
+            (Some(Kind::Tiff), Samples::Double(v)) => v.iter().copied().map(|d| valid(d as f32)).collect(),
             (Some(Kind::Coded(ImageFormat::Png)), Samples::Word(v)) => {
-                v.into_iter().map(|v| if v == 0 { f32::INFINITY } else { v as f32 / 256.0 }).collect()
+                v.iter().copied().map(|v| if v == 0 { f32::INFINITY } else { v as f32 / 256.0 }).collect()
             }
             (Some(Kind::Coded(ImageFormat::Png)), _) => {
                 return wrong(
@@ -187,7 +177,7 @@ impl Reader {
         match (kind, raster.channels, raster.samples) {
             (Some(Kind::Coded(ImageFormat::Png)), 1, Samples::Byte(v)) => {
                 let disparity = |v| if v == 0 { f32::INFINITY } else { f32::from(v) / scale };
-                Ok(Plane::new(raster.width, raster.height, v.into_iter().map(disparity).collect()))
+                Ok(Plane::new(raster.width, raster.height, v.iter().copied().map(disparity).collect()))
             }
             _ => Err(Error::read(
                 path,
@@ -235,88 +225,6 @@ pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
 /// Those of [`Reader::scaled_disparity`].
 pub fn scaled_disparity(path: &Path, scale: f32) -> Result<Plane<f32>> {
     Reader::default().scaled_disparity(path, scale)
-}
-
-/// From samples to levels, the same for both images of a pair.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Scale {
-    /// 8-bit levels, stored as they are or times 257.
-    Level,
-    /// Words with this many free bits at the top.
-    Shift(u32),
-    /// Floats between these bounds.
-    Linear { min: f64, max: f64 },
-}
-
-impl Scale {
-    /// The scale that what is not masked asks for.
-    fn of(images: &[Raster; 2], masks: &[Plane<bool>; 2]) -> Self {
-        let each = || images.iter().zip(masks);
-        if images[0].samples.is_float() {
-            let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-            each().for_each(|(i, m)| {
-                i.each_double(m, |v| {
-                    min = min.min(v);
-                    max = max.max(v);
-                });
-            });
-            return Self::Linear { min, max };
-        }
-        if each().all(|(i, _)| matches!(i.samples, Samples::Byte(_))) {
-            return Self::Level;
-        }
-        let (mut bits, mut levels) = (0, true);
-        each().for_each(|(i, m)| {
-            i.each_word(m, |v| {
-                bits |= v;
-                levels &= v.is_multiple_of(257);
-            });
-        });
-        if levels { Self::Level } else { Self::Shift(bits.leading_zeros().min(8)) }
-    }
-
-    fn apply(self, raster: &Raster, masked: Plane<bool>) -> Image {
-        let n = raster.channels;
-        let pixels = match &raster.samples {
-            Samples::Byte(v) => pixels(v, n, &masked, |v| self.word(stretched(v))),
-            Samples::Word(v) => pixels(v, n, &masked, |v| self.word(v)),
-            Samples::Float(v) => pixels(v, n, &masked, |v| self.double(v as f64)),
-            Samples::Double(v) => pixels(v, n, &masked, |v| self.double(v)),
-        };
-        Image { pixels, masked }
-    }
-
-    fn word(self, v: u16) -> u16 {
-        match self {
-            Self::Shift(free) => v << free,
-            Self::Level | Self::Linear { .. } => (v / 257) << 8,
-        }
-    }
-
-    fn double(self, v: f64) -> u16 {
-        match self {
-            // Halves, for the difference of two doubles may be none.
-            Self::Linear { min, max } if max > min => {
-                ((v / 2.0 - min / 2.0) / (max / 2.0 - min / 2.0) * LINEAR_TOP).round() as u16
-            }
-            _ => 0,
-        }
-    }
-}
-
-/// Pixels from samples of `n` channels; what is masked becomes zero, whatever it was.
-fn pixels<S: Copy>(samples: &[S], n: usize, masked: &Plane<bool>, level: impl Fn(S) -> u16) -> Plane<Pixel> {
-    let pixel = |(p, masked): (&[S], &bool)| match p {
-        _ if *masked => [0; 4],
-        [r, g, b, ..] => {
-            let [r, g, b] = [*r, *g, *b].map(&level);
-            [r, g, b, grey(r, g, b)]
-        }
-        [v, ..] => [level(*v); 4],
-        [] => [0; 4],
-    };
-    let values = samples.chunks_exact(n).zip(masked.data()).map(pixel).collect();
-    Plane::new(masked.width(), masked.height(), values)
 }
 
 #[cfg(test)]

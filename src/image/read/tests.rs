@@ -8,9 +8,10 @@ use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::{ExtraSamples, Tag};
 
 use super::*;
-use crate::image::pfm;
+use crate::image::raster::{Raster, stretched};
+use crate::image::{Image, pfm};
 
-fn decode(bytes: &[u8]) -> std::result::Result<Raster, String> {
+fn decode(bytes: &[u8]) -> std::result::Result<Raster<'static>, String> {
     super::decode(bytes, MAX_PIXELS)
 }
 

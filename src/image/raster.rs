@@ -1,0 +1,239 @@
+//! Images as they are stored, and the levels that the matcher sees in them.
+
+use std::borrow::Cow;
+
+use super::{Image, Pair, Pixel, Plane, grey};
+use crate::error::{Error, Result};
+
+/// Float values and the wider integers end here: 255 in 1/256 of an 8-bit level.
+const LINEAR_TOP: f64 = 65280.0;
+
+/// Samples as they are stored, all channels of a pixel next to each other.
+#[derive(Clone, Debug)]
+pub enum Samples<'a> {
+    /// 8 bits.
+    Byte(Cow<'a, [u8]>),
+    /// 16 bits.
+    Word(Cow<'a, [u16]>),
+    /// Float.
+    Float(Cow<'a, [f32]>),
+    /// Double, and integers that do not fit a word.
+    Double(Cow<'a, [f64]>),
+}
+
+impl Samples<'_> {
+    pub(super) fn is_float(&self) -> bool {
+        matches!(self, Self::Float(_) | Self::Double(_))
+    }
+}
+
+/// An image as it is stored, in a file or in memory.
+#[derive(Clone, Debug)]
+pub struct Raster<'a> {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
+    pub(super) channels: usize,
+    pub(super) samples: Samples<'a>,
+}
+
+impl<'a> Raster<'a> {
+    /// An image of `channels` a pixel: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 those and alpha.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] when it has no pixel or another number of channels, or `samples` are not as many.
+    pub fn new(width: usize, height: usize, channels: usize, samples: Samples<'a>) -> Result<Self> {
+        let count = match &samples {
+            Samples::Byte(v) => v.len(),
+            Samples::Word(v) => v.len(),
+            Samples::Float(v) => v.len(),
+            Samples::Double(v) => v.len(),
+        };
+        let wanted = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(channels));
+        if count == 0 || !(1..=4).contains(&channels) || wanted != Some(count) {
+            return Err(Error::Mismatch(format!(
+                "{count} samples for {width} x {height} pixels of {channels} channels: an image has pixels of 1 to 4 channels"
+            )));
+        }
+        Ok(Self { width, height, channels, samples })
+    }
+
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// `f` of the grey or colour samples of each pixel.
+    pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
+        Plane::new(self.width, self.height, values)
+    }
+
+    /// `true` where alpha is 0 or a value is not finite.
+    pub(super) fn masked(&self) -> Plane<bool> {
+        fn masked<S: Copy>(
+            raster: &Raster<'_>,
+            samples: &[S],
+            clear: impl Fn(S) -> bool,
+            ok: impl Fn(S) -> bool,
+        ) -> Plane<bool> {
+            let n = raster.channels;
+            let colours = if n < 3 { 1 } else { 3 };
+            let pixel = |p: &[S]| (n > colours && clear(p[colours])) || !p[..colours].iter().all(|&v| ok(v));
+            Plane::new(raster.width, raster.height, samples.chunks_exact(n).map(pixel).collect())
+        }
+        match &self.samples {
+            Samples::Byte(v) => masked(self, v, |a| a == 0, |_| true),
+            Samples::Word(v) => masked(self, v, |a| a == 0, |_| true),
+            Samples::Float(v) => masked(self, v, |a| a == 0.0, f32::is_finite),
+            Samples::Double(v) => masked(self, v, |a| a == 0.0, f64::is_finite),
+        }
+    }
+
+    /// Calls `f` with the grey or colour samples of every pixel that is not masked.
+    pub(super) fn each<S: Copy>(&self, samples: &[S], masked: &Plane<bool>, mut f: impl FnMut(S)) {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        for (pixel, _) in samples.chunks_exact(self.channels).zip(masked.data()).filter(|(_, m)| !**m) {
+            pixel[..colours].iter().for_each(|&v| f(v));
+        }
+    }
+
+    pub(super) fn each_word(&self, masked: &Plane<bool>, f: impl FnMut(u16)) {
+        match &self.samples {
+            Samples::Byte(v) => {
+                let mut f = f;
+                self.each(v, masked, |v| f(stretched(v)));
+            }
+            Samples::Word(v) => self.each(v, masked, f),
+            Samples::Float(_) | Samples::Double(_) => {}
+        }
+    }
+
+    pub(super) fn each_double(&self, masked: &Plane<bool>, mut f: impl FnMut(f64)) {
+        match &self.samples {
+            Samples::Float(v) => self.each(v, masked, |v| f(v as f64)),
+            Samples::Double(v) => self.each(v, masked, f),
+            Samples::Byte(_) | Samples::Word(_) => {}
+        }
+    }
+}
+
+/// An 8-bit level on the 16-bit scale.
+pub(in crate::image) fn stretched(v: u8) -> u16 {
+    v as u16 * 257
+}
+
+/// The pair that two images make, their values scaled alike; where `ignored`, the left one is masked. [`Reader::pair`] says
+/// how.
+///
+/// # Errors
+/// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
+///
+/// [`Reader::pair`]: super::read::Reader::pair
+pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Result<Pair> {
+    let images = [&left, &right];
+    if left.samples.is_float() != right.samples.is_float() {
+        return Err(Error::Mismatch(
+            "one image holds float values and the other whole ones: give both in one format".into(),
+        ));
+    }
+    let mut masks = images.map(Raster::masked);
+    if let Some(ignored) = ignored {
+        if ignored.size() != left.size() {
+            let ((w, h), (width, height)) = (ignored.size(), left.size());
+            return Err(Error::Mismatch(format!(
+                "the mask is {w} x {h} and the left image {width} x {height}: a mask has the size of the left image"
+            )));
+        }
+        for (masked, ignored) in masks[0].data_mut().iter_mut().zip(ignored.data()) {
+            *masked |= ignored;
+        }
+    }
+    let scale = Scale::of(images, &masks);
+    let [in_left, in_right] = masks;
+    let l = scale.apply(&left, in_left);
+    drop(left);
+    Pair::new(l, scale.apply(&right, in_right))
+}
+
+/// From samples to levels, the same for both images of a pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scale {
+    /// 8-bit levels, stored as they are or times 257.
+    Level,
+    /// Words with this many free bits at the top.
+    Shift(u32),
+    /// Floats between these bounds.
+    Linear { min: f64, max: f64 },
+}
+
+impl Scale {
+    /// The scale that what is not masked asks for.
+    fn of(images: [&Raster; 2], masks: &[Plane<bool>; 2]) -> Self {
+        let each = || images.iter().zip(masks);
+        if images[0].samples.is_float() {
+            let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
+            each().for_each(|(i, m)| {
+                i.each_double(m, |v| {
+                    min = min.min(v);
+                    max = max.max(v);
+                });
+            });
+            return Self::Linear { min, max };
+        }
+        if each().all(|(i, _)| matches!(i.samples, Samples::Byte(_))) {
+            return Self::Level;
+        }
+        let (mut bits, mut levels) = (0, true);
+        each().for_each(|(i, m)| {
+            i.each_word(m, |v| {
+                bits |= v;
+                levels &= v.is_multiple_of(257);
+            });
+        });
+        if levels { Self::Level } else { Self::Shift(bits.leading_zeros().min(8)) }
+    }
+
+    fn apply(self, raster: &Raster, masked: Plane<bool>) -> Image {
+        let n = raster.channels;
+        let pixels = match &raster.samples {
+            Samples::Byte(v) => pixels(v, n, &masked, |v| self.word(stretched(v))),
+            Samples::Word(v) => pixels(v, n, &masked, |v| self.word(v)),
+            Samples::Float(v) => pixels(v, n, &masked, |v| self.double(v as f64)),
+            Samples::Double(v) => pixels(v, n, &masked, |v| self.double(v)),
+        };
+        Image { pixels, masked }
+    }
+
+    fn word(self, v: u16) -> u16 {
+        match self {
+            Self::Shift(free) => v << free,
+            Self::Level | Self::Linear { .. } => (v / 257) << 8,
+        }
+    }
+
+    fn double(self, v: f64) -> u16 {
+        match self {
+            // Halves, for the difference of two doubles may be none.
+            Self::Linear { min, max } if max > min => {
+                ((v / 2.0 - min / 2.0) / (max / 2.0 - min / 2.0) * LINEAR_TOP).round() as u16
+            }
+            _ => 0,
+        }
+    }
+}
+
+/// Pixels from samples of `n` channels; what is masked becomes zero, whatever it was.
+fn pixels<S: Copy>(samples: &[S], n: usize, masked: &Plane<bool>, level: impl Fn(S) -> u16) -> Plane<Pixel> {
+    let pixel = |(p, masked): (&[S], &bool)| match p {
+        _ if *masked => [0; 4],
+        [r, g, b, ..] => {
+            let [r, g, b] = [*r, *g, *b].map(&level);
+            [r, g, b, grey(r, g, b)]
+        }
+        [v, ..] => [level(*v); 4],
+        [] => [0; 4],
+    };
+    let values = samples.chunks_exact(n).zip(masked.data()).map(pixel).collect();
+    Plane::new(masked.width(), masked.height(), values)
+}
