@@ -7,7 +7,7 @@ use mrfgs::depth::Rig;
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::options::{DisparityRange, Fill, MAX_DISPARITY, Schedule};
+use mrfgs::options::{Fill, Schedule};
 use mrfgs::plan::Plan;
 use mrfgs::solver::{Glimpse, Inspector};
 use mrfgs::tiles::Tiles;
@@ -15,6 +15,7 @@ use mrfgs::{Error, Matcher, Result};
 
 use super::intermediates::Intermediates;
 use super::match_outputs::{MoreOutputs, Outcome};
+use super::search::{Found, Search};
 use super::sidecar::{Files, Sidecar};
 use super::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
 
@@ -50,13 +51,8 @@ pub(super) struct Args {
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: PathBuf,
 
-    /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
-    /// - 1 of the calibration file, else auto]
-    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = pixels_or_auto)]
-    max_disparity: Option<Largest>,
-    /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
-    min_disparity: Option<i32>,
+    #[command(flatten)]
+    search: Search,
     /// Calibration file: the range (ndisp), and the cameras for depth and points [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
     calib: Option<PathBuf>,
@@ -85,21 +81,6 @@ pub(super) struct Args {
     more: MoreOutputs,
 }
 
-fn pixels(text: &str) -> std::result::Result<i32, String> {
-    text.parse().map_err(|_| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
-}
-
-/// The largest disparity to search.
-#[derive(Clone, Copy)]
-enum Largest {
-    Auto,
-    Pixels(i32),
-}
-
-fn pixels_or_auto(text: &str) -> std::result::Result<Largest, String> {
-    if text == "auto" { Ok(Largest::Auto) } else { pixels(text).map(Largest::Pixels) }
-}
-
 pub(super) fn run(args: &Args) -> Result<()> {
     let mut method = args.method.method()?;
     if args.no_fill {
@@ -108,7 +89,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution()?;
     let pair = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
     let calibration = calibration(args)?;
-    let range = range(args, &pair, calibration.as_ref())?;
+    let known = calibration.as_ref().map(|(path, calibration)| (path.as_path(), calibration));
+    let Found { range, by_matches } = args.search.range(&pair, known)?;
+    if by_matches && !args.quiet {
+        let (min, max) = (range.min, range.max);
+        super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
+    }
     let rig = rig(args, &pair, calibration.as_ref())?;
     let inputs = [
         ("LEFT", Some(&args.left)),
@@ -171,7 +157,7 @@ fn calibration(args: &Args) -> Result<Option<Calibrated>> {
     if let Some(path) = &args.calib {
         return Ok(Some((path.clone(), Calibration::read(path)?)));
     }
-    if args.max_disparity.is_some() && args.more.take_cameras().is_none() {
+    if args.search.max_disparity.is_some() && args.more.take_cameras().is_none() {
         return Ok(None);
     }
     let found = Calibration::beside(&args.left)?;
@@ -202,43 +188,6 @@ fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Opt
         Err(Error::Option { reason, .. }) => Err(Error::read(path, reason)),
         rig => rig.map(Some),
     }
-}
-
-/// The range to search.
-fn range(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<DisparityRange> {
-    let min = args.min_disparity.unwrap_or(0);
-    let calibrated = || calibration.map_or(Ok(None), |(path, c)| super::calibrated_range(path, c, min));
-    let range = match args.max_disparity {
-        Some(Largest::Pixels(max)) => DisparityRange::new(min, max)?,
-        Some(Largest::Auto) => found_range(args, pair)?,
-        None => match calibrated()? {
-            Some(range) => range,
-            None => found_range(args, pair)?,
-        },
-    };
-    let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
-    if i64::from(range.min) >= width || i64::from(range.max) <= -width {
-        let reason = format!(
-            "no disparity from {} to {} is inside images {width} pixels wide; give those of the pair",
-            range.min, range.max
-        );
-        return Err(Error::option("--max-disparity", reason));
-    }
-    Ok(range)
-}
-
-/// The range of the sparse matches.
-fn found_range(args: &Args, pair: &Pair) -> Result<DisparityRange> {
-    let found = check::range(pair).ok_or_else(|| {
-        let reason = "give the largest disparity to search, in pixels: there are too few matches to find it";
-        Error::option("--max-disparity", reason)
-    })?;
-    let range = DisparityRange::new(args.min_disparity.unwrap_or(found.min), found.max)?;
-    if !args.quiet {
-        let (min, max) = (range.min, range.max);
-        super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
-    }
-    Ok(range)
 }
 
 /// Says on standard error what is probably wrong.

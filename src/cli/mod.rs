@@ -14,6 +14,7 @@ mod presets;
 mod process;
 mod progress;
 mod report;
+mod search;
 mod sidecar;
 mod submission;
 mod synthetic;
