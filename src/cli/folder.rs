@@ -106,8 +106,14 @@ impl<'a> Folder<'a> {
         range.ok_or_else(silent).map(Some)
     }
 
+    /// What the two views are called.
+    pub(super) fn view_names(&self) -> [&'static str; 2] {
+        let [left, right, _] = self.layout.files;
+        [left, right]
+    }
+
     fn views(&self, reader: Reader) -> Result<Pair> {
-        let [left, right, _] = self.layout.files.map(|file| self.dir.join(file));
+        let [left, right] = self.view_names().map(|file| self.dir.join(file));
         reader.pair(&left, &right, None)
     }
 

@@ -1,6 +1,9 @@
 //! The command line: one file a subcommand, and here what they share. Nothing else in the crate prints.
 
 mod ablations;
+mod batch;
+mod batch_list;
+mod batch_record;
 mod bench;
 mod breakdown;
 mod devices;
@@ -46,11 +49,12 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match im0.png im1.png disparity.png      (range from the calib.txt beside im0.png)
+  mrfgs batch pairs.csv maps                     (many pairs; run it again to resume)
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
-Exit status: 0 when all went well, 2 when the command line makes no sense, 1 for any other failure. A failure is one \
-line on standard error and leaves no output behind.";
+Exit status: 0 when all went well, 2 when the command line makes no sense, 130 when a batch is stopped, 1 for any other \
+failure. A failure is one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
 #[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
@@ -62,6 +66,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Match(r#match::Args),
+    Batch(batch::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
     /// List the devices of this machine, their limits, and which one `auto` takes
@@ -73,6 +78,10 @@ enum Command {
 pub(crate) enum Failure {
     /// The command line makes no sense.
     Usage(String),
+    /// Some pairs of a batch failed.
+    Incomplete(String),
+    /// The user stopped it.
+    Stopped(String),
     /// Anything else.
     Error(Error),
 }
@@ -81,7 +90,9 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Usage(_) => ExitCode::from(2),
-            Self::Error(_) => ExitCode::FAILURE,
+            // As shells have it for SIGINT.
+            Self::Stopped(_) => ExitCode::from(130),
+            Self::Incomplete(_) | Self::Error(_) => ExitCode::FAILURE,
         }
     }
 }
@@ -90,11 +101,16 @@ impl fmt::Display for Failure {
     /// One line, whatever names of files hold.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let text = match self {
-            Self::Usage(text) => text.clone(),
+            Self::Usage(text) | Self::Incomplete(text) | Self::Stopped(text) => text.clone(),
             Self::Error(error) => error.to_string(),
         };
-        f.write_str(&text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" "))
+        f.write_str(&single_line(&text))
     }
+}
+
+/// The lines of a text in one.
+fn single_line(text: &str) -> String {
+    text.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 impl From<Error> for Failure {
@@ -112,6 +128,7 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
     };
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
+        Command::Batch(args) => batch::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,
         Command::Bench(args) => bench::run(&args)?,
         Command::Devices => devices::run()?,
@@ -123,7 +140,7 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
 /// The parser's complaint without its headings and the usage.
 fn one_line(error: &clap::Error) -> String {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "give a subcommand: match, evaluate, bench, devices or presets; `mrfgs --help` explains"
+        return "give a subcommand: match, batch, evaluate, bench, devices or presets; `mrfgs --help` explains"
             .into();
     }
     let text = error.render().to_string();

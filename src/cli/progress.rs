@@ -1,4 +1,4 @@
-//! The bar that shows how far a match is.
+//! The bars that show how far a match is, and how far a batch.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -47,5 +47,43 @@ impl Bar {
         if let Some(bar) = self.drawn {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// The pairs done of all those of a batch, on a terminal.
+pub(super) struct PairBar(ProgressBar);
+
+impl PairBar {
+    /// A bar for so many pairs, of which some are done.
+    pub(super) fn new(pairs: usize, done: usize, quiet: bool) -> Self {
+        if quiet || !std::io::stderr().is_terminal() {
+            return Self(ProgressBar::hidden());
+        }
+        let style = ProgressStyle::with_template("mrfgs [{bar:40}] {pos} of {len} {msg}");
+        let bar =
+            ProgressBar::new(pairs as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_position(done as u64);
+        Self(bar)
+    }
+
+    /// Shows the pair at work.
+    pub(super) fn begin(&self, name: &str) {
+        self.0.set_message(name.to_owned());
+    }
+
+    /// Counts a pair that is done or has failed.
+    pub(super) fn end(&self) {
+        self.0.inc(1);
+    }
+
+    /// Lets `say` write to standard error past the bar.
+    pub(super) fn past(&self, say: impl FnOnce()) {
+        self.0.suspend(say);
+    }
+}
+
+impl Drop for PairBar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }

@@ -11,7 +11,7 @@ type Failure = (&'static str, i32, &'static [&'static str]);
 /// `M` stands for a `match` that would succeed, up to its output.
 const FAILURES: &[Failure] = &[
     // The command line itself.
-    ("", 2, &["subcommand", "match, evaluate", "--help"]),
+    ("", 2, &["subcommand", "match, batch, evaluate", "--help"]),
     ("frobnicate", 2, &["frobnicate", "--help"]),
     ("match left.png", 2, &["<RIGHT> <OUTPUT>", "mrfgs match --help"]),
     ("M out.pfm --frobnicate", 2, &["--frobnicate", "--help"]),
@@ -224,6 +224,24 @@ const FAILURES: &[Failure] = &[
         1,
         &["left.png is 60 x 40", "240 x 180"],
     ),
+    // Batches.
+    ("batch", 2, &["<LIST> <OUTDIR>", "mrfgs batch --help"]),
+    ("batch none.csv out", 1, &["none.csv", "no such file", "check the name"]),
+    ("batch left.png out", 1, &["left.png", "UTF-8", "CSV"]),
+    ("batch empty.png out", 1, &["empty.png", "lists no pair", "CSV"]),
+    ("batch folder/full out", 1, &["folder/full", "lists no pair"]),
+    ("batch pairs.csv none/out", 1, &["none/out", "there is no folder none", "create it"]),
+    ("batch pairs.csv left.png", 1, &["left.png", "is a file", "folder"]),
+    ("batch pairs.csv .", 1, &["./left.png", "is an input", "another folder"]),
+    ("batch . zero", 1, &["zero", "the folder of the pairs", "give another"]),
+    ("batch pairs.csv out --shard 0/3", 2, &["--shard", "'0/3'", "K/N", "--help"]),
+    ("batch pairs.csv out --shard 4/3", 2, &["--shard", "K from 1 to N"]),
+    ("batch pairs.csv out --shard 2", 2, &["--shard", "2/8"]),
+    ("batch pairs.csv out --format jpg", 2, &["--format", "pfm, tif, png"]),
+    ("batch pairs.csv out --preset best", 1, &["--preset", "default, paper"]),
+    ("batch pairs.csv out --set levels=17", 1, &["--set levels", "17 is outside 1 to 16"]),
+    ("batch pairs.csv out --backend cpu --device 0", 1, &["--device", "--backend cpu"]),
+    ("batch pairs.csv out --quiet --timings", 2, &["--quiet", "--timings"]),
     // Benches.
     ("bench none", 1, &["none/im0.png", "a folder to match holds im0.png, im1.png, calib.txt; or"]),
     ("bench left.png", 1, &["left.png/im0.png", "a folder to match holds"]),

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
 
+mod batch;
 mod bench;
 mod evaluate;
 mod failures;
@@ -150,6 +151,8 @@ fn workshop() -> TempDir {
     for (from, to) in [("left.png", "im0.png"), ("text.png", "im1.png"), ("misfit/calib.txt", "calib.txt")] {
         fs::copy(at(from), at("broken").join(to)).unwrap();
     }
+    // A pair whose map would take the place of its left image.
+    fs::write(at("pairs.csv"), "name,left,right\nleft,left.png,right.png\n").unwrap();
     fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
     // Files that are nearly images.
     image::GrayImage::new(1, 1).save(at("dot.png")).unwrap();
@@ -256,6 +259,7 @@ fn help_teaches() {
     }
     assert!(help(&["--help"]).contains("Exit status: 0"));
     assert!(help(&["evaluate", "--help"]).contains("mask0nocc.png"));
+    assert!(help(&["batch", "--help"]).contains("name,left,right,max_disparity # a comment"));
     assert!(help(&["presets", "--help"]).contains("Examples:"));
     assert!(help(&["bench", "--help"]).contains("[default: default and paper,"));
     assert_eq!(help(&["--version"]), format!("mrfgs {}", env!("CARGO_PKG_VERSION")));

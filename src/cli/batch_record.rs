@@ -1,0 +1,127 @@
+//! The record that a batch writes of a pair, last of all its files: what was asked for, and what came of it.
+
+use std::fs;
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+use mrfgs::options::Method;
+use mrfgs::{Error, Result};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::batch_list::Listed;
+use super::outputs;
+use super::search::Search;
+use super::sidecar::Sidecar;
+
+/// What a batch is to make of a pair. The record of a complete pair holds the same.
+#[derive(Serialize)]
+pub(super) struct Request {
+    inputs: Vec<InputFile>,
+    #[serde(flatten)]
+    search: Search,
+    /// The names of the maps, in the output folder.
+    outputs: Vec<String>,
+}
+
+/// A file as it was when it was read.
+#[derive(Serialize)]
+struct InputFile {
+    path: String,
+    bytes: Option<u64>,
+    /// When it was last changed, in ms since 1970.
+    modified: Option<u64>,
+}
+
+/// How far a pair is.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// Its record says that it is done, and fits.
+    Complete,
+    /// Its record says why it failed.
+    Failed(String),
+    /// There is no record, or one of something else.
+    Missing,
+}
+
+#[derive(Serialize)]
+struct Done<'a> {
+    status: &'static str,
+    request: &'a Request,
+    warnings: &'a [String],
+    #[serde(flatten)]
+    sidecar: Sidecar<'a>,
+}
+
+#[derive(Serialize)]
+struct Failed<'a> {
+    status: &'static str,
+    reason: &'a str,
+    request: &'a Request,
+    version: &'static str,
+    method: &'a Method,
+}
+
+impl Request {
+    pub(super) fn new(listed: &Listed, base: &Path, outputs: Vec<String>) -> Self {
+        let inputs = listed.inputs(base).into_iter().map(|path| {
+            let about = fs::metadata(base.join(&path)).ok();
+            let modified =
+                about.as_ref().and_then(|about| about.modified().ok()?.duration_since(UNIX_EPOCH).ok());
+            InputFile {
+                path,
+                bytes: about.map(|about| about.len()),
+                modified: modified.and_then(|time| u64::try_from(time.as_millis()).ok()),
+            }
+        });
+        Self { inputs: inputs.collect(), search: listed.search(), outputs }
+    }
+
+    pub(super) fn outputs(&self) -> &[String] {
+        &self.outputs
+    }
+
+    /// The outputs that the record `path` names; none where there is no record.
+    pub(super) fn recorded_outputs(path: &Path) -> Vec<String> {
+        let record = read(path).unwrap_or_default();
+        serde_json::from_value(record["request"]["outputs"].clone()).unwrap_or_default()
+    }
+
+    /// How far the pair is whose record is `path`, in the folder of its outputs, if `method` is to match it.
+    pub(super) fn state(&self, path: &Path, method: &Method) -> State {
+        let Some(record) = read(path) else { return State::Missing };
+        if record["status"] == "failed" {
+            return State::Failed(record["reason"].as_str().unwrap_or("for no known reason").to_owned());
+        }
+        let complete = record["status"] == "done"
+            && record["version"] == env!("CARGO_PKG_VERSION")
+            && same(&record["request"], self)
+            && same(&record["method"], method)
+            && self.outputs.iter().all(|name| path.with_file_name(name).is_file());
+        if complete { State::Complete } else { State::Missing }
+    }
+
+    /// The text of the record `path` of a pair that is done.
+    pub(super) fn done(&self, path: &Path, sidecar: Sidecar, warnings: &[String]) -> Result<String> {
+        outputs::json_text(path, &Done { status: "done", request: self, warnings, sidecar })
+    }
+
+    /// The text of the record `path` of a pair that failed.
+    pub(super) fn failed(&self, path: &Path, method: &Method, reason: &Error) -> Result<String> {
+        let reason = &super::single_line(&reason.to_string());
+        let version = env!("CARGO_PKG_VERSION");
+        outputs::json_text(path, &Failed { status: "failed", reason, request: self, version, method })
+    }
+}
+
+fn read(path: &Path) -> Option<Value> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+/// Whether `recorded` is what `value` is once it has been written and read: the detour rounds both alike.
+fn same(recorded: &Value, value: &impl Serialize) -> bool {
+    let text = serde_json::to_string(value);
+    text.ok()
+        .and_then(|text| serde_json::from_str::<Value>(&text).ok())
+        .is_some_and(|value| value == *recorded)
+}

@@ -1,0 +1,390 @@
+//! `mrfgs batch`: the maps of single matches, and every pair exactly once, whatever stops a run on its way.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant, SystemTime};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::{Run, listing, run, scene};
+
+const SCENES: [&str; 4] = ["slanted", "steep", "thin", "wall"];
+
+/// A folder with a list of so many pairs, cut from the scenes at different places.
+fn pairs(count: usize, (width, height): (u32, u32)) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut list = String::from("name,left,right,max_disparity\n# all are cut from scenes\n");
+    fs::create_dir(folder.path().join("images")).unwrap();
+    let views =
+        SCENES.map(|name| ["im0.png", "im1.png"].map(|file| image::open(scene(name).join(file)).unwrap()));
+    for i in 0..count {
+        let (x, y) = (i as u32 * 3 % (240 - width), i as u32 * 5 % (180 - height));
+        for (view, side) in views[i % SCENES.len()].iter().zip(["left", "right"]) {
+            let file = folder.path().join(format!("images/{i}-{side}.png"));
+            view.crop_imm(x, y, width, height).save(file).unwrap();
+        }
+        writeln!(list, "pair-{i},images/{i}-left.png,images/{i}-right.png,31").unwrap();
+    }
+    fs::write(folder.path().join("list.csv"), list).unwrap();
+    folder
+}
+
+fn batch(folder: &Path, args: &[&str]) -> Run {
+    run(folder, &[&["batch"], args, &["--backend", "cpu"]].concat())
+}
+
+fn record(folder: &Path, name: &str) -> Value {
+    serde_json::from_slice(&fs::read(folder.join(format!("{name}.json"))).unwrap()).unwrap()
+}
+
+/// The files of a folder with the times of their last change.
+fn times(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
+    let time = |path: PathBuf| (path.clone(), fs::metadata(path).unwrap().modified().unwrap());
+    listing(folder).into_keys().map(time).collect()
+}
+
+fn names(folder: &Path, ending: &str) -> Vec<String> {
+    let names =
+        fs::read_dir(folder).into_iter().flatten().map(|e| e.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = names.filter_map(|name| name.strip_suffix(ending).map(str::to_owned)).collect();
+    names.sort();
+    names
+}
+
+/// The maps of a folder by name.
+fn maps(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    names(folder, ".pfm")
+        .into_iter()
+        .map(|n| (n.clone(), fs::read(folder.join(n + ".pfm")).unwrap()))
+        .collect()
+}
+
+fn started(folder: &Path, args: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .current_dir(folder)
+        .arg("batch")
+        .args(args)
+        .args(["--backend", "cpu", "--threads", "1"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Waits until the folder has so many records.
+fn wait_for(folder: &Path, records: usize) {
+    let start = Instant::now();
+    while names(folder, ".json").len() < records {
+        assert!(start.elapsed() < Duration::from_secs(120), "no record {records}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_batch_is_its_single_matches() {
+    let folder = pairs(3, (96, 64));
+    let told = batch(folder.path(), &["list.csv", "out", "--confidence", "--validity"]).succeeded();
+    assert_eq!((told.stdout.as_str(), told.stderr.as_str()), ("", "mrfgs: 3 done, 0 skipped, 0 failed\n"));
+    let at = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    for i in 0..3 {
+        let [left, right] = ["left", "right"].map(|side| format!("images/{i}-{side}.png"));
+        let single = |max| {
+            let args = ["match", &left, &right, "a.pfm", "--max-disparity", max, "--backend", "cpu"];
+            let more = ["--confidence", "c.png", "--validity", "v.png"];
+            run(folder.path(), &[args.as_slice(), &more].concat()).succeeded();
+        };
+        single("31");
+        for (one, many) in [("a.pfm", ".pfm"), ("c.png", "-confidence.png"), ("v.png", "-validity.png")] {
+            assert!(at(one) == at(&format!("out/pair-{i}{many}")), "{many} of {i}");
+        }
+        single("15");
+        assert!(at("a.pfm") != at(&format!("out/pair-{i}.pfm")), "another range is another map");
+    }
+    let record = record(&folder.path().join("out"), "pair-1");
+    assert_eq!(record["status"], "done");
+    assert_eq!((&record["labels"], &record["width"]), (&32.into(), &96.into()));
+    assert_eq!(record["files"]["output"], "pair-1.pfm");
+    assert!(record["density"].as_f64().unwrap() > 90.0 && record["seconds"].as_f64().unwrap() > 0.0);
+    assert_eq!(listing(&folder.path().join("out")).len(), 12, "nothing else is left");
+
+    for format in ["png", "tif"] {
+        let name = format!("a.{format}");
+        batch(folder.path(), &["list.csv", format, "--format", format, "--quiet"]).succeeded();
+        let args = ["match", "images/0-left.png", "images/0-right.png", &name, "--max-disparity", "31"];
+        run(folder.path(), &[args.as_slice(), &["--backend", "cpu"]].concat()).succeeded();
+        assert!(at(&name) == at(&format!("{format}/pair-0.{format}")));
+    }
+}
+
+#[test]
+fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
+    let folder = pairs(3, (64, 48));
+    let out = folder.path().join("out");
+    let again = |args: &[&str], said: &str| {
+        let told = batch(folder.path(), &[&["list.csv", "out"], args].concat()).succeeded();
+        assert_eq!(told.stderr, format!("mrfgs: {said}\n"));
+    };
+    again(&[], "3 done, 0 skipped, 0 failed");
+    let before = (listing(&out), times(&out));
+    again(&[], "0 done, 3 skipped, 0 failed");
+    assert!((listing(&out), times(&out)) == before, "finished files are not touched");
+
+    // Each of these makes another map of what it concerns.
+    fs::remove_file(out.join("pair-0.json")).unwrap();
+    again(&[], "1 done, 2 skipped, 0 failed");
+    fs::remove_file(out.join("pair-1.pfm")).unwrap();
+    again(&[], "1 done, 2 skipped, 0 failed");
+    fs::copy(folder.path().join("images/1-left.png"), folder.path().join("images/2-left.png")).unwrap();
+    again(&[], "1 done, 2 skipped, 0 failed");
+    let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
+    fs::write(folder.path().join("list.csv"), list.replacen(",31\n", ",30\n", 1)).unwrap();
+    again(&[], "1 done, 2 skipped, 0 failed");
+    again(&["--validity"], "3 done, 0 skipped, 0 failed");
+    again(&["--set", "temperature=0.3"], "3 done, 0 skipped, 0 failed");
+    assert!(names(&out, "-validity.png").is_empty(), "maps of an earlier request go with its record");
+    again(&["--set", "temperature=0.3"], "0 done, 3 skipped, 0 failed");
+    // The record of another version.
+    let text = fs::read_to_string(out.join("pair-2.json")).unwrap();
+    let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    assert!(text.contains(&version));
+    fs::write(out.join("pair-2.json"), text.replace(&version, "\"version\": \"0.0.1\"")).unwrap();
+    again(&["--set", "temperature=0.3"], "1 done, 2 skipped, 0 failed");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_killed_batch_resumes() {
+    let folder = pairs(20, (120, 90));
+    batch(folder.path(), &["list.csv", "whole", "--quiet"]).succeeded();
+    let whole = maps(&folder.path().join("whole"));
+    assert_eq!(whole.len(), 20);
+    let out = folder.path().join("out");
+    let mut killed = 0;
+    for records in [1, 5, 9, 14] {
+        let mut child = started(folder.path(), &["list.csv", "out"]);
+        wait_for(&out, records);
+        child.kill().unwrap();
+        killed += usize::from(!child.wait_with_output().unwrap().status.success());
+        // What is complete is whole.
+        for name in names(&out, ".json") {
+            assert_eq!(record(&out, &name)["status"], "done");
+            assert!(fs::read(out.join(format!("{name}.pfm"))).unwrap() == whole[&name], "{name}");
+        }
+    }
+    assert_eq!(killed, 4, "all runs were killed on their way");
+    // As a run leaves it that is killed in the middle of a pair.
+    fs::create_dir_all(out.join(".pair-19.tmp")).unwrap();
+    fs::write(out.join(".pair-19.tmp/pair-19.pfm"), "half").unwrap();
+    let (complete, before) = (names(&out, ".json"), times(&out));
+    assert!((14..20).contains(&complete.len()), "{complete:?}");
+    let told = batch(folder.path(), &["list.csv", "out"]).succeeded();
+    let (done, skipped) = (20 - complete.len(), complete.len());
+    assert_eq!(told.stderr, format!("mrfgs: {done} done, {skipped} skipped, 0 failed\n"));
+    assert!(maps(&out) == whole);
+    let after = times(&out);
+    for name in complete {
+        for file in [format!("{name}.json"), format!("{name}.pfm")].map(|file| out.join(file)) {
+            assert_eq!(after[&file], before[&file], "{name} was not run again");
+        }
+    }
+    assert_eq!(after.len(), 40, "nothing else is left: {:?}", after.keys());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_batch_tidies_up() {
+    let folder = pairs(12, (160, 120));
+    let out = folder.path().join("out");
+    for (signal, records) in [("-INT", 1), ("-TERM", 4)] {
+        let child = started(folder.path(), &["list.csv", "out"]);
+        wait_for(&out, records);
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{said}");
+        let complete = names(&out, ".json").len();
+        assert_eq!(said, format!("mrfgs: stopped after {complete} of 12; run it again to resume\n"));
+        assert_eq!(listing(&out).len(), 2 * complete, "nothing half written is left");
+    }
+    batch(folder.path(), &["list.csv", "out"]).succeeded();
+    assert_eq!(listing(&out).len(), 24);
+}
+
+#[test]
+fn a_bad_pair_does_not_stop_the_others() {
+    let folder = pairs(4, (64, 48));
+    let out = folder.path().join("out");
+    let good = fs::read(folder.path().join("images/1-right.png")).unwrap();
+    fs::write(folder.path().join("images/1-right.png"), "text").unwrap();
+    fs::remove_file(folder.path().join("images/2-left.png")).unwrap();
+    let told = batch(folder.path(), &["list.csv", "out", "--quiet"]);
+    assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""));
+    let lines: Vec<_> = told.stderr.lines().collect();
+    assert_eq!(lines.len(), 3, "{lines:?}");
+    assert!(lines[0].starts_with("mrfgs: pair-1: ") && lines[0].contains("images/1-right.png"), "{lines:?}");
+    assert!(lines[1].starts_with("mrfgs: pair-2: ") && lines[1].contains("no such file"), "{lines:?}");
+    let summary = "mrfgs: 2 done, 0 skipped, 2 failed: pair-1, pair-2; ";
+    assert!(lines[2].starts_with(summary) && lines[2].contains("run it again"), "{lines:?}");
+    assert_eq!(names(&out, ".pfm"), ["pair-0", "pair-3"]);
+    let failed = record(&out, "pair-1");
+    assert_eq!(failed["status"], "failed");
+    assert!(failed["reason"].as_str().unwrap().contains("images/1-right.png"));
+
+    fs::write(folder.path().join("images/1-right.png"), good).unwrap();
+    let told = batch(folder.path(), &["list.csv", "out"]);
+    assert_eq!(told.code, Some(1));
+    assert!(told.stderr.contains("1 done, 2 skipped, 1 failed: pair-2;"), "{told:?}");
+    assert_eq!(record(&out, "pair-1")["status"], "done");
+    // What no format holds is a fault of the pair too.
+    let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
+    fs::write(folder.path().join("list.csv"), list.replacen(",31\n", ",300\n", 1)).unwrap();
+    let told = batch(folder.path(), &["list.csv", "out", "--format", "png"]);
+    assert!(told.stderr.contains("pair-0: cannot write out/pair-0.png: 16-bit PNG"), "{told:?}");
+    assert!(told.stderr.contains("2 done, 0 skipped, 2 failed"), "{told:?}");
+    assert_eq!(names(&out, ".pfm"), <[&str; 0]>::default(), "maps of an earlier request go with its record");
+}
+
+#[test]
+fn shards_are_disjoint_and_make_the_whole() {
+    let folder = pairs(9, (64, 48));
+    batch(folder.path(), &["list.csv", "whole"]).succeeded();
+    let mut found = Vec::new();
+    for shard in ["1/3", "2/3", "3/3"] {
+        let apart = format!("part-{}", &shard[..1]);
+        for out in [&apart, "together"] {
+            batch(folder.path(), &["list.csv", out, "--shard", shard, "--quiet"]).succeeded();
+        }
+        found.extend(names(&folder.path().join(apart), ".json"));
+    }
+    found.sort();
+    let whole = folder.path().join("whole");
+    assert_eq!(found, names(&whole, ".json"), "each pair is in exactly one shard");
+    assert!(maps(&folder.path().join("together")) == maps(&whole));
+    // More pairs move none of the others.
+    let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
+    let more = list.replacen("pair-0,", "new,images/0-left.png,images/0-right.png,31\npair-0,", 1);
+    fs::write(folder.path().join("list.csv"), more).unwrap();
+    for shard in ["1/3", "2/3", "3/3"] {
+        batch(folder.path(), &["list.csv", "together", "--shard", shard, "--quiet"]).succeeded();
+        let told = batch(folder.path(), &["list.csv", "together", "--shard", shard, "--status"]).succeeded();
+        assert!(told.stdout.ends_with(" complete, 0 failed, 0 missing\n"), "{told:?}");
+    }
+    let told = batch(folder.path(), &["list.csv", "together"]).succeeded();
+    assert_eq!(told.stderr, "mrfgs: 0 done, 10 skipped, 0 failed\n");
+}
+
+#[test]
+fn status_tells_and_runs_nothing() {
+    let folder = pairs(4, (64, 48));
+    let before = listing(folder.path());
+    let status = || batch(folder.path(), &["list.csv", "out", "--status"]).succeeded().stdout;
+    let all = |state: &str| ["0", "1", "2", "3"].map(|i| format!("{state:<9} pair-{i}\n")).concat();
+    assert_eq!(status(), all("missing") + "0 complete, 0 failed, 4 missing\n");
+    assert!(listing(folder.path()) == before);
+    let image = folder.path().join("images/3-left.png");
+    let good = fs::read(&image).unwrap();
+    fs::write(&image, "").unwrap();
+    assert_eq!(batch(folder.path(), &["list.csv", "out"]).code, Some(1));
+    fs::remove_file(folder.path().join("out/pair-1.json")).unwrap();
+    let (told, out) = (status(), folder.path().join("out"));
+    let lines: Vec<_> = told.lines().collect();
+    assert_eq!(lines[..3], ["complete  pair-0", "missing   pair-1", "complete  pair-2"]);
+    assert!(lines[3].starts_with("failed    pair-3: cannot read images/3-left.png"), "{told}");
+    assert_eq!(lines[4], "2 complete, 1 failed, 1 missing");
+    assert!(!out.join("pair-1.json").exists());
+    fs::write(&image, good).unwrap();
+    batch(folder.path(), &["list.csv", "out"]).succeeded();
+    assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
+    let other = batch(folder.path(), &["list.csv", "out", "--status", "--validity"]).succeeded().stdout;
+    assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
+}
+
+#[test]
+fn the_folders_in_a_folder_are_pairs() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["slanted", "wall"] {
+        fs::create_dir_all(folder.path().join("data").join(name)).unwrap();
+        for file in ["im0.png", "im1.png", "calib.txt"] {
+            fs::copy(scene(name).join(file), folder.path().join("data").join(name).join(file)).unwrap();
+        }
+    }
+    fs::create_dir(folder.path().join("data/.hidden")).unwrap();
+    fs::write(folder.path().join("data/readme"), "").unwrap();
+    batch(folder.path(), &["data", "out"]).succeeded();
+    let args = ["match", "data/wall/im0.png", "data/wall/im1.png", "wall.pfm", "--backend", "cpu"];
+    run(folder.path(), &args).succeeded();
+    assert_eq!(names(&folder.path().join("out"), ".pfm"), ["slanted", "wall"]);
+    assert!(maps(&folder.path().join("out"))["wall"] == maps(folder.path())["wall"]);
+    fs::create_dir(folder.path().join("data/empty")).unwrap();
+    let told = batch(folder.path(), &["data", "out"]);
+    assert!(told.stderr.contains("0 done, 2 skipped, 1 failed: empty;"), "{told:?}");
+    let told = batch(folder.path(), &["data", "data/out"]);
+    told.failed(1, &["data/out", "the folder of the pairs", "give another"], "inside");
+    fs::create_dir(folder.path().join("data/two words")).unwrap();
+    batch(folder.path(), &["data", "new"]).failed(1, &["data/two words", "rename it"], "name");
+    assert!(!folder.path().join("new").exists());
+}
+
+#[test]
+fn a_bad_list_is_refused_before_anything_runs() {
+    let folder = pairs(1, (64, 48));
+    let long = format!("name,left,right\n{},l,r\n", "n".repeat(201));
+    let lists: &[(&str, &[&str])] = &[
+        ("", &["lists no pair", "CSV"]),
+        ("name,left,right\n\n# nothing\n", &["lists no pair"]),
+        ("a,l,r\n", &["line 1", "`a` is no column", "name, left, right, max_disparity"]),
+        ("name,left,left\n", &["line 1", "two columns left"]),
+        ("name,left,max_disparity\n", &["line 1", "no column right"]),
+        ("name,left,right\na,l,r\n\n# comment\nb,l\n", &["line 5", "2 fields and 3 columns"]),
+        ("name,left,right\na,l,r,31\n", &["line 2", "4 fields and 3 columns"]),
+        ("name,left,right\na,,r\n", &["line 2", "left is missing"]),
+        ("name,left,right\n,l,r\n", &["line 2", "name is missing"]),
+        ("name,left,right\na,l,r\nA,l,r\n", &["line 3", "name A is taken by line 2", "rename"]),
+        ("name,left,right\n../a,l,r\n", &["line 2", "`../a` is no name for files", "rename"]),
+        ("name,left,right\n.a,l,r\n", &["line 2", "`.a` is no name"]),
+        ("name,left,right\n-a,l,r\n", &["line 2", "`-a` is no name"]),
+        ("name,left,right\na\u{1b}b,l,r\n", &["line 2", "is no name"]),
+        ("name,left,right\na-Validity,l,r\n", &["line 2", "ends in -validity", "rename"]),
+        (&long, &["line 2", "at most 200"]),
+        ("name,left,right,max_disparity\na,l,r,many\n", &["line 2", "max_disparity", "whole number"]),
+        ("name,left,right,max_disparity\na,l,r,-3\n", &["line 2", "max_disparity", "below", "min_disparity"]),
+        ("name,left,right,min_disparity\na,l,r,1.5\n", &["line 2", "min_disparity", "whole number"]),
+    ];
+    for (text, words) in lists {
+        fs::write(folder.path().join("bad.csv"), text).unwrap();
+        let before = listing(folder.path());
+        for more in [&[][..], &["--status"]] {
+            let told = batch(folder.path(), &[&["bad.csv", "out"], more].concat());
+            told.failed(1, &[&["bad.csv"], *words].concat(), text);
+        }
+        assert!(listing(folder.path()) == before, "{text}");
+    }
+    fs::write(folder.path().join("bad.csv"), b"name,left,right\n\xff,l,r\n").unwrap();
+    batch(folder.path(), &["bad.csv", "out"]).failed(1, &["bad.csv", "UTF-8"], "bytes");
+    // Quotes, spaces, columns in another order, a byte order mark, the line ends of another system.
+    let good = "\u{feff}mask,right, left ,name\r\n,\"images/0-right.png\",images/0-left.png,a\r\n";
+    fs::write(folder.path().join("good.csv"), good).unwrap();
+    let told = batch(folder.path(), &["good.csv", "out"]).succeeded();
+    assert_eq!(told.stderr, "mrfgs: 1 done, 0 skipped, 0 failed\n");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_without_permission_ends_a_batch_at_once() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = pairs(2, (64, 48));
+    let mut locked = folder.path().join("locked");
+    fs::create_dir(&locked).unwrap();
+    fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(locked.join("probe"), "").is_ok() {
+        // This is root, who may write anywhere but where the kernel says no.
+        locked = "/sys".into();
+    }
+    let locked = locked.to_str().unwrap();
+    batch(folder.path(), &["list.csv", locked]).failed(1, &[locked, "nothing can be created"], "locked");
+}
