@@ -18,6 +18,7 @@ mod process;
 mod progress;
 mod report;
 mod search;
+mod shell;
 mod sidecar;
 mod submission;
 mod synthetic;
@@ -72,6 +73,8 @@ enum Command {
     /// List the devices of this machine, their limits, and which one `auto` takes
     Devices,
     Presets(presets::Args),
+    Completions(shell::CompletionsArgs),
+    Man(shell::ManArgs),
 }
 
 /// Why the program ends early.
@@ -133,6 +136,8 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
         Command::Bench(args) => bench::run(&args)?,
         Command::Devices => devices::run()?,
         Command::Presets(args) => presets::run(&args)?,
+        Command::Completions(args) => shell::completions(&args)?,
+        Command::Man(args) => shell::man(&args)?,
     }
     Ok(())
 }
@@ -140,7 +145,7 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
 /// The parser's complaint without its headings and the usage.
 fn one_line(error: &clap::Error) -> String {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "give a subcommand: match, batch, evaluate, bench, devices or presets; `mrfgs --help` explains"
+        return "give a subcommand: match, batch, evaluate, bench, devices, presets, completions or man; `mrfgs --help` explains"
             .into();
     }
     let text = error.render().to_string();

@@ -284,3 +284,29 @@ fn a_reader_that_leaves_early_is_no_failure() {
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(text.contains("standard output") && text.lines().count() == 1, "{text}");
 }
+
+#[test]
+fn shells_and_readers_get_every_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = run(folder.path(), &["completions", shell]).succeeded().stdout;
+        assert!(script.contains("mrfgs") && script.contains("max-disparity"), "{shell}");
+    }
+    run(folder.path(), &["man", "pages"]).succeeded();
+    let pages = listing(&folder.path().join("pages"));
+    let names: Vec<_> = pages.keys().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+    for name in
+        ["", "-match", "-batch", "-evaluate", "-bench", "-devices", "-presets", "-completions", "-man"]
+    {
+        assert!(names.contains(&format!("mrfgs{name}.1").as_str()), "{name}: {names:?}");
+    }
+    assert_eq!(names.len(), 9);
+    let page = pages.iter().find(|(path, _)| path.ends_with("mrfgs-match.1")).unwrap().1.clone().unwrap();
+    let page = String::from_utf8(page).unwrap();
+    assert!(page.starts_with(".ie") && page.contains(".TH mrfgs-match 1"), "{page}");
+    for flag in ["max\\-disparity", "point\\-cloud", "memory"] {
+        assert!(page.contains(flag), "no {flag} in:\n{page}");
+    }
+    // Again, over what is there.
+    run(folder.path(), &["man", "pages"]).succeeded();
+}
