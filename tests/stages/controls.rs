@@ -2,10 +2,10 @@
 
 use crate::common::compare::compare;
 use crate::common::devices::backends;
-use crate::common::random::{self, Random, State};
+use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::floods::{twin_flood, whole_flood};
-use crate::same;
+use crate::{same, twin_start};
 use mrfgs::backend::Volume;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
@@ -61,13 +61,7 @@ fn control_one_wrong_element_is_found() {
 
 /// A case in which every parameter of every stage matters, and the volumes of a twin that follows `plan`.
 fn twin_of_the_control(plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) -> Vec<(String, Vec<u32>)> {
-    let mut costs = vec![twin::cost::cost(plan, pair)];
-    for z in 1..plan.levels.len() {
-        costs.push(twin::pyramid::pyramid(plan, z, &costs[z - 1]));
-    }
-    let evidence =
-        costs.iter().enumerate().map(|(z, cost)| twin::evidence::evidence(plan, z, cost)).collect();
-    let mut state = State::fresh(plan, evidence);
+    let (costs, mut state) = twin_start(plan, pair);
     twin_flood(plan, graphs, &mut state);
     let mut all: Vec<(String, Vec<u32>)> =
         costs.into_iter().enumerate().map(|(z, cost)| (format!("{:?}", Volume::Cost(z)), cost)).collect();

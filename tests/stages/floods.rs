@@ -4,7 +4,7 @@ use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
 use crate::common::random::{self, Random, State};
 use crate::common::twin;
-use crate::{MINIMA, on_all, resolve, same, twin_estimate};
+use crate::{MINIMA, on_all, resolve, same, twin_estimate, twin_start};
 use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
@@ -112,13 +112,7 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
 /// From the pair to the estimate, on every backend and on the twins; the number of iterations.
 pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     let graphs = graph::build(pair.left(), plan);
-    let mut costs = vec![twin::cost::cost(plan, pair)];
-    for z in 1..plan.levels.len() {
-        costs.push(twin::pyramid::pyramid(plan, z, &costs[z - 1]));
-    }
-    let evidence =
-        costs.iter().enumerate().map(|(z, cost)| twin::evidence::evidence(plan, z, cost)).collect();
-    let mut state = State::fresh(plan, evidence);
+    let (costs, mut state) = twin_start(plan, pair);
     let iterations = twin_flood(plan, &graphs, &mut state);
     let mut maps = twin::Finest::zero(plan.size());
     twin_estimate(plan, &costs[0], &state.belief[0], &mut maps);

@@ -424,6 +424,18 @@ fn twin_estimate(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Fin
     twin::sub_pixel::sub_pixel(plan, cost, maps);
 }
 
+/// The twins' costs of all levels, and their state before anyone has spoken.
+fn twin_start(plan: &Plan, pair: &Pair) -> (Vec<Vec<u32>>, State) {
+    let mut costs = vec![twin::cost::cost(plan, pair)];
+    for z in 1..plan.levels.len() {
+        costs.push(twin::pyramid::pyramid(plan, z, &costs[z - 1]));
+    }
+    let evidence =
+        costs.iter().enumerate().map(|(z, cost)| twin::evidence::evidence(plan, z, cost)).collect();
+    let state = State::fresh(plan, evidence);
+    (costs, state)
+}
+
 /// The twin's resolution messages of one level, into the state.
 fn resolve(plan: &Plan, state: &mut State, z: usize) {
     let (down, up) = twin::resolution::resolution(
