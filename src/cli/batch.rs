@@ -22,6 +22,7 @@ use super::batch_list::{Input, List, Listed};
 use super::batch_record::{Request, State};
 use super::progress::PairBar;
 use super::sidecar::Sidecar;
+use super::sign::Sign;
 use super::{ExecutionArgs, Failure, MethodArgs, ReadArgs};
 
 const EXAMPLES: &str = "\
@@ -361,7 +362,7 @@ impl Batch<'_> {
         for (file, of) in wanted.more(&listed.name) {
             write::grey8(&staging.path().join(file), of(maps))?;
         }
-        let sidecar = Sidecar::new(&input.files, &matched, time);
+        let sidecar = Sidecar::new(&input.files, &matched, time, Sign::default());
         let text = request.done(&record, sidecar, &warnings)?;
         self.publish(&staging, request.outputs(), &record, &text)?;
         Ok(Ok(matched.note))

@@ -16,6 +16,7 @@ use mrfgs::{Error, Result};
 use super::folder::{self, Folder};
 use super::search::{self, Largest, Search};
 use super::sidecar::Files;
+use super::sign::Sign;
 
 /// What the header of a list may name; the first three it must.
 const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
@@ -154,7 +155,7 @@ impl Listed {
                 };
                 let calibration_path = left_path.with_file_name("calib.txt");
                 let known = calibration.as_ref().map(|known| (calibration_path.as_path(), known));
-                let range = search.range(&pair, known).map_err(in_columns)?.range;
+                let range = search.range(&pair, known, Sign::default()).map_err(in_columns)?.range;
                 let calibration = calibration.map(|_| calibration_beside(left));
                 let files = Files {
                     left: left.clone(),

@@ -7,7 +7,7 @@ use mrfgs::depth::Rig;
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::options::{Fill, Schedule};
+use mrfgs::options::{DisparityRange, Fill, Schedule};
 use mrfgs::plan::Plan;
 use mrfgs::solver::{Glimpse, Inspector};
 use mrfgs::tiles::Tiles;
@@ -17,6 +17,7 @@ use super::intermediates::Intermediates;
 use super::match_outputs::{MoreOutputs, Outcome};
 use super::search::{Found, Search};
 use super::sidecar::{Files, Sidecar};
+use super::sign::Sign;
 use super::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
 
 const EXAMPLES: &str = "\
@@ -53,6 +54,9 @@ pub(super) struct Args {
 
     #[command(flatten)]
     search: Search,
+    /// Which way disparities count: those of the range, OUTPUT and --raw
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    sign: Sign,
     /// Calibration file: the range (ndisp), and the cameras for depth and points [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
     calib: Option<PathBuf>,
@@ -90,9 +94,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let pair = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
     let calibration = calibration(args)?;
     let known = calibration.as_ref().map(|(path, calibration)| (path.as_path(), calibration));
-    let Found { range, by_matches } = args.search.range(&pair, known)?;
+    let Found { range, by_matches } = args.search.range(&pair, known, args.sign)?;
     if by_matches && !args.quiet {
-        let (min, max) = (range.min, range.max);
+        let DisparityRange { min, max } = args.sign.range(range);
         super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
     }
     let rig = rig(args, &pair, calibration.as_ref())?;
@@ -104,9 +108,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
         ("the calibration file", calibration.as_ref().map(|(path, _)| path)),
     ];
     let inputs = inputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
-    args.more.check(&args.output, &inputs.collect::<Vec<_>>(), range)?;
+    args.more.check(&args.output, &inputs.collect::<Vec<_>>(), args.sign.range(range))?;
     if !args.quiet {
-        warn(&check::warnings(&pair, Some(range)));
+        warn(check::warnings(&pair, Some(range)));
     }
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     if args.dry_run {
@@ -122,7 +126,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let (matched, time) = super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, look)?;
     if !args.quiet {
-        warn(&check::clipped(&matched.maps, range));
+        warn(check::clipped(&matched.maps, range).into_iter().map(|warning| args.sign.warning(warning)));
     }
     // Outputs take memory too.
     drop(matcher);
@@ -140,7 +144,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
         rig,
         maps: &matched.maps,
         range,
-        sidecar: Sidecar::new(&files, &matched, time),
+        sign: args.sign,
+        sidecar: Sidecar::new(&files, &matched, time, args.sign),
     };
     let said = args.more.write(&args.output, &outcome, steps)?;
     if let Some((file, _)) = calibration.filter(|_| !args.quiet && !said.is_empty()) {
@@ -191,7 +196,7 @@ fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Opt
 }
 
 /// Says on standard error what is probably wrong.
-fn warn(warnings: &[Warning]) {
+fn warn(warnings: impl IntoIterator<Item = Warning>) {
     for warning in warnings {
         super::say(&format!("warning: {warning}"));
     }

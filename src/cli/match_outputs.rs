@@ -14,6 +14,7 @@ use super::intermediates::Intermediates;
 use super::outputs::{self, StagedFolder, Written};
 use super::plural;
 use super::sidecar::Sidecar;
+use super::sign::Sign;
 
 /// The outputs besides the map.
 #[derive(clap::Args)]
@@ -51,8 +52,8 @@ pub(super) struct MoreOutputs {
     side_by_side: bool,
     /// Writes what ran and what came of it as JSON; `-` prints it
     ///
-    /// It has `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `width`, `height`, `range` (`min`, `max`),
-    /// `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why it is not the device hoped for),
+    /// It has `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `width`, `height`, `sign`, `range`
+    /// (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why it is not the device hoped for),
     /// `tiles`, `iterations`, `seconds` (of the match), `stages` (ms by stage and level, with --timings), and of all pixels, in
     /// percent: `density` (with a disparity), `measured` and `filled`, which add up to it; `mean_confidence` is that of the
     /// measured ones.
@@ -89,6 +90,7 @@ pub(super) struct Outcome<'a> {
     pub(super) rig: Option<Rig>,
     pub(super) maps: &'a Maps,
     pub(super) range: DisparityRange,
+    pub(super) sign: Sign,
     pub(super) sidecar: Sidecar<'a>,
 }
 
@@ -146,18 +148,18 @@ impl MoreOutputs {
         outcome: &Outcome,
         steps: Option<Intermediates>,
     ) -> Result<String> {
-        let &Outcome { left, rig, maps, range, ref sidecar } = outcome;
-        let map = maps.final_map();
+        let &Outcome { left, rig, maps, range, sign, ref sidecar } = outcome;
+        let map = || maps.final_map();
         let mut written = Written::default();
         let mut said = Vec::new();
         if !outputs::is_printed(output) {
-            written.note(output, write::disparity(output, &map))?;
+            written.note(output, write::disparity(output, &sign.map(map())))?;
         }
         if let Some(path) = &self.raw {
-            written.note(path, write::disparity(path, &maps.raw_map()))?;
+            written.note(path, write::disparity(path, &sign.map(maps.raw_map())))?;
         }
         if let (Some(path), Some(rig)) = (&self.depth, &rig) {
-            let depths = rig.depths(&map);
+            let depths = rig.depths(&map());
             written.note(path, write::depth(path, &depths))?;
             let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
             said.push(match known().reduce(f32::min).zip(known().reduce(f32::max)) {
@@ -178,7 +180,7 @@ impl MoreOutputs {
         }
         if let Some(path) = &self.preview {
             let colours = self.colours.map(ColourMap::from).unwrap_or_default();
-            let mut picture = colour::preview(&map, range.min as f32, range.max as f32, colours);
+            let mut picture = colour::preview(&map(), range.min as f32, range.max as f32, colours);
             if let Some(left) = left.filter(|_| self.side_by_side) {
                 picture = colour::side_by_side(&left.to_rgb8(), &picture);
             }
@@ -194,7 +196,7 @@ impl MoreOutputs {
         }
         // What is printed cannot be taken back, so it comes last.
         if outputs::is_printed(output) {
-            outputs::print_data(&pfm::encode(&map))?;
+            outputs::print_data(&pfm::encode(&sign.map(map())))?;
         }
         written.keep();
         if let Some((_, text)) = json.filter(|(path, _)| outputs::is_printed(path)) {

@@ -9,6 +9,8 @@ use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
+use super::sign::Sign;
+
 /// What the user says of the range.
 #[derive(clap::Args, Clone, Copy, Serialize)]
 pub(super) struct Search {
@@ -38,7 +40,9 @@ pub(super) struct Found {
 }
 
 pub(super) fn pixels(text: &str) -> std::result::Result<i32, String> {
-    text.parse().map_err(|_| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
+    let reach = -MAX_DISPARITY..=MAX_DISPARITY;
+    let number = text.parse().ok().filter(|number| reach.contains(number));
+    number.ok_or_else(|| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
 }
 
 pub(super) fn pixels_or_auto(text: &str) -> std::result::Result<Largest, String> {
@@ -46,33 +50,59 @@ pub(super) fn pixels_or_auto(text: &str) -> std::result::Result<Largest, String>
 }
 
 impl Search {
-    /// The range to search in `pair`; a `calibration` comes with its path.
-    pub(super) fn range(&self, pair: &Pair, calibration: Option<(&Path, &Calibration)>) -> Result<Found> {
-        let min = self.min_disparity.unwrap_or(0);
-        let calibrated = || calibration.map_or(Ok(None), |(path, c)| super::calibrated_range(path, c, min));
-        let given = match self.max_disparity {
-            Some(Largest::Pixels(max)) => Some(DisparityRange::new(min, max)?),
-            Some(Largest::Auto) => None,
-            None => calibrated()?,
+    /// The range to search in `pair`, where the user counts by `sign`; a `calibration` comes with its path.
+    pub(super) fn range(
+        &self,
+        pair: &Pair,
+        calibration: Option<(&Path, &Calibration)>,
+        sign: Sign,
+    ) -> Result<Found> {
+        let (max, auto) = match self.max_disparity {
+            Some(Largest::Pixels(max)) => (Some(max), false),
+            other => (None, other.is_some()),
         };
-        let range = given.map_or_else(|| self.by_matches(pair), Ok)?;
+        // What is far is at 0 unless told otherwise, whichever end of the range that is.
+        let (near, far) = match sign {
+            Sign::LeftMinusRight => (max, self.min_disparity),
+            Sign::RightMinusLeft => (self.min_disparity, max),
+        };
+        let between = |near: i32, far: i32| {
+            let range = match sign {
+                Sign::LeftMinusRight => DisparityRange::new(far, near),
+                Sign::RightMinusLeft => DisparityRange::new(near, far),
+            };
+            range.map(|range| sign.range(range))
+        };
+        let given = match near {
+            Some(near) if !auto => Some(between(near, far.unwrap_or(0))?),
+            None if !auto => calibration.map_or(Ok(None), |(path, c)| {
+                super::calibrated_range(path, c, sign.disparity(far.unwrap_or(0)))
+            })?,
+            _ => None,
+        };
+        let range = match given {
+            Some(range) => range,
+            None => {
+                let found = by_matches(pair)?;
+                let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
+                between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
+            }
+        };
         let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
         if i64::from(range.min) >= width || i64::from(range.max) <= -width {
+            let DisparityRange { min, max } = sign.range(range);
             let reason = format!(
-                "no disparity from {} to {} is inside images {width} pixels wide; give those of the pair",
-                range.min, range.max
+                "no disparity from {min} to {max} is inside images {width} pixels wide; give those of the pair"
             );
             return Err(Error::option("--max-disparity", reason));
         }
         Ok(Found { range, by_matches: given.is_none() })
     }
+}
 
-    fn by_matches(&self, pair: &Pair) -> Result<DisparityRange> {
-        let found = check::range(pair).ok_or_else(|| {
-            let reason =
-                "give the largest disparity to search, in pixels: there are too few matches to find it";
-            Error::option("--max-disparity", reason)
-        })?;
-        DisparityRange::new(self.min_disparity.unwrap_or(found.min), found.max)
-    }
+fn by_matches(pair: &Pair) -> Result<DisparityRange> {
+    check::range(pair).ok_or_else(|| {
+        let reason = "give the largest disparity to search, in pixels: there are too few matches to find it";
+        Error::option("--max-disparity", reason)
+    })
 }

@@ -8,6 +8,8 @@ use mrfgs::maps::{flag, has_disparity};
 use mrfgs::options::{DisparityRange, Method};
 use serde::Serialize;
 
+use super::sign::Sign;
+
 /// Where a match took its input from and put its map, as the user wrote it.
 #[derive(Serialize)]
 pub(super) struct Files {
@@ -25,6 +27,7 @@ pub(super) struct Sidecar<'a> {
     files: &'a Files,
     width: usize,
     height: usize,
+    sign: Sign,
     range: DisparityRange,
     labels: usize,
     method: &'a Method,
@@ -42,7 +45,7 @@ pub(super) struct Sidecar<'a> {
 }
 
 impl<'a> Sidecar<'a> {
-    pub(super) fn new(files: &'a Files, matched: &'a Matched, time: Duration) -> Self {
+    pub(super) fn new(files: &'a Files, matched: &'a Matched, time: Duration, sign: Sign) -> Self {
         let Matched { maps, plan, .. } = matched;
         let (width, height) = plan.size();
         let percent = |count: usize| 100.0 * count as f64 / (width * height) as f64;
@@ -58,7 +61,8 @@ impl<'a> Sidecar<'a> {
             files,
             width,
             height,
-            range: plan.range,
+            sign,
+            range: sign.range(plan.range),
             labels: plan.range.labels(),
             method: &plan.method,
             ran_on: &matched.ran_on,

@@ -11,6 +11,7 @@ mod files;
 mod hostile;
 mod matching;
 mod outputs;
+mod plugin;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,0 +1,163 @@
+//! `mrfgs match` as a stereo algorithm of the Ames Stereo Pipeline, called as its `stereo_corr` calls plug-ins.
+
+use std::fs::File;
+use std::path::Path;
+use std::process::Command;
+
+use mrfgs::image::Plane;
+use mrfgs::image::pfm::{self, Pfm};
+use serde_json::Value;
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+
+use super::{run, scene, scene_file};
+
+/// Rows and columns at the borders without data.
+const MARGIN: usize = 6;
+
+/// What the pipeline makes of the options after the name in `--stereo-algorithm`: tokens with `=` become variables of the
+/// environment, an option without value gets the value 1, and most signs are refused.
+fn plugin_options(options: &str) -> Vec<String> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || " _+-=.".contains(c);
+    assert!(options.chars().all(allowed), "{options}");
+    let is_option = |token: &str| {
+        let mut chars = token.chars();
+        chars.next() == Some('-') && chars.next().is_some_and(|c| !c.is_ascii_digit())
+    };
+    let mut given: Vec<(String, Vec<String>)> = Vec::new();
+    for token in options.split_whitespace().filter(|token| !token.contains('=')) {
+        match given.last_mut() {
+            _ if is_option(token) => given.push((token.into(), Vec::new())),
+            Some((_, values)) => values.push(token.into()),
+            None => panic!("{token} is no option"),
+        }
+    }
+    let with_values = given.into_iter().flat_map(|(option, values)| {
+        let values = if values.is_empty() { vec!["1".into()] } else { values };
+        std::iter::once(option).chain(values)
+    });
+    with_values.collect()
+}
+
+/// Writes a view as the pipeline does: float, tone between 0 and 1, NaN where there are no data.
+fn write_view(path: &Path, view: &image::GrayImage) {
+    let (width, height) = view.dimensions();
+    let pixels: Vec<f32> = view
+        .enumerate_pixels()
+        .map(|(x, y, tone)| {
+            let inside = |at: u32, size: u32| (MARGIN..size as usize - MARGIN).contains(&(at as usize));
+            if inside(x, width) && inside(y, height) { f32::from(tone.0[0]) / 255.0 } else { f32::NAN }
+        })
+        .collect();
+    let mut encoder = TiffEncoder::new_big(File::create(path).unwrap()).unwrap();
+    encoder.write_image::<Gray32Float>(width, height, &pixels).unwrap();
+}
+
+fn read_map(path: &Path) -> Plane<f32> {
+    let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
+    let (width, height) = decoder.dimensions().unwrap();
+    let DecodingResult::F32(values) = decoder.read_image().unwrap() else { panic!("float") };
+    Plane::new(width as usize, height as usize, values)
+}
+
+fn read_pfm(path: &Path) -> Plane<f32> {
+    let Pfm::Grey(map) = pfm::read(path).unwrap() else { panic!("one channel") };
+    map
+}
+
+#[test]
+fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let views =
+        ["im0.png", "im1.png"].map(|file| image::open(scene("slanted").join(file)).unwrap().to_luma8());
+    for (view, name) in views.iter().zip(["left.tif", "right.tif"]) {
+        write_view(&at(name), view);
+    }
+    let plugin = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/asp-plugin");
+    let call = |options: &str| {
+        let output = Command::new(&plugin)
+            .current_dir(folder.path())
+            .env("MRFGS", env!("CARGO_BIN_EXE_mrfgs"))
+            .args(plugin_options(options))
+            .args(["left.tif", "right.tif", "out.tif"])
+            .output()
+            .unwrap();
+        (output.status.success(), String::from_utf8(output.stderr).unwrap())
+    };
+    // The pipeline tells plug-ins no range.
+    for options in ["--backend cpu", "--backend cpu --threads 1 --min-disparity -31 --max-disparity 0"] {
+        let (success, told) = call(options);
+        assert!(success, "{told}");
+        let (found, truth) = (read_map(&at("out.tif")), read_pfm(&scene("slanted").join("disp0GT.pfm")));
+        assert_eq!(found.size(), truth.size());
+        let (width, height) = found.size();
+        let (mut errors, mut holes) = (Vec::new(), 0);
+        for y in 0..height {
+            for x in 0..width {
+                let d = found[(x, y)];
+                assert!(d.is_nan() || (-31.0..=0.0).contains(&d), "{d} at {x}, {y}");
+                let inside = (MARGIN..width - MARGIN).contains(&x) && (MARGIN..height - MARGIN).contains(&y);
+                assert!(inside || d.is_nan(), "a disparity without data at {x}, {y}");
+                holes += usize::from(inside && d.is_nan());
+                if !d.is_nan() {
+                    // Seen at x + d on the right.
+                    errors.push((d + truth[(x, y)]).abs());
+                }
+            }
+        }
+        errors.sort_by(f32::total_cmp);
+        assert!(errors.len() > width * height / 2 && holes > 0, "{} and {holes}", errors.len());
+        assert!(errors[errors.len() / 2] < 0.25, "{}", errors[errors.len() / 2]);
+    }
+    // Why the plug-in says that itself.
+    let (success, told) = call("--backend cpu --no-fill");
+    assert!(!success && told.lines().count() == 1, "{told}");
+}
+
+#[test]
+fn the_sign_turns_map_and_range_around() {
+    let folder = tempfile::tempdir().unwrap();
+    let matched = |name: &str, more: &[&str]| {
+        let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
+        let args = [&["match", &left, &right, name, "--no-fill", "--backend", "cpu", "--json", "-"], more];
+        let told = run(folder.path(), &args.concat()).succeeded();
+        (read_map(&folder.path().join(name)), told.json())
+    };
+    let (ours, told) = matched("ours.tif", &["--max-disparity", "30", "--min-disparity", "2"]);
+    let range = |told: &Value| ["min", "max"].map(|end| told["range"][end].as_i64().unwrap());
+    assert_eq!((told["sign"].as_str(), range(&told)), (Some("left-minus-right"), [2, 30]));
+    let turned = ["--sign", "right-minus-left", "--min-disparity", "-30", "--max-disparity", "-2"];
+    let (theirs, told) = matched("theirs.tif", &[&turned[..], &["--raw", "raw.tif"]].concat());
+    assert_eq!((told["sign"].as_str(), range(&told)), (Some("right-minus-left"), [-30, -2]));
+    let raw = read_map(&folder.path().join("raw.tif"));
+    let mut invalid = 0;
+    for (i, (&d, &turned)) in ours.data().iter().zip(theirs.data()).enumerate() {
+        invalid += usize::from(d.is_nan());
+        assert!(if d.is_nan() { turned.is_nan() } else { turned.to_bits() == (-d).to_bits() }, "pixel {i}");
+        assert!((-30.0..=-2.0).contains(&raw.data()[i]), "pixel {i}");
+    }
+    assert!((1..ours.data().len() / 2).contains(&invalid), "{invalid} of {}", ours.data().len());
+
+    // Printed, what is invalid is +infinity all the same.
+    let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
+    let printed = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .args(["match", &left, &right, "-", "--no-fill", "--backend", "cpu", "--quiet"])
+        .args(turned)
+        .output()
+        .unwrap();
+    std::fs::write(folder.path().join("printed.pfm"), printed.stdout).unwrap();
+    let expected = theirs.map(|&d| if d.is_nan() { f32::INFINITY } else { d });
+    assert_eq!(read_pfm(&folder.path().join("printed.pfm")), expected);
+
+    // One end alone: the far one is at 0, as it is the other way round.
+    let (_, told) = matched("a.tif", &["--sign", "right-minus-left", "--min-disparity", "-20"]);
+    assert_eq!(range(&told), [-20, 0]);
+    // And by a calibration.
+    let (_, told) = matched("b.tif", &["--sign", "right-minus-left"]);
+    let (_, ours) = matched("c.tif", &[]);
+    assert_eq!(range(&told), {
+        let [min, max] = range(&ours);
+        [-max, -min]
+    });
+}
