@@ -1,6 +1,6 @@
 //! `mrfgs batch`.
 
-use std::collections::HashSet;
+use std::collections::{HashSet, VecDeque};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -16,10 +16,10 @@ use mrfgs::image::{Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::Method;
 use mrfgs::{Error, Matched, Matcher, Result};
-use tempfile::TempDir;
 
 use super::batch_list::{Input, List, Listed};
 use super::batch_record::{Request, State};
+use super::claim::Claim;
 use super::progress::PairBar;
 use super::sidecar::Sidecar;
 use super::sign::Sign;
@@ -66,7 +66,8 @@ pub(super) struct Args {
     /// Does one of N parts of the list, the K-th from 1 on, such as 2/8
     ///
     /// The part of a pair follows from its name and N alone (64-bit FNV-1a, upper and lower half joined by exclusive or,
-    /// modulo N), so it stays the same when others come or go. Parts may run at the same time into the same OUTDIR.
+    /// modulo N), so it stays the same when others come or go. Runs at the same time into the same
+    /// OUTDIR, of parts or of the whole, do each pair once: a run locks the pair that it is at (OUTDIR/.NAME.tmp).
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<Shard>,
     /// Prints how far each pair is (complete, failed or missing) for the same arguments, and runs nothing
@@ -158,6 +159,9 @@ impl Shard {
         (hash >> 32 ^ hash & 0xffff_ffff) % self.count == self.index
     }
 }
+
+/// How long to leave pairs alone that other runs are at.
+const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Whether the user wants it to stop.
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -287,17 +291,43 @@ impl Batch<'_> {
     /// Does every pair that is not complete.
     fn run(&self, pairs: &[Listed], mut matcher: Matcher) -> std::result::Result<(), Failure> {
         for listed in pairs {
-            self.remove_remains(&listed.name)?;
+            Claim::remove_remains(&self.args.folder, &listed.name)?;
         }
-        let left: Vec<_> = pairs.iter().filter(|listed| self.state(listed) != State::Complete).collect();
-        let (all, skipped) = (pairs.len(), pairs.len() - left.len());
-        let (mut done, mut failed) = (0, Vec::new());
+        let mut left: VecDeque<_> =
+            pairs.iter().filter(|listed| self.state(listed) != State::Complete).collect();
+        let all = pairs.len();
+        let (mut done, mut skipped, mut failed) = (0, all - left.len(), Vec::new());
         let bar = PairBar::new(all, skipped, self.args.quiet);
         let mut told = None;
-        for listed in left {
+        // How many pairs in a row were with other runs.
+        let mut taken = 0;
+        while let Some(listed) = left.pop_front() {
             let name = listed.name.as_str();
             bar.begin(name);
-            match self.pair(listed, &mut matcher, &bar) {
+            let interrupted = || {
+                let finished = skipped + done + failed.len();
+                Failure::Stopped(format!("stopped after {finished} of {all}; run it again to resume"))
+            };
+            if go_on().is_break() {
+                return Err(interrupted());
+            }
+            let Some(claim) = Claim::new(&self.args.folder, name)? else {
+                left.push_back(listed);
+                taken += 1;
+                if taken >= left.len() {
+                    std::thread::sleep(PATIENCE);
+                    taken = 0;
+                }
+                continue;
+            };
+            taken = 0;
+            if self.state(listed) == State::Complete {
+                // By another run, since this one began.
+                skipped += 1;
+                bar.end();
+                continue;
+            }
+            match self.pair(listed, &claim, &mut matcher, &bar) {
                 Ok(Ok(note)) => {
                     done += 1;
                     // Why there is no device is the same for all that follow.
@@ -310,11 +340,7 @@ impl Batch<'_> {
                     failed.push(name);
                     bar.past(|| super::say(&super::single_line(&format!("{name}: {error}"))));
                 }
-                Err(Error::Interrupted) => {
-                    let finished = skipped + done + failed.len();
-                    let text = format!("stopped after {finished} of {all}; run it again to resume");
-                    return Err(Failure::Stopped(text));
-                }
+                Err(Error::Interrupted) => return Err(interrupted()),
                 Err(error) => return Err(error.into()),
             }
             bar.end();
@@ -335,18 +361,20 @@ impl Batch<'_> {
     ///
     /// # Errors
     /// What concerns all pairs; inside, what concerns this one.
-    fn pair(&self, listed: &Listed, matcher: &mut Matcher, bar: &PairBar) -> Result<Result<Option<String>>> {
-        if go_on().is_break() {
-            return Err(Error::Interrupted);
-        }
+    fn pair(
+        &self,
+        listed: &Listed,
+        claim: &Claim,
+        matcher: &mut Matcher,
+        bar: &PairBar,
+    ) -> Result<Result<Option<String>>> {
         let (request, record) = (self.request(listed), self.record(listed));
-        let staging = self.staging(&listed.name)?;
-        let (mut input, matched, time, warnings) = match self.compute(listed, matcher, &staging) {
+        let (mut input, matched, time, warnings) = match self.compute(listed, matcher, claim) {
             Ok(computed) => computed,
             Err(error @ (Error::Interrupted | Error::Device(_))) => return Err(error),
             Err(error) => {
                 let text = request.failed(&record, &self.method, &error)?;
-                self.publish(&staging, &[], &record, &text)?;
+                self.publish(claim, &[], &record, &text)?;
                 return Ok(Err(error));
             }
         };
@@ -358,13 +386,13 @@ impl Batch<'_> {
         }
         let (maps, wanted) = (&matched.maps, &self.args.maps);
         input.files.output = wanted.disparity_name(&listed.name);
-        write::disparity(&staging.path().join(&input.files.output), &maps.final_map())?;
+        write::disparity(&claim.folder().join(&input.files.output), &maps.final_map())?;
         for (file, of) in wanted.more(&listed.name) {
-            write::grey8(&staging.path().join(file), of(maps))?;
+            write::grey8(&claim.folder().join(file), of(maps))?;
         }
         let sidecar = Sidecar::new(&input.files, &matched, time, Sign::default());
         let text = request.done(&record, sidecar, &warnings)?;
-        self.publish(&staging, request.outputs(), &record, &text)?;
+        self.publish(claim, request.outputs(), &record, &text)?;
         Ok(Ok(matched.note))
     }
 
@@ -372,13 +400,13 @@ impl Batch<'_> {
         &self,
         listed: &Listed,
         matcher: &mut Matcher,
-        staging: &TempDir,
+        claim: &Claim,
     ) -> Result<(Input, Matched, Duration, Vec<String>)> {
         let input = listed.read(&self.base, self.reader)?;
         let (pair, range) = (&input.pair, input.range);
         let map = self.args.maps.disparity_name(&listed.name);
         // The folder is there, so what is wrong is the range.
-        write::check_disparity_path(&staging.path().join(&map), range.min, range.max).map_err(
+        write::check_disparity_path(&claim.folder().join(&map), range.min, range.max).map_err(
             |e| match e {
                 Error::Write { reason, .. } => Error::write(self.args.folder.join(&map), reason),
                 error => error,
@@ -392,36 +420,11 @@ impl Batch<'_> {
         Ok((input, matched, time, warnings.iter().map(ToString::to_string).collect()))
     }
 
-    /// Where the files of a pair are made. The name is that of the pair, so that what a killed run leaves can be told from
-    /// what others are at.
-    fn staging_name(name: &str) -> String {
-        format!(".{name}.tmp")
-    }
-
-    fn staging(&self, name: &str) -> Result<TempDir> {
-        let folder = &self.args.folder;
-        let staging_name = Self::staging_name(name);
-        let staging = tempfile::Builder::new().prefix(&staging_name).rand_bytes(0).tempdir_in(folder);
-        staging.map_err(|e| match e.kind() {
-            ErrorKind::AlreadyExists => {
-                let reason =
-                    "another run is at this pair; wait for it, or give each run a --shard of its own";
-                Error::write(folder.join(staging_name), reason)
-            }
-            kind => Error::write(folder, format!("nothing can be created in it: {kind}")),
-        })
-    }
-
-    fn remove_remains(&self, name: &str) -> Result<()> {
-        let remains = self.args.folder.join(Self::staging_name(name));
-        gone(&remains, fs::remove_dir_all(&remains))
-    }
-
     /// Puts `outputs` in their place, and then the record. Until that is there the pair is not complete, so the old one goes
     /// first, and with it the maps that it names.
-    fn publish(&self, staging: &TempDir, outputs: &[String], record: &Path, text: &str) -> Result<()> {
+    fn publish(&self, claim: &Claim, outputs: &[String], record: &Path, text: &str) -> Result<()> {
         let name = record.file_name().unwrap_or(record.as_os_str());
-        let staged_record = staging.path().join(name);
+        let staged_record = claim.folder().join(name);
         write::save(&staged_record, text.as_bytes())?;
         let old = Request::recorded_outputs(record);
         gone(record, fs::remove_file(record))?;
@@ -432,7 +435,7 @@ impl Batch<'_> {
         }
         for map in outputs {
             let place = self.args.folder.join(map);
-            fs::rename(staging.path().join(map), &place).map_err(|e| Error::write(&place, e))?;
+            fs::rename(claim.folder().join(map), &place).map_err(|e| Error::write(&place, e))?;
         }
         fs::rename(staged_record, record).map_err(|e| Error::write(record, e))
     }

@@ -6,6 +6,7 @@ mod batch_list;
 mod batch_record;
 mod bench;
 mod breakdown;
+mod claim;
 mod devices;
 mod evaluate;
 mod folder;

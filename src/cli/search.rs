@@ -80,13 +80,12 @@ impl Search {
             })?,
             _ => None,
         };
-        let range = match given {
-            Some(range) => range,
-            None => {
-                let found = by_matches(pair)?;
-                let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
-                between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
-            }
+        let range = if let Some(range) = given {
+            range
+        } else {
+            let found = by_matches(pair)?;
+            let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
+            between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };
         let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
         if i64::from(range.min) >= width || i64::from(range.max) <= -width {

@@ -194,6 +194,28 @@ fn a_killed_batch_resumes() {
     assert_eq!(after.len(), 40, "nothing else is left: {:?}", after.keys());
 }
 
+#[test]
+fn runs_at_the_same_time_share_the_pairs() {
+    let folder = pairs(20, (96, 64));
+    batch(folder.path(), &["list.csv", "single"]).succeeded();
+    let whole = maps(&folder.path().join("single"));
+    let out = folder.path().join("out");
+    let runs = [(); 3].map(|()| started(folder.path(), &["list.csv", "out"]));
+    let done = runs.map(|run| {
+        let output = run.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{said}");
+        let numbers: Vec<usize> = said.split(' ').filter_map(|word| word.parse().ok()).collect();
+        let [done, skipped, 0] = numbers[..] else { panic!("{said}") };
+        assert_eq!(done + skipped, 20, "{said}");
+        done
+    });
+    assert_eq!(done.iter().sum::<usize>(), 20, "each pair once: {done:?}");
+    assert!(done.iter().filter(|&&done| done > 0).count() > 1, "{done:?}");
+    assert!(maps(&out) == whole);
+    assert_eq!(listing(&out).len(), 40, "nothing else is left");
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_batch_tidies_up() {

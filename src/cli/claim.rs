@@ -1,0 +1,147 @@
+//! Which run of a batch is at a pair.
+
+use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use mrfgs::{Error, Result};
+use same_file::Handle;
+
+/// The file that is locked.
+const LOCK: &str = "lock";
+
+/// A pair that this run is at, and the folder in which the files of the pair are made. While it lives the folder is locked, and
+/// afterwards gone. The lock goes with its process however that ends; then the folder is there without a lock.
+pub(super) struct Claim {
+    folder: PathBuf,
+    /// Not read, but locked.
+    _lock: File,
+}
+
+impl Claim {
+    /// Claims the pair `name` of the output folder `parent`, and removes what a run left of it that was killed; `None` while
+    /// another run is at it.
+    pub(super) fn new(parent: &Path, name: &str) -> Result<Option<Self>> {
+        let folder = staging(parent, name);
+        let failed =
+            |e: io::Error| Error::write(parent, format!("nothing can be created in it: {}", e.kind()));
+        loop {
+            if let Err(e) = fs::create_dir(&folder)
+                && e.kind() != ErrorKind::AlreadyExists
+            {
+                return Err(failed(e));
+            }
+            let path = folder.join(LOCK);
+            let lock = match File::options().write(true).create(true).truncate(false).open(&path) {
+                // Whose folder that was has just removed it.
+                Err(e) if e.kind() == ErrorKind::NotFound => continue,
+                lock => lock.map_err(failed)?,
+            };
+            match lock.try_lock() {
+                Err(TryLockError::WouldBlock) => return Ok(None),
+                // Some file systems of networks know no locks; there it is up to the user.
+                Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => return Err(failed(e)),
+                Err(TryLockError::Error(_)) | Ok(()) => {}
+            }
+            let locked = Handle::from_file(lock.try_clone().map_err(failed)?).map_err(failed)?;
+            if Handle::from_path(&path).is_ok_and(|there| there == locked) {
+                let claim = Self { folder, _lock: lock };
+                claim.clear().map_err(failed)?;
+                return Ok(Some(claim));
+            }
+            // It was removed between opening and locking, so it keeps nobody out.
+        }
+    }
+
+    /// Removes what a run left of the pair `name` that was killed, unless another run is at it.
+    pub(super) fn remove_remains(parent: &Path, name: &str) -> Result<()> {
+        if staging(parent, name).exists() {
+            Self::new(parent, name)?;
+        }
+        Ok(())
+    }
+
+    /// Where the files of the pair are made.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Removes everything but the lock.
+    fn clear(&self) -> io::Result<()> {
+        for entry in fs::read_dir(&self.folder)? {
+            let entry = entry?;
+            if entry.file_name() != LOCK {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // The lock last: once it is gone, the folder may be another run's.
+        if self.clear().is_ok() && fs::remove_file(self.folder.join(LOCK)).is_ok() {
+            let _ = fs::remove_dir(&self.folder);
+        }
+    }
+}
+
+/// The folder of a pair: by its name, so that what a killed run leaves is found.
+fn staging(parent: &Path, name: &str) -> PathBuf {
+    parent.join(format!(".{name}.tmp"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_pair_is_claimed_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let claimed = || Claim::new(folder.path(), "a").unwrap();
+        let first = claimed().unwrap();
+        fs::write(first.folder().join("a.pfm"), "half").unwrap();
+        assert!(claimed().is_none() && Claim::new(folder.path(), "b").unwrap().is_some());
+        Claim::remove_remains(folder.path(), "a").unwrap();
+        assert!(first.folder().join("a.pfm").exists(), "it is not for others to remove");
+        drop(first);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(claimed().is_some());
+
+        // What a killed run leaves: no lock, but the file that was locked.
+        let remains = staging(folder.path(), "a");
+        fs::create_dir(&remains).unwrap();
+        for file in ["lock", "a.pfm"] {
+            fs::write(remains.join(file), "half").unwrap();
+        }
+        let claim = claimed().unwrap();
+        assert!(!claim.folder().join("a.pfm").exists());
+        drop(claim);
+        assert!(!remains.exists());
+    }
+
+    #[test]
+    fn claims_shut_each_other_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = AtomicUsize::new(0);
+        let held = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..500 {
+                        let Some(claim) = Claim::new(folder.path(), "a").unwrap() else { continue };
+                        assert_eq!(inside.fetch_add(1, Ordering::SeqCst), 0);
+                        fs::write(claim.folder().join("a.pfm"), "map").unwrap();
+                        held.fetch_add(1, Ordering::SeqCst);
+                        inside.fetch_sub(1, Ordering::SeqCst);
+                    }
+                });
+            }
+        });
+        assert!(held.into_inner() > 100);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
