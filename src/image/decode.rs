@@ -238,7 +238,7 @@ fn jpeg_is_whole(bytes: &[u8]) -> bool {
 /// Integer and float TIFF. What is packed into less than a byte, or is neither grey nor RGB, is left to the
 /// general decoder.
 fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'static>, String> {
-    check_tiff_counts(bytes)?;
+    check_tiff_directory(bytes)?;
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(tiff_reason)?;
     let (width, height) = decoder.dimensions().map_err(tiff_reason)?;
     check_claim(width as u64, height as u64, max_pixels, MAX_PIXELS_PER_BYTE, bytes)?;
@@ -301,9 +301,9 @@ fn decode_tiff(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'sta
     Ok(Raster { width, height, channels, samples })
 }
 
-/// Errors when an entry of the first directory claims more values than the file has bytes: the decoder takes memory for
-/// them before it reads them. What else is wrong with a directory the decoder finds.
-fn check_tiff_counts(bytes: &[u8]) -> std::result::Result<(), String> {
+/// Errors where the first directory claims what the decoder believes before it looks: more values than the file has bytes, for
+/// which it takes memory, and more planes and rows than it can count. What else is wrong with a directory the decoder finds.
+fn check_tiff_directory(bytes: &[u8]) -> std::result::Result<(), String> {
     let big = bytes[2..4].contains(&43);
     let number = |at: usize, size: usize| {
         let field = bytes.get(at..at.checked_add(size)?)?;
@@ -312,18 +312,39 @@ fn check_tiff_counts(bytes: &[u8]) -> std::result::Result<(), String> {
     };
     // Sizes of places and counts, of the number of entries, and of an entry.
     let (wide, head, entry) = if big { (8, 8, 20) } else { (4, 2, 12) };
-    let count = |start: usize, i: usize| {
-        let at = start.checked_add(head)?.checked_add(i * entry)?;
-        number(at + 4, wide)
-    };
     let Some(start) = number(wide, wide) else { return Ok(()) };
     let entries = number(start, head).unwrap_or(0).min(bytes.len() / entry);
-    match (0..entries).map_while(|i| count(start, i)).find(|count| *count > bytes.len()) {
-        Some(count) => {
-            Err(damaged(format!("the TIFF directory claims {count} values in {} bytes", bytes.len())))
+    let (mut rows, mut planes) = (1, 1);
+    for i in 0..entries {
+        let Some(at) = start.checked_add(head).and_then(|at| at.checked_add(i * entry)) else { break };
+        let fields = (number(at, 2), number(at + 2, 2), number(at + 4, wide));
+        let (Some(tag), Some(kind), Some(count)) = fields else { break };
+        if count > bytes.len() {
+            return Err(damaged(format!(
+                "the TIFF directory claims {count} values in {} bytes",
+                bytes.len()
+            )));
         }
-        None => Ok(()),
+        let size = match kind {
+            1 | 6 => 1,
+            3 | 8 => 2,
+            16..=18 => 8,
+            _ => 4,
+        };
+        // What does not fit stands elsewhere.
+        let place = at + 4 + wide;
+        let place = if size > wide { number(place, wide).unwrap_or(usize::MAX) } else { place };
+        let value = number(place, size).unwrap_or(0);
+        match Tag::from_u16(tag as u16) {
+            Some(Tag::ImageLength) => rows = rows.max(value),
+            Some(Tag::SamplesPerPixel) => planes = planes.max(value),
+            _ => {}
+        }
     }
+    if rows.checked_mul(planes).is_none_or(|strips| u32::try_from(strips).is_err()) {
+        return Err(damaged(format!("the TIFF directory claims {planes} planes of {rows} rows")));
+    }
+    Ok(())
 }
 
 /// The samples with all channels of a pixel next to each other, from those or from one plane after the other.
