@@ -1,4 +1,4 @@
-//! `mrfgs devices`.
+//! `mrfgs devices` and `mrfgs --version`.
 
 use std::fmt::Write;
 
@@ -36,4 +36,28 @@ pub(super) fn run() -> Result<()> {
         None => writeln!(out, "`auto` takes the CPU path"),
     };
     super::print(&out)
+}
+
+/// The version of wgpu that Cargo.toml asks for.
+const WGPU: &str = "30";
+
+/// What a report of a bug should begin with: the versions of the program, of wgpu and of every driver.
+pub(super) fn print_versions() -> Result<()> {
+    let mut out = format!("mrfgs {}\nwgpu {WGPU}\n", env!("CARGO_PKG_VERSION"));
+    for device in gpu::devices() {
+        let driver = if device.driver.is_empty() { "unknown" } else { &device.driver };
+        let _ = writeln!(out, "device {}: {}, {}, driver {driver}", device.index, device.name, device.api);
+    }
+    super::print(&out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_of_wgpu_is_that_of_the_manifest() {
+        let manifest: toml::Table = include_str!("../../Cargo.toml").parse().unwrap();
+        assert_eq!(manifest["dependencies"]["wgpu"]["version"].as_str(), Some(WGPU));
+    }
 }

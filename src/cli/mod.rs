@@ -33,7 +33,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::{MAX_PIXELS, Reader};
@@ -61,7 +61,11 @@ failure. A failure is one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
 #[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
+#[command(disable_version_flag = true)]
 struct Cli {
+    /// Print the versions of mrfgs, of wgpu and of every driver
+    #[arg(short = 'V', long, action = ArgAction::Version)]
+    version: (),
     #[command(subcommand)]
     command: Command,
 }
@@ -129,6 +133,7 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(answer) if answer.use_stderr() => return Err(Failure::Usage(one_line(&answer))),
+        Err(answer) if answer.kind() == ErrorKind::DisplayVersion => return Ok(devices::print_versions()?),
         Err(help) => return Ok(printed(help.print())?),
     };
     match cli.command {

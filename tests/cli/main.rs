@@ -263,7 +263,21 @@ fn help_teaches() {
     assert!(help(&["batch", "--help"]).contains("name,left,right,max_disparity # a comment"));
     assert!(help(&["presets", "--help"]).contains("Examples:"));
     assert!(help(&["bench", "--help"]).contains("[default: default and paper,"));
-    assert_eq!(help(&["--version"]), format!("mrfgs {}", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn the_version_names_what_a_report_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = run(folder.path(), &["--version"]).succeeded().stdout;
+    let mut lines = told.lines();
+    assert_eq!(lines.next(), Some(format!("mrfgs {}", env!("CARGO_PKG_VERSION")).as_str()));
+    assert!(lines.next().is_some_and(|line| line.starts_with("wgpu ")), "{told}");
+    let devices = gpu::devices();
+    assert_eq!(lines.clone().count(), devices.len(), "{told}");
+    for (line, device) in lines.zip(devices) {
+        assert!(line.contains(&device.name) && line.contains(&device.driver), "{line}");
+    }
+    assert_eq!(run(folder.path(), &["-V"]).succeeded().stdout, told);
 }
 
 #[cfg(target_os = "linux")]
