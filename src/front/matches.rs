@@ -12,6 +12,7 @@ use crate::image::{Image, Pair, Plane};
 use crate::maps::FRACTION;
 use crate::options::DisparityRange;
 use rayon::prelude::*;
+use std::array::from_fn;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
@@ -296,16 +297,10 @@ fn correlation(
     columns: RangeInclusive<usize>,
 ) -> Vec<f64> {
     let (first, count) = (*columns.start(), columns.count());
-    let mut products = vec![0_i32; count];
-    for row in 0..WINDOW {
-        let template = &of.grey.row(y + row - RADIUS)[x - RADIUS..=x + RADIUS];
-        let line = &within.grey.row(v + row - RADIUS)[first - RADIUS..];
-        for (column, &t) in template.iter().enumerate() {
-            for (sum, &value) in products.iter_mut().zip(&line[column..]) {
-                *sum += t as i32 * value as i32;
-            }
-        }
-    }
+    let template = from_fn(|row| from_fn(|column| of.grey[(x + column - RADIUS, y + row - RADIUS)]));
+    let lines = from_fn(|row| &within.grey.row(v + row - RADIUS)[first - RADIUS..]);
+    let mut products = vec![0; count];
+    products_along(&template, &lines, &mut products);
     let (sum, norm) = (of.sum[(x, y)] as i64, of.norm[(x, y)]);
     (0..count)
         .map(|i| {
@@ -313,6 +308,44 @@ fn correlation(
             if norms > 0.0 { (WINDOW_PIXELS * products[i] as i64 - sum * there) as f64 / norms } else { 0.0 }
         })
         .collect()
+}
+
+/// The sum of the products of `template` with the window that begins at each place of `lines`.
+#[pulp::with_simd(products_along = pulp::Arch::new())]
+#[inline(always)]
+fn products_along_on<'a, S: pulp::Simd>(
+    _: S,
+    template: &'a [[i16; WINDOW]; WINDOW],
+    lines: &'a [&'a [i16]; WINDOW],
+    out: &'a mut [i32],
+) {
+    let (blocks, rest) = out.as_chunks_mut::<32>();
+    let first_of_rest = 32 * blocks.len();
+    for (i, block) in blocks.iter_mut().enumerate() {
+        *block = products_at(template, lines, 32 * i);
+    }
+    for (i, sum) in rest.iter_mut().enumerate() {
+        [*sum] = products_at(template, lines, first_of_rest + i);
+    }
+}
+
+/// The same at `N` places from `first` on; sums of so few stay in registers.
+#[inline(always)]
+fn products_at<const N: usize>(
+    template: &[[i16; WINDOW]; WINDOW],
+    lines: &[&[i16]; WINDOW],
+    first: usize,
+) -> [i32; N] {
+    let mut sums = [0; N];
+    for (template, line) in template.iter().zip(lines) {
+        let line = &line[first..first + WINDOW - 1 + N];
+        for (column, &t) in template.iter().enumerate() {
+            for (sum, &value) in sums.iter_mut().zip(&line[column..]) {
+                *sum += t as i32 * value as i32;
+            }
+        }
+    }
+    sums
 }
 
 /// Where the parabola through `(-1, before)`, `(0, peak)`, `(1, after)` has its vertex, in 1/256.
