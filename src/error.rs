@@ -74,3 +74,12 @@ pub(crate) fn one_line(text: &str) -> String {
         None => line,
     }
 }
+
+/// What a user gave, as a message may quote it: not longer than a glance, and without what a terminal would obey.
+pub(crate) fn quoted(text: &str) -> String {
+    const MOST: usize = 60;
+    let mut characters = text.escape_debug();
+    let shown: String = characters.by_ref().take(MOST).collect();
+    let more = if characters.next().is_some() { "..." } else { "" };
+    format!("`{shown}{more}`")
+}

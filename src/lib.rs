@@ -41,7 +41,7 @@
 //! - [`roofline`] counts what the messages cost at least, to hold a machine against.
 //! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
-//! - [`evaluation`] compares maps with ground truth.
+//! - [`evaluation`] compares maps with ground truth; [`list`] reads which pairs a batch is to match.
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
@@ -53,6 +53,7 @@ pub mod evaluation;
 pub mod front;
 pub mod graph;
 pub mod image;
+pub mod list;
 pub mod maps;
 mod matcher;
 mod memory;

@@ -12,10 +12,11 @@ use std::path::{Path, PathBuf};
 type Target = fn(&[u8]);
 
 /// Every target with its name, which is that of its folder.
-const TARGETS: [(&str, Target); 4] = [
+const TARGETS: [(&str, Target); 5] = [
     ("pfm", targets::pfm),
     ("calib", targets::calib),
     ("image", targets::image),
+    ("list", targets::list),
     ("config", targets::config),
 ];
 

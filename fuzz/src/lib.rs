@@ -6,8 +6,10 @@
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::pfm::{self, Pfm};
 use mrfgs::image::read::Reader;
-use mrfgs::options::{Method, PRESETS};
+use mrfgs::list::{self, Largest};
+use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::{Error, Result};
+use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
 
@@ -69,6 +71,22 @@ pub fn image(bytes: &[u8]) {
         let mask = told(reader.mask(path)).expect("the same file");
         let mut masks = masked.left().masked.data().iter().zip(pair.left().masked.data()).zip(mask.data());
         assert!(masks.all(|((both, own), mask)| *both == (*own || *mask)));
+    });
+}
+
+/// A list of pairs.
+pub fn list(bytes: &[u8]) {
+    with_file(bytes, |path| {
+        let Some(rows) = told(list::read(path)) else { return };
+        let mut names = HashSet::new();
+        for row in rows {
+            assert!(names.insert(row.name.to_ascii_lowercase()), "{} is there twice", row.name);
+            assert!(!row.name.is_empty() && !row.left.is_empty() && !row.right.is_empty());
+            assert!(!row.name.contains(['/', '\\']) && !row.name.starts_with('.'), "{}", row.name);
+            if let Some(Largest::Pixels(max)) = row.max_disparity {
+                assert!(DisparityRange::new(row.min_disparity.unwrap_or(0), max).is_ok());
+            }
+        }
     });
 }
 

@@ -5,7 +5,8 @@ use std::path::Path;
 use mrfgs::front::check;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+use mrfgs::list::{self, Largest};
+use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
@@ -16,20 +17,11 @@ use super::sign::Sign;
 pub(super) struct Search {
     /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
     /// - 1 of the calibration file, else auto]
-    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = pixels_or_auto)]
+    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = str::parse::<Largest>)]
     pub(super) max_disparity: Option<Largest>,
     /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = list::pixels)]
     pub(super) min_disparity: Option<i32>,
-}
-
-/// The largest disparity to search.
-#[derive(Clone, Copy, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Largest {
-    Auto,
-    #[serde(untagged)]
-    Pixels(i32),
 }
 
 /// A range, and where it is from.
@@ -37,16 +29,6 @@ pub(super) struct Found {
     pub(super) range: DisparityRange,
     /// Whether sparse matches gave it.
     pub(super) by_matches: bool,
-}
-
-pub(super) fn pixels(text: &str) -> std::result::Result<i32, String> {
-    let reach = -MAX_DISPARITY..=MAX_DISPARITY;
-    let number = text.parse().ok().filter(|number| reach.contains(number));
-    number.ok_or_else(|| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
-}
-
-pub(super) fn pixels_or_auto(text: &str) -> std::result::Result<Largest, String> {
-    if text == "auto" { Ok(Largest::Auto) } else { pixels(text).map(Largest::Pixels) }
 }
 
 impl Search {

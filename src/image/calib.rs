@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, quoted};
 
 /// A calibration file is a dozen lines; no more than this is read of one.
 const MAX_BYTES: u64 = 1 << 20;
@@ -134,11 +134,6 @@ fn camera(text: &str) -> std::result::Result<Camera, String> {
         }
         _ => Err(wrong()),
     }
-}
-
-/// The text as a message may quote it: not longer than a glance.
-fn quoted(text: &str) -> String {
-    format!("{:?}", text.chars().take(60).collect::<String>())
 }
 
 #[cfg(test)]

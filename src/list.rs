@@ -1,0 +1,212 @@
+//! Lists of pairs: CSV files in UTF-8 whose header names their columns.
+//!
+//! The columns are name, left, right, and where they are needed `max_disparity`, `min_disparity` and mask. An empty field is as a
+//! column left out. Empty lines and those that begin with # say nothing.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+use std::str::FromStr;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+use serde::Serialize;
+
+use crate::error::{Error, Result, quoted};
+use crate::options::{DisparityRange, MAX_DISPARITY};
+
+/// What the header of a list may name; the first three it must.
+const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
+const REQUIRED: usize = 3;
+
+/// The longest name of a pair, in bytes: what file systems allow leaves room for what is added.
+const MAX_NAME: usize = 200;
+/// A list of a million pairs is smaller.
+const MAX_BYTES: u64 = 1 << 28;
+
+/// One pair of a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// What its outputs are called; see [`Names`].
+    pub name: String,
+    /// Path of the left image. Paths are as the list has them.
+    pub left: String,
+    /// Path of the right image.
+    pub right: String,
+    /// Path of the mask, if there is one.
+    pub mask: Option<String>,
+    /// Largest disparity to search, where the list says it.
+    pub max_disparity: Option<Largest>,
+    /// Smallest disparity to search, in pixels, where the list says it; at most the largest.
+    pub min_disparity: Option<i32>,
+}
+
+/// The largest disparity to search, as users give it: a number of pixels, or `auto`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Largest {
+    /// What sparse matches say.
+    Auto,
+    /// So many pixels, within [`MAX_DISPARITY`] of 0.
+    #[serde(untagged)]
+    Pixels(i32),
+}
+
+impl FromStr for Largest {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if text == "auto" { Ok(Self::Auto) } else { pixels(text).map(Self::Pixels) }
+    }
+}
+
+/// A disparity, in pixels, as users give it.
+///
+/// # Errors
+/// What to give instead, for anything but a whole number within [`MAX_DISPARITY`] of 0.
+pub fn pixels(text: &str) -> std::result::Result<i32, String> {
+    let reach = -MAX_DISPARITY..=MAX_DISPARITY;
+    let number = text.parse().ok().filter(|number| reach.contains(number));
+    number.ok_or_else(|| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
+}
+
+/// Reads a list; it may have no rows.
+///
+/// # Errors
+/// [`Error::Read`] with the line, where there is one, for what cannot be read or makes no sense.
+pub fn read(path: &Path) -> Result<Vec<Row>> {
+    let mut text = String::new();
+    File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text)).map_err(
+        |e| match e.kind() {
+            ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
+            ErrorKind::InvalidData => Error::read(path, "is no text in UTF-8; give a CSV file"),
+            _ => Error::read(path, e),
+        },
+    )?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(Error::read(path, "larger than any list of pairs; is it one?"));
+    }
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let lines = text.lines().zip(1..).map(|(line, number)| (number, line));
+    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let Some((number, header)) = lines.next() else { return Ok(Vec::new()) };
+    let wrong = |number: usize, reason: String| Error::read(path, format!("line {number}: {reason}"));
+    let columns = columns(&fields(header)).map_err(|reason| wrong(number, reason))?;
+    let mut names = Names::default();
+    let mut rows = Vec::new();
+    for (number, line) in lines {
+        let row = row(&columns, &fields(line)).map_err(|reason| wrong(number, reason))?;
+        names.add(&row.name, number).map_err(|reason| wrong(number, reason))?;
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// An error of the range, told by the list's columns rather than by flags.
+#[must_use]
+pub fn in_columns(error: Error) -> Error {
+    match error {
+        Error::Option { name, reason } => Error::Option {
+            name: name.trim_start_matches("--").replace('-', "_"),
+            reason: reason.replace("--min-disparity", "min_disparity"),
+        },
+        error => error,
+    }
+}
+
+/// The fields of a line of CSV.
+fn fields(line: &str) -> StringRecord {
+    let mut reader =
+        ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(line.as_bytes());
+    // A line of UTF-8 in memory always is a record.
+    reader.records().next().and_then(std::result::Result::ok).unwrap_or_default()
+}
+
+/// Which column each field of the rows belongs to.
+fn columns(header: &StringRecord) -> std::result::Result<Vec<&'static str>, String> {
+    let known = COLUMNS.join(", ");
+    let mut columns = Vec::new();
+    for field in header {
+        let column = COLUMNS.into_iter().find(|column| *column == field);
+        let column = column.ok_or_else(|| {
+            format!("{} is no column; the header names the columns, of {known}", quoted(field))
+        })?;
+        if columns.contains(&column) {
+            return Err(format!("there are two columns {column}; leave one away"));
+        }
+        columns.push(column);
+    }
+    match COLUMNS[..REQUIRED].iter().find(|column| !columns.contains(column)) {
+        Some(missing) => {
+            Err(format!("there is no column {missing}; the header names the columns, of {known}"))
+        }
+        None => Ok(columns),
+    }
+}
+
+fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, String> {
+    if fields.len() != columns.len() {
+        let (found, wanted) = (fields.len(), columns.len());
+        return Err(format!(
+            "there are {found} fields and {wanted} columns; give one each, in double quotes where it has a comma"
+        ));
+    }
+    let field = |name: &str| {
+        let place = columns.iter().position(|column| *column == name)?;
+        fields.get(place).filter(|field| !field.is_empty())
+    };
+    let required =
+        |name: &str| field(name).map(str::to_owned).ok_or_else(|| format!("the {name} is missing"));
+    let within = |column: &str, reason: String| format!("{column}: {reason}");
+    let max = field("max_disparity").map(str::parse).transpose();
+    let min = field("min_disparity").map(pixels).transpose();
+    let row = Row {
+        name: required("name")?,
+        left: required("left")?,
+        right: required("right")?,
+        mask: field("mask").map(str::to_owned),
+        max_disparity: max.map_err(|reason| within("max_disparity", reason))?,
+        min_disparity: min.map_err(|reason| within("min_disparity", reason))?,
+    };
+    if let Some(Largest::Pixels(max)) = row.max_disparity {
+        let range = DisparityRange::new(row.min_disparity.unwrap_or(0), max);
+        range.map_err(|error| in_columns(error).to_string())?;
+    }
+    Ok(row)
+}
+
+/// The names of pairs so far, each good for files of its own. They are told apart by more than upper and lower case: on some file
+/// systems `A` and `a` are one file.
+#[derive(Debug, Default)]
+pub struct Names(HashMap<String, usize>);
+
+impl Names {
+    /// Adds a name from line `line` (from 1; 0 where there are no lines).
+    ///
+    /// # Errors
+    /// What is wrong and the remedy, for a name that is taken, or that no file should have.
+    pub fn add(&mut self, name: &str, line: usize) -> std::result::Result<(), String> {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if name.len() > MAX_NAME || name.starts_with(['.', '-']) || !name.chars().all(allowed) {
+            return Err(format!(
+                "{} is no name for files; rename it: letters (A to Z), digits, -, _ and ., not - or . first, at most \
+                 {MAX_NAME}",
+                quoted(name)
+            ));
+        }
+        let lower = name.to_ascii_lowercase();
+        if let Some(ending) = ["-confidence", "-validity"].into_iter().find(|ending| lower.ends_with(ending))
+        {
+            return Err(format!("`{name}` ends in {ending}, as maps of other pairs do; rename it"));
+        }
+        if let Some(other) = self.0.insert(lower, line) {
+            let mut reason = format!("the name {name} is taken");
+            if other > 0 {
+                let _ = write!(reason, " by line {other}");
+            }
+            return Err(reason + "; rename one of them, by more than upper and lower case");
+        }
+        Ok(())
+    }
+}
