@@ -4,9 +4,7 @@ use std::collections::{HashSet, VecDeque};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, ErrorKind, Write};
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
@@ -23,6 +21,7 @@ use super::claim::Claim;
 use super::progress::PairBar;
 use super::sidecar::Sidecar;
 use super::sign::Sign;
+use super::stop;
 use super::{ExecutionArgs, Failure, MethodArgs, ReadArgs};
 
 const EXAMPLES: &str = "\
@@ -163,13 +162,6 @@ impl Shard {
 /// How long to leave pairs alone that other runs are at.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Whether the user wants it to stop.
-static STOP: AtomicBool = AtomicBool::new(false);
-
-fn go_on() -> ControlFlow<()> {
-    if STOP.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-}
-
 /// What all pairs have in common.
 struct Batch<'a> {
     args: &'a Args,
@@ -190,8 +182,7 @@ pub(super) fn run(args: &Args) -> std::result::Result<(), Failure> {
     if args.status {
         return Ok(batch.print_status(&pairs)?);
     }
-    // Where that fails a signal ends it at once, and the next run removes what is left.
-    let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
+    stop::listen();
     let matcher = Matcher::new(&execution)?;
     match fs::create_dir(&args.folder) {
         Err(e) if e.kind() != ErrorKind::AlreadyExists => Err(Error::write(&args.folder, e).into()),
@@ -308,7 +299,7 @@ impl Batch<'_> {
                 let finished = skipped + done + failed.len();
                 Failure::Stopped(format!("stopped after {finished} of {all}; run it again to resume"))
             };
-            if go_on().is_break() {
+            if stop::go_on().is_break() {
                 return Err(interrupted());
             }
             let Some(claim) = Claim::new(&self.args.folder, name)? else {
@@ -414,7 +405,7 @@ impl Batch<'_> {
         )?;
         let mut warnings = check::warnings(pair, Some(range));
         let start = Instant::now();
-        let matched = matcher.run(pair, range, &self.method, &mut |_| go_on())?;
+        let matched = matcher.run(pair, range, &self.method, &mut |_| stop::go_on())?;
         let time = start.elapsed();
         warnings.extend(check::clipped(&matched.maps, range));
         Ok((input, matched, time, warnings.iter().map(ToString::to_string).collect()))

@@ -16,6 +16,7 @@ use super::breakdown;
 use super::folder::{self, Folder, Scene};
 use super::outputs;
 use super::report::{self, Destination, Picture};
+use super::stop;
 use super::submission::Submission;
 use super::tables::{self, Comparison};
 use super::{ExecutionArgs, MethodArgs, ReadArgs};
@@ -202,6 +203,9 @@ fn over<T>(pairs: &[Figures], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) ->
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
+    if args.disparity.is_none() {
+        stop::listen();
+    }
     let (destination, submission) = check_outputs(args)?;
     if args.tables {
         return compare(args);

@@ -18,6 +18,7 @@ use super::match_outputs::{MoreOutputs, Outcome};
 use super::search::{Found, Search};
 use super::sidecar::{Files, Sidecar};
 use super::sign::Sign;
+use super::stop;
 use super::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
 
 const EXAMPLES: &str = "\
@@ -86,6 +87,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
+    stop::listen();
     let mut method = args.method.method()?;
     if args.no_fill {
         method.fill = Fill::None;

@@ -22,6 +22,7 @@ mod search;
 mod shell;
 mod sidecar;
 mod sign;
+mod stop;
 mod submission;
 mod synthetic;
 mod tables;
@@ -56,7 +57,7 @@ Examples:
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
-Exit status: 0 when all went well, 2 when the command line makes no sense, 130 when a batch is stopped, 1 for any other \
+Exit status: 0 when all went well, 2 when the command line makes no sense, 130 when stopped by Ctrl-C or SIGTERM, 1 for any other \
 failure. A failure is one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
@@ -99,8 +100,7 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Usage(_) => ExitCode::from(2),
-            // As shells have it for SIGINT.
-            Self::Stopped(_) => ExitCode::from(130),
+            Self::Stopped(_) => ExitCode::from(stop::STOPPED),
             Self::Incomplete(_) | Self::Error(_) => ExitCode::FAILURE,
         }
     }
@@ -124,7 +124,10 @@ fn single_line(text: &str) -> String {
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        Self::Error(error)
+        match error {
+            Error::Interrupted => Self::Stopped("stopped; nothing is left behind".into()),
+            error => Self::Error(error),
+        }
     }
 }
 
@@ -335,7 +338,7 @@ fn calibrated_range(path: &Path, calibration: &Calibration, min: i32) -> Result<
     }
 }
 
-/// Matches a pair with a progress bar, and says on standard error what ran where and how long. `name` tells pairs
+/// Matches a pair with a progress bar, unless it is [stopped](stop), and says on standard error what ran where and how long. `name` tells pairs
 /// apart where there are several.
 fn match_and_tell(
     matcher: &mut Matcher,

@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use mrfgs::solver::Progress;
 
+use super::stop;
+
 /// What is over sooner than this needs no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
 const STEPS: u64 = 1000;
@@ -25,6 +27,7 @@ impl Bar {
         Self { start: Instant::now(), wanted, name: name.unwrap_or("mrfgs").into(), drawn: None }
     }
 
+    /// Shows how far it is, and says whether to go on.
     pub(super) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
         if self.wanted && self.start.elapsed() > PATIENCE {
             let bar = self.drawn.get_or_insert_with(|| {
@@ -39,7 +42,7 @@ impl Bar {
             });
             bar.set_position((progress.done * STEPS as f64) as u64);
         }
-        ControlFlow::Continue(())
+        stop::go_on()
     }
 
     /// Takes the bar away.

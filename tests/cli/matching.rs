@@ -1,6 +1,9 @@
 //! `mrfgs match`: what it writes.
 
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use mrfgs::image::read;
 use mrfgs::maps::flag;
@@ -195,6 +198,49 @@ fn intermediates_show_every_step() {
         assert!(changes.lines().count() > 5 && changes.starts_with("iteration,rms_change_px"), "{changes}");
         assert!(listing(folder.path()).keys().all(|p| !p.to_str().unwrap().contains(".mrfgs-")));
         fs::remove_dir_all(steps).unwrap();
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_stopped_leaves_nothing_behind() {
+    let (left, right) = (scene_file("mixed", "im0.png"), scene_file("mixed", "im1.png"));
+    let dirs = ["slanted", "mixed"].map(|name| scene(name).to_str().unwrap().to_owned());
+    // `match` once its folder is begun, `evaluate` once it has told of the first pair.
+    let runs: [(&str, &[&str]); 2] = [
+        ("-INT", &["match", &left, &right, "d.pfm", "--intermediates", "steps", "--json", "told.json"]),
+        ("-TERM", &["evaluate", &dirs[0], &dirs[1], "--report", "report"]),
+    ];
+    for (signal, args) in runs {
+        let folder = tempfile::tempdir().unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+            .current_dir(folder.path())
+            .args(args)
+            .args(["--preset", "paper", "--set", "tolerance=0", "--backend", "cpu", "--threads", "1"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut told = BufReader::new(child.stderr.take().unwrap());
+        let mut said = String::new();
+        if args[0] == "evaluate" {
+            told.read_line(&mut said).unwrap();
+            assert!(said.contains("slanted"), "{said}");
+        } else {
+            let start = Instant::now();
+            while fs::read_dir(folder.path()).unwrap().next().is_none() {
+                assert!(start.elapsed() < Duration::from_secs(60), "no folder is begun");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        told.read_to_string(&mut said).unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{args:?}: {said}");
+        assert_eq!(said.lines().last(), Some("mrfgs: stopped; nothing is left behind"), "{args:?}");
+        assert_eq!(output.stdout, b"", "{args:?}");
+        assert!(listing(folder.path()).is_empty(), "{args:?}: {:?}", listing(folder.path()).keys());
     }
 }
 
