@@ -18,6 +18,7 @@ use mrfgs::{Error, Matched, Matcher, Result};
 use super::batch_list::{Input, List, Listed};
 use super::batch_record::{Request, State};
 use super::claim::Claim;
+use super::outputs;
 use super::progress::PairBar;
 use super::sidecar::Sidecar;
 use super::sign::Sign;
@@ -193,18 +194,7 @@ pub(super) fn run(args: &Args) -> std::result::Result<(), Failure> {
 /// Refuses an output folder that could not be one, and outputs that would overwrite an input.
 fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
     let folder = &args.folder;
-    let parent = folder.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
-    let place = match folder.canonicalize() {
-        Ok(place) if place.is_dir() => place,
-        Ok(_) => return Err(Error::write(folder, "is a file; give the name of a folder")),
-        Err(_) => match (parent.canonicalize(), folder.file_name()) {
-            (Ok(parent), Some(name)) if parent.is_dir() => parent.join(name),
-            _ => {
-                let reason = format!("there is no folder {}; create it first", parent.display());
-                return Err(Error::write(folder, reason));
-            }
-        },
-    };
+    let place = outputs::folder_place(folder)?;
     if args.list.is_dir() {
         if args.list.canonicalize().is_ok_and(|list| place.starts_with(list)) {
             let reason = format!("lies in {}, the folder of the pairs; give another", args.list.display());

@@ -128,6 +128,24 @@ pub(super) fn deliver(
     super::print(&printed)
 }
 
+/// Where a folder for outputs is, or would be.
+pub(super) fn folder_place(name: &Path) -> Result<PathBuf> {
+    match fs::canonicalize(name) {
+        Ok(place) if place.is_dir() => Ok(place),
+        Ok(_) => Err(Error::write(name, "is a file; give the name of a folder")),
+        Err(_) => {
+            let parent = parent(name);
+            match (fs::canonicalize(parent), name.file_name()) {
+                (Ok(parent), Some(last)) if parent.is_dir() => Ok(parent.join(last)),
+                _ => {
+                    let reason = format!("there is no folder {}; create it first", parent.display());
+                    Err(Error::write(name, reason))
+                }
+            }
+        }
+    }
+}
+
 /// A folder in the making, beside the place that it takes once it is whole; gone with all it holds when dropped before.
 pub(super) struct StagedFolder {
     /// As the user wrote it.
@@ -139,18 +157,7 @@ pub(super) struct StagedFolder {
 impl StagedFolder {
     /// Begins the folder `name`, which may be there already.
     pub(super) fn new(name: &Path) -> Result<Self> {
-        let error = |reason: String| Err(Error::write(name, reason));
-        let place = match fs::canonicalize(name) {
-            Ok(place) if !place.is_dir() => return error("is a file; give the name of a folder".into()),
-            Ok(place) => place,
-            Err(_) => {
-                let parent = parent(name);
-                match (fs::canonicalize(parent), name.file_name()) {
-                    (Ok(parent), Some(last)) if parent.is_dir() => parent.join(last),
-                    _ => return error(format!("there is no folder {}; create it first", parent.display())),
-                }
-            }
-        };
+        let place = folder_place(name)?;
         let beside = place.parent().unwrap_or(&place);
         let staging = tempfile::Builder::new().prefix(".mrfgs-").suffix(".tmp").tempdir_in(beside);
         let staging = staging.map_err(|e| {
