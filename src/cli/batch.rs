@@ -278,7 +278,7 @@ impl Batch<'_> {
             pairs.iter().filter(|listed| self.state(listed) != State::Complete).collect();
         let all = pairs.len();
         let (mut done, mut skipped, mut failed) = (0, all - left.len(), Vec::new());
-        let bar = PairBar::new(all, skipped, self.args.quiet);
+        let mut bar = PairBar::new(all, skipped, self.args.quiet);
         let mut told = None;
         // How many pairs in a row were with other runs.
         let mut taken = 0;

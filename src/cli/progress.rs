@@ -12,6 +12,8 @@ use super::stop;
 /// What is over sooner than this needs no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
 const STEPS: u64 = 1000;
+/// How often a batch tells a log how far it is.
+const SILENCE: Duration = Duration::from_secs(30);
 
 /// A bar on a terminal, from [`PATIENCE`] on.
 pub(super) struct Bar {
@@ -53,40 +55,96 @@ impl Bar {
     }
 }
 
-/// The pairs done of all those of a batch, on a terminal.
-pub(super) struct PairBar(ProgressBar);
+/// The pairs done of all those of a batch: a bar on a terminal, elsewhere a line now and then.
+pub(super) struct PairBar {
+    drawn: Option<ProgressBar>,
+    log: Option<Log>,
+}
 
 impl PairBar {
-    /// A bar for so many pairs, of which some are done.
+    /// For so many pairs, of which some are done.
     pub(super) fn new(pairs: usize, done: usize, quiet: bool) -> Self {
-        if quiet || !std::io::stderr().is_terminal() {
-            return Self(ProgressBar::hidden());
+        let terminal = std::io::stderr().is_terminal();
+        let bar = || {
+            let style = ProgressStyle::with_template("mrfgs [{bar:40}] {pos} of {len} {msg}");
+            let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+            let bar = ProgressBar::new(pairs as u64).with_style(style);
+            bar.set_position(done as u64);
+            bar
+        };
+        Self {
+            drawn: (terminal && !quiet).then(bar),
+            log: (!terminal && !quiet).then(|| Log { pairs, done, last: Instant::now() }),
         }
-        let style = ProgressStyle::with_template("mrfgs [{bar:40}] {pos} of {len} {msg}");
-        let bar =
-            ProgressBar::new(pairs as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_position(done as u64);
-        Self(bar)
     }
 
     /// Shows the pair at work.
-    pub(super) fn begin(&self, name: &str) {
-        self.0.set_message(name.to_owned());
+    pub(super) fn begin(&mut self, name: &str) {
+        if let Some(bar) = &self.drawn {
+            bar.set_message(name.to_owned());
+        }
+        if let Some(line) = self.log.as_mut().and_then(|log| log.line(name, Instant::now())) {
+            super::say(&line);
+        }
     }
 
     /// Counts a pair that is done or has failed.
-    pub(super) fn end(&self) {
-        self.0.inc(1);
+    pub(super) fn end(&mut self) {
+        if let Some(bar) = &self.drawn {
+            bar.inc(1);
+        }
+        if let Some(log) = &mut self.log {
+            log.done += 1;
+        }
     }
 
     /// Lets `say` write to standard error past the bar.
     pub(super) fn past(&self, say: impl FnOnce()) {
-        self.0.suspend(say);
+        match &self.drawn {
+            Some(bar) => bar.suspend(say),
+            None => say(),
+        }
     }
 }
 
 impl Drop for PairBar {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        if let Some(bar) = &self.drawn {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// How far a batch is, for logs.
+struct Log {
+    pairs: usize,
+    done: usize,
+    /// When it last was told.
+    last: Instant,
+}
+
+impl Log {
+    /// What to tell before the pair `name`, if it is time.
+    fn line(&mut self, name: &str, now: Instant) -> Option<String> {
+        (now.duration_since(self.last) >= SILENCE).then(|| {
+            self.last = now;
+            format!("{} of {} pairs, now {name}", self.done, self.pairs)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_tells_now_and_then() {
+        let start = Instant::now();
+        let mut log = Log { pairs: 9, done: 2, last: start };
+        assert_eq!(log.line("a", start + SILENCE / 2), None);
+        assert_eq!(log.line("b", start + SILENCE), Some("2 of 9 pairs, now b".into()));
+        assert_eq!(log.line("c", start + SILENCE + SILENCE / 2), None);
+        log.done = 5;
+        assert_eq!(log.line("d", start + 2 * SILENCE), Some("5 of 9 pairs, now d".into()));
     }
 }
