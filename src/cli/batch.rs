@@ -66,8 +66,8 @@ pub(super) struct Args {
     /// Does one of N parts of the list, the K-th from 1 on, such as 2/8
     ///
     /// The part of a pair follows from its name and N alone (64-bit FNV-1a, upper and lower half joined by exclusive or,
-    /// modulo N), so it stays the same when others come or go. Runs at the same time into the same
-    /// OUTDIR, of parts or of the whole, do each pair once: a run locks the pair that it is at (OUTDIR/.NAME.tmp).
+    /// modulo N), so it stays the same when others come or go. Runs at the same time into the same OUTDIR, of parts or of the
+    /// whole, do each pair once: a run locks the pair that it is at (OUTDIR/.NAME.tmp), where the file system has locks.
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<Shard>,
     /// Prints how far each pair is (complete, failed or missing) for the same arguments, and runs nothing

@@ -39,8 +39,7 @@ impl Claim {
             };
             match lock.try_lock() {
                 Err(TryLockError::WouldBlock) => return Ok(None),
-                // Some file systems of networks know no locks; there it is up to the user.
-                Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => return Err(failed(e)),
+                // Some file systems of networks have no locks; there it is up to the user.
                 Err(TryLockError::Error(_)) | Ok(()) => {}
             }
             let locked = Handle::from_file(lock.try_clone().map_err(failed)?).map_err(failed)?;

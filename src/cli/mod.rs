@@ -57,8 +57,8 @@ Examples:
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
-Exit status: 0 when all went well, 2 when the command line makes no sense, 130 when stopped by Ctrl-C or SIGTERM, 1 for any other \
-failure. A failure is one line on standard error and leaves no output behind.";
+Exit status: 0 when all went well, 2 when the command line makes no sense, 130 when stopped by Ctrl-C or SIGTERM, 1 for \
+any other failure. A failure is one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
 #[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
@@ -338,8 +338,8 @@ fn calibrated_range(path: &Path, calibration: &Calibration, min: i32) -> Result<
     }
 }
 
-/// Matches a pair with a progress bar, unless it is [stopped](stop), and says on standard error what ran where and how long. `name` tells pairs
-/// apart where there are several.
+/// Matches a pair with a progress bar, unless it is [stopped](stop), and says on standard error what ran where and how long.
+/// `name` tells pairs apart where there are several.
 fn match_and_tell(
     matcher: &mut Matcher,
     pair: &Pair,
