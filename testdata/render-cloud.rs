@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(args: &[String]) -> Result<(), String> {
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
     let (files, degrees) = args.split_at(args.len().min(2));
     let degrees: Result<Vec<f64>, _> = degrees.iter().map(|angle| angle.parse()).collect();
     let ([cloud, picture], Some([right, up])) = (files, degrees.ok().and_then(angles)) else {

@@ -12,6 +12,9 @@ mod hostile;
 mod matching;
 mod outputs;
 mod plugin;
+#[path = "../../testdata/render-cloud.rs"]
+#[allow(dead_code, reason = "an example has a main function")]
+mod render_cloud;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -112,6 +112,22 @@ fn a_calibration_file_elsewhere_gives_the_range() {
     run(folder.path(), &args).succeeded();
 }
 
+#[test]
+fn the_pictures_of_the_readme_are_those_of_its_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    matched(folder.path(), "mixed", &["d.pfm", "--preview", "disparity.png", "--point-cloud", "cloud.ply"]);
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    super::render_cloud::run(&[at("cloud.ply"), at("cloud.png")]).unwrap();
+    // The sines of another system may put a point into the next pixel.
+    for (name, most) in [("disparity.png", 0), ("cloud.png", 640 * 480 / 1000)] {
+        let [made, shown] =
+            [at(name), scene_file("mixed", name)].map(|path| image::open(path).unwrap().to_rgb8());
+        assert_eq!(made.dimensions(), shown.dimensions());
+        let others = made.pixels().zip(shown.pixels()).filter(|(made, shown)| made != shown).count();
+        assert!(others <= most, "{name} is another picture now, in {others} pixels; replace it");
+    }
+}
+
 /// A point of a cloud: position, colour, confidence.
 type Point = ([f64; 3], [u8; 3], u8);
 
