@@ -310,6 +310,11 @@ impl ExecutionArgs {
         if self.backend == Backend::Cpu && device.is_some() {
             return Err(no_device());
         }
+        if let Some(threads) = threads {
+            // What is done around a match (reading, the look at what may be wrong) is bound by it too. A second call changes
+            // nothing.
+            let _ = rayon::ThreadPoolBuilder::new().num_threads((*threads).into()).build_global();
+        }
         Ok(Execution {
             backend: match self.backend {
                 Backend::Auto => Choice::Auto,

@@ -55,7 +55,9 @@ impl Reader {
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
-        let images = [decode_file(left, self.max_pixels)?, decode_file(right, self.max_pixels)?];
+        let (first, second) =
+            rayon::join(|| decode_file(left, self.max_pixels), || decode_file(right, self.max_pixels));
+        let images = [first?, second?];
         let [l, r] = &images;
         if l.size() != r.size() {
             return Err(Error::Mismatch(format!(
