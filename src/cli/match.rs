@@ -55,7 +55,7 @@ pub(super) struct Args {
 
     #[command(flatten)]
     search: Search,
-    /// Which way disparities count: those of the range, OUTPUT and --raw
+    /// Which way disparities count in the range, OUTPUT and --raw; the Ames Stereo Pipeline takes right-minus-left
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
     /// Calibration file: the range (ndisp), and the cameras for depth and points [default: a calib.txt beside LEFT]
