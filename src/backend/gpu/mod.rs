@@ -1,10 +1,11 @@
 //! The GPU path: wgpu on Vulkan or Metal, one shader or a few a stage.
 //!
-//! Volumes are \[y\]\[x\]\[slot\]\[label\], labels padded to blocks of 16, packed four 8-bit or two 16-bit values a word. Rows start
-//! at multiples of 256 bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a
-//! shader see at once, a stage runs band by band, each band bound with the rows above and below that it reads; where
-//! it exceeds the largest buffer, it is several (`buffers`). The pair and its graph go up once, the maps come down
-//! once, and in between nothing leaves the device but the sum of [`Stage::Change`].
+//! Volumes are \[y\]\[slot\]\[quad\]\[x\]: four labels of all pixels of a row, then the next four, and so of one slot after the
+//! other, packed four 8-bit or two 16-bit values a word; labels are padded to blocks of 16. Rows start at multiples of 256
+//! bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a shader see at once, a stage
+//! runs band by band, each band bound with the rows above and below that it reads; where it exceeds the largest buffer, it is
+//! several (`buffers`). The pair and its graph go up once, the maps come down once, and in between nothing leaves the device
+//! but the sum of [`Stage::Change`].
 
 mod buffers;
 mod device;
@@ -12,8 +13,9 @@ mod kernels;
 mod stages;
 mod timer;
 mod upload;
+mod values;
 
-use super::{Backend, Map, PaddedRows, Requested, Stage, Traffic, Volume, volume_shape};
+use super::{Backend, Map, Requested, Stage, Traffic, Volume};
 use crate::error::{Error, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
@@ -293,43 +295,6 @@ impl Gpu {
         self.device.check()
     }
 
-    /// Where a volume is, words a row and values a word.
-    fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
-        let state = self.state();
-        let width = state.plan.volume_width.bytes();
-        let level = &state.buffers.levels[volume.level()];
-        let (rows, bytes) = match volume {
-            Volume::Cost(z) => (&level.cost, if z == 0 { 1 } else { 2 }),
-            Volume::Evidence(_) => (&level.evidence, 1),
-            Volume::Dependency(_) => (&level.dependency, width),
-            Volume::Down(_) => (&level.down, width),
-            Volume::Up(_) => (&level.up, width),
-            Volume::Belief(_) => (&level.belief, width),
-        };
-        let pitch = match volume {
-            Volume::Dependency(_) => level.params.dependency_pitch,
-            _ => level.params.pitch,
-        };
-        (rows.clone(), bytes * pitch as usize, 4 / bytes)
-    }
-
-    /// Where a map is: the buffer, words a pixel, the word, the lowest bit and the mask.
-    fn map(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
-        let b = &self.state().buffers;
-        let (rows, words, word, bit, mask) = match map {
-            Map::Label => (&b.peaks, 2, 0, 0, 0xffff),
-            Map::Best => (&b.peaks, 2, 0, 16, 0xffff),
-            Map::Rival => (&b.peaks, 2, 1, 0, 0xffff),
-            Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
-            Map::RightBest => (&b.right_labels, 1, 0, 16, 0xffff),
-            Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),
-            Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
-            Map::Validity => (&b.flags, 1, 0, 0, 0xff),
-            Map::Confidence => (&b.flags, 1, 0, 8, 0xff),
-        };
-        (rows.clone(), words, word, bit, mask)
-    }
-
     /// Width, height, and elements in a row of maps.
     fn map_shape(&self) -> (usize, usize, usize) {
         let (width, height) = self.state().plan.size();
@@ -347,18 +312,6 @@ struct RequestedRows {
 pub struct RequestedMaps {
     rows: RequestedRows,
     shape: (usize, usize, usize),
-}
-
-/// The word of a row of `volume` that holds a label of its line \[x\]\[slot\]: the shaders keep the first four labels of all
-/// pixels together, then the next four, and so on, and the same of each slot.
-fn word_places(plan: &Plan, volume: Volume, per_word: usize) -> impl Fn(usize, usize) -> usize + use<> {
-    let level = &plan.levels[volume.level()];
-    let slots = volume_shape(plan, volume).0 / level.pixels();
-    let (width, quads) = (level.width, level.stride / 4);
-    move |line, label| {
-        let quad = (line % slots * quads + label / 4) * width + line / slots;
-        quad * (4 / per_word) + label % 4 / per_word
-    }
 }
 
 impl Backend for Gpu {
@@ -483,60 +436,20 @@ impl Backend for Gpu {
     }
 
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
-        let (buffer, pitch, per_word) = self.volume(volume);
-        let words = self.rows(&[&buffer])?.remove(0);
-        let plan = &self.state().plan;
-        let (rows, labels, _) = volume_shape(plan, volume);
-        let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
-        let lines = rows / plan.levels[volume.level()].height;
-        let mut values = Vec::with_capacity(rows * labels);
-        for line in words.chunks_exact(pitch) {
-            for (i, label) in (0..lines).flat_map(|i| (0..labels).map(move |label| (i, label))) {
-                let word = line[place(i, label)] >> (bits * (label % per_word));
-                values.push(word & (u32::MAX >> (32 - bits)));
-            }
-        }
-        Ok(values)
+        self.volume_values(volume)
     }
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         self.submit()?;
-        let (buffer, pitch, per_word) = self.volume(volume);
-        let plan = &self.state().plan;
-        let height = plan.levels[volume.level()].height;
-        let rows = PaddedRows::new(plan, volume, values);
-        let per_line = volume_shape(plan, volume).0 / height;
-        let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
-        let mut words = vec![0u32; pitch * height];
-        for (i, row) in rows.iter().enumerate() {
-            let line = &mut words[i / per_line * pitch..];
-            for (label, value) in row.into_iter().enumerate() {
-                line[place(i % per_line, label)] |= value << (bits * (label % per_word));
-            }
-        }
-        buffer.write(&mut self.device, &words)
+        self.set_volume_values(volume, values)
     }
 
     fn read_map(&mut self, map: Map) -> Result<Plane<i32>> {
-        let (rows, words, word, bit, mask) = self.map(map);
-        let data = self.rows(&[&rows])?.remove(0);
-        let (width, height, pitch) = self.map_shape();
-        let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
-        Ok(Plane::from_fn(width, height, value))
+        self.map_values(map)
     }
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
-        let (rows, words, word, bit, mask) = self.map(map);
-        let mut data = self.rows(&[&rows])?.remove(0);
-        let (width, height, pitch) = self.map_shape();
-        assert_eq!(values.size(), (width, height), "a map of the size of the images");
-        for y in 0..height {
-            for x in 0..width {
-                let old = &mut data[words * (y * pitch + x) + word];
-                *old = *old & !(mask << bit) | (values[(x, y)].cast_unsigned() & mask) << bit;
-            }
-        }
-        rows.write(&mut self.device, &data)
+        self.set_map_values(map, values)
     }
 
     fn poison(&mut self, byte: u8) -> Result<()> {

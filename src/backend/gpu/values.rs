@@ -1,0 +1,119 @@
+//! Volumes and maps as a device holds them, value by value: for tests, which look at every stage by itself.
+
+use super::Gpu;
+use super::buffers::Rows;
+use crate::backend::{Map, PaddedRows, Volume, volume_shape};
+use crate::error::Result;
+use crate::image::Plane;
+use crate::plan::Plan;
+
+impl Gpu {
+    /// The values of a volume, as [`Backend::read`](crate::backend::Backend::read) gives them.
+    pub(super) fn volume_values(&mut self, volume: Volume) -> Result<Vec<u32>> {
+        let (buffer, pitch, per_word) = self.volume(volume);
+        let words = self.rows(&[&buffer])?.remove(0);
+        let plan = &self.state().plan;
+        let (rows, labels, _) = volume_shape(plan, volume);
+        let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
+        let lines = rows / plan.levels[volume.level()].height;
+        let mut values = Vec::with_capacity(rows * labels);
+        for line in words.chunks_exact(pitch) {
+            for (i, label) in (0..lines).flat_map(|i| (0..labels).map(move |label| (i, label))) {
+                let word = line[place(i, label)] >> (bits * (label % per_word));
+                values.push(word & (u32::MAX >> (32 - bits)));
+            }
+        }
+        Ok(values)
+    }
+
+    /// Sets them.
+    pub(super) fn set_volume_values(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
+        let (buffer, pitch, per_word) = self.volume(volume);
+        let plan = &self.state().plan;
+        let height = plan.levels[volume.level()].height;
+        let rows = PaddedRows::new(plan, volume, values);
+        let per_line = volume_shape(plan, volume).0 / height;
+        let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
+        let mut words = vec![0u32; pitch * height];
+        for (i, row) in rows.iter().enumerate() {
+            let line = &mut words[i / per_line * pitch..];
+            for (label, value) in row.into_iter().enumerate() {
+                line[place(i % per_line, label)] |= value << (bits * (label % per_word));
+            }
+        }
+        buffer.write(&mut self.device, &words)
+    }
+
+    /// The values of a map, which may share its words with others.
+    pub(super) fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
+        let (rows, words, word, bit, mask) = self.map(map);
+        let data = self.rows(&[&rows])?.remove(0);
+        let (width, height, pitch) = self.map_shape();
+        let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
+        Ok(Plane::from_fn(width, height, value))
+    }
+
+    /// Sets them, and nothing else in these words.
+    pub(super) fn set_map_values(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
+        let (rows, words, word, bit, mask) = self.map(map);
+        let mut data = self.rows(&[&rows])?.remove(0);
+        let (width, height, pitch) = self.map_shape();
+        assert_eq!(values.size(), (width, height), "a map of the size of the images");
+        for y in 0..height {
+            for x in 0..width {
+                let old = &mut data[words * (y * pitch + x) + word];
+                *old = *old & !(mask << bit) | (values[(x, y)].cast_unsigned() & mask) << bit;
+            }
+        }
+        rows.write(&mut self.device, &data)
+    }
+
+    /// Where a volume is, words a row and values a word.
+    fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
+        let state = self.state();
+        let width = state.plan.volume_width.bytes();
+        let level = &state.buffers.levels[volume.level()];
+        let (rows, bytes) = match volume {
+            Volume::Cost(z) => (&level.cost, if z == 0 { 1 } else { 2 }),
+            Volume::Evidence(_) => (&level.evidence, 1),
+            Volume::Dependency(_) => (&level.dependency, width),
+            Volume::Down(_) => (&level.down, width),
+            Volume::Up(_) => (&level.up, width),
+            Volume::Belief(_) => (&level.belief, width),
+        };
+        let pitch = match volume {
+            Volume::Dependency(_) => level.params.dependency_pitch,
+            _ => level.params.pitch,
+        };
+        (rows.clone(), bytes * pitch as usize, 4 / bytes)
+    }
+
+    /// Where a map is: the buffer, words a pixel, the word, the lowest bit and the mask.
+    fn map(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
+        let b = &self.state().buffers;
+        let (rows, words, word, bit, mask) = match map {
+            Map::Label => (&b.peaks, 2, 0, 0, 0xffff),
+            Map::Best => (&b.peaks, 2, 0, 16, 0xffff),
+            Map::Rival => (&b.peaks, 2, 1, 0, 0xffff),
+            Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
+            Map::RightBest => (&b.right_labels, 1, 0, 16, 0xffff),
+            Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),
+            Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
+            Map::Validity => (&b.flags, 1, 0, 0, 0xff),
+            Map::Confidence => (&b.flags, 1, 0, 8, 0xff),
+        };
+        (rows.clone(), words, word, bit, mask)
+    }
+}
+
+/// The word of a row of `volume` that holds a label of its line \[x\]\[slot\]: the shaders keep the first four labels of all
+/// pixels together, then the next four, and so on, and the same of each slot.
+fn word_places(plan: &Plan, volume: Volume, per_word: usize) -> impl Fn(usize, usize) -> usize + use<> {
+    let level = &plan.levels[volume.level()];
+    let slots = volume_shape(plan, volume).0 / level.pixels();
+    let (width, quads) = (level.width, level.stride / 4);
+    move |line, label| {
+        let quad = (line % slots * quads + label / 4) * width + line / slots;
+        quad * (4 / per_word) + label % 4 / per_word
+    }
+}
