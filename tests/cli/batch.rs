@@ -196,7 +196,8 @@ fn a_killed_batch_resumes() {
 
 #[test]
 fn runs_at_the_same_time_share_the_pairs() {
-    let folder = pairs(20, (96, 64));
+    // Long enough that none does it all before the others begin.
+    let folder = pairs(30, (160, 120));
     batch(folder.path(), &["list.csv", "single"]).succeeded();
     let whole = maps(&folder.path().join("single"));
     let out = folder.path().join("out");
@@ -207,13 +208,13 @@ fn runs_at_the_same_time_share_the_pairs() {
         assert!(output.status.success(), "{said}");
         let numbers: Vec<usize> = said.split(' ').filter_map(|word| word.parse().ok()).collect();
         let [done, skipped, 0] = numbers[..] else { panic!("{said}") };
-        assert_eq!(done + skipped, 20, "{said}");
+        assert_eq!(done + skipped, 30, "{said}");
         done
     });
-    assert_eq!(done.iter().sum::<usize>(), 20, "each pair once: {done:?}");
+    assert_eq!(done.iter().sum::<usize>(), 30, "each pair once: {done:?}");
     assert!(done.iter().filter(|&&done| done > 0).count() > 1, "{done:?}");
     assert!(maps(&out) == whole);
-    assert_eq!(listing(&out).len(), 40, "nothing else is left");
+    assert_eq!(listing(&out).len(), 60, "nothing else is left");
 }
 
 #[cfg(unix)]
