@@ -4,7 +4,7 @@
 //! place. Padding labels go through the same arithmetic as labels; their belief is the largest there is, and no label's
 //! exceeds [`Plan::belief_most`], so that no minimum is theirs alone.
 
-use super::units::{Blocks, Cutting, Least, Units, block, block_mut, keep_least, least_of, smallest};
+use super::units::{Blocks, Cutting, Least, Units, block, block_mut, keep_least, smallest};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{Cut, CutRule, GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use rayon::prelude::*;
@@ -83,6 +83,7 @@ pub(super) fn row<U: Units>(
         let (dx, dy) = offset(code as u8);
         (REACH.wrapping_add_signed(dy as isize), dx as isize * stride as isize)
     });
+    touch(around[2 * REACH]);
     for (x, messages) in messages.chunks_exact_mut(slots * stride).enumerate() {
         let own = x * stride;
         let place = |code: u8| {
@@ -110,6 +111,13 @@ pub(super) fn row<U: Units>(
             }
         }
     }
+}
+
+/// Brings a row into the cache in its own order, which the processor foresees; that in which factors come upon it, it does
+/// not.
+fn touch<U: Units>(row: &[U]) {
+    let step = 64 / size_of::<U>();
+    std::hint::black_box(row.iter().step_by(step).fold(U::default(), |most, &v| most.max(v)));
 }
 
 /// A factor of three, whose sums are of two each.
@@ -153,9 +161,39 @@ fn three<U: Units>(cut: Cut, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut 
     let stride = beliefs[0].len();
     let mut factor = Three { beliefs, messages: &*messages, sums, least: [[U::MOST; LABEL_BLOCK]; 3] };
     factor.all(stride);
-    let least = least_of(&factor.least);
+    let (least, tau) = (factor.least, U::of(cut.tau.into()));
     for ((out, sums), least) in messages.chunks_exact_mut(stride).zip(sums.chunks_exact(stride)).zip(least) {
-        Cutting::new(sums, least, cut, out).all(stride);
+        let least = least_in_all(least);
+        RelativeCutting { sums, least, high: least.map(|least| least.plus(tau)), out }.all(stride);
+    }
+}
+
+/// The smallest of all lanes, in each of them. (So the bounds of a message stay in vectors; on their way through single bytes
+/// a factor waited longer than it computed.)
+#[inline(always)]
+fn least_in_all<U: Units>(mut lanes: Least<U>) -> Least<U> {
+    for apart in [8, 4, 2, 1] {
+        lanes = from_fn(|i| lanes[i].min(lanes[i ^ apart]));
+    }
+    lanes
+}
+
+/// [`Cutting`] by [`CutRule::Relative`], with bounds that are vectors.
+struct RelativeCutting<'a, U> {
+    sums: &'a [U],
+    least: Least<U>,
+    high: Least<U>,
+    out: &'a mut [U],
+}
+
+impl<U: Units> Blocks for RelativeCutting<'_, U> {
+    #[inline(always)]
+    fn block<const N: usize>(&mut self, at: usize) {
+        let sums = block::<U, N>(self.sums, at);
+        *block_mut(self.out, at) = from_fn::<U, N, _>(|i| {
+            let lane = i % LABEL_BLOCK;
+            sums[i].min(self.high[lane]).less(self.least[lane])
+        });
     }
 }
 
