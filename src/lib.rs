@@ -62,6 +62,7 @@ pub mod plan;
 pub mod roofline;
 pub mod solver;
 pub mod tables;
+mod text;
 pub mod tiles;
 
 pub use error::{Error, Result};

@@ -5,8 +5,6 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
-use std::fs::File;
-use std::io::{ErrorKind, Read};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -15,6 +13,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result, quoted};
 use crate::options::{DisparityRange, MAX_DISPARITY};
+use crate::text;
 
 /// What the header of a list may name; the first three it must.
 const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
@@ -76,17 +75,8 @@ pub fn pixels(text: &str) -> std::result::Result<i32, String> {
 /// # Errors
 /// [`Error::Read`] with the line, where there is one, for what cannot be read or makes no sense.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
-    let mut text = String::new();
-    File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text)).map_err(
-        |e| match e.kind() {
-            ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-            ErrorKind::InvalidData => Error::read(path, "is no text in UTF-8; give a CSV file"),
-            _ => Error::read(path, e),
-        },
-    )?;
-    if text.len() as u64 > MAX_BYTES {
-        return Err(Error::read(path, "larger than any list of pairs; is it one?"));
-    }
+    let text = String::from_utf8(text::read(path, MAX_BYTES, "list of pairs")?)
+        .map_err(|_| Error::read(path, "is no text in UTF-8; give a CSV file"))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let lines = text.lines().zip(1..).map(|(line, number)| (number, line));
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
@@ -176,8 +166,9 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     Ok(row)
 }
 
-/// The names of pairs so far, each good for files of its own. They are told apart by more than upper and lower case: on some file
-/// systems `A` and `a` are one file.
+/// The names of pairs so far, each good for files of its own: letters, digits, -, _ and ., and no ending that `mrfgs batch` gives
+/// to more maps of a pair (-confidence, -validity). They differ by more than upper and lower case: on some file systems `A` and
+/// `a` are one file.
 #[derive(Debug, Default)]
 pub struct Names(HashMap<String, usize>);
 

@@ -7,8 +7,8 @@
 //! this project's.
 
 use crate::error::{Error, Result, one_line};
+use crate::text;
 use serde::{Deserialize, Serialize};
-use std::io::Read;
 use std::path::Path;
 
 /// The disparities to search, in pixels, both ends included.
@@ -367,17 +367,8 @@ impl Method {
     /// [`Error::Read`] when the file cannot be read, is no TOML, or holds a key or a value that does not fit; it names
     /// the line.
     pub fn load(&mut self, path: &Path) -> Result<()> {
-        let mut text = String::new();
-        std::fs::File::open(path)
-            .and_then(|file| file.take(MAX_CONFIG_BYTES + 1).read_to_string(&mut text))
-            .map_err(|e| match e.kind() {
-                std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-                std::io::ErrorKind::InvalidData => Error::read(path, "is no text; give a TOML file"),
-                _ => Error::read(path, e),
-            })?;
-        if text.len() as u64 > MAX_CONFIG_BYTES {
-            return Err(Error::read(path, "larger than any config file; is it one?"));
-        }
+        let text = String::from_utf8(text::read(path, MAX_CONFIG_BYTES, "config file")?)
+            .map_err(|_| Error::read(path, "is no text; give a TOML file"))?;
         let line = |at: usize| text[..at].matches('\n').count() + 1;
         let table = text.parse::<toml::Table>().map_err(|e| {
             let place = e.span().map(|s| format!("line {}: ", line(s.start.min(text.len()))));

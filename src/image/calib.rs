@@ -1,9 +1,9 @@
 //! `calib.txt`, the calibration file of the Middlebury benchmark.
 
-use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result, quoted};
+use crate::text;
 
 /// A calibration file is a dozen lines; no more than this is read of one.
 const MAX_BYTES: u64 = 1 << 20;
@@ -54,16 +54,7 @@ impl Calibration {
     /// # Errors
     /// [`Error::Read`] when the file cannot be read, or names the line and the key whose value makes no sense.
     pub fn read(path: &Path) -> Result<Self> {
-        let mut bytes = Vec::new();
-        std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(
-            |e| match e.kind() {
-                ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-                _ => Error::read(path, e),
-            },
-        )?;
-        if bytes.len() as u64 > MAX_BYTES {
-            return Err(Error::read(path, "larger than any calibration file; is it one?"));
-        }
+        let bytes = text::read(path, MAX_BYTES, "calibration file")?;
         // Only the keys known here matter, and they are ASCII.
         Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::read(path, reason))
     }

@@ -116,7 +116,8 @@ pub(super) fn row<U: Units>(
 /// Brings a row into the cache in its own order, which the processor foresees; that in which factors come upon it, it does
 /// not.
 fn touch<U: Units>(row: &[U]) {
-    let step = 64 / size_of::<U>();
+    const CACHE_LINE: usize = 64;
+    let step = CACHE_LINE / size_of::<U>();
     std::hint::black_box(row.iter().step_by(step).fold(U::default(), |most, &v| most.max(v)));
 }
 

@@ -440,7 +440,6 @@ impl Backend for Gpu {
     }
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
-        self.submit()?;
         self.set_volume_values(volume, values)
     }
 

@@ -26,8 +26,9 @@ impl Gpu {
         Ok(values)
     }
 
-    /// Sets them.
+    /// Sets them, after everything recorded so far.
     pub(super) fn set_volume_values(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
+        self.submit()?;
         let (buffer, pitch, per_word) = self.volume(volume);
         let plan = &self.state().plan;
         let height = plan.levels[volume.level()].height;
