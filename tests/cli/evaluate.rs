@@ -1,12 +1,29 @@
-//! `mrfgs evaluate`.
+//! `mrfgs evaluate`: figures, older layouts, the paper's tables, breakdown, ablations.
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 
-use mrfgs::options::Method;
+use image::{GrayImage, Luma};
+use mrfgs::evaluation::confidence::sparsify;
+use mrfgs::image::{Plane, read, write};
+use mrfgs::options::{self, Method};
 use serde_json::Value;
+use tempfile::TempDir;
 
-use super::{run, scene, scene_file};
+use super::{listing, run, scene, scene_file};
+
+/// Evaluates; the standard output.
+pub(super) fn evaluated(folder: &Path, args: &[&str]) -> String {
+    run(folder, &[&["evaluate"], args].concat()).succeeded().stdout
+}
+
+/// Evaluates and fails: one line with all these words, and the folder stays as it was.
+pub(super) fn refused(folder: &Path, args: &[&str], code: i32, words: &[&str]) {
+    let before = listing(folder);
+    run(folder, &[&["evaluate"], args].concat()).failed(code, words, &format!("{args:?}"));
+    assert!(listing(folder) == before, "{args:?}");
+}
 
 /// Every number of a report, by its place in the JSON.
 fn figures(value: &Value, place: &str, all: &mut BTreeMap<String, f64>) {
@@ -73,4 +90,332 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
     let args = ["evaluate", "--disparity", "map.pfm", "--truth", &truth];
     let told = run(folder.path(), &args).succeeded();
     assert!(told.stdout.contains("map          final |"), "{}", told.stdout);
+}
+
+/// Copies a rendered scene, 2014's layout, to a folder of another name.
+pub(super) fn copy(name: &str, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt", "mask0nocc.png"] {
+        fs::copy(scene(name).join(file), to.join(file)).unwrap();
+    }
+}
+
+/// The truth of `slanted` as 8 bits hold it, unknown in the top left corner: in levels, and in pixels as they read.
+fn quantised(scale: f32) -> (GrayImage, Plane<f32>) {
+    let truth = read::read_disparity(&scene("slanted").join("disp0GT.pfm")).unwrap();
+    let levels = Plane::from_fn(truth.width(), truth.height(), |x, y| {
+        if x < 40 && y < 30 { 0 } else { (truth[(x, y)] * scale).round() as u8 }
+    });
+    let pixels = levels.map(|&v| if v == 0 { f32::INFINITY } else { v as f32 / scale });
+    let (w, h) = (levels.width() as u32, levels.height() as u32);
+    (GrayImage::from_fn(w, h, |x, y| Luma([levels[(x as usize, y as usize)]])), pixels)
+}
+
+/// A folder with `slanted` in the layouts of 2003 (`old`) and 2005 (`newer`), and its maps by the program.
+fn older_layouts() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for (dir, files, scale) in [
+        ("old", ["im2.png", "im6.png", "disp2.png"], 4.0),
+        ("newer", ["view1.png", "view5.png", "disp1.png"], 3.0),
+    ] {
+        fs::create_dir(at(dir)).unwrap();
+        fs::copy(scene("slanted").join("im0.png"), at(dir).join(files[0])).unwrap();
+        fs::copy(scene("slanted").join("im1.png"), at(dir).join(files[1])).unwrap();
+        quantised(scale).0.save(at(dir).join(files[2])).unwrap();
+    }
+    folder
+}
+
+pub(super) fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
+    let folder = older_layouts();
+    let at = |name: &str| folder.path().join(name);
+    let [old, newer] = ["old/im2.png old/im6.png", "newer/view1.png newer/view5.png"];
+    for (dir, images, truth, scale) in
+        [("old", old, "old/disp2.png", 4.0), ("newer", newer, "newer/disp1.png", 3.0)]
+    {
+        let figures = json(&evaluated(folder.path(), &[dir, "--json", "-"]));
+        let pixels = quantised(scale).1;
+        let largest = pixels.data().iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, b| a.max(*b));
+        let max = (largest.ceil() as i32).to_string();
+        let images: Vec<_> = images.split(' ').collect();
+        let args = ["match", images[0], images[1], "map.pfm", "--raw", "raw.pfm", "--max-disparity", &max];
+        assert_eq!(run(folder.path(), &args).code, Some(0));
+        write::disparity(&at("truth.pfm"), &pixels).unwrap();
+
+        for (map, file) in [("final", "map.pfm"), ("raw", "raw.pfm")] {
+            let by_pfm = ["--disparity", file, "--truth", "truth.pfm", "--json", "-"];
+            let scale = scale.to_string();
+            let by_png = ["--disparity", file, "--truth", truth, "--truth-scale", &scale, "--json", "-"];
+            let expected = json(&evaluated(folder.path(), &by_pfm));
+            assert_eq!(json(&evaluated(folder.path(), &by_png)), expected);
+            let (found, expected) = (&figures["pairs"][0][map], &expected["pairs"][0]["final"]);
+            assert_eq!(found["all"]["pixels"], 240 * 180 - 40 * 30, "what is unknown stays out");
+            assert!(found["all"]["avg"].as_f64().unwrap() < 2.0, "{found}");
+            assert_eq!(found, expected, "{dir}, {map}");
+        }
+        assert_eq!(figures["pairs"][0]["name"], dir);
+    }
+
+    // Twice the scale is half the disparity, and calib.txt has the last word on the range.
+    let half = json(&evaluated(folder.path(), &["old", "--truth-scale", "8", "--json", "-"]));
+    assert!(half["pairs"][0]["final"]["all"]["avg"].as_f64().unwrap() > 3.0);
+    fs::write(at("old/calib.txt"), "ndisp=9\n").unwrap();
+    let near = json(&evaluated(folder.path(), &["old", "newer", "--json", "-"]));
+    assert!(near["pairs"][0]["final"]["all"]["avg"].as_f64().unwrap() > 3.0);
+    assert!(near["pairs"][1]["final"]["all"]["avg"].as_f64().unwrap() < 2.0);
+}
+
+#[test]
+fn scales_and_incomplete_folders_are_refused() {
+    let folder = older_layouts();
+    let at = |name: &str| folder.path().join(name);
+    for scale in ["0", "-3", "nan", "inf", "three", "0.01", "256"] {
+        refused(folder.path(), &["old", "--truth-scale", scale], 2, &["--truth-scale", "0.1 to 255"]);
+    }
+    copy("slanted", &at("new"));
+    write::disparity(&at("map.pfm"), &Plane::filled(240, 180, 1.0)).unwrap();
+    let word = ["--truth-scale", "leave it out"];
+    refused(folder.path(), &["new", "--truth-scale", "3"], 1, &word);
+    let args = ["--disparity", "map.pfm", "--truth", "map.pfm", "--truth-scale", "3"];
+    refused(folder.path(), &args, 1, &["map.pfm", "8-bit PNG", "leave --truth-scale out"]);
+    refused(folder.path(), &[&args[..3], &["old/disp2.png"]].concat(), 1, &["disp2.png", "--truth-scale"]);
+    refused(folder.path(), &[&args[..3], &["old/im2.png"], &args[4..]].concat(), 1, &["im2.png", "grey"]);
+
+    fs::remove_file(at("newer/view5.png")).unwrap();
+    refused(
+        folder.path(),
+        &["old", "newer"],
+        1,
+        &["newer/view5.png", "holds view1.png, view5.png, disp1.png"],
+    );
+    fs::remove_file(at("old/disp2.png")).unwrap();
+    refused(folder.path(), &["old"], 1, &["old/disp2.png", "holds im2.png, im6.png, disp2.png"]);
+    fs::create_dir(at("bare")).unwrap();
+    let all = ["bare/im0.png", "disp0GT.pfm, calib.txt", "view1.png", "disp2.png"];
+    refused(folder.path(), &["bare"], 1, &all);
+}
+
+#[test]
+fn tables_stand_beside_the_papers() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    copy("slanted", &at("Teddy"));
+    copy("exposure", &at("Cones"));
+    copy("thin", &at("thin"));
+    let presets: Vec<&str> = ["fgs", "paper", "default"]
+        .into_iter()
+        .filter(|name| options::PRESETS.iter().any(|preset| preset.0 == *name))
+        .collect();
+
+    let text = evaluated(folder.path(), &["Teddy", "Cones", "--tables", "--json", "out.json"]);
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    for words in [
+        "Table 1: raw maps, before post-processing.",
+        "Table 2: final maps, after post-processing.",
+        "Teddy       |  2.60  32.02  14.17|  2.09  32.43  13.90|",
+        "Cones       |  2.32  33.33  15.11|  1.98  33.43  15.06|",
+        "mean        |  2.11  33.29  12.33|  1.83  33.36  12.15|",
+        "|   paper: MR-FGS    |",
+    ] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    for preset in &presets {
+        assert!(text.contains(&format!(" ours: {preset} ")) || text.contains(&format!(" ours: {preset}\n")));
+    }
+
+    let all = json(&fs::read_to_string(at("out.json")).unwrap());
+    assert!(all["source"].as_str().unwrap().contains("Tables 1 and 2"));
+    let methods = all["methods"].as_object().unwrap();
+    assert!(methods.len() == presets.len() && presets.iter().all(|p| methods.contains_key(*p)));
+    let [raw, finished] = &all["tables"].as_array().unwrap()[..] else { panic!("two tables") };
+    assert_eq!((&raw["number"], &raw["map"]), (&1.into(), &"raw".into()));
+    assert_eq!((&finished["number"], &finished["map"]), (&2.into(), &"final".into()));
+    assert_eq!(raw["pairs"][0]["name"], "Teddy");
+    assert_eq!(raw["pairs"][0]["published"]["fgs"]["avg"], 2.60);
+    assert_eq!(finished["pairs"][1]["published"]["mr-fgs"]["bad2.0"], 15.06);
+    let mean = finished["mean"]["published"]["fgs"]["psnr"].as_f64().unwrap();
+    assert!((mean - f64::midpoint(33.25, 33.33)).abs() < 1e-9);
+
+    // Ours are those that the preset gives by itself.
+    for preset in presets {
+        let alone = evaluated(folder.path(), &["Teddy", "Cones", "--preset", preset, "--json", "-"]);
+        let alone = json(&alone);
+        for (table, map) in [(raw, "raw"), (finished, "final")] {
+            for name in ["avg", "psnr", "bad2.0"] {
+                for i in 0..2 {
+                    let ours = &table["pairs"][i]["ours"][preset][name];
+                    assert_eq!(ours, &alone["pairs"][i][map]["all"][name], "{preset}, {map}, {name}");
+                }
+                assert_eq!(table["mean"]["ours"][preset][name], alone["mean"][map]["all"][name]);
+            }
+        }
+    }
+
+    // A pair that the paper lacks leaves its columns, and those of the mean, empty.
+    let text = evaluated(folder.path(), &["Teddy", "thin", "--tables"]);
+    for line in ["thin", "mean"] {
+        let empty = format!("{line:12}|     -      -      -|     -      -      -|  ");
+        assert!(text.contains(&empty), "no `{empty}` in:\n{text}");
+    }
+    let printed = json(&evaluated(folder.path(), &["thin", "--tables", "--json", "-"]));
+    assert!(printed["tables"][0]["pairs"][0]["published"].is_null());
+
+    for flags in [
+        ["--preset", "paper"],
+        ["--set", "levels=2"],
+        ["--memory", "1GiB"],
+        ["--config", "x"],
+        ["--report", "r"],
+    ] {
+        let args = [&["Teddy", "--tables"], &flags[..]].concat();
+        refused(folder.path(), &args, 2, &["--tables", flags[0], "cannot be used"]);
+    }
+}
+
+/// What JSON holds of each entry of an object, added up.
+fn total(of: &Value, field: &str) -> f64 {
+    of.as_object().unwrap().values().map(|entry| entry[field].as_f64().unwrap()).sum()
+}
+
+#[test]
+fn a_breakdown_adds_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    copy("slanted", &at("Teddy"));
+    copy("thin", &at("thin"));
+    fs::remove_file(at("thin/mask0nocc.png")).unwrap();
+    let text = evaluated(folder.path(), &["Teddy", "thin", "--breakdown", "--json", "out.json"]);
+    let figures = json(&fs::read_to_string(at("out.json")).unwrap());
+
+    let [teddy, thin] = &figures["pairs"].as_array().unwrap()[..] else { panic!("two pairs") };
+    for (name, of) in [("Teddy", teddy), ("thin", thin), ("mean", &figures["mean"])] {
+        let (breakdown, bad) = (&of["breakdown"], of["final"]["all"]["bad2.0"].as_f64().unwrap());
+        assert_eq!(breakdown.as_object().unwrap().len(), 6);
+        assert!((total(breakdown, "share") - 100.0).abs() < 1e-9, "{breakdown}");
+        assert!((total(breakdown, "points") - bad).abs() < 1e-9, "{breakdown}");
+        let confidence = &of["confidence"];
+        assert!((confidence["random"].as_f64().unwrap() - bad).abs() < 1e-9);
+        assert!((confidence["curve"][19].as_f64().unwrap() - bad).abs() < 1e-9);
+        assert_eq!(confidence["curve"].as_array().unwrap().len(), 20);
+        let [optimal, auc] = ["optimal", "auc"].map(|key| confidence[key].as_f64().unwrap());
+        assert!(optimal < auc && auc < bad, "{confidence}");
+
+        // The text has the same.
+        let found: Vec<&str> = text.lines().filter(|line| line.starts_with(&format!("{name:12}|"))).collect();
+        let [errors, worth] = found[..] else { panic!("two lines of {name}:\n{text}") };
+        let classes = ["border", "occluded", "edge", "plain", "slanted", "other"].map(|class| {
+            let [share, points] = ["share", "points"].map(|key| breakdown[class][key].as_f64().unwrap());
+            format!("{share:>6.2} {points:>6.2}")
+        });
+        assert_eq!(errors, format!("{name:12}|{}|{bad:>6.2}", classes.join("|")));
+        let figure = |value: &Value| value.as_f64().map_or_else(|| "-".into(), |v| format!("{v:.2}"));
+        let [precision, recall] = ["precision", "recall"].map(|key| figure(&of["validity"][key]));
+        let expected = format!("{name:12}|{auc:>6.2} {optimal:>7.2} {bad:>7.2}|{precision:>10} {recall:>7}");
+        assert_eq!(worth, expected);
+    }
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    // Without a mask nothing is known of occlusion; no mean stands for fewer pairs.
+    assert_eq!(thin["breakdown"]["occluded"]["share"], 0.0);
+    assert!(thin["validity"].is_null() && figures["mean"]["validity"].is_null());
+
+    // Of the maps that the program writes.
+    let args = ["match", "Teddy/im0.png", "Teddy/im1.png", "map.pfm", "--confidence", "c.png", "--validity"];
+    assert_eq!(run(folder.path(), &[&args[..], &["v.png"]].concat()).code, Some(0));
+    let truth = read::read_disparity(&at("Teddy/disp0GT.pfm")).unwrap();
+    let (map, grey) = (read::read_disparity(&at("map.pfm")).unwrap(), |file: &str| read::grey8(&at(file)));
+    let expected = sparsify(&map, &truth, &grey("c.png").unwrap()).unwrap();
+    // JSON is read to the last bit but one.
+    let auc = teddy["confidence"]["auc"].as_f64().unwrap();
+    assert!((auc - expected.auc).abs() <= 1e-12 * expected.auc, "{auc} against {}", expected.auc);
+    let (validity, mask) = (grey("v.png").unwrap(), grey("Teddy/mask0nocc.png").unwrap());
+    let of = |flagged: bool, unseen: bool| {
+        let pixels = validity.data().iter().zip(mask.data());
+        pixels.filter(|&(v, m)| (v & 7 != 0) == flagged && (*m != 255) == unseen).count() as f64
+    };
+    let [hits, alarms, missed] = [of(true, true), of(true, false), of(false, true)];
+    assert_eq!(teddy["validity"]["precision"].as_f64(), Some(100.0 * hits / (hits + alarms)));
+    assert_eq!(teddy["validity"]["recall"].as_f64(), Some(100.0 * hits / (hits + missed)));
+
+    // The figures are there without the flag, the tables are not; a map that others made has neither.
+    let plain = evaluated(folder.path(), &["Teddy", "thin"]);
+    assert!(text.starts_with(&plain) && text.len() > plain.len());
+    let again = json(&evaluated(folder.path(), &["Teddy", "thin", "--json", "-"]));
+    assert_eq!(again["mean"], figures["mean"]);
+    let args = ["--disparity", "map.pfm", "--truth", "Teddy/disp0GT.pfm", "--json", "-"];
+    let others = json(&evaluated(folder.path(), &args));
+    for key in ["breakdown", "confidence", "validity"] {
+        assert!(others["pairs"][0][key].is_null() && others["mean"][key].is_null());
+    }
+    refused(folder.path(), &[&args[..4], &["--breakdown"]].concat(), 2, &["--breakdown", "cannot be used"]);
+    refused(folder.path(), &["Teddy", "--breakdown", "--tables"], 2, &["--breakdown", "--tables"]);
+}
+
+#[test]
+fn ablations_are_held_against_the_default() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // A part of a scene, to be quick.
+    let (x, y, width, height) = (60, 40, 120, 90);
+    fs::create_dir(at("part")).unwrap();
+    for file in ["im0.png", "im1.png"] {
+        let view = image::open(scene("thin").join(file)).unwrap();
+        view.crop_imm(x, y, width, height).save(at("part").join(file)).unwrap();
+    }
+    let truth = read::read_disparity(&scene("thin").join("disp0GT.pfm")).unwrap();
+    let part =
+        Plane::from_fn(width as usize, height as usize, |i, j| truth[(i + x as usize, j + y as usize)]);
+    write::disparity(&at("part/disp0GT.pfm"), &part).unwrap();
+    fs::write(at("part/calib.txt"), "ndisp=32\n").unwrap();
+
+    let text = evaluated(folder.path(), &["part", "--ablations", "--json", "out.json"]);
+    let all = json(&fs::read_to_string(at("out.json")).unwrap());
+    assert_eq!(all["pairs"], serde_json::json!(["part"]));
+    let rows = all["rows"].as_array().unwrap();
+    assert!(rows.len() > 10);
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    let number = |row: &Value, key: &str| row[key].as_f64().unwrap();
+    let default = &rows[0];
+    assert_eq!((default["name"].as_str(), number(default, "time")), (Some("default"), 1.0));
+    for row in rows {
+        let change = 100.0 * (number(row, "bad2.0") / number(default, "bad2.0") - 1.0);
+        assert!((number(row, "change") - change).abs() < 1e-9 && number(row, "time") > 0.0, "{row}");
+        let start = format!("{:24} | ", row["name"].as_str().unwrap());
+        let line = text.lines().find(|line| line.starts_with(start.trim_end())).unwrap();
+        for (key, value) in row["changes"].as_object().unwrap() {
+            assert!(line.contains(&format!("{key}={}", value.as_str().unwrap())), "{line}");
+        }
+        assert!(line.contains(&format!(" {:.2} {change:>+9.1} ", number(row, "bad2.0"))), "{line}");
+    }
+
+    // A row is what --set gives by itself.
+    let changed = rows.iter().find(|row| row["changes"]["sub-pixel"] == "false").unwrap();
+    for (row, flags) in [(default, &[][..]), (changed, &["--set", "sub-pixel=false"])] {
+        let alone = json(&evaluated(folder.path(), &[&["part", "--json", "-"], flags].concat()));
+        for key in ["avg", "bad0.5", "bad2.0"] {
+            assert_eq!(row[key], alone["mean"]["final"]["all"][key], "{flags:?}, {key}");
+        }
+    }
+    assert!(number(changed, "bad0.5") > number(default, "bad0.5"));
+
+    for flags in [
+        &["--preset", "paper"][..],
+        &["--set", "levels=2"],
+        &["--config", "x"],
+        &["--memory", "1GiB"],
+        &["--report", "r"],
+        &["--tables"],
+        &["--breakdown"],
+    ] {
+        let args = [&["part", "--ablations"], flags].concat();
+        refused(folder.path(), &args, 2, &["--ablations", flags[0], "cannot be used"]);
+    }
+    let args = ["--ablations", "--disparity", "part/disp0GT.pfm", "--truth", "part/disp0GT.pfm"];
+    refused(folder.path(), &args, 2, &["--ablations", "--disparity"]);
+    refused(folder.path(), &["--ablations"], 2, &["DIR"]);
 }

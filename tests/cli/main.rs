@@ -15,6 +15,7 @@ mod plugin;
 #[path = "../../testdata/render-cloud.rs"]
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;
+mod report;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -404,3 +404,8 @@ fn disparity(random: &mut Random, width: usize, height: usize) -> Plane<i32> {
         step * patches[(x / patch, y / patch)] - 2000 + random.pick(&[0, 0, 0, 1, -1, 256])
     })
 }
+
+/// Noise in every pixel.
+pub fn texture(random: &mut Random, width: usize, height: usize) -> Image {
+    Image::from_rgb8(&Plane::from_fn(width, height, |_, _| [0; 3].map(|_: i32| random.within(0, 255) as u8)))
+}

@@ -8,6 +8,7 @@
 mod common;
 mod controls;
 mod floods;
+mod maps;
 mod saturation;
 
 use common::compare::{compare, compare_finest, compare_maps};

@@ -1,0 +1,117 @@
+//! `mrfgs evaluate --report`.
+
+use std::fs;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+
+use super::evaluate::{copy, evaluated, json, refused};
+use super::scene;
+
+/// The values of an attribute in a page, in order.
+fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
+    let start = format!(" {name}=\"");
+    page.split(&start).skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
+}
+
+#[test]
+fn a_report_is_whole_and_stands_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    copy("slanted", &at("Teddy"));
+    // What a name of a folder may hold.
+    let odd = if cfg!(windows) { "a & 'b'" } else { "<b>\"a\" & 'b'" };
+    copy("mixed", &at(odd));
+    evaluated(folder.path(), &["Teddy", odd, "--report", "out", "--json", "out.json"]);
+
+    let page = fs::read_to_string(at("out/index.html")).unwrap();
+    assert!(page.starts_with("<!doctype html>\n") && page.ends_with("</html>\n"));
+    assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("<script"));
+    assert_eq!(page.matches("<section>").count(), 2);
+    assert!(page.contains("<h2>Teddy</h2>") && !page.contains("<b>\"a\""));
+    assert!(page.contains("&amp; &#39;b&#39;</h2>"), "{}", &page[..3000]);
+    assert!(page.contains("prefers-color-scheme: dark") && page.contains("image-rendering: pixelated"));
+    let figures = json(&fs::read_to_string(at("out.json")).unwrap());
+    for pair in figures["pairs"].as_array().unwrap() {
+        let avg = pair["final"]["all"]["avg"].as_f64().unwrap();
+        assert!(page.matches(&format!("<td>{avg:.3}</td>")).count() >= 2, "{avg}");
+        let occluded = pair["breakdown"]["occluded"]["share"].as_f64().unwrap();
+        let auc = pair["confidence"]["auc"].as_f64().unwrap();
+        for words in [format!("occluded</th><td>{occluded:.2}</td>"), format!("AUC {auc:.2} %")] {
+            assert!(page.contains(&words), "{words}");
+        }
+    }
+
+    let (files, sources) = (attributes(&page, "data-file"), attributes(&page, "src"));
+    assert_eq!((files.len(), sources.len()), (14, 14));
+    assert!(attributes(&page, "alt").iter().all(|alt| alt.len() > 15));
+    for (file, source) in files.iter().zip(sources) {
+        let bytes = BASE64.decode(source.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
+        assert_eq!(fs::read(at("out").join(file)).unwrap(), bytes, "{file}");
+        let picture = image::load_from_memory(&bytes).unwrap();
+        let (w, h) = if file.starts_with("1-Teddy-") { (240, 180) } else { (320, 240) };
+        // Below the map: nothing, the scale (16 rows), or one line of classes (9 rows).
+        let legend = match file.rsplit('-').next().unwrap() {
+            "left.png" | "zones.png" => 0,
+            "validity.png" => 9,
+            _ => 16,
+        };
+        assert_eq!((picture.width(), picture.height()), (w, h + legend), "{file}");
+    }
+    assert_eq!(fs::read_dir(at("out")).unwrap().count(), 15);
+    // The left view is the left view.
+    let left = image::open(at("out/1-Teddy-left.png")).unwrap().into_rgb8();
+    assert_eq!(left, image::open(at("Teddy/im0.png")).unwrap().into_rgb8());
+
+    // A later report takes its place; a map that others made has fewer pictures.
+    let args = ["--disparity", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
+    evaluated(folder.path(), &args);
+    let mut names: Vec<_> =
+        fs::read_dir(at("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    let pictures = ["disparity", "error", "truth"].map(|name| format!("1-disp0GT-{name}.png"));
+    assert_eq!(names, [&pictures[..], &["index.html".into()]].concat());
+    let error = image::open(at("out/1-disp0GT-error.png")).unwrap().into_rgb8();
+    assert!((0..180).all(|y| error.get_pixel(100, y).0 == [250; 3]), "no error is white");
+
+    // Nothing temporary is left.
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 4);
+}
+
+#[test]
+fn a_report_that_cannot_be_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    copy("slanted", &at("Teddy"));
+    fs::create_dir(at("misfit")).unwrap();
+    fs::create_dir(at("empty")).unwrap();
+    for file in ["im0.png", "im1.png", "calib.txt"] {
+        fs::copy(scene("slanted").join(file), at("misfit").join(file)).unwrap();
+    }
+    fs::copy(scene("mixed").join("disp0GT.pfm"), at("misfit/disp0GT.pfm")).unwrap();
+
+    // The folder itself.
+    refused(folder.path(), &["Teddy", "--report", "Teddy"], 1, &["Teddy", "no part of an earlier report"]);
+    refused(folder.path(), &["Teddy", "--report", "none/out"], 1, &["none/out", "create it first"]);
+    refused(folder.path(), &["Teddy", "--report", "Teddy/im0.png"], 1, &["im0.png", "is a file"]);
+    let args = ["Teddy", "--report", "empty", "--json", "empty/a.json"];
+    refused(folder.path(), &args, 1, &["--json", "empty/a.json", "another name"]);
+
+    // What fails later: the second pair, or the JSON.
+    for out in ["out", "empty"] {
+        refused(folder.path(), &["misfit", "--report", out], 1, &["disp0GT.pfm is 320 x 240"]);
+    }
+    if cfg!(target_os = "linux") {
+        let args = ["--disparity", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
+        refused(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat(), 1, &["/dev/full"]);
+    }
+
+    // A report with something else in it stays, and so does a page that is none.
+    let args = ["--disparity", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "empty"];
+    evaluated(folder.path(), &args);
+    fs::write(at("empty/notes.txt"), "precious").unwrap();
+    refused(folder.path(), &args, 1, &["empty", "notes.txt", "new folder"]);
+    fs::create_dir(at("site")).unwrap();
+    fs::write(at("site/index.html"), "<!doctype html><title>Home</title>").unwrap();
+    refused(folder.path(), &[&args[..5], &["site"]].concat(), 1, &["site", "index.html"]);
+}
