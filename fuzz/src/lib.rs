@@ -19,7 +19,7 @@ pub const MAX_PIXELS: u64 = 1 << 16;
 /// A PFM file.
 pub fn pfm(bytes: &[u8]) {
     with_file(bytes, |path| {
-        let map = Reader { max_pixels: MAX_PIXELS }.disparity(path);
+        let map = Reader { max_pixels: MAX_PIXELS, ..Reader::default() }.disparity(path);
         match told(pfm::read(path)) {
             Some(Pfm::Grey(plane)) if (plane.data().len() as u64) <= MAX_PIXELS => {
                 let map = map.expect("a plane is a map of disparities");
@@ -52,7 +52,7 @@ pub fn calib(bytes: &[u8]) {
 /// An image of any kind: as both views and the mask of a pair, as levels, and as a map of disparities.
 pub fn image(bytes: &[u8]) {
     with_file(bytes, |path| {
-        let reader = Reader { max_pixels: MAX_PIXELS };
+        let reader = Reader { max_pixels: MAX_PIXELS, ..Reader::default() };
         let pair = told(reader.pair(path, path, None));
         let levels = told(reader.grey8(path));
         let map = told(reader.disparity(path));

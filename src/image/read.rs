@@ -7,25 +7,28 @@ use std::path::Path;
 use image::ImageFormat;
 
 use super::decode::{Kind, decode, decode_file, load};
-use super::raster::{self, Samples};
+use super::raster::{self, Raster, Samples};
 use super::{Pair, Plane, grey};
 use crate::error::{Error, Result};
 
-/// Most pixels of an image unless a [`Reader`] says otherwise: as many as 16,384 x 16,384.
-pub const MAX_PIXELS: u64 = 1 << 28;
+pub use super::decode::is_guarded;
+pub use super::file::MAX_PIXELS;
 
 /// How files are read. The functions of this module read as the default does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reader {
     /// Most pixels that an image may have. A file whose header claims more is refused before memory is taken for them, so
     /// that a small file cannot take all there is. An image takes up to 32 bytes a pixel while it is read.
     pub max_pixels: u64,
+    /// The value that stands for no data in both images of a pair and in maps of disparities, as the file stores it: 0 to 255 of 8
+    /// bits, an index of a palette in TIFF. A pixel is masked whose every sample has it. `None`: what a TIFF file says itself.
+    pub no_data: Option<f64>,
 }
 
 impl Default for Reader {
-    /// [`MAX_PIXELS`].
+    /// [`MAX_PIXELS`], and what files say themselves of no data.
     fn default() -> Self {
-        Self { max_pixels: MAX_PIXELS }
+        Self { max_pixels: MAX_PIXELS, no_data: None }
     }
 }
 
@@ -56,7 +59,7 @@ impl Reader {
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
         let (first, second) =
-            rayon::join(|| decode_file(left, self.max_pixels), || decode_file(right, self.max_pixels));
+            rayon::join(|| self.decode(left, self.no_data), || self.decode(right, self.no_data));
         let images = [first?, second?];
         let [l, r] = &images;
         if l.size() != r.size() {
@@ -96,12 +99,16 @@ impl Reader {
         raster::pair(l, r, ignored.as_ref())
     }
 
+    fn decode(self, path: &Path, no_data: Option<f64>) -> Result<Raster<'static>> {
+        decode_file(path, self.max_pixels, no_data)
+    }
+
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).
     ///
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`].
     pub fn mask(self, path: &Path) -> Result<Plane<bool>> {
-        let raster = decode_file(path, self.max_pixels)?;
+        let raster = self.decode(path, None)?;
         let plane = match &raster.samples {
             Samples::Byte(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0)),
             Samples::Word(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0)),
@@ -117,7 +124,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`], and for float values.
     pub fn grey8(self, path: &Path) -> Result<Plane<u8>> {
-        let raster = decode_file(path, self.max_pixels)?;
+        let raster = self.decode(path, None)?;
         let level = |c: &[u16]| match c {
             [r, g, b] => (grey(*r, *g, *b) >> 8) as u8,
             [v, ..] => (v >> 8) as u8,
@@ -144,7 +151,8 @@ impl Reader {
         const REMEDY: &str = "disparity maps are .pfm, float .tif, or 16-bit .png with disparity times 256";
         let bytes = load(path, self.max_pixels)?;
         let kind = Kind::of(&bytes);
-        let raster = decode(&bytes, self.max_pixels).map_err(|reason| Error::read(path, reason))?;
+        let raster =
+            decode(&bytes, self.max_pixels, self.no_data).map_err(|reason| Error::read(path, reason))?;
         drop(bytes);
         let wrong = |what: &str| Err(Error::read(path, format!("{what}; {REMEDY}")));
         if raster.channels != 1 {
@@ -164,7 +172,13 @@ impl Reader {
             }
             _ => return wrong("holds no disparities"),
         };
-        Ok(Plane::new(raster.width, raster.height, values))
+        let mut map = Plane::new(raster.width, raster.height, values);
+        for (disparity, no_data) in map.data_mut().iter_mut().zip(raster.no_data.iter().flatten()) {
+            if *no_data {
+                *disparity = f32::INFINITY;
+            }
+        }
+        Ok(map)
     }
 
     /// Reads an 8-bit PNG that holds disparities times `scale`, as the ground truth of the older Middlebury sets; 0 is
@@ -175,7 +189,8 @@ impl Reader {
     pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
         let bytes = load(path, self.max_pixels)?;
         let kind = Kind::of(&bytes);
-        let raster = decode(&bytes, self.max_pixels).map_err(|reason| Error::read(path, reason))?;
+        let raster =
+            decode(&bytes, self.max_pixels, self.no_data).map_err(|reason| Error::read(path, reason))?;
         match (kind, raster.channels, raster.samples) {
             (Some(Kind::Coded(ImageFormat::Png)), 1, Samples::Byte(v)) => {
                 let disparity = |v| if v == 0 { f32::INFINITY } else { f32::from(v) / scale };

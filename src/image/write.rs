@@ -1,13 +1,15 @@
 //! Writing maps and pictures: whole or not at all.
 
 use std::fs;
-use std::io::{Cursor, Write};
+use std::io::{Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use tempfile::NamedTempFile;
-use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+use tiff::TiffResult;
+use tiff::encoder::{TiffEncoder, TiffKind, colortype::Gray32Float};
+use tiff::tags::Tag;
 
 use super::{Plane, pfm};
 use crate::error::{Error, Result};
@@ -26,7 +28,7 @@ enum Format {
 /// Writes a disparity map (in pixels; what is not finite is invalid) in the format that the extension names:
 ///
 /// - `.pfm`: float, invalid is +infinity;
-/// - `.tif`, `.tiff`: float, invalid is NaN;
+/// - `.tif`, `.tiff`: float, invalid is NaN, which GDAL's tag for no data says;
 /// - `.png`: 16 bits, disparity times 256, invalid is 0, as in the KITTI benchmark. Disparities from 0 to below 256 only; a
 ///   valid one that would round to 0 becomes 1.
 ///
@@ -209,12 +211,23 @@ fn tiff(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
     // Offsets in plain TIFF end at 4 GiB; few programs read BigTIFF, so only what needs it gets it.
     let written = if map.data().len() < 1_000_000_000 {
-        TiffEncoder::new(&mut bytes).and_then(|mut e| e.write_image::<Gray32Float>(w, h, map.data()))
+        TiffEncoder::new(&mut bytes).and_then(|e| tiff_image(e, (w, h), map.data()))
     } else {
-        TiffEncoder::new_big(&mut bytes).and_then(|mut e| e.write_image::<Gray32Float>(w, h, map.data()))
+        TiffEncoder::new_big(&mut bytes).and_then(|e| tiff_image(e, (w, h), map.data()))
     };
     written.map_err(|e| Error::write(path, e))?;
     Ok(bytes.into_inner())
+}
+
+fn tiff_image<W: Write + Seek, K: TiffKind>(
+    mut encoder: TiffEncoder<W, K>,
+    (width, height): (u32, u32),
+    values: &[f32],
+) -> TiffResult<()> {
+    let mut image = encoder.new_image::<Gray32Float>(width, height)?;
+    // By GDAL, and so for whatever stands on it.
+    image.encoder().write_tag(Tag::GdalNodata, "nan")?;
+    image.write_data(values)
 }
 
 fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
@@ -361,6 +374,7 @@ mod tests {
         disparity(&path, &map).unwrap();
         let bytes = fs::read(&path).unwrap();
         let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).unwrap();
+        assert_eq!(decoder.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
         let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
             panic!("float")
         };

@@ -73,6 +73,72 @@ pub fn tiff_data(entries: usize) -> u32 {
     8 + 2 + 12 * entries as u32 + 4
 }
 
+/// The values of a tag.
+#[derive(Clone, Copy)]
+pub enum Values<'a> {
+    Text(&'a str),
+    Short(&'a [u16]),
+    Long(&'a [u32]),
+    Fraction(&'a [(u32, u32)]),
+}
+
+/// A TIFF file of one image whose strips or tiles are `chunks`.
+#[derive(Clone, Copy)]
+pub struct Tiff<'a> {
+    pub big_endian: bool,
+    pub tiled: bool,
+    /// In the order of their numbers, but for the places and sizes of `chunks`.
+    pub tags: &'a [(u16, Values<'a>)],
+    pub chunks: &'a [&'a [u8]],
+}
+
+impl Tiff<'_> {
+    pub fn bytes(&self) -> Vec<u8> {
+        let short = |v: u16| if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() };
+        let long = |v: u32| if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() };
+        let mut out = if self.big_endian { b"MM\0*".to_vec() } else { b"II*\0".to_vec() };
+        out.extend(long(0));
+        // What is pointed to comes first.
+        let mut places = Vec::new();
+        for chunk in self.chunks {
+            places.push(out.len() as u32);
+            out.extend(*chunk);
+        }
+        let sizes: Vec<u32> = self.chunks.iter().map(|chunk| chunk.len() as u32).collect();
+        let (offsets, counts) = if self.tiled { (324, 325) } else { (273, 279) };
+        let mut tags = self.tags.to_vec();
+        tags.extend([(offsets, Values::Long(&places)), (counts, Values::Long(&sizes))]);
+        tags.sort_by_key(|(tag, _)| *tag);
+        let mut entries = Vec::new();
+        for (tag, values) in tags {
+            let (kind, count, values) = match values {
+                Values::Text(text) => (2, text.len() + 1, [text.as_bytes(), &[0]].concat()),
+                Values::Short(v) => (3, v.len(), v.iter().flat_map(|v| short(*v)).collect()),
+                Values::Long(v) => (4, v.len(), v.iter().flat_map(|v| long(*v)).collect()),
+                Values::Fraction(v) => (
+                    5,
+                    v.len(),
+                    v.iter().flat_map(|(a, b)| [long(*a), long(*b)].concat()).collect::<Vec<_>>(),
+                ),
+            };
+            entries.extend([&short(tag)[..], &short(kind), &long(count as u32)].concat());
+            if values.len() <= 4 {
+                entries.extend(&values);
+                entries.resize(entries.len() + 4 - values.len(), 0);
+            } else {
+                entries.extend(long(out.len() as u32));
+                out.extend(values);
+            }
+        }
+        let place = long(out.len() as u32);
+        out[4..8].copy_from_slice(&place);
+        out.extend(short((entries.len() / 12) as u16));
+        out.extend(entries);
+        out.extend(long(0));
+        out
+    }
+}
+
 /// A JPEG file of 8 x 8 pixels, baseline, whose components all have one value each. `adobe` is the colour transform of its
 /// Adobe mark, without which four components say nothing of their colours; `exif` what its Exif mark holds.
 pub fn jpeg(components: &[u8], adobe: Option<u8>, exif: Option<&[u8]>) -> Vec<u8> {

@@ -12,7 +12,7 @@ use crate::image::raster::{Raster, stretched};
 use crate::image::{Image, pfm};
 
 fn decode(bytes: &[u8]) -> std::result::Result<Raster<'static>, String> {
-    super::decode(bytes, MAX_PIXELS)
+    super::decode(bytes, MAX_PIXELS, None)
 }
 
 const W: u32 = 4;

@@ -2,10 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-#[path = "common/files.rs"]
+#[path = "../common/files.rs"]
 mod files;
+mod tiffs;
 
-use files::{Png, exif_orientation, jpeg, tiff, tiff_data};
+use files::{Png, exif_orientation, jpeg};
 use mrfgs::image::{Image, read};
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -62,27 +63,6 @@ fn small_depths_span_all_levels() {
     // PNM says what its white is.
     assert_eq!(greys(b"P5\n3 1\n15\n\x00\x08\x0f"), [0, 136, 255].map(Some));
     assert_eq!(greys(b"P5\n2 1\n1023\n\x00\x00\x03\xff"), [0, 255].map(Some));
-    let packed = |bits, photometric, data: &[u8]| {
-        let at = tiff_data(9);
-        let entries = [
-            (256, 4, 1, 3),
-            (257, 4, 1, 1),
-            (258, 3, 1, bits),
-            (259, 3, 1, 1),
-            (262, 3, 1, photometric),
-            (273, 4, 1, at),
-            (277, 3, 1, 1),
-            (278, 4, 1, 1),
-            (279, 4, 1, data.len() as u32),
-        ];
-        tiff(&entries, data)
-    };
-    assert_eq!(greys(&packed(1, 1, &[0b0110_0000])), [0, 255, 255].map(Some));
-    assert_eq!(greys(&packed(1, 0, &[0b0110_0000])), [255, 0, 0].map(Some), "white is zero");
-    assert_eq!(greys(&packed(8, 1, &[0, 7, 255])), [0, 7, 255].map(Some));
-    refused(&packed(4, 1, &[0x08, 0xf0]), &["convert it to PNG"]);
-    refused(&packed(4, 3, &[0x08, 0xf0]), &["Palette", "convert it to PNG"]);
-    refused(&packed(8, 3, &[0, 7, 255]), &["Palette", "convert it to PNG"]);
 }
 
 #[test]
@@ -148,6 +128,20 @@ fn jpeg_of_every_colour_model() {
     // Adobe stores the inks inverted: 255 is none. Red is what cyan and black leave.
     close(&jpeg(&[200, 100, 50, 128], Some(0), None), [100, 50, 25]);
     close(&jpeg(&[255 / 2, 128, 128, 255], Some(2), None), [128; 3]);
+}
+
+/// The decoder would fill up with grey what comes after the damage.
+#[test]
+fn damage_within_a_jpeg_file_is_noticed() {
+    let mut bytes = Vec::new();
+    let noise = |x: u32, y: u32| image::Luma([(x * x * 31 + y * y * 17 + x * y * 13) as u8]);
+    let picture = image::GrayImage::from_fn(64, 64, noise);
+    picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Jpeg).unwrap();
+    assert_eq!(left(&bytes).width(), 64);
+    let middle = bytes.len() / 2;
+    // Sixteen ones in a row are no code.
+    bytes[middle..middle + 8].copy_from_slice(&[0xff, 0, 0xff, 0, 0xff, 0, 0xff, 0]);
+    refused(&bytes, &["corrupt", "get the file again"]);
 }
 
 /// Pixels are taken as they are stored, since that is what a pair was rectified as.

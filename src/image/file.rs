@@ -1,0 +1,99 @@
+//! Image files before they are decoded: their bytes, and what their headers may claim.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::{Error, Result, one_line};
+use crate::memory;
+
+/// Most pixels of an image unless the caller says otherwise: as many as 16,384 x 16,384.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// Bytes of a pixel at most: four channels of the widest kind.
+const PIXEL_BYTES: u64 = 32;
+
+/// Bytes of a file that are no pixels, at most: headers, profiles, previews.
+const EXTRA_BYTES: u64 = 1 << 26;
+
+/// Bytes that `pixels` pixels take at most, in a file or decoded, and whatever comes with them.
+pub(super) fn most_bytes(pixels: u64) -> u64 {
+    pixels.saturating_mul(PIXEL_BYTES).saturating_add(EXTRA_BYTES)
+}
+
+/// The bytes of a file, unless it is too large for an image of `max_pixels` pixels. `refused` says why a file that begins with
+/// these bytes is not read, and spares reading a large one, or one without end.
+pub(super) fn load(
+    path: &Path,
+    max_pixels: u64,
+    refused: impl FnOnce(&[u8]) -> Option<String>,
+) -> Result<Vec<u8>> {
+    let max_bytes = most_bytes(max_pixels);
+    let error = |reason: &str| Err(Error::read(path, reason));
+    let io = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
+        _ => Error::read(path, e),
+    };
+    let metadata = fs::metadata(path).map_err(io)?;
+    if metadata.is_dir() {
+        return error("is a folder; give the image file");
+    }
+    if metadata.len() > max_bytes {
+        return Err(Error::read(
+            path,
+            format!("has more bytes than {max_pixels} pixels can take; raise --max-pixels or crop it"),
+        ));
+    }
+    memory::check(metadata.len()).map_err(|e| Error::read(path, e))?;
+    let mut file = File::open(path).map_err(io)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(64).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.is_empty() {
+        return error("the file is empty; get it again");
+    }
+    if let Some(reason) = refused(&bytes) {
+        return Err(Error::read(path, reason));
+    }
+    file.take(max_bytes).read_to_end(&mut bytes).map_err(io)?;
+    Ok(bytes)
+}
+
+/// Errors when an image of this size will not be read: it has no pixel, or more than `max_pixels`.
+pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> std::result::Result<(), String> {
+    if width == 0 || height == 0 {
+        return Err(format!("is {width} x {height} and holds no pixel"));
+    }
+    if width.checked_mul(height).is_none_or(|n| n > max_pixels) {
+        return Err(format!(
+            "claims {width} x {height} pixels and at most {max_pixels} are read; if that is true, raise --max-pixels \
+             or crop it"
+        ));
+    }
+    Ok(())
+}
+
+/// As [`check_size`], and errors when `bytes` bytes cannot hold so many pixels, of which at most `per_byte` fit into one.
+pub(super) fn check_claim(
+    (width, height): (u64, u64),
+    max_pixels: u64,
+    per_byte: u64,
+    bytes: usize,
+) -> std::result::Result<(), String> {
+    check_size(width, height, max_pixels)?;
+    if width * height > per_byte * bytes as u64 {
+        return Err(format!(
+            "claims {width} x {height} pixels in {bytes} bytes: truncated or damaged; get the file again"
+        ));
+    }
+    Ok(())
+}
+
+/// What is wrong with a file that does not decode, and what to do about it.
+pub(super) fn damaged(e: impl std::fmt::Display) -> String {
+    format!("{}; truncated or damaged? get the file again, or convert it to PNG", one_line(&e.to_string()))
+}
+
+/// What a decoder does not know, and what to do about it.
+pub(super) fn unsupported(e: impl std::fmt::Display) -> String {
+    format!("{}; convert it to PNG", one_line(&e.to_string()))
+}

@@ -1,0 +1,57 @@
+//! JPEG files, with a decoder that is told to be strict: by default it fills up what is missing or damaged with grey, and says
+//! nothing.
+
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::file::{check_claim, damaged};
+use super::raster::{Raster, Samples};
+use crate::memory;
+
+/// The most pixels that a byte of a file stands for: blocks of 64 without detail, subsampled, take a few bits.
+const MAX_PIXELS_PER_BYTE: u64 = 10_000;
+
+/// Bytes that the decoder takes for a pixel beside its samples, at most: the coefficients of a progressive image, and rows in
+/// between.
+const BYTES_BESIDE: u64 = 10;
+
+/// Decodes a file of at most `max_pixels` pixels.
+///
+/// # Errors
+/// What is wrong with the file, in one line.
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, String> {
+    // The decoder takes the end of the file for the end of the pixels.
+    if !is_whole(bytes) {
+        return Err(damaged("the JPEG data has no end"));
+    }
+    let options =
+        DecoderOptions::default().set_strict_mode(true).set_max_width(usize::MAX).set_max_height(usize::MAX);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(reason)?;
+    let size = decoder.dimensions().ok_or_else(|| damaged("the JPEG file does not say its size"))?;
+    check_claim((size.0 as u64, size.1 as u64), max_pixels, MAX_PIXELS_PER_BYTE, bytes.len())?;
+    let (channels, colours) = match decoder.input_colorspace() {
+        Some(ColorSpace::Luma) => (1, ColorSpace::Luma),
+        _ => (3, ColorSpace::RGB),
+    };
+    decoder.set_options(options.jpeg_set_out_colorspace(colours));
+    let count = size.0 * size.1 * channels;
+    memory::check(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64).map_err(|e| e.to_string())?;
+    let mut samples = memory::filled(count, 0).map_err(|e| e.to_string())?;
+    decoder.decode_into(&mut samples).map_err(reason)?;
+    let samples = Samples::Byte(samples.into());
+    Ok(Raster { width: size.0, height: size.1, channels, samples, no_data: None })
+}
+
+/// The error of the decoder, which prints some texts as Rust has them.
+fn reason(e: impl std::fmt::Display) -> String {
+    damaged(e.to_string().trim_matches('"').trim_start_matches("[strict-mode]: "))
+}
+
+/// Whether the last scan is followed by an end mark. Within a scan, 0xff 0xd9 cannot occur.
+fn is_whole(bytes: &[u8]) -> bool {
+    let last = |mark: u8| bytes.windows(2).rposition(|w| w == [0xff, mark]);
+    matches!((last(0xda), last(0xd9)), (Some(scan), Some(end)) if end > scan)
+}

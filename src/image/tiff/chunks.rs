@@ -1,0 +1,231 @@
+//! Strips and tiles of TIFF files: from the bytes in the file to rows of samples, unpacked and without predictor.
+//!
+//! The `tiff` crate unpacks them, one at a time, as grey rows of bytes that it need not understand. (What it makes of whole
+//! images is not enough here, as of 0.11: samples of 12 bits, palettes and bits in reversed order are refused or misread, and
+//! planes in tiles panic.)
+
+use std::borrow::Cow;
+use std::io::Cursor;
+
+use tiff::TiffError;
+use tiff::decoder::{Decoder, Limits};
+
+use super::directory::Order;
+use crate::image::file::{damaged, unsupported};
+use crate::memory;
+
+pub(super) const UNCOMPRESSED: u64 = 1;
+pub(super) const FAX4: u64 = 4;
+pub(super) const JPEG: u64 = 7;
+
+/// How the rows of a strip or tile are stored.
+pub(super) struct Packing<'a> {
+    /// The value of the tag.
+    pub(super) compression: u64,
+    pub(super) predictor: u64,
+    /// Whether the first bit of a byte is the least.
+    pub(super) reversed: bool,
+    /// Tables that all strips or tiles share.
+    pub(super) jpeg_tables: Option<&'a [u8]>,
+    pub(super) order: Order,
+    pub(super) bits: u32,
+    /// Samples of a pixel in a row: one where planes are apart.
+    pub(super) samples: usize,
+    /// Width in pixels, what lies beyond the image included.
+    pub(super) width: usize,
+    /// Bytes of a row.
+    pub(super) row_bytes: usize,
+}
+
+impl Packing<'_> {
+    /// The first `rows` rows of a strip or tile.
+    ///
+    /// # Errors
+    /// What is wrong with it, in one line.
+    pub(super) fn rows<'a>(&self, data: &'a [u8], rows: usize) -> Result<Cow<'a, [u8]>, String> {
+        let bytes = self.row_bytes * rows;
+        let data = if self.reversed && self.compression != JPEG {
+            let mut copy = memory::filled(data.len(), 0_u8).map_err(|e| e.to_string())?;
+            copy.iter_mut().zip(data).for_each(|(to, from)| *to = from.reverse_bits());
+            Cow::Owned(copy)
+        } else {
+            Cow::Borrowed(data)
+        };
+        let mut rows = if self.compression == UNCOMPRESSED {
+            if data.len() < bytes {
+                return Err(damaged("the TIFF file ends within its pixels"));
+            }
+            match data {
+                Cow::Borrowed(data) => Cow::Borrowed(&data[..bytes]),
+                Cow::Owned(data) => Cow::Owned(data),
+            }
+        } else {
+            Cow::Owned(self.unpacked(&data, rows)?)
+        };
+        if self.predictor != 1 {
+            rows.to_mut().chunks_exact_mut(self.row_bytes).for_each(|row| self.undo_predictor(row));
+        }
+        Ok(rows)
+    }
+
+    /// What the `tiff` crate makes of compressed data: a file with nothing else in it, grey, in one strip.
+    fn unpacked(&self, data: &[u8], rows: usize) -> Result<Vec<u8>, String> {
+        if self.compression == JPEG {
+            let frame =
+                jpeg_frame(data).ok_or_else(|| damaged("a JPEG strip or tile does not say its size"))?;
+            let [height, width, components] = frame;
+            // The decoder believes the frame.
+            if (width, components) != (self.width, self.samples) || height < rows {
+                return Err(damaged("a JPEG strip or tile does not have the size that its header says"));
+            }
+        }
+        // The fax decoder counts pixels.
+        let (width, bits) = if self.compression == FAX4 { (self.width, 1) } else { (self.row_bytes, 8) };
+        let tables = self.jpeg_tables.unwrap_or_default();
+        let count = if tables.is_empty() { 9 } else { 10 };
+        let at = 8 + 2 + 12 * count + 4;
+        let number =
+            |n: usize| u32::try_from(n).map_err(|_| unsupported("a TIFF strip or tile is too large"));
+        let place = number(at + tables.len())?;
+        let (width, height, length) = (number(width)?, number(rows)?, number(data.len())?);
+        let mut file = b"II*\0\x08\0\0\0".to_vec();
+        file.extend((count as u16).to_le_bytes());
+        let mut entry = |tag: u16, kind: u16, count: u32, value: u32| {
+            file.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+            file.extend([count.to_le_bytes(), value.to_le_bytes()].concat());
+        };
+        entry(256, 4, 1, width);
+        entry(257, 4, 1, height);
+        entry(258, 3, 1, bits);
+        entry(259, 3, 1, self.compression as u32);
+        entry(262, 3, 1, 1);
+        entry(273, 4, 1, place);
+        entry(277, 3, 1, 1);
+        entry(278, 4, 1, height);
+        entry(279, 4, 1, length);
+        if !tables.is_empty() {
+            entry(347, 7, number(tables.len())?, number(at)?);
+        }
+        file.extend([0; 4]);
+        file.extend(tables);
+        file.try_reserve_exact(data.len()).map_err(|_| memory::lacking(data.len() as u64).to_string())?;
+        file.extend(data);
+        let mut out = memory::filled(self.row_bytes * rows, 0).map_err(|e| e.to_string())?;
+        let reason = |e: TiffError| match e {
+            TiffError::UnsupportedError(_) => unsupported(e),
+            _ => damaged(e),
+        };
+        let decoder = Decoder::new(Cursor::new(file)).map_err(reason)?;
+        decoder.with_limits(Limits::unlimited()).read_chunk_bytes(0, &mut out).map_err(reason)?;
+        Ok(out)
+    }
+
+    /// Turns the differences in a row into what they are differences of.
+    fn undo_predictor(&self, row: &mut [u8]) {
+        let size = self.bits as usize / 8;
+        let store = |to: &mut [u8], value: u64| match self.order {
+            Order::Little => to.copy_from_slice(&value.to_le_bytes()[..size]),
+            Order::Big => to.copy_from_slice(&value.to_be_bytes()[8 - size..]),
+        };
+        let floats = self.predictor == 3;
+        // Differences are of samples, or, of floats, of their bytes in planes, the highest first.
+        let step = if floats { 1 } else { size };
+        let distance = self.samples * step;
+        if step == 1 {
+            for i in distance..row.len() {
+                row[i] = row[i].wrapping_add(row[i - distance]);
+            }
+        } else {
+            for i in (distance..row.len()).step_by(step) {
+                let number = |row: &[u8], at: usize| self.order.number(&row[at..at + step]);
+                let sum = number(row, i).wrapping_add(number(row, i - distance));
+                store(&mut row[i..i + step], sum);
+            }
+        }
+        if floats {
+            let planes = row.to_vec();
+            let count = row.len() / size;
+            for (i, value) in row.chunks_exact_mut(size).enumerate() {
+                let bytes = (0..size).map(|b| planes[b * count + i]);
+                store(value, bytes.fold(0, |n, byte| n << 8 | u64::from(byte)));
+            }
+        }
+    }
+}
+
+/// Height, width and components that a JPEG stream claims.
+fn jpeg_frame(data: &[u8]) -> Option<[usize; 3]> {
+    let mut at = 2;
+    loop {
+        let &[0xff, mark, a, b, ..] = data.get(at..)? else { return None };
+        match mark {
+            0xff => at += 1,
+            // Marks without a segment.
+            0x01 | 0xd0..=0xd8 => at += 2,
+            0xc0..=0xcf if !matches!(mark, 0xc4 | 0xc8 | 0xcc) => {
+                let [_, h, i, w, j, components] = *data.get(at + 4..at + 10)?.first_chunk()?;
+                let size = |a, b| usize::from(u16::from_be_bytes([a, b]));
+                return Some([size(h, i), size(w, j), usize::from(components)]);
+            }
+            _ => at += 2 + usize::from(u16::from_be_bytes([a, b])),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The differences that the predictor of a row of 16-bit or wider samples stores.
+    fn packing(bits: u32, samples: usize, predictor: u64, order: Order) -> Packing<'static> {
+        let (width, row_bytes) = (4, 4 * samples * bits as usize / 8);
+        Packing {
+            compression: UNCOMPRESSED,
+            predictor,
+            reversed: false,
+            jpeg_tables: None,
+            order,
+            bits,
+            samples,
+            width,
+            row_bytes,
+        }
+    }
+
+    #[test]
+    fn differences_are_summed_in_either_order() {
+        // 1, 300, 65535, 4 and their differences, modulo 2^16.
+        let (values, differences) = ([1_u16, 300, 65_535, 4], [1_u16, 299, 65_235, 5]);
+        for (order, bytes) in [
+            (Order::Little, u16::to_le_bytes as fn(u16) -> [u8; 2]),
+            (Order::Big, u16::to_be_bytes as fn(u16) -> [u8; 2]),
+        ] {
+            let stored = differences.map(bytes).concat();
+            let rows = packing(16, 1, 2, order).rows(&stored, 1).unwrap();
+            assert_eq!(*rows, values.map(bytes).concat(), "{order:?}");
+            let plain = packing(16, 1, 1, order).rows(&stored, 1).unwrap();
+            assert_eq!(*plain, stored, "control");
+        }
+    }
+
+    #[test]
+    fn differences_of_floats_are_of_their_bytes() {
+        let values = [1.5_f32, -2.25, 3e7, 0.0];
+        let planes: Vec<u8> = (0..4).flat_map(|b| values.map(|v| v.to_be_bytes()[b])).collect();
+        let mut stored = planes.clone();
+        for i in (1..stored.len()).rev() {
+            stored[i] = stored[i].wrapping_sub(planes[i - 1]);
+        }
+        let rows = packing(32, 1, 3, Order::Little).rows(&stored, 1).unwrap();
+        assert_eq!(*rows, values.map(f32::to_le_bytes).concat());
+    }
+
+    #[test]
+    fn the_frame_of_a_jpeg_stream_is_found() {
+        let stream = [0xff, 0xd8, 0xff, 0xe0, 0, 4, 1, 2, 0xff, 0xff, 0xc2, 0, 17, 8, 1, 2, 0, 9, 3];
+        assert_eq!(jpeg_frame(&stream), Some([258, 9, 3]));
+        for length in 0..stream.len() {
+            assert_eq!(jpeg_frame(&stream[..length]), None, "{length}");
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! What the samples of a TIFF file mean: grey, colours, palettes, inks and alpha.
+
+use super::directory::Directory;
+use super::{equal, tag};
+use crate::image::file::{damaged, unsupported};
+use crate::image::raster::Samples;
+use crate::memory;
+
+/// What the colours of a pixel are.
+enum Model {
+    Grey {
+        white_is_zero: bool,
+    },
+    Rgb,
+    /// Red, green and blue of every index.
+    Palette(Vec<[u8; 3]>),
+    Cmyk,
+    YCbCr {
+        coefficients: [f64; 3],
+        black_white: [f64; 6],
+    },
+}
+
+/// What comes with the colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Alpha {
+    None,
+    /// The colours are as they are.
+    Plain,
+    /// The colours have been multiplied by it.
+    Premultiplied,
+}
+
+/// The meaning of the samples of a pixel.
+pub(super) struct Colours {
+    model: Model,
+    alpha: Alpha,
+    /// Bits of a sample.
+    pub(super) bits: u32,
+    /// Samples of a pixel, those included that are not read.
+    pub(super) samples: usize,
+    /// Columns and rows that share a pair of chroma samples.
+    pub(super) subsampling: Option<(usize, usize)>,
+}
+
+impl Colours {
+    /// What the directory says.
+    ///
+    /// # Errors
+    /// What of it is not understood.
+    pub(super) fn of(directory: &Directory) -> Result<Self, String> {
+        let samples = directory.first(tag::SAMPLES, 1)? as usize;
+        let bits = equal(directory, tag::BITS, 1, "depths")?;
+        if samples == 0 || samples > usize::from(u16::MAX) || !(1..=64).contains(&bits) {
+            return Err(damaged(format!("the TIFF directory claims {samples} samples of {bits} bits")));
+        }
+        let bits = bits as u32;
+        let extra = directory.unsigned(tag::EXTRA_SAMPLES)?;
+        // Which is required, but some forget it.
+        let guess = if samples >= 3 { 2 } else { 1 };
+        let photometric = directory.first(tag::PHOTOMETRIC, guess)?;
+        let model = match photometric {
+            0 | 1 => Model::Grey { white_is_zero: photometric == 0 },
+            2 => Model::Rgb,
+            3 => Model::Palette(palette(directory, bits)?),
+            5 => match directory.first(tag::INK_SET, 1)? {
+                1 if matches!(bits, 8 | 16) => Model::Cmyk,
+                1 => return Err(unsupported(format!("holds inks of {bits} bits"))),
+                _ => return Err(unsupported("holds inks other than cyan, magenta, yellow and black")),
+            },
+            6 if bits == 8 => Model::ycbcr(directory)?,
+            4 => return Err("holds the mask of another image; give the image".into()),
+            6 | 8..=10 | 32_844 | 32_845 => {
+                let space = if photometric == 6 { "YCbCr" } else { "Lab or Luv" };
+                return Err(unsupported(format!("holds {space} colours of {bits} bits")));
+            }
+            32_803 | 34_892 => {
+                return Err("is a camera's raw file; develop it, and give the developed images".into());
+            }
+            other => return Err(unsupported(format!("has the unknown photometric interpretation {other}"))),
+        };
+        let colours = model.stored();
+        let alpha = match extra.as_deref().and_then(|extra| extra.first()) {
+            Some(1) => Alpha::Premultiplied,
+            Some(2) => Alpha::Plain,
+            // Many programs write alpha without saying so.
+            None if photometric == 2 && samples == 4 => Alpha::Plain,
+            _ => Alpha::None,
+        };
+        let alpha = if samples > colours { alpha } else { Alpha::None };
+        let known = colours + usize::from(alpha != Alpha::None);
+        if samples < colours || colours == 1 && samples != known {
+            let plural = if samples == 1 { "" } else { "s" };
+            return Err(format!("has {samples} band{plural}; extract one, or red, green and blue"));
+        }
+        let subsampling = match model {
+            Model::YCbCr { .. } => {
+                let values = directory.unsigned(tag::YCBCR_SUBSAMPLING)?;
+                match values.as_deref().unwrap_or(&[2, 2]) {
+                    [across @ (1 | 2 | 4), down @ (1 | 2 | 4), ..] => {
+                        Some((*across as usize, *down as usize))
+                    }
+                    _ => return Err(damaged("the TIFF chroma samples are stored in an unknown way")),
+                }
+            }
+            _ => None,
+        };
+        if subsampling.is_some_and(|sub| sub != (1, 1)) && samples != 3 {
+            return Err(unsupported(format!("holds YCbCr colours in {samples} samples")));
+        }
+        Ok(Self { model, alpha, bits, samples, subsampling })
+    }
+
+    /// Samples of a pixel's colour.
+    pub(super) fn stored(&self) -> usize {
+        self.model.stored()
+    }
+
+    /// Samples of a pixel that are read.
+    pub(super) fn read(&self) -> usize {
+        self.stored() + usize::from(self.alpha != Alpha::None)
+    }
+
+    /// Grey or red, green and blue, with alpha where there is one, and how many they are. Unsigned samples of fewer than 8 bits span
+    /// all levels of 8; those of 9 to 15 stay as they are.
+    pub(super) fn levels(&self, samples: Samples<'static>) -> Result<(usize, Samples<'static>), String> {
+        let n = self.read();
+        // White.
+        let most = if self.bits < 64 { (1_u64 << self.bits) - 1 } else { u64::MAX };
+        let samples = match samples {
+            Samples::Byte(mut v) if self.bits < 8 && !matches!(self.model, Model::Palette(_)) => {
+                let most = most as u32;
+                v.to_mut().iter_mut().for_each(|v| *v = ((u32::from(*v) * 510 + most) / (2 * most)) as u8);
+                Samples::Byte(v)
+            }
+            other => other,
+        };
+        let (channels, mut samples) = match (&self.model, samples) {
+            (Model::Grey { white_is_zero: true }, samples) => (1, inverted(samples, n, most)),
+            (Model::Grey { .. }, samples) => (1, samples),
+            (Model::Rgb, samples) => (3, samples),
+            (Model::Palette(colours), Samples::Byte(v)) => {
+                let rgb = |p: &[u8]| colours.get(usize::from(p[0])).copied();
+                (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+            }
+            (Model::Palette(colours), Samples::Word(v)) => {
+                // Alpha goes to the bits of the colours.
+                let alpha = |a: u16| (u64::from(a) * 255 / most) as u8;
+                let rgb = |p: &[u16]| colours.get(usize::from(p[0])).copied();
+                (3, Samples::Byte(self.replaced(&v, rgb, alpha)?.into()))
+            }
+            (Model::Cmyk, Samples::Byte(v)) => {
+                let ink = |a: u8, b: u8| (u16::from(255 - a) * u16::from(255 - b) / 255) as u8;
+                let rgb = |p: &[u8]| Some([0, 1, 2].map(|i| ink(p[i], p[3])));
+                (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+            }
+            (Model::Cmyk, Samples::Word(v)) => {
+                let ink =
+                    |a: u16, b: u16| (u32::from(u16::MAX - a) * u32::from(u16::MAX - b) / 65_535) as u16;
+                let rgb = |p: &[u16]| Some([0, 1, 2].map(|i| ink(p[i], p[3])));
+                (3, Samples::Word(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+            }
+            (Model::YCbCr { coefficients, black_white }, Samples::Byte(v)) => {
+                let rgb = |p: &[u8]| Some(rgb_of(p, coefficients, black_white));
+                (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+            }
+            _ => return Err(unsupported("holds colours in samples of another kind")),
+        };
+        if self.alpha == Alpha::None {
+            return Ok((channels, samples));
+        }
+        if self.alpha == Alpha::Premultiplied {
+            divide(&mut samples, channels + 1, most);
+        }
+        Ok((channels + 1, samples))
+    }
+
+    /// Red, green and blue in place of the colour of each pixel, alpha kept; `rgb` has none for an index beyond a palette.
+    fn replaced<S: Copy, T>(
+        &self,
+        samples: &[S],
+        rgb: impl Fn(&[S]) -> Option<[T; 3]>,
+        alpha: impl Fn(S) -> T,
+    ) -> Result<Vec<T>, String> {
+        let (n, has_alpha) = (self.read(), self.alpha != Alpha::None);
+        let count = samples.len() / n * (3 + usize::from(has_alpha));
+        let mut out = memory::reserved(count).map_err(|e| e.to_string())?;
+        for pixel in samples.chunks_exact(n) {
+            out.extend(rgb(pixel).ok_or_else(|| damaged("an index is beyond the end of the palette"))?);
+            out.extend(has_alpha.then(|| alpha(pixel[n - 1])));
+        }
+        Ok(out)
+    }
+}
+
+impl Model {
+    /// Samples of a pixel's colour, as they are stored.
+    fn stored(&self) -> usize {
+        match self {
+            Self::Grey { .. } | Self::Palette(_) => 1,
+            Self::Rgb | Self::YCbCr { .. } => 3,
+            Self::Cmyk => 4,
+        }
+    }
+
+    fn ycbcr(directory: &Directory) -> Result<Self, String> {
+        let coefficients = directory.reals(tag::YCBCR_COEFFICIENTS)?;
+        let coefficients = coefficients.as_deref().and_then(|values| values.first_chunk().copied());
+        let black_white = directory.reals(tag::REFERENCE_BLACK_WHITE)?;
+        let black_white = black_white.as_deref().and_then(|values| values.first_chunk().copied());
+        let (coefficients, black_white): ([f64; 3], [f64; 6]) = (
+            coefficients.unwrap_or([0.299, 0.587, 0.114]),
+            black_white.unwrap_or([0.0, 255.0, 128.0, 255.0, 128.0, 255.0]),
+        );
+        let sound = coefficients[1] > 0.0 && black_white.chunks_exact(2).all(|pair| pair[1] > pair[0]);
+        if !sound || !coefficients.iter().chain(&black_white).all(|value| value.is_finite()) {
+            return Err(damaged("the TIFF file defines YCbCr colours that cannot be"));
+        }
+        Ok(Self::YCbCr { coefficients, black_white })
+    }
+}
+
+/// Red, green and blue of every index of `bits` bits, in 8 bits.
+fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, String> {
+    if bits > 16 {
+        return Err(unsupported(format!("holds indices of {bits} bits into a palette")));
+    }
+    let map = directory.unsigned(tag::COLOUR_MAP)?;
+    let count = 1 << bits;
+    let Some(map) = map.filter(|map| map.len() >= 3 * count) else {
+        return Err(damaged("the TIFF palette is missing, or too short"));
+    };
+    // 16 bits by the book, but some programs write 8.
+    let shift = if map[..3 * count].iter().any(|v| *v > 255) { 8 } else { 0 };
+    Ok((0..count).map(|i| [0, 1, 2].map(|c| (map[c * count + i] >> shift) as u8)).collect())
+}
+
+/// White for black and black for white, alpha left as it is.
+fn inverted(samples: Samples<'static>, n: usize, most: u64) -> Samples<'static> {
+    fn each<S: Copy>(samples: &mut [S], n: usize, f: impl Fn(S) -> S) {
+        samples.iter_mut().step_by(n).for_each(|v| *v = f(*v));
+    }
+    match samples {
+        Samples::Byte(mut v) => {
+            each(v.to_mut(), n, |v| 255 - v);
+            Samples::Byte(v)
+        }
+        Samples::Word(mut v) => {
+            each(v.to_mut(), n, |v| most as u16 - v);
+            Samples::Word(v)
+        }
+        // These are spread from the least to the largest.
+        Samples::Float(mut v) => {
+            each(v.to_mut(), n, |v| -v);
+            Samples::Float(v)
+        }
+        Samples::Double(mut v) => {
+            each(v.to_mut(), n, |v| -v);
+            Samples::Double(v)
+        }
+    }
+}
+
+/// Divides the colours by the alpha that they were multiplied by; where it is 0 there is nothing to divide.
+fn divide(samples: &mut Samples<'static>, n: usize, most: u64) {
+    fn each<S: Copy>(samples: &mut [S], n: usize, f: impl Fn(S, S) -> S) {
+        for pixel in samples.chunks_exact_mut(n) {
+            let alpha = pixel[n - 1];
+            pixel[..n - 1].iter_mut().for_each(|v| *v = f(*v, alpha));
+        }
+    }
+    let quotient =
+        |v: u32, alpha: u32, most: u32| (v * most + alpha / 2).checked_div(alpha).map_or(v, |v| v.min(most));
+    match samples {
+        Samples::Byte(v) => each(v.to_mut(), n, |v, a| quotient(v.into(), a.into(), 255) as u8),
+        Samples::Word(v) => each(v.to_mut(), n, |v, a| quotient(v.into(), a.into(), most as u32) as u16),
+        Samples::Float(v) => each(v.to_mut(), n, |v, a| if a == 0.0 { v } else { v / a }),
+        Samples::Double(v) => each(v.to_mut(), n, |v, a| if a == 0.0 { v } else { v / a }),
+    }
+}
+
+/// Y, Cb and Cr of every pixel of `rows` rows, from units in which `across` x `down` pixels share a pair of chroma samples.
+pub(super) fn spread(
+    stored: &[u8],
+    width: usize,
+    rows: usize,
+    (across, down): (usize, usize),
+) -> Result<Vec<u8>, String> {
+    let unit = across * down + 2;
+    let units = width.div_ceil(across);
+    let mut out = memory::reserved(3 * width * rows).map_err(|e| e.to_string())?;
+    for y in 0..rows {
+        let line = &stored[y / down * units * unit..][..units * unit];
+        for x in 0..width {
+            let unit = &line[x / across * unit..][..unit];
+            let chroma = &unit[across * down..];
+            out.extend([unit[y % down * across + x % across], chroma[0], chroma[1]]);
+        }
+    }
+    Ok(out)
+}
+
+/// Red, green and blue by section 21 of TIFF 6.0.
+fn rgb_of(pixel: &[u8], [red, green, blue]: &[f64; 3], black_white: &[f64; 6]) -> [u8; 3] {
+    let level = |i: usize, most: f64| {
+        let (black, white) = (black_white[2 * i], black_white[2 * i + 1]);
+        (f64::from(pixel[i]) - black) * most / (white - black)
+    };
+    let (y, cb, cr) = (level(0, 255.0), level(1, 127.0), level(2, 127.0));
+    let r = y + cr * (2.0 - 2.0 * red);
+    let b = y + cb * (2.0 - 2.0 * blue);
+    let g = (y - blue * b - red * r) / green;
+    [r, g, b].map(|v| (v + 0.5).clamp(0.0, 255.0) as u8)
+}

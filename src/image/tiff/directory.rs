@@ -1,0 +1,193 @@
+//! Directories of TIFF files: tags and their values, as they stand in the file.
+
+use std::collections::HashSet;
+
+use super::tag;
+use crate::image::file::damaged;
+
+/// Directories that are looked at, at most: a file with more has no end.
+const MOST: usize = 1 << 12;
+
+/// How numbers are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    Little,
+    Big,
+}
+
+impl Order {
+    /// The number in `bytes`, at most eight of them.
+    pub(super) fn number(self, bytes: &[u8]) -> u64 {
+        let append = |n: u64, byte: &u8| n << 8 | u64::from(*byte);
+        match self {
+            Self::Little => bytes.iter().rev().fold(0, append),
+            Self::Big => bytes.iter().fold(0, append),
+        }
+    }
+}
+
+/// A tag, and where its values are.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    tag: u16,
+    kind: u16,
+    count: u64,
+    /// Place in the file; the file may end before it.
+    place: u64,
+}
+
+/// The tags of one image in a file.
+pub(super) struct Directory<'a> {
+    file: &'a [u8],
+    pub(super) order: Order,
+    entries: Vec<Entry>,
+    /// Place of the next directory; 0 after the last.
+    next: u64,
+}
+
+impl<'a> Directory<'a> {
+    /// The directory of the first image that is no reduced copy and no mask of another one.
+    ///
+    /// # Errors
+    /// What is wrong with the file, in one line.
+    pub(super) fn of(file: &'a [u8]) -> Result<Self, String> {
+        let (order, big) = match file {
+            [b'I', b'I', kind, 0, ..] => (Order::Little, *kind == 43),
+            [b'M', b'M', 0, kind, ..] => (Order::Big, *kind == 43),
+            _ => return Err(damaged("the TIFF file does not begin like one")),
+        };
+        let mut place = number(file, order, if big { 8 } else { 4 }, if big { 8 } else { 4 })
+            .ok_or_else(|| damaged("the TIFF file ends before its directory"))?;
+        let first = Self::read(file, order, big, place)?;
+        if first.is_image()? {
+            return Ok(first);
+        }
+        let mut seen = HashSet::from([place]);
+        place = first.next;
+        while place != 0 && seen.insert(place) && seen.len() < MOST {
+            let Ok(other) = Self::read(file, order, big, place) else { break };
+            if other.is_image()? {
+                return Ok(other);
+            }
+            place = other.next;
+        }
+        if first.has(tag::SUB_DIRECTORIES) {
+            return Err(
+                "holds a reduced copy, and the image itself in a directory below; convert it to PNG".into()
+            );
+        }
+        Ok(first)
+    }
+
+    fn read(file: &'a [u8], order: Order, big: bool, place: u64) -> Result<Self, String> {
+        // Sizes of the number of entries, of an entry, and of counts and places.
+        let (head, size, wide) = if big { (8, 20, 8) } else { (2, 12, 4) };
+        let ends = || damaged("the TIFF file ends within its directory");
+        let count = number(file, order, place, head as usize).ok_or_else(ends)?;
+        if count > (file.len() / size) as u64 {
+            return Err(damaged(format!("the TIFF directory claims {count} tags in {} bytes", file.len())));
+        }
+        let mut entries = Vec::new();
+        for i in 0..count {
+            let at = place + head + i * size as u64;
+            let field =
+                |offset: u64, length: usize| number(file, order, at + offset, length).ok_or_else(ends);
+            let (tag, kind, count) = (field(0, 2)? as u16, field(2, 2)? as u16, field(4, wide)?);
+            let inline = at + 4 + wide as u64;
+            let fits =
+                (size_of_kind(kind) as u64).checked_mul(count).is_some_and(|bytes| bytes <= wide as u64);
+            let place = if fits { inline } else { number(file, order, inline, wide).ok_or_else(ends)? };
+            entries.push(Entry { tag, kind, count, place });
+        }
+        let next = number(file, order, place + head + count * size as u64, wide).ok_or_else(ends)?;
+        Ok(Self { file, order, entries, next })
+    }
+
+    /// Whether it is of an image in full size.
+    fn is_image(&self) -> Result<bool, String> {
+        // Bit 0 tells a reduced copy, bit 2 a mask. The older tag has 2 for a reduced copy.
+        Ok(self.first(tag::NEW_SUBFILE_TYPE, 0)? & 5 == 0 && self.first(tag::SUBFILE_TYPE, 1)? != 2)
+    }
+
+    /// Whether the tag is there.
+    pub(super) fn has(&self, tag: u16) -> bool {
+        self.entries.iter().any(|entry| entry.tag == tag)
+    }
+
+    /// The values of a tag as they stand, with their kind.
+    fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, String> {
+        let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };
+        let bytes = entry.count.checked_mul(size_of_kind(entry.kind) as u64);
+        let range = bytes.and_then(|bytes| Some(entry.place..entry.place.checked_add(bytes)?));
+        let values = range.and_then(|range| {
+            self.file.get(usize::try_from(range.start).ok()?..usize::try_from(range.end).ok()?)
+        });
+        match values {
+            Some(values) => Ok(Some((entry.kind, values))),
+            None => Err(damaged(format!(
+                "the TIFF directory claims {} values in {} bytes",
+                entry.count,
+                self.file.len()
+            ))),
+        }
+    }
+
+    /// The values of a tag that holds whole numbers; `None` where there is none.
+    pub(super) fn unsigned(&self, tag: u16) -> Result<Option<Vec<u64>>, String> {
+        let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
+        if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
+            return Err(damaged(format!("the TIFF tag {tag} holds no whole numbers")));
+        }
+        Ok(Some(values.chunks_exact(size_of_kind(kind)).map(|value| self.order.number(value)).collect()))
+    }
+
+    /// The first value of a tag, or `default`.
+    pub(super) fn first(&self, tag: u16, default: u64) -> Result<u64, String> {
+        Ok(self.unsigned(tag)?.and_then(|values| values.first().copied()).unwrap_or(default))
+    }
+
+    /// The first value of a tag that must be there.
+    pub(super) fn required(&self, tag: u16, what: &str) -> Result<u64, String> {
+        let value = self.unsigned(tag)?.and_then(|values| values.first().copied());
+        value.ok_or_else(|| damaged(format!("the TIFF directory does not say the {what}")))
+    }
+
+    /// The bytes of a tag, whatever they are.
+    pub(super) fn bytes(&self, tag: u16) -> Result<Option<&'a [u8]>, String> {
+        Ok(self.values(tag)?.map(|(_, values)| values))
+    }
+
+    /// The values of a tag that holds fractions of unsigned numbers, or floats.
+    pub(super) fn reals(&self, tag: u16) -> Result<Option<Vec<f64>>, String> {
+        let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
+        let real = |value: &[u8]| match kind {
+            5 => self.order.number(&value[..4]) as f64 / self.order.number(&value[4..]) as f64,
+            11 => f64::from(f32::from_bits(self.order.number(value) as u32)),
+            12 => f64::from_bits(self.order.number(value)),
+            _ => self.order.number(value) as f64,
+        };
+        Ok(Some(values.chunks_exact(size_of_kind(kind)).map(real).collect()))
+    }
+
+    /// The text of a tag, up to where it ends.
+    pub(super) fn text(&self, tag: u16) -> Result<Option<String>, String> {
+        let text = self.bytes(tag)?.and_then(|bytes| bytes.split(|byte| *byte == 0).next());
+        Ok(text.map(|bytes| String::from_utf8_lossy(bytes).trim().to_owned()))
+    }
+}
+
+/// The number of `size` bytes at `place`; `None` beyond the end.
+fn number(file: &[u8], order: Order, place: u64, size: usize) -> Option<u64> {
+    let start = usize::try_from(place).ok()?;
+    Some(order.number(file.get(start..start.checked_add(size)?)?))
+}
+
+/// Bytes of a value of a kind of field.
+fn size_of_kind(kind: u16) -> usize {
+    match kind {
+        3 | 8 => 2,
+        4 | 9 | 11 | 13 => 4,
+        5 | 10 | 12 | 16..=18 => 8,
+        _ => 1,
+    }
+}

@@ -1,0 +1,375 @@
+//! TIFF files: which image of a file is read, and its samples as levels.
+//!
+//! Tags are those of TIFF 6.0 and its technical notes, and of GDAL for what holds no data. What changes the meaning of samples
+//! is either understood here or refused; orientation, resolution, colour profiles and response curves are neither, as
+//! everywhere in [`Reader::pair`](super::read::Reader::pair).
+
+mod chunks;
+mod colours;
+mod directory;
+
+use std::borrow::Cow;
+
+use half::f16;
+
+use self::chunks::Packing;
+use self::colours::Colours;
+use self::directory::{Directory, Order};
+use super::file::{check_claim, damaged, unsupported};
+use super::raster::{Raster, Samples, holding};
+use crate::error::quoted;
+use crate::memory;
+
+/// The tags that are looked at.
+mod tag {
+    pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
+    pub(super) const SUBFILE_TYPE: u16 = 255;
+    pub(super) const WIDTH: u16 = 256;
+    pub(super) const HEIGHT: u16 = 257;
+    pub(super) const BITS: u16 = 258;
+    pub(super) const COMPRESSION: u16 = 259;
+    pub(super) const PHOTOMETRIC: u16 = 262;
+    pub(super) const FILL_ORDER: u16 = 266;
+    pub(super) const STRIP_OFFSETS: u16 = 273;
+    pub(super) const SAMPLES: u16 = 277;
+    pub(super) const ROWS_PER_STRIP: u16 = 278;
+    pub(super) const STRIP_BYTE_COUNTS: u16 = 279;
+    pub(super) const PLANAR_CONFIGURATION: u16 = 284;
+    pub(super) const PREDICTOR: u16 = 317;
+    pub(super) const COLOUR_MAP: u16 = 320;
+    pub(super) const TILE_WIDTH: u16 = 322;
+    pub(super) const TILE_HEIGHT: u16 = 323;
+    pub(super) const TILE_OFFSETS: u16 = 324;
+    pub(super) const TILE_BYTE_COUNTS: u16 = 325;
+    pub(super) const SUB_DIRECTORIES: u16 = 330;
+    pub(super) const INK_SET: u16 = 332;
+    pub(super) const EXTRA_SAMPLES: u16 = 338;
+    pub(super) const SAMPLE_FORMAT: u16 = 339;
+    pub(super) const JPEG_TABLES: u16 = 347;
+    pub(super) const YCBCR_COEFFICIENTS: u16 = 529;
+    pub(super) const YCBCR_SUBSAMPLING: u16 = 530;
+    pub(super) const REFERENCE_BLACK_WHITE: u16 = 532;
+    /// GDAL's, as text.
+    pub(super) const NO_DATA: u16 = 42_113;
+}
+
+/// No compression here packs more pixels than this into a byte; a directory that claims more lies, and believing it would cost
+/// memory in vain.
+const MAX_PIXELS_PER_BYTE: u64 = 10_000;
+
+/// How samples are numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Unsigned,
+    Signed,
+    Float,
+}
+
+/// Where the pixels of an image are, and what they are.
+struct Layout<'a> {
+    width: usize,
+    height: usize,
+    format: Format,
+    /// Samples of a pixel that are read; extra ones behind are not.
+    read: usize,
+    /// Whether each sample has a plane of its own.
+    planar: bool,
+    /// Width and height of a strip or tile.
+    chunk: (usize, usize),
+    /// Where each strip or tile begins, and its bytes where the file says.
+    offsets: Vec<u64>,
+    byte_counts: Option<Vec<u64>>,
+    /// Columns and rows that share a pair of chroma samples, where those are stored more sparsely.
+    subsampling: Option<(usize, usize)>,
+    packing: Packing<'a>,
+}
+
+/// Decodes a file of at most `max_pixels` pixels. Pixels whose every sample is `no_data`, or else what the file says, are marked.
+///
+/// # Errors
+/// What is wrong with the file, in one line.
+pub(super) fn decode(file: &[u8], max_pixels: u64, no_data: Option<f64>) -> Result<Raster<'static>, String> {
+    let directory = Directory::of(file)?;
+    let colours = Colours::of(&directory)?;
+    let layout = Layout::of(&directory, &colours, file.len(), max_pixels)?;
+    let no_data = no_data.map_or_else(|| no_data_of(&directory), |value| Ok(Some(value)))?;
+    let samples = layout.samples(file, no_data.unwrap_or(0.0))?;
+    let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose();
+    let no_data = no_data.map_err(|e| e.to_string())?;
+    let (channels, samples) = colours.levels(samples)?;
+    Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data })
+}
+
+/// The value that GDAL says stands for no data.
+fn no_data_of(directory: &Directory) -> Result<Option<f64>, String> {
+    let Some(text) = directory.text(tag::NO_DATA)? else { return Ok(None) };
+    match text.parse() {
+        Ok(value) => Ok(Some(value)),
+        // Written so by some.
+        Err(_) if text.is_empty() => Ok(None),
+        Err(_) => Err(format!(
+            "has the no-data value {}, which is no number; give one with --no-data",
+            quoted(&text)
+        )),
+    }
+}
+
+impl<'a> Layout<'a> {
+    fn of(
+        directory: &Directory<'a>,
+        colours: &Colours,
+        file_bytes: usize,
+        max_pixels: u64,
+    ) -> Result<Self, String> {
+        let size = (directory.required(tag::WIDTH, "width")?, directory.required(tag::HEIGHT, "height")?);
+        check_claim(size, max_pixels, MAX_PIXELS_PER_BYTE, file_bytes)?;
+        let (width, height) = (size.0 as usize, size.1 as usize);
+
+        let bits = colours.bits;
+        let format = match equal(directory, tag::SAMPLE_FORMAT, 1, "formats")? {
+            // 4 is undefined: there are bits, and nothing better to take them for.
+            1 | 4 => Format::Unsigned,
+            2 => Format::Signed,
+            3 => Format::Float,
+            5 | 6 => return Err("holds complex numbers; convert it to their magnitudes".into()),
+            other => return Err(unsupported(format!("holds samples of the unknown format {other}"))),
+        };
+        if !matches!((format, bits), (Format::Unsigned, 1..=64) | (_, 16 | 32 | 64) | (Format::Signed, 8)) {
+            return Err(unsupported(format!("holds samples of {bits} bits")));
+        }
+
+        let planar = match directory.first(tag::PLANAR_CONFIGURATION, 1)? {
+            1 => false,
+            2 => colours.samples > 1,
+            other => {
+                return Err(damaged(format!("the TIFF planes are in the unknown configuration {other}")));
+            }
+        };
+        let compression = directory.first(tag::COMPRESSION, chunks::UNCOMPRESSED)?;
+        let read = match compression {
+            chunks::JPEG => bits == 8,
+            chunks::FAX4 => bits == 1 && colours.samples == 1,
+            // None, LZW, Deflate under both its numbers, PackBits.
+            1 | 5 | 8 | 32_773 | 32_946 => true,
+            _ => false,
+        };
+        if !read {
+            let name = match compression {
+                2..=4 => " (fax)",
+                6 | 7 => " (JPEG)",
+                34_887 => " (LERC)",
+                34_925 => " (LZMA)",
+                50_000 => " (Zstandard)",
+                50_001 => " (WebP)",
+                _ => "",
+            };
+            let reason = format!(
+                "holds samples of {bits} bits in the compression {compression}{name}, which is not read"
+            );
+            return Err(unsupported(reason));
+        }
+        let predictor = match directory.first(tag::PREDICTOR, 1)? {
+            // Only of these does it mean anything.
+            _ if !matches!(compression, 5 | 8 | 32_946) => 1,
+            1 => 1,
+            2 if matches!(bits, 8 | 16 | 32 | 64) => 2,
+            3 if format == Format::Float => 3,
+            other => {
+                return Err(unsupported(format!("holds samples of {bits} bits with the predictor {other}")));
+            }
+        };
+        let reversed = match directory.first(tag::FILL_ORDER, 1)? {
+            1 => false,
+            2 => true,
+            other => return Err(damaged(format!("the TIFF bits are in the unknown order {other}"))),
+        };
+        let subsampling = colours.subsampling.filter(|sub| *sub != (1, 1) && compression != chunks::JPEG);
+        if subsampling.is_some() && (planar || predictor != 1) {
+            return Err(unsupported("holds chroma samples that are stored more sparsely, in planes"));
+        }
+
+        let tiled = directory.has(tag::TILE_WIDTH);
+        let (chunk, offsets, byte_counts) = if tiled {
+            let side = |tag, what| Ok::<_, String>(directory.required(tag, what)?.max(1));
+            let chunk = (
+                side(tag::TILE_WIDTH, "width of its tiles")?,
+                side(tag::TILE_HEIGHT, "height of its tiles")?,
+            );
+            (chunk, tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS)
+        } else {
+            let rows = directory.first(tag::ROWS_PER_STRIP, size.1)?.clamp(1, size.1);
+            ((size.0, rows), tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS)
+        };
+        // Some programs name their tiles strips.
+        let either =
+            |tag, other| if directory.has(tag) { directory.unsigned(tag) } else { directory.unsigned(other) };
+        let offsets = either(offsets, tag::STRIP_OFFSETS)?;
+        let offsets =
+            offsets.ok_or_else(|| damaged("the TIFF directory does not say where the pixels are"))?;
+        let byte_counts = either(byte_counts, tag::STRIP_BYTE_COUNTS)?;
+
+        // Samples of a pixel in a row.
+        let samples = if planar { 1 } else { colours.samples };
+        let row_bits = match subsampling {
+            // Rows are units then, of as many pixels and the two samples that they share.
+            Some((across, down)) => {
+                u128::from(chunk.0.div_ceil(across as u64)) * (across * down + 2) as u128 * 8
+            }
+            None => u128::from(chunk.0) * samples as u128 * u128::from(bits),
+        };
+        let row_bytes = row_bits.div_ceil(8);
+        // Sixteen samples of the widest kind for a pixel, and room for a tile of a small picture.
+        let most = u128::from(size.0 * size.1) * 128 + (1 << 26);
+        if row_bytes * u128::from(chunk.1) > most {
+            return Err(damaged(format!(
+                "the TIFF directory claims {samples} samples in strips or tiles of {} x {} pixels for an image of \
+                 {width} x {height}",
+                chunk.0, chunk.1
+            )));
+        }
+        let chunk = (chunk.0 as usize, chunk.1 as usize);
+        let planes = if planar { colours.samples } else { 1 };
+        let count = width.div_ceil(chunk.0) * height.div_ceil(chunk.1) * planes;
+        if [Some(offsets.len()), byte_counts.as_ref().map(Vec::len)].into_iter().flatten().any(|n| n < count)
+        {
+            return Err(damaged(format!(
+                "the TIFF directory lists fewer strips or tiles than the {count} it needs"
+            )));
+        }
+        let packing = Packing {
+            compression,
+            predictor,
+            reversed,
+            jpeg_tables: directory.bytes(tag::JPEG_TABLES)?,
+            order: directory.order,
+            bits,
+            samples,
+            width: chunk.0,
+            row_bytes: row_bytes as usize,
+        };
+        let read = colours.read();
+        Ok(Self { width, height, format, read, planar, chunk, offsets, byte_counts, subsampling, packing })
+    }
+
+    /// The samples that are read of all pixels; `missing` where the file leaves a strip or tile out.
+    fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, String> {
+        let (order, bits) = (self.packing.order, self.packing.bits);
+        let size = bits as usize / 8;
+        let number = |row: &[u8], i: usize| order.number(&row[i * size..(i + 1) * size]);
+        let signed = |row: &[u8], i: usize| (number(row, i) << (64 - bits)) as i64 >> (64 - bits);
+        Ok(match (self.format, bits) {
+            (Format::Unsigned, 8) => {
+                Samples::Byte(self.assembled(file, missing as u8, |row, i| row[i])?.into())
+            }
+            (Format::Unsigned, 16) => {
+                let word = match order {
+                    Order::Little => u16::from_le_bytes,
+                    Order::Big => u16::from_be_bytes,
+                };
+                let read = |row: &[u8], i: usize| word([row[2 * i], row[2 * i + 1]]);
+                Samples::Word(self.assembled(file, missing as u16, read)?.into())
+            }
+            (Format::Unsigned, 1..8) => Samples::Byte(
+                self.assembled(file, missing as u8, |row, i| packed(row, i, bits) as u8)?.into(),
+            ),
+            (Format::Unsigned, 9..16) => Samples::Word(
+                self.assembled(file, missing as u16, |row, i| packed(row, i, bits) as u16)?.into(),
+            ),
+            (Format::Unsigned, 24 | 32 | 64) => {
+                Samples::Double(self.assembled(file, missing, |row, i| number(row, i) as f64)?.into())
+            }
+            (Format::Unsigned, _) => {
+                Samples::Double(self.assembled(file, missing, |row, i| packed(row, i, bits) as f64)?.into())
+            }
+            (Format::Signed, 8 | 16) => {
+                Samples::Float(self.assembled(file, missing as f32, |row, i| signed(row, i) as f32)?.into())
+            }
+            (Format::Signed, _) => {
+                Samples::Double(self.assembled(file, missing, |row, i| signed(row, i) as f64)?.into())
+            }
+            (Format::Float, 16) => {
+                let read = |row: &[u8], i: usize| f16::from_bits(number(row, i) as u16).to_f32();
+                Samples::Float(self.assembled(file, missing as f32, read)?.into())
+            }
+            (Format::Float, 32) => {
+                let read = |row: &[u8], i: usize| f32::from_bits(number(row, i) as u32);
+                Samples::Float(self.assembled(file, missing as f32, read)?.into())
+            }
+            (Format::Float, _) => Samples::Double(
+                self.assembled(file, missing, |row, i| f64::from_bits(number(row, i)))?.into(),
+            ),
+        })
+    }
+
+    /// Puts strips or tiles together; `read` takes sample `i` of a row.
+    fn assembled<S: Copy>(
+        &self,
+        file: &[u8],
+        missing: S,
+        read: impl Fn(&[u8], usize) -> S,
+    ) -> Result<Vec<S>, String> {
+        let mut out =
+            memory::filled(self.width * self.height * self.read, missing).map_err(|e| e.to_string())?;
+        let (across, down) = (self.width.div_ceil(self.chunk.0), self.height.div_ceil(self.chunk.1));
+        let (in_row, samples) = if self.planar { (1, 1) } else { (self.read, self.packing.samples) };
+        for (i, &offset) in self.offsets.iter().enumerate() {
+            let (plane, place) = (i / (across * down), i % (across * down));
+            if plane >= if self.planar { self.read } else { 1 } {
+                break;
+            }
+            let bytes = self.byte_counts.as_ref().map(|counts| counts[i]);
+            if bytes == Some(0) {
+                // GDAL leaves out tiles of nothing but no data.
+                continue;
+            }
+            let (left, top) = (place % across * self.chunk.0, place / across * self.chunk.1);
+            let columns = self.chunk.0.min(self.width - left);
+            let rows = self.chunk.1.min(self.height - top);
+            let data = usize::try_from(offset).ok().and_then(|start| file.get(start..));
+            let data = data.ok_or_else(|| damaged("the TIFF pixels begin behind the end of the file"))?;
+            // Without compression what is needed is known, and byte counts are often wrong.
+            let end = match bytes {
+                Some(bytes) if self.packing.compression != chunks::UNCOMPRESSED => {
+                    usize::try_from(bytes).unwrap_or(usize::MAX)
+                }
+                _ => usize::MAX,
+            };
+            let data = &data[..end.min(data.len())];
+            let stored =
+                self.packing.rows(data, rows.div_ceil(self.subsampling.map_or(1, |(_, down)| down)))?;
+            let stored = match self.subsampling {
+                Some(sub) => Cow::Owned(colours::spread(&stored, self.chunk.0, rows, sub)?),
+                None => stored,
+            };
+            let row_bytes =
+                if self.subsampling.is_some() { 3 * self.chunk.0 } else { self.packing.row_bytes };
+            for (y, row) in (top..top + rows).zip(stored.chunks_exact(row_bytes)) {
+                let start = (y * self.width + left) * self.read + plane;
+                for x in 0..columns {
+                    for c in 0..in_row {
+                        out[start + x * self.read + c] = read(row, x * samples + c);
+                    }
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// The value of a tag that has one for every sample, all alike.
+fn equal(directory: &Directory, tag: u16, default: u64, what: &str) -> Result<u64, String> {
+    let values = directory.unsigned(tag)?.unwrap_or_default();
+    let first = values.first().copied().unwrap_or(default);
+    if values.iter().any(|value| *value != first) {
+        return Err(unsupported(format!("holds samples of different {what}")));
+    }
+    Ok(first)
+}
+
+/// Number `i` of `bits` bits in a row, the highest bit first.
+fn packed(row: &[u8], i: usize, bits: u32) -> u64 {
+    let (start, bits) = (i * bits as usize, bits as usize);
+    let (first, last) = (start / 8, (start + bits).div_ceil(8));
+    let all = row[first..last].iter().fold(0_u128, |n, byte| n << 8 | u128::from(*byte));
+    (all >> (8 * last - start - bits) & ((1 << bits) - 1)) as u64
+}
