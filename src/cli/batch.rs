@@ -82,7 +82,7 @@ pub(super) struct Args {
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
-    execution: ExecutionArgs,
+    pub(super) execution: ExecutionArgs,
 }
 
 /// The maps to write of each pair.

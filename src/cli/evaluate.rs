@@ -124,7 +124,7 @@ pub(super) struct Args {
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
-    execution: ExecutionArgs,
+    pub(super) execution: ExecutionArgs,
 
     /// Evaluates this map instead, whoever made it: .pfm, float .tif, or 16-bit .png with disparity times 256
     #[arg(

@@ -80,7 +80,7 @@ pub(super) struct Args {
     no_fill: bool,
 
     #[command(flatten)]
-    execution: ExecutionArgs,
+    pub(super) execution: ExecutionArgs,
 
     #[command(flatten)]
     more: MoreOutputs,

@@ -35,6 +35,7 @@ use std::time::{Duration, Instant};
 
 use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand, ValueEnum};
+use mrfgs::backend::gpu;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::{MAX_PIXELS, Reader};
@@ -42,6 +43,8 @@ use mrfgs::options::{Choice, DisparityRange, Execution, MAX_MEMORY, Method};
 use mrfgs::solver::Inspector;
 use mrfgs::{Error, Matched, Matcher, Result, Timing};
 use progress::Bar;
+
+pub(crate) use process::tell_panics_in_one_line;
 
 const ABOUT: &str = "\
 Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
@@ -82,6 +85,19 @@ enum Command {
     Presets(presets::Args),
     Completions(shell::CompletionsArgs),
     Man(shell::ManArgs),
+}
+
+impl Command {
+    /// Whether it asks the drivers which devices there are.
+    fn asks_for_devices(&self) -> bool {
+        match self {
+            Self::Match(args) => args.execution.asks_for_devices(),
+            Self::Batch(args) => args.execution.asks_for_devices(),
+            Self::Evaluate(args) => args.execution.asks_for_devices(),
+            Self::Bench(_) | Self::Devices => true,
+            Self::Presets(_) | Self::Completions(_) | Self::Man(_) => false,
+        }
+    }
 }
 
 /// Why the program ends early.
@@ -136,9 +152,15 @@ pub(crate) fn run() -> std::result::Result<(), Failure> {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(answer) if answer.use_stderr() => return Err(Failure::Usage(one_line(&answer))),
-        Err(answer) if answer.kind() == ErrorKind::DisplayVersion => return Ok(devices::print_versions()?),
+        Err(answer) if answer.kind() == ErrorKind::DisplayVersion => {
+            process::quiet_loader();
+            return Ok(devices::print_versions()?);
+        }
         Err(help) => return Ok(printed(help.print())?),
     };
+    if cli.command.asks_for_devices() {
+        process::quiet_loader();
+    }
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
@@ -308,6 +330,14 @@ struct ResourceArgs {
 }
 
 impl ExecutionArgs {
+    fn asks_for_devices(&self) -> bool {
+        match self.backend {
+            Backend::Auto => self.resources.device.is_some() || gpu::may_have_gpu(),
+            Backend::Gpu => true,
+            Backend::Cpu => false,
+        }
+    }
+
     fn execution(&self) -> Result<Execution> {
         let ResourceArgs { device, threads } = &self.resources;
         if self.backend == Backend::Cpu && device.is_some() {

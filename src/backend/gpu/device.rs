@@ -155,10 +155,24 @@ fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     ))
 }
 
-/// Whether `auto` finds a device to its taste.
+/// Whether there may be a GPU. On Linux every driver of one has a node in `/dev`; elsewhere only the driver knows.
+#[must_use]
+pub fn may_have_gpu() -> bool {
+    // Of the kernel's graphics, NVIDIA, Windows below (WSL), Arm, Qualcomm, Imagination.
+    const NODES: [&str; 9] = ["dri", "nvidia", "nvhost", "nvgpu", "nvmap", "dxg", "mali", "kgsl", "pvr"];
+    if !cfg!(target_os = "linux") {
+        return true;
+    }
+    let Ok(entries) = std::fs::read_dir("/dev") else { return true };
+    let mut names = entries.flatten().map(|entry| entry.file_name());
+    names.any(|name| NODES.iter().any(|node| name.to_string_lossy().starts_with(node)))
+}
+
+/// Whether `auto` finds a device to its taste. Where there is no GPU the driver is not asked: a loader that finds no display may
+/// print to standard error.
 #[must_use]
 pub fn has_automatic() -> bool {
-    adapters().iter().any(|a| is_automatic(a.get_info().device_type))
+    may_have_gpu() && adapters().iter().any(|a| is_automatic(a.get_info().device_type))
 }
 
 /// What a device is denied, or does wrong, on purpose: tests run the engine as if on a lesser device, or a failing one.

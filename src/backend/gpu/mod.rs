@@ -25,7 +25,7 @@ use crate::plan::Plan;
 use crate::tables::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
-pub use device::{DeviceInfo, Handicap, devices, has_automatic};
+pub use device::{DeviceInfo, Handicap, devices, has_automatic, may_have_gpu};
 pub use kernels::{Kernel, LevelParams, Params, Variant};
 use stages::{Step, Steps};
 use std::collections::HashMap;
