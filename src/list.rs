@@ -101,6 +101,7 @@ pub fn in_columns(error: Error) -> Error {
             name: name.trim_start_matches("--").replace('-', "_"),
             reason: reason.replace("--min-disparity", "min_disparity"),
         },
+        Error::Mismatch(reason) => Error::Mismatch(reason.replace("--max-disparity", "max_disparity")),
         error => error,
     }
 }
@@ -166,9 +167,9 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     Ok(row)
 }
 
-/// The names of pairs so far, each good for files of its own: letters, digits, -, _ and ., and no ending that `mrfgs batch` gives
-/// to more maps of a pair (-confidence, -validity). They differ by more than upper and lower case: on some file systems `A` and
-/// `a` are one file.
+/// The names of pairs so far, each good for files of its own on every file system: no / \ : * ? " < > | and no control characters,
+/// no . or - first, no . or space last, and no ending that `mrfgs batch` gives to more maps of a pair (-confidence, -validity).
+/// They differ by more than upper and lower case: on some file systems `A` and `a` are one file.
 #[derive(Debug, Default)]
 pub struct Names(HashMap<String, usize>);
 
@@ -178,15 +179,15 @@ impl Names {
     /// # Errors
     /// What is wrong and the remedy, for a name that is taken, or that no file should have.
     pub fn add(&mut self, name: &str, line: usize) -> std::result::Result<(), String> {
-        let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-        if name.len() > MAX_NAME || name.starts_with(['.', '-']) || !name.chars().all(allowed) {
+        let forbidden = |c: char| c.is_control() || r#"/\:*?"<>|"#.contains(c);
+        let ends_badly = name.starts_with(['.', '-', ' ']) || name.ends_with(['.', ' ']);
+        if name.len() > MAX_NAME || ends_badly || name.contains(forbidden) {
             return Err(format!(
-                "{} is no name for files; rename it: letters (A to Z), digits, -, _ and ., not - or . first, at most \
-                 {MAX_NAME}",
+                r#"{} is no name for files; rename it: at most {MAX_NAME} bytes, none of / \ : * ? " < > |, no . or - first, no . or space last"#,
                 quoted(name)
             ));
         }
-        let lower = name.to_ascii_lowercase();
+        let lower = name.to_lowercase();
         if let Some(ending) = ["-confidence", "-validity"].into_iter().find(|ending| lower.ends_with(ending))
         {
             return Err(format!("`{name}` ends in {ending}, as maps of other pairs do; rename it"));

@@ -1,5 +1,7 @@
 //! How much memory there is to ask for, and memory that can be refused.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::error::{Error, Result};
 
 /// Bytes that can be had without swapping, where the system says so.
@@ -9,32 +11,54 @@ fn available() -> Option<u64> {
     line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
 }
 
+/// What to do where a match needs more memory than there is.
+pub(crate) const SMALLER_MATCH: &str = "let it take less (--memory), or use a smaller image, a smaller range (--min-disparity, \
+                                        --max-disparity) or fewer neighbours (--set percentile)";
+/// The same where an image does.
+pub(crate) const SMALLER_IMAGE: &str = "use a smaller image, or a part of it";
+
 /// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end it without a
-/// word.
+/// word. `remedy` says what to do.
 ///
 /// # Errors
 /// [`Error::Memory`] with both figures, where both are known.
-pub(crate) fn check(bytes: u64) -> Result<()> {
-    match available() {
-        Some(free) if bytes > free => {
-            return Err(Error::Memory(format!(
-                "{} are needed and {} are free{REMEDY}",
-                size(bytes),
-                size(free)
-            )));
-        }
-        _ => {}
+pub(crate) fn check(bytes: u64, remedy: &str) -> Result<()> {
+    if let Some(free) = available().filter(|free| bytes > *free) {
+        let (bytes, free) = (size(bytes), size(free));
+        return Err(Error::Memory(format!("{bytes} of memory are needed and {free} are free: {remedy}")));
     }
     // Limits of the process (`ulimit -v`) and of a system that does not overcommit: what is never touched costs nothing.
-    reserved::<u8>(usize::try_from(bytes).unwrap_or(usize::MAX)).map(drop).map_err(|_| lacking(bytes))
+    let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| lacking(bytes as u64, remedy))
 }
 
-const REMEDY: &str = ": let it take less (--memory), or use a smaller image, a smaller range (--min-disparity, --max-disparity) \
-                      or fewer neighbours (--set percentile)";
+/// Bytes that have been claimed.
+static CLAIMED: AtomicU64 = AtomicU64::new(0);
 
-/// What to say where `bytes` cannot be had.
-pub(crate) fn lacking(bytes: u64) -> Error {
-    Error::Memory(format!("{} of memory are needed and cannot be had{REMEDY}", size(bytes)))
+/// Memory that somebody takes, step by step, while this lives: other claims must do without it.
+pub(crate) struct Claim(u64);
+
+impl Claim {
+    /// Claims `bytes` for what is done to an image.
+    ///
+    /// # Errors
+    /// Those of [`check`], of all claims together.
+    pub(crate) fn new(bytes: u64) -> Result<Self> {
+        let claim = Self(bytes);
+        let others = CLAIMED.fetch_add(bytes, Ordering::Relaxed);
+        // Where it fails the claim is dropped.
+        check(others.saturating_add(bytes), SMALLER_IMAGE).map(|()| claim)
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        CLAIMED.fetch_sub(self.0, Ordering::Relaxed);
+    }
+}
+
+fn lacking(bytes: u64, remedy: &str) -> Error {
+    Error::Memory(format!("{} of memory are needed and cannot be had: {remedy}", size(bytes)))
 }
 
 /// A size for people.
@@ -50,7 +74,7 @@ fn size(bytes: u64) -> String {
 pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>> {
     let mut out = Vec::new();
     let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
-    out.try_reserve_exact(count).map_err(|_| lacking(bytes))?;
+    out.try_reserve_exact(count).map_err(|_| lacking(bytes, SMALLER_IMAGE))?;
     Ok(out)
 }
 
@@ -71,11 +95,23 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_declined() {
         for bytes in [1 << 55, u64::MAX] {
-            let said = check(bytes).unwrap_err().to_string();
+            let said = check(bytes, SMALLER_IMAGE).unwrap_err().to_string();
             assert!(said.contains("GiB") && said.contains("smaller image") && !said.contains('\n'), "{said}");
         }
         assert!(filled(usize::MAX / 8, 0_u64).is_err());
         assert_eq!(filled(3, 7).unwrap(), [7; 3]);
-        check(1 << 20).unwrap();
+        check(1 << 20, SMALLER_MATCH).unwrap();
+    }
+
+    #[test]
+    fn claims_add_up() {
+        let Some(free) = available() else { return };
+        let most = free / 3 * 2;
+        let first = Claim::new(most).unwrap();
+        assert!(Claim::new(most).is_err(), "both together are too much");
+        assert!(Claim::new(u64::MAX).is_err());
+        drop(first);
+        assert_eq!(CLAIMED.load(Ordering::Relaxed), 0);
+        drop(Claim::new(most).unwrap());
     }
 }

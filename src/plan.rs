@@ -377,6 +377,18 @@ impl Plan {
         100 * self.levels[0].pixels() as u64
     }
 
+    /// Bytes that the host takes beside the pair, at most, before it hands the graphs to a backend: for a pixel 14 of guides
+    /// and 3 of coarser images while the graphs are built, and the graphs; or 48 while a view's illumination is corrected, and 18 of the
+    /// corrected pair; or 200 of spectrum and responses while texture zones are found.
+    #[must_use]
+    pub fn front_bytes(&self) -> u64 {
+        let graphs =
+            self.levels.iter().map(|l| l.pixels() * (self.neighbours + 4 * self.slots() + 4)).sum::<usize>();
+        let corrected = if self.method.illumination == Illumination::None { 0 } else { 66 };
+        let zones = if self.restricted() { 200 } else { 0 };
+        (17 + corrected + zones) * self.levels[0].pixels() as u64 + graphs as u64
+    }
+
     /// Bytes of the pair: 18 a pixel, two views of 8 and their masks.
     #[must_use]
     pub fn pair_bytes(&self) -> u64 {

@@ -10,6 +10,7 @@ use crate::front::zones::{self, Zones};
 use crate::graph::{self, LevelGraph};
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
+use crate::memory;
 use crate::options::{Fill, Illumination, Median, Method, Schedule, Visibility};
 use crate::plan::{Phase, Plan};
 use crate::tiles::Tiles;
@@ -124,6 +125,7 @@ pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
 /// All stages of a match in one piece; the number of iterations.
 fn run(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work) -> Result<u32> {
     check_size(plan, pair)?;
+    memory::check(plan.front_bytes(), memory::SMALLER_MATCH)?;
     let right_labels = if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = work.inspector.take();
@@ -158,6 +160,7 @@ pub fn solve_tiles(
 ) -> Result<Solution> {
     let whole = tiles.whole();
     check_size(whole, pair)?;
+    memory::check(tiles.largest().front_bytes(), memory::SMALLER_MATCH)?;
     let all: f64 = tiles.list().iter().map(|tile| total_work(&tile.plan)).sum();
     let mut work = Work::new(observer, None, matchings(whole) as f64 * all);
     work.tile = Some((0, matchings(whole) * tiles.count()));

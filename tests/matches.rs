@@ -178,7 +178,7 @@ fn threads_change_nothing() {
         pool.install(|| {
             (
                 matches::find(&case.pair, Some((&zones, 15)), Some(case.range)),
-                check::range(&case.pair),
+                check::range(&case.pair).unwrap(),
                 check::warnings(&case.pair, None),
             )
         })
@@ -263,7 +263,7 @@ fn there_is_nothing_to_match() {
         {
             assert_eq!(matches::find(&pair, None, range), [], "{:?}", pair.size());
         }
-        assert_eq!(check::range(&pair), None);
+        assert_eq!(check::range(&pair).unwrap(), None);
         let said = check::warnings(&pair, None);
         assert!(said.iter().all(|w| matches!(w, Warning::Identical | Warning::Plain { .. })), "{said:?}");
     }
@@ -273,7 +273,7 @@ fn there_is_nothing_to_match() {
     // Views of different things cannot.
     let (left, right) = (Case::scene("slanted"), Case::scene("thin"));
     let strangers = Pair::new(left.pair.left().clone(), right.pair.right().clone()).unwrap();
-    assert_eq!(check::range(&strangers), None);
+    assert_eq!(check::range(&strangers).unwrap(), None);
 }
 
 /// Matches at (0, 0), (1, 0) and so on.
@@ -364,7 +364,7 @@ fn the_range_holds_the_truth() {
     // The truth of real pairs has stray pixels: 36 of Cones and one of Dolls lie far below all others.
     let scenes = SCENES.map(Case::scene).into_iter().map(|case| (case, 100.0, 3.0));
     for (case, share, most) in scenes.chain(real_pairs().into_iter().map(|case| (case, 99.95, 1.3))) {
-        let range = check::range(&case.pair).unwrap();
+        let range = check::range(&case.pair).unwrap().unwrap();
         let low = case.truths().fold(f32::MAX, f32::min).floor() as i32;
         let high = case.truths().fold(f32::MIN, f32::max).ceil() as i32;
         let inside = case.truths().filter(|t| range.min as f32 <= *t && *t <= range.max as f32).count();

@@ -80,7 +80,7 @@ pub fn list(bytes: &[u8]) {
         let Some(rows) = told(list::read(path)) else { return };
         let mut names = HashSet::new();
         for row in rows {
-            assert!(names.insert(row.name.to_ascii_lowercase()), "{} is there twice", row.name);
+            assert!(names.insert(row.name.to_lowercase()), "{} is there twice", row.name);
             assert!(!row.name.is_empty() && !row.left.is_empty() && !row.right.is_empty());
             assert!(!row.name.contains(['/', '\\']) && !row.name.starts_with('.'), "{}", row.name);
             if let Some(Largest::Pixels(max)) = row.max_disparity {

@@ -47,10 +47,13 @@ A list:
 /// with # are comments. Or LIST is a folder, and each folder in it that is not hidden a pair in one of the layouts that `mrfgs
 /// evaluate` takes; without a calib.txt the range is that of the truth.
 ///
+/// A name is that of files: up to 200 bytes, letters of any script and spaces included, but no / \ : * ? " < > | and no control
+/// characters, no . or - first, no . or space last. Names differ by more than upper and lower case.
+///
 /// Of each pair the map goes to OUTDIR/NAME.pfm (see --format), and last its record to OUTDIR/NAME.json: what `match --json`
 /// has, `status` ("done" or "failed", with a `reason`), `warnings`, and the `request`: inputs with sizes (bytes) and times (ms
-/// since 1970), range and outputs. A pair is complete when its record says done, its maps are there, and it holds the same
-/// request, method and version; a further run skips it and does all others. What fails is named, and does not keep the
+/// since 1970), range and outputs, and `bytes` of each output. A pair is complete when its record says done, its maps are there with as many
+/// bytes, and it holds the same request, method and version; a further run skips it and does all others. What fails is named, and does not keep the
 /// others from running.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -208,14 +211,14 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
     let inside = inputs.filter_map(|path| {
         let path = path.canonicalize().ok()?;
         let name = path.file_name().filter(|_| path.parent() == Some(&place))?;
-        Some(name.to_string_lossy().to_ascii_lowercase())
+        Some(name.to_string_lossy().to_lowercase())
     });
     let inside: HashSet<_> = inside.collect();
     if inside.is_empty() {
         return Ok(());
     }
     let owned = pairs.iter().flat_map(|listed| owned(&listed.name));
-    match owned.into_iter().find(|name| inside.contains(&name.to_ascii_lowercase())) {
+    match owned.into_iter().find(|name| inside.contains(&name.to_lowercase())) {
         Some(name) => {
             let reason = "is an input, and an output would take its place; give another folder";
             Err(Error::write(folder.join(name), reason))
@@ -366,13 +369,22 @@ impl Batch<'_> {
             });
         }
         let (maps, wanted) = (&matched.maps, &self.args.maps);
+        let staged = |file: &str| claim.folder().join(file);
+        // The place in the making is nothing to tell.
+        let named = |e| match e {
+            Error::Write { path, reason } => match path.file_name() {
+                Some(name) => Error::write(self.args.folder.join(name), reason),
+                None => Error::write(path, reason),
+            },
+            other => other,
+        };
         input.files.output = wanted.disparity_name(&listed.name);
-        write::disparity(&claim.folder().join(&input.files.output), &maps.final_map())?;
+        write::disparity(&staged(&input.files.output), &maps.final_map()).map_err(named)?;
         for (file, of) in wanted.more(&listed.name) {
-            write::grey8(&claim.folder().join(file), of(maps))?;
+            write::grey8(&staged(&file), of(maps)).map_err(named)?;
         }
         let sidecar = Sidecar::new(&input.files, &matched, time, Sign::default());
-        let text = request.done(&record, sidecar, &warnings)?;
+        let text = request.done(&record, claim.folder(), sidecar, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
         Ok(Ok(matched.note))
     }
@@ -393,7 +405,7 @@ impl Batch<'_> {
                 error => error,
             },
         )?;
-        let mut warnings = check::warnings(pair, Some(range));
+        let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
         let start = Instant::now();
         let matched = matcher.run(pair, range, &self.method, &mut |_| stop::go_on())?;
         let time = start.elapsed();
@@ -406,27 +418,20 @@ impl Batch<'_> {
     fn publish(&self, claim: &Claim, outputs: &[String], record: &Path, text: &str) -> Result<()> {
         let name = record.file_name().unwrap_or(record.as_os_str());
         let staged_record = claim.folder().join(name);
-        write::save(&staged_record, text.as_bytes())?;
+        write::save(&staged_record, text.as_bytes()).map_err(|e| match e {
+            Error::Write { reason, .. } => Error::write(record, reason),
+            other => other,
+        })?;
         let old = Request::recorded_outputs(record);
-        gone(record, fs::remove_file(record))?;
+        write::remove(record)?;
         let stem = record.file_stem().unwrap_or_default().to_string_lossy();
         for map in owned(&stem).into_iter().filter(|map| old.contains(map)) {
-            let map = self.args.folder.join(map);
-            gone(&map, fs::remove_file(&map))?;
+            write::remove(&self.args.folder.join(map))?;
         }
         for map in outputs {
-            let place = self.args.folder.join(map);
-            fs::rename(claim.folder().join(map), &place).map_err(|e| Error::write(&place, e))?;
+            write::publish(&claim.folder().join(map), &self.args.folder.join(map))?;
         }
-        fs::rename(staged_record, record).map_err(|e| Error::write(record, e))
-    }
-}
-
-/// What became of a removal; that there was nothing is no error.
-fn gone(path: &Path, removal: io::Result<()>) -> Result<()> {
-    match removal {
-        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::write(path, e)),
-        _ => Ok(()),
+        write::publish(&staged_record, record)
     }
 }
 

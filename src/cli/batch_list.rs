@@ -11,7 +11,7 @@ use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 
 use super::folder::{self, Folder};
-use super::search::Search;
+use super::search::{Found, Search};
 use super::sidecar::Files;
 use super::sign::Sign;
 
@@ -44,6 +44,8 @@ enum Source {
 pub(super) struct Input {
     pub(super) pair: Pair,
     pub(super) range: DisparityRange,
+    /// Whether sparse matches gave the range.
+    pub(super) by_matches: bool,
     /// Without the output, which the reader does not know.
     pub(super) files: Files,
 }
@@ -130,7 +132,8 @@ impl Listed {
                 };
                 let calibration_path = left_path.with_file_name("calib.txt");
                 let known = calibration.as_ref().map(|known| (calibration_path.as_path(), known));
-                let range = search.range(&pair, known, Sign::default()).map_err(list::in_columns)?.range;
+                let found = search.range(&pair, known, Sign::default()).map_err(list::in_columns)?;
+                let Found { range, by_matches } = found;
                 let calibration = calibration.map(|_| calibration_beside(left));
                 let files = Files {
                     left: left.clone(),
@@ -139,7 +142,7 @@ impl Listed {
                     calibration,
                     output,
                 };
-                Ok(Input { pair, range, files })
+                Ok(Input { pair, range, by_matches, files })
             }
             Source::Folder => {
                 let dir = base.join(&self.name);
@@ -148,7 +151,8 @@ impl Listed {
                 let inside = |file: &str| shown(&Path::new(&self.name).join(file));
                 let [left, right] = folder.view_names().map(inside);
                 let calibration = dir.join("calib.txt").exists().then(|| inside("calib.txt"));
-                Ok(Input { pair, range, files: Files { left, right, mask: None, calibration, output } })
+                let files = Files { left, right, mask: None, calibration, output };
+                Ok(Input { pair, range, by_matches: false, files })
             }
         }
     }

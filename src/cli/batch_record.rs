@@ -1,5 +1,6 @@
 //! The record that a batch writes of a pair, last of all its files: what was asked for, and what came of it.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::time::UNIX_EPOCH;
@@ -48,6 +49,8 @@ pub(super) enum State {
 struct Done<'a> {
     status: &'static str,
     request: &'a Request,
+    /// The size of each output.
+    bytes: BTreeMap<&'a str, u64>,
     warnings: &'a [String],
     #[serde(flatten)]
     sidecar: Sidecar<'a>,
@@ -97,13 +100,25 @@ impl Request {
             && record["version"] == env!("CARGO_PKG_VERSION")
             && same(&record["request"], self)
             && same(&record["method"], method)
-            && self.outputs.iter().all(|name| path.with_file_name(name).is_file());
+            && self.outputs.iter().all(|name| {
+                let size = fs::metadata(path.with_file_name(name)).ok().filter(fs::Metadata::is_file);
+                size.is_some_and(|size| record["bytes"][name] == size.len())
+            });
         if complete { State::Complete } else { State::Missing }
     }
 
-    /// The text of the record `path` of a pair that is done.
-    pub(super) fn done(&self, path: &Path, sidecar: Sidecar, warnings: &[String]) -> Result<String> {
-        outputs::json_text(path, &Done { status: "done", request: self, warnings, sidecar })
+    /// The text of the record `path` of a pair that is done, and whose outputs are in the folder `staged`.
+    pub(super) fn done(
+        &self,
+        path: &Path,
+        staged: &Path,
+        sidecar: Sidecar,
+        warnings: &[String],
+    ) -> Result<String> {
+        let size = |name: &String| fs::metadata(staged.join(name)).map(|about| about.len());
+        let sizes = self.outputs.iter().map(|name| Ok((name.as_str(), size(name)?)));
+        let bytes = sizes.collect::<std::io::Result<_>>().map_err(|e| Error::write(path, e))?;
+        outputs::json_text(path, &Done { status: "done", request: self, bytes, warnings, sidecar })
     }
 
     /// The text of the record `path` of a pair that failed.

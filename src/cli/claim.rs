@@ -1,5 +1,6 @@
-//! Which run of a batch is at a pair.
+//! Which run is at a pair of a batch, or at a folder of outputs.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use same_file::Handle;
 /// The file that is locked.
 const LOCK: &str = "lock";
 
-/// A pair that this run is at, and the folder in which the files of the pair are made. While it lives the folder is locked, and
+/// What this run is at, and the folder in which its files are made. While it lives the folder is locked, and
 /// afterwards gone. The lock goes with its process however that ends; then the folder is there without a lock.
 pub(super) struct Claim {
     folder: PathBuf,
@@ -19,10 +20,10 @@ pub(super) struct Claim {
 }
 
 impl Claim {
-    /// Claims the pair `name` of the output folder `parent`, and removes what a run left of it that was killed; `None` while
-    /// another run is at it.
-    pub(super) fn new(parent: &Path, name: &str) -> Result<Option<Self>> {
-        let folder = staging(parent, name);
+    /// Claims `name` of the output folder `parent`, and removes what a run left of it that was killed; `None` while another run is
+    /// at it.
+    pub(super) fn new(parent: &Path, name: impl AsRef<OsStr>) -> Result<Option<Self>> {
+        let folder = staging(parent, name.as_ref());
         let failed =
             |e: io::Error| Error::write(parent, format!("nothing can be created in it: {}", e.kind()));
         loop {
@@ -52,15 +53,15 @@ impl Claim {
         }
     }
 
-    /// Removes what a run left of the pair `name` that was killed, unless another run is at it.
+    /// Removes what a run left of `name` that was killed, unless another run is at it.
     pub(super) fn remove_remains(parent: &Path, name: &str) -> Result<()> {
-        if staging(parent, name).exists() {
+        if staging(parent, name.as_ref()).exists() {
             Self::new(parent, name)?;
         }
         Ok(())
     }
 
-    /// Where the files of the pair are made.
+    /// Where the files are made.
     pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -69,7 +70,9 @@ impl Claim {
     fn clear(&self) -> io::Result<()> {
         for entry in fs::read_dir(&self.folder)? {
             let entry = entry?;
-            if entry.file_name() != LOCK {
+            if entry.file_type()?.is_dir() {
+                fs::remove_dir_all(entry.path())?;
+            } else if entry.file_name() != LOCK {
                 fs::remove_file(entry.path())?;
             }
         }
@@ -86,9 +89,12 @@ impl Drop for Claim {
     }
 }
 
-/// The folder of a pair: by its name, so that what a killed run leaves is found.
-fn staging(parent: &Path, name: &str) -> PathBuf {
-    parent.join(format!(".{name}.tmp"))
+/// The folder for `name`: called after it, so that what a killed run leaves is found.
+fn staging(parent: &Path, name: &OsStr) -> PathBuf {
+    let mut folder = OsString::from(".");
+    folder.push(name);
+    folder.push(".tmp");
+    parent.join(folder)
 }
 
 #[cfg(test)]
@@ -111,13 +117,13 @@ mod tests {
         assert!(claimed().is_some());
 
         // What a killed run leaves: no lock, but the file that was locked.
-        let remains = staging(folder.path(), "a");
-        fs::create_dir(&remains).unwrap();
-        for file in ["lock", "a.pfm"] {
+        let remains = staging(folder.path(), "a".as_ref());
+        fs::create_dir_all(remains.join("new/below")).unwrap();
+        for file in ["lock", "a.pfm", "new/b.pfm"] {
             fs::write(remains.join(file), "half").unwrap();
         }
         let claim = claimed().unwrap();
-        assert!(!claim.folder().join("a.pfm").exists());
+        assert!(!claim.folder().join("a.pfm").exists() && !claim.folder().join("new").exists());
         drop(claim);
         assert!(!remains.exists());
     }

@@ -35,6 +35,10 @@ impl Intermediates {
 
     /// Takes what a match shows on its way.
     pub(super) fn look(&mut self, glimpse: &mut Glimpse) -> Result<()> {
+        self.show(glimpse).map_err(|e| self.folder.named(e))
+    }
+
+    fn show(&mut self, glimpse: &mut Glimpse) -> Result<()> {
         match glimpse {
             Glimpse::Corrected(pair) => self.corrected(pair),
             Glimpse::Matches(pair, zones, matches) => self.zones(pair, zones, matches),
@@ -59,7 +63,8 @@ impl Intermediates {
 
     /// Puts everything where it was asked for.
     pub(super) fn finish(self) -> Result<()> {
-        write::save(&self.path("change-per-iteration.csv"), self.changes.as_bytes())?;
+        let saved = write::save(&self.path("change-per-iteration.csv"), self.changes.as_bytes());
+        saved.map_err(|e| self.folder.named(e))?;
         self.folder.publish()
     }
 

@@ -112,7 +112,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let inputs = inputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
     args.more.check(&args.output, &inputs.collect::<Vec<_>>(), args.sign.range(range))?;
     if !args.quiet {
-        warn(check::warnings(&pair, Some(range)));
+        // A range that was found says nothing of what the user knows.
+        warn(check::warnings(&pair, (!by_matches).then_some(range)));
     }
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     if args.dry_run {

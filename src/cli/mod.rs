@@ -60,8 +60,8 @@ Examples:
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
-Exit status: 0 when all went well, 2 when the command line makes no sense, 130 when stopped by Ctrl-C or SIGTERM, 1 for \
-any other failure. A failure is one line on standard error and leaves no output behind.";
+Exit status: 0 when all went well, 2 when the command line makes no sense (for this pair, or on this machine), 130 when \
+stopped by Ctrl-C or SIGTERM, 1 for any other failure. A failure is one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
 #[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
@@ -115,7 +115,7 @@ pub(crate) enum Failure {
 impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Usage(_) => ExitCode::from(2),
+            Self::Usage(_) | Self::Error(Error::Option { .. }) => ExitCode::from(2),
             Self::Stopped(_) => ExitCode::from(stop::STOPPED),
             Self::Incomplete(_) | Self::Error(_) => ExitCode::FAILURE,
         }

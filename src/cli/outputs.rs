@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use mrfgs::image::write;
 use mrfgs::{Error, Result};
 use serde::Serialize;
-use tempfile::TempDir;
+
+use super::claim::Claim;
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
 pub(super) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
@@ -146,23 +147,30 @@ pub(super) fn folder_place(name: &Path) -> Result<PathBuf> {
     }
 }
 
-/// A folder in the making, beside the place that it takes once it is whole; gone with all it holds when dropped before.
+/// A folder in the making, beside the place that it takes once it is whole; gone with all it holds when dropped before, and when
+/// the program is killed, by the next run that makes it.
 pub(super) struct StagedFolder {
     /// As the user wrote it.
     name: PathBuf,
     place: PathBuf,
-    staging: TempDir,
+    staging: Claim,
 }
 
 impl StagedFolder {
     /// Begins the folder `name`, which may be there already.
     pub(super) fn new(name: &Path) -> Result<Self> {
         let place = folder_place(name)?;
-        let beside = place.parent().unwrap_or(&place);
-        let staging = tempfile::Builder::new().prefix(".mrfgs-").suffix(".tmp").tempdir_in(beside);
-        let staging = staging.map_err(|e| {
-            let reason = format!("nothing can be created in {}: {}", beside.display(), e.kind());
-            Error::write(name, reason)
+        let (Some(beside), Some(last)) = (place.parent(), place.file_name()) else {
+            return Err(Error::write(name, "has no name; give the name of a folder"));
+        };
+        let staging = Claim::new(beside, last).map_err(|e| match e {
+            Error::Write { reason, .. } => {
+                Error::write(name, reason.replacen("in it", &format!("in {}", beside.display()), 1))
+            }
+            other => other,
+        })?;
+        let staging = staging.ok_or_else(|| {
+            Error::write(name, "another run is writing it; wait for that, or give another name")
         })?;
         let staged = Self { name: name.to_owned(), place, staging };
         fs::create_dir(staged.path()).map_err(|e| Error::write(name, e))?;
@@ -183,15 +191,25 @@ impl StagedFolder {
         &self.place
     }
 
-    /// Where it is made: inside, for the staging folder itself is private.
+    /// Where it is made.
     pub(super) fn path(&self) -> PathBuf {
-        self.staging.path().join("new")
+        self.staging.folder().join("new")
+    }
+
+    /// An error that tells the place of a file in the making as one that tells the folder.
+    pub(super) fn named(&self, error: Error) -> Error {
+        match error {
+            Error::Write { path, reason } if path.starts_with(self.staging.folder()) => {
+                Error::write(&self.name, reason)
+            }
+            other => other,
+        }
     }
 
     /// Puts it in its place; what was there goes, and comes back when that fails.
     pub(super) fn publish(self) -> Result<()> {
         let error = |e: std::io::Error| Error::write(&self.name, e);
-        let old = self.staging.path().join("old");
+        let old = self.staging.folder().join("old");
         let replaces = self.place.exists();
         if replaces {
             fs::rename(&self.place, &old).map_err(error)?;

@@ -192,7 +192,7 @@ impl<'a> Destination<'a> {
     fn publish<'b>(&self, files: impl Iterator<Item = (String, &'b [u8])>) -> Result<()> {
         let staged = StagedFolder::new(self.dir)?;
         for (name, bytes) in files {
-            write::save(&staged.path().join(name), bytes)?;
+            write::save(&staged.path().join(name), bytes).map_err(|e| staged.named(e))?;
         }
         self.refuse_strangers()?;
         staged.publish()

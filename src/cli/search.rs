@@ -82,8 +82,6 @@ impl Search {
 }
 
 fn by_matches(pair: &Pair) -> Result<DisparityRange> {
-    check::range(pair).ok_or_else(|| {
-        let reason = "give the largest disparity to search, in pixels: there are too few matches to find it";
-        Error::option("--max-disparity", reason)
-    })
+    let lacking = "the views have too few matches to find the range of disparities; give --max-disparity";
+    check::range(pair)?.ok_or_else(|| Error::Mismatch(lacking.into()))
 }

@@ -50,9 +50,10 @@ impl Submission {
         let Self { folder, method, ending } = self;
         let dir = folder.path().join(name);
         fs::create_dir(&dir).map_err(|e| Error::write(folder.place().join(name), e))?;
-        write::disparity(&dir.join(format!("disp0{method}{ending}.pfm")), map)?;
         let time = format!("{:.3}\n", time.as_secs_f64());
-        write::save(&dir.join(format!("time{method}.txt")), time.as_bytes())
+        write::disparity(&dir.join(format!("disp0{method}{ending}.pfm")), map)
+            .and_then(|()| write::save(&dir.join(format!("time{method}.txt")), time.as_bytes()))
+            .map_err(|e| folder.named(e))
     }
 
     /// Puts it in its place.

@@ -8,8 +8,10 @@
 //! Sums are integers and the rest is + - * / and square roots in a fixed order, so every machine finds the same
 //! matches, whatever the number of threads.
 
+use crate::error::Result;
 use crate::image::{Image, Pair, Plane};
 use crate::maps::FRACTION;
+use crate::memory;
 use crate::options::DisparityRange;
 use rayon::prelude::*;
 use std::array::from_fn;
@@ -79,6 +81,19 @@ pub fn find(pair: &Pair, zones: Option<(&Plane<u8>, usize)>, range: Option<Dispa
     let (width, height) = pair.size();
     let spacing = if range.is_some() { SPACING } else { width * height / OVERVIEW };
     search(pair, zones, range, spacing, 0)
+}
+
+/// Bytes that a search takes for a pixel: the statistics of both views, and the eigenvalues of one; and twice one view's pixels
+/// and mask, where it is looked at in other ways.
+const BYTES: u64 = 2 * (2 + 4 + 8) + 8 + 2 * 9;
+
+/// Declines to search a pair that the machine has not enough memory for.
+///
+/// # Errors
+/// [`Error::Memory`](crate::Error::Memory).
+pub(super) fn check_memory(pair: &Pair) -> Result<()> {
+    let (width, height) = pair.size();
+    memory::check(BYTES * (width * height) as u64, memory::SMALLER_IMAGE)
 }
 
 /// [`find`] with one corner in `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below its own.

@@ -11,7 +11,7 @@ use super::file::{self, check_claim, check_size, damaged, most_bytes, unsupporte
 use super::raster::{Raster, Samples};
 use super::{jpeg, pfm, tiff};
 use crate::error::{Error, Result, one_line};
-use crate::memory;
+use crate::memory::Claim;
 
 /// No codec here packs more pixels than this into a byte; a header that claims more lies, and believing it
 /// would cost memory in vain.
@@ -160,7 +160,7 @@ fn decode_coded(
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
     check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
     // The decoder holds rows and their filtered copies beside its pixels.
-    memory::check(2 * decoder.total_bytes()).map_err(|e| e.to_string())?;
+    let _claim = Claim::new(2 * decoder.total_bytes()).map_err(|e| e.to_string())?;
     let image = DynamicImage::from_decoder(decoder).map_err(coded_reason)?;
     let (channels, samples) = match image {
         DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw().into())),

@@ -44,7 +44,7 @@ pub(super) fn load(
             format!("has more bytes than {max_pixels} pixels can take; raise --max-pixels or crop it"),
         ));
     }
-    memory::check(metadata.len()).map_err(|e| Error::read(path, e))?;
+    memory::check(metadata.len(), memory::SMALLER_IMAGE).map_err(|e| Error::read(path, e))?;
     let mut file = File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
     file.by_ref().take(64).read_to_end(&mut bytes).map_err(io)?;

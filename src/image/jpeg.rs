@@ -8,7 +8,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::file::{check_claim, damaged};
 use super::raster::{Raster, Samples};
-use crate::memory;
+use crate::memory::{self, Claim};
 
 /// The most pixels that a byte of a file stands for: blocks of 64 without detail, subsampled, take a few bits.
 const MAX_PIXELS_PER_BYTE: u64 = 10_000;
@@ -38,7 +38,8 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, S
     };
     decoder.set_options(options.jpeg_set_out_colorspace(colours));
     let count = size.0 * size.1 * channels;
-    memory::check(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64).map_err(|e| e.to_string())?;
+    let _claim =
+        Claim::new(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64).map_err(|e| e.to_string())?;
     let mut samples = memory::filled(count, 0).map_err(|e| e.to_string())?;
     decoder.decode_into(&mut samples).map_err(reason)?;
     let samples = Samples::Byte(samples.into());

@@ -9,6 +9,7 @@ pub mod pfm;
 pub mod ply;
 pub mod raster;
 pub mod read;
+mod save;
 mod tiff;
 pub mod write;
 
@@ -150,6 +151,13 @@ impl<T: Clone> Plane<T> {
         Self { width: self.width, height: self.height, data: data.collect() }
     }
 
+    /// The plane with top and bottom exchanged.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        let data = self.data.chunks(self.width.max(1)).rev().flat_map(|row| row.iter().cloned());
+        Self { width: self.width, height: self.height, data: data.collect() }
+    }
+
     /// The values in `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
@@ -225,6 +233,12 @@ impl Image {
     #[must_use]
     pub fn mirrored(&self) -> Self {
         Self { pixels: self.pixels.mirrored(), masked: self.masked.mirrored() }
+    }
+
+    /// The image with top and bottom exchanged.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        Self { pixels: self.pixels.flipped(), masked: self.masked.flipped() }
     }
 
     /// What is in `part`.

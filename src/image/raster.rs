@@ -169,7 +169,7 @@ pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Resul
     let images = [&left, &right];
     // Of either view the pixels and their mask.
     let pixels = left.width as u64 * left.height as u64;
-    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64)?;
+    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, memory::SMALLER_IMAGE)?;
     if left.samples.is_float() != right.samples.is_float() {
         return Err(Error::Mismatch(
             "one image holds float values and the other whole ones: give both in one format".into(),

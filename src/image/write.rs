@@ -2,17 +2,19 @@
 
 use std::fs;
 use std::io::{Cursor, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
-use tempfile::NamedTempFile;
 use tiff::TiffResult;
 use tiff::encoder::{TiffEncoder, TiffKind, colortype::Gray32Float};
 use tiff::tags::Tag;
 
+use super::save::Target;
 use super::{Plane, pfm};
 use crate::error::{Error, Result};
+
+pub use super::save::{publish, remove, save};
 
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;
@@ -235,84 +237,6 @@ fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
         (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
         _ => {
             Err(Error::write(path, format!("the format holds no picture of {} x {} pixels", size.0, size.1)))
-        }
-    }
-}
-
-/// Where bytes go.
-enum Target {
-    /// A regular file, there already or not: a temporary file in its folder takes its place by a rename.
-    File { file: PathBuf, folder: PathBuf },
-    /// Anything else that exists: a device or a pipe must not be replaced by a file.
-    Special,
-}
-
-impl Target {
-    fn of(path: &Path) -> Result<Self> {
-        let error = |reason: &str| Err(Error::write(path, reason));
-        let file = match fs::metadata(path) {
-            Ok(m) if m.is_dir() => return error("is a folder; give the name of a file"),
-            Ok(m) if !m.is_file() => return Ok(Self::Special),
-            Ok(m) if m.permissions().readonly() => {
-                return error("the file there is read-only; remove it first");
-            }
-            // A link stays a link: what it points to is replaced.
-            Ok(_) => fs::canonicalize(path).map_err(|e| Error::write(path, e))?,
-            Err(_) => path.to_owned(),
-        };
-        if file.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator) {
-            return error("names no file; give the name of one");
-        }
-        let folder = match file.parent() {
-            Some(p) if p != Path::new("") => p.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        if !folder.is_dir() {
-            return error(&format!("there is no folder {}; create it first", folder.display()));
-        }
-        Ok(Self::File { file, folder })
-    }
-
-    /// Tries to create a file where [`save`] would.
-    fn check(&self, path: &Path) -> Result<()> {
-        match self {
-            Self::File { folder, .. } => temporary(path, folder).map(drop),
-            Self::Special => Ok(()),
-        }
-    }
-}
-
-/// A file without a name that matters, gone when dropped.
-fn temporary(path: &Path, folder: &Path) -> Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mrfgs-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        // Temporary files are private by default; an output is as open as the umask lets it be.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder).map_err(|e| {
-        Error::write(path, format!("no file can be created in {}: {}", folder.display(), e.kind()))
-    })
-}
-
-/// Writes a file that appears whole or not at all. What exists and is no regular file is written to directly.
-///
-/// # Errors
-/// [`Error::Write`] when the file cannot be written.
-pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
-    let error = |e: std::io::Error| Error::write(path, e);
-    match Target::of(path)? {
-        Target::Special => {
-            fs::OpenOptions::new().write(true).open(path).and_then(|mut f| f.write_all(bytes)).map_err(error)
-        }
-        Target::File { file, folder } => {
-            let mut temporary = temporary(path, &folder)?;
-            temporary.write_all(bytes).map_err(error)?;
-            // Else a crash of the machine could leave the name without the content.
-            temporary.as_file().sync_all().map_err(error)?;
-            temporary.persist(file).map(drop).map_err(|e| error(e.error))
         }
     }
 }

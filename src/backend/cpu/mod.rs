@@ -398,7 +398,7 @@ impl Backend for Cpu {
             _ => {
                 // What the last match holds goes before the next one asks for more.
                 self.state = None;
-                memory::check(plan.bytes())?;
+                memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
                 self.state = Some(match plan.volume_width {
                     VolumeWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)?),
                     VolumeWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)?),

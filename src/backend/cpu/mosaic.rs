@@ -25,7 +25,7 @@ impl Mosaic {
     /// # Errors
     /// [`crate::Error::Memory`] when the machine cannot hold them.
     pub fn new(plan: &Plan, pair: &Pair) -> Result<Self> {
-        memory::check(plan.mosaic_bytes())?;
+        memory::check(plan.mosaic_bytes(), memory::SMALLER_MATCH)?;
         let (width, height) = plan.size();
         let maps = Finest {
             right: Plane::filled(width, height, NO_LABEL),

@@ -338,7 +338,7 @@ impl Backend for Gpu {
                 // What the last match holds goes before the next one asks for more.
                 drop(other);
                 if self.device.software {
-                    memory::check(plan.bytes())?;
+                    memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
                 }
                 let buffers = Buffers::new(&self.device, plan)?;
                 let steps = self.steps(plan, &buffers)?;

@@ -108,7 +108,8 @@ impl Packing<'_> {
         }
         file.extend([0; 4]);
         file.extend(tables);
-        file.try_reserve_exact(data.len()).map_err(|_| memory::lacking(data.len() as u64).to_string())?;
+        file.try_reserve_exact(data.len())
+            .map_err(|_| unsupported("a TIFF strip or tile is too large for the memory"))?;
         file.extend(data);
         let mut out = memory::filled(self.row_bytes * rows, 0).map_err(|e| e.to_string())?;
         let reason = |e: TiffError| match e {
