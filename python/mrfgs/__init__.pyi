@@ -5,12 +5,16 @@ import numpy.typing as npt
 
 __version__: str
 
-_Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16] | npt.NDArray[np.float32] | npt.NDArray[np.float64]
+# Whatever numpy makes an array of: uint8, uint16, float32 or float64, (height, width) or (height, width, channels).
+_Image = npt.ArrayLike
 _Backend = Literal["auto", "cpu", "gpu"]
+
+class MatchWarning(UserWarning):
+    """What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."""
 
 @final
 class Matched:
-    """What a match leaves behind; all maps have the shape (height, width) of the images."""
+    """The maps of a pair, and what made them. All maps have the shape (height, width) of the images."""
 
     @property
     def disparity(self) -> npt.NDArray[np.float32]:
@@ -46,11 +50,7 @@ class Matched:
 
 @final
 class Matcher:
-    """Matches pair after pair, and keeps in between what is dear: the device, its compiled shaders, its buffers.
-
-    `backend` is auto, cpu or gpu; `device` an adapter by index or part of its name, as `mrfgs devices` lists them; `threads` those
-    of the CPU path, one a core where None.
-    """
+    """Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between."""
 
     def __new__(cls, *, backend: _Backend = "auto", device: str | None = None, threads: int | None = None) -> Matcher: ...
     def match(
@@ -60,21 +60,13 @@ class Matcher:
         max_disparity: int | None = None,
         *,
         min_disparity: int | None = None,
-        mask: npt.NDArray[np.bool_] | None = None,
+        mask: npt.ArrayLike | None = None,
+        no_data: float | None = None,
         preset: str = "default",
         options: Mapping[str, Any] | None = None,
+        warn: bool = True,
     ) -> Matched:
-        """Matches a rectified pair.
-
-        `left` and `right` have the shape (height, width) or (height, width, channels): grey, grey and alpha, RGB, or RGBA;
-        uint8, uint16, float32 or float64, scaled as files are. Ignored are pixels of alpha 0, values that are not finite, and,
-        in the left image, where `mask` is True. Disparities are searched from `min_disparity` to `max_disparity`, both
-        included; sparse matches find what is not given. `options` replaces keys of the preset, as `mrfgs presets` lists them:
-        {"fill": "none", "memory": 2048}. Other threads run meanwhile; Ctrl-C ends it.
-
-        Raises ValueError for what makes no sense, TypeError for other arrays, RuntimeError where the wanted device fails,
-        MemoryError where it does not fit.
-        """
+        """Matches a rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
 
 def match(
     left: _Image,
@@ -82,11 +74,13 @@ def match(
     max_disparity: int | None = None,
     *,
     min_disparity: int | None = None,
-    mask: npt.NDArray[np.bool_] | None = None,
+    mask: npt.ArrayLike | None = None,
+    no_data: float | None = None,
     preset: str = "default",
     options: Mapping[str, Any] | None = None,
+    warn: bool = True,
     backend: _Backend = "auto",
     device: str | None = None,
     threads: int | None = None,
 ) -> Matched:
-    """Matches one pair; see `Matcher` and `Matcher.match` for the arguments."""
+    """Matches one rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""

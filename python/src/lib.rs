@@ -1,6 +1,9 @@
 //! The Python module `mrfgs._mrfgs`: arrays in, the matcher of the crate `mrfgs`, arrays out.
 
-use std::borrow::Cow;
+mod arrays;
+mod words;
+
+use std::ffi::CString;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -8,99 +11,41 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use mrfgs::front::check;
-use mrfgs::image::raster::{self, Raster, Samples};
-use mrfgs::image::{Pair, Plane};
+use mrfgs::front::check::{self, Warning};
+use mrfgs::image::{Pair, Plane, raster};
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
 use mrfgs::solver::Observer;
 use mrfgs::{Error, Matched, Matcher};
-use numpy::{
-    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
-};
-use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple, PyType};
 
-/// The exception that says what went wrong.
+pyo3::create_exception!(
+    mrfgs,
+    MatchWarning,
+    PyUserWarning,
+    "What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."
+);
+
+/// The exception that says what went wrong, in the words of Python.
 fn exception(error: Error) -> PyErr {
+    let text = words::in_python(&error.to_string());
     match error {
-        Error::Memory(_) => PyMemoryError::new_err(error.to_string()),
-        Error::Device(_) => PyRuntimeError::new_err(error.to_string()),
+        Error::Memory(_) => PyMemoryError::new_err(text),
+        Error::Device(_) => PyRuntimeError::new_err(text),
         Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-        _ => PyValueError::new_err(error.to_string()),
+        _ => PyValueError::new_err(text),
     }
 }
 
-/// The samples of an array, borrowed; copied where they do not lie in one piece.
-fn samples<'a, T: numpy::Element + Copy>(array: &'a PyReadonlyArrayDyn<T>) -> Cow<'a, [T]> {
-    match array.as_slice() {
-        Ok(slice) => Cow::Borrowed(slice),
-        Err(_) => array.as_array().iter().copied().collect::<Vec<_>>().into(),
+/// Says what is probably wrong, at the line of Python that called.
+fn warn(py: Python, warnings: impl IntoIterator<Item = Warning>) -> PyResult<()> {
+    for warning in warnings {
+        let text = CString::new(words::in_python(&warning.to_string()))?;
+        PyErr::warn(py, &py.get_type::<MatchWarning>(), &text, 1)?;
     }
-}
-
-/// An image in an array, kept alive and unchanged while it is read.
-enum Pixels<'py> {
-    Byte(PyReadonlyArrayDyn<'py, u8>),
-    Word(PyReadonlyArrayDyn<'py, u16>),
-    Float(PyReadonlyArrayDyn<'py, f32>),
-    Double(PyReadonlyArrayDyn<'py, f64>),
-}
-
-impl<'py> Pixels<'py> {
-    fn of(name: &str, array: &Bound<'py, PyUntypedArray>) -> PyResult<Self> {
-        let array = array.as_any();
-        if let Ok(array) = array.extract() {
-            return Ok(Self::Byte(array));
-        }
-        if let Ok(array) = array.extract() {
-            return Ok(Self::Word(array));
-        }
-        if let Ok(array) = array.extract() {
-            return Ok(Self::Float(array));
-        }
-        if let Ok(array) = array.extract() {
-            return Ok(Self::Double(array));
-        }
-        Err(PyTypeError::new_err(format!("{name}: give an array of uint8, uint16, float32 or float64")))
-    }
-
-    fn raster(&self, name: &str) -> PyResult<Raster<'_>> {
-        let (shape, samples) = match self {
-            Self::Byte(a) => (a.shape(), Samples::Byte(samples(a))),
-            Self::Word(a) => (a.shape(), Samples::Word(samples(a))),
-            Self::Float(a) => (a.shape(), Samples::Float(samples(a))),
-            Self::Double(a) => (a.shape(), Samples::Double(samples(a))),
-        };
-        let (height, width, channels) = match *shape {
-            [height, width] => (height, width, 1),
-            [height, width, channels] => (height, width, channels),
-            _ => {
-                let reason =
-                    format!("{name}: give an array of shape (height, width) or (height, width, channels)");
-                return Err(PyValueError::new_err(reason));
-            }
-        };
-        Raster::new(width, height, channels, samples)
-            .map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
-    }
-}
-
-/// The pair of two arrays, whose colours are red, green, blue.
-fn pair(
-    left: &Bound<PyUntypedArray>,
-    right: &Bound<PyUntypedArray>,
-    mask: Option<PyReadonlyArrayDyn<bool>>,
-) -> PyResult<Pair> {
-    let (left, right) = (Pixels::of("left", left)?, Pixels::of("right", right)?);
-    let mask = match mask {
-        Some(mask) => match *mask.shape() {
-            [height, width] => Some(Plane::new(width, height, samples(&mask).into_owned())),
-            _ => return Err(PyValueError::new_err("mask: give an array of shape (height, width)")),
-        },
-        None => None,
-    };
-    raster::pair(left.raster("left")?, right.raster("right")?, mask.as_ref()).map_err(exception)
+    Ok(())
 }
 
 /// The method: a preset, and what replaces some of its keys.
@@ -127,23 +72,34 @@ fn execution(backend: &str, device: Option<String>, threads: Option<usize>) -> P
     Ok(Execution { backend, device, threads, ..Execution::default() })
 }
 
-/// What a match leaves behind.
+/// The maps of a pair, and what made them. All maps have the shape (height, width) of the images.
 #[pyclass(name = "Matched", frozen, get_all, module = "mrfgs")]
 struct PyMatched {
+    /// Disparity in pixels, float32, +inf where there is none.
     disparity: Py<PyArray2<f32>>,
+    /// Disparity before post-processing in pixels, float32, +inf where the left image is masked.
     raw: Py<PyArray2<f32>>,
+    /// How far the best rival is behind, in 1/8 nat, uint8; 0 where there is no measurement.
     confidence: Py<PyArray2<u8>>,
+    /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
+    /// confidence, 16 filled, 32 masked; 0 is measured and trusted.
     validity: Py<PyArray2<u8>>,
+    /// Smallest disparity that was searched, in pixels.
     min_disparity: i32,
+    /// Largest disparity that was searched, in pixels.
     max_disparity: i32,
+    /// Iterations done, of all phases together.
     iterations: u32,
+    /// Tiles that the image was matched in.
     tiles: usize,
+    /// What ran it.
     ran_on: String,
+    /// Why that is not the device that was hoped for, where that is so; else None.
     note: Option<String>,
 }
 
 impl PyMatched {
-    fn new(py: Python, matched: Matched) -> PyResult<Self> {
+    fn of(py: Python, matched: Matched) -> PyResult<Self> {
         fn array<T: numpy::Element>(py: Python, plane: Plane<T>) -> PyResult<Py<PyArray2<T>>> {
             let shape = [plane.height(), plane.width()];
             Ok(plane.into_data().into_pyarray(py).reshape(shape)?.unbind())
@@ -164,7 +120,62 @@ impl PyMatched {
     }
 }
 
-/// Matches pair after pair, and keeps in between what is dear.
+#[pymethods]
+impl PyMatched {
+    #[new]
+    #[allow(clippy::too_many_arguments, reason = "what it is made of")]
+    fn new(
+        disparity: Py<PyArray2<f32>>,
+        raw: Py<PyArray2<f32>>,
+        confidence: Py<PyArray2<u8>>,
+        validity: Py<PyArray2<u8>>,
+        min_disparity: i32,
+        max_disparity: i32,
+        iterations: u32,
+        tiles: usize,
+        ran_on: String,
+        note: Option<String>,
+    ) -> Self {
+        Self {
+            disparity,
+            raw,
+            confidence,
+            validity,
+            min_disparity,
+            max_disparity,
+            iterations,
+            tiles,
+            ran_on,
+            note,
+        }
+    }
+
+    /// How `pickle` and `copy` make another one.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
+        let maps =
+            (self.disparity.bind(py), self.raw.bind(py), self.confidence.bind(py), self.validity.bind(py));
+        let (d, r, c, v) = maps;
+        let Self { min_disparity, max_disparity, iterations, tiles, ran_on, note, .. } = self;
+        let all = (d, r, c, v, min_disparity, max_disparity, iterations, tiles, ran_on, note.as_deref());
+        Ok((py.get_type::<Self>(), all.into_pyobject(py)?))
+    }
+
+    fn __repr__(&self, py: Python) -> String {
+        let shape = self.disparity.bind(py).shape();
+        let (height, width) = (shape[0], shape[1]);
+        let Self { min_disparity, max_disparity, ran_on, .. } = self;
+        format!(
+            "<mrfgs.Matched: {width} x {height}, disparities {min_disparity} to {max_disparity}, on {ran_on}>"
+        )
+    }
+}
+
+/// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
+///
+/// backend: "auto" takes a GPU where there is one, else the CPU; "gpu" takes a GPU or any Vulkan or Metal driver and raises
+///     RuntimeError where there is none; "cpu" takes the CPU. The maps are the same, bit for bit.
+/// device: an adapter by its index or a part of its name, as `mrfgs devices` lists them; None takes the fastest kind.
+/// threads: those of the CPU path; None takes one a core.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
 struct PyMatcher(Mutex<Matcher>);
 
@@ -178,33 +189,103 @@ impl PyMatcher {
         Ok(Self(Mutex::new(matcher)))
     }
 
+    /// Matches a rectified pair, and returns its maps as a Matched.
+    ///
+    /// left, right: arrays of shape (height, width) or (height, width, channels): grey, grey and alpha, RGB or RGBA, of uint8,
+    ///     uint16, float32 or float64, in any layout. Left (x, y) with disparity d is seen at right (x - d, y). 8 bits are taken as
+    ///     they are; 16 bits fill their range with the largest value of both; floats run from the least to the largest value of
+    ///     both. Ignored are pixels of alpha 0, values that are not finite, and what a masked array masks.
+    /// max_disparity, min_disparity: the range to search in pixels, both ends included. Without max_disparity sparse matches
+    ///     find the range; min_disparity is 0 where max_disparity is given alone.
+    /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
+    /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
+    /// preset: "default", "paper" or "fgs"; `mrfgs presets` lists them with every key.
+    /// options: keys that replace the preset's, such as {"fill": "none", "memory": 2048}.
+    /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of
+    ///     the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
+    ///
+    /// Other threads run meanwhile; Ctrl-C ends it. Raises ValueError for what makes no sense, TypeError for other arrays,
+    /// RuntimeError where the wanted device fails, and MemoryError where it does not fit.
     #[pyo3(
         name = "match",
-        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, preset="default", options=None)
+        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
+                     options=None, warn=true)
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn run(
         &self,
         py: Python,
-        left: &Bound<PyUntypedArray>,
-        right: &Bound<PyUntypedArray>,
+        left: &Bound<PyAny>,
+        right: &Bound<PyAny>,
         max_disparity: Option<i32>,
         min_disparity: Option<i32>,
-        mask: Option<PyReadonlyArrayDyn<bool>>,
+        mask: Option<&Bound<PyAny>>,
+        no_data: Option<f64>,
         preset: &str,
         options: Option<&Bound<PyDict>>,
+        warn: bool,
     ) -> PyResult<PyMatched> {
         let method = method(preset, options)?;
-        let pair = pair(left, right, mask)?;
+        let (left, right) = (arrays::Image::of("left", left)?, arrays::Image::of("right", right)?);
+        let mask = mask.map(arrays::mask).transpose()?;
+        let rasters = [left.raster()?, right.raster()?].map(|raster| match no_data {
+            Some(value) => raster.without(value),
+            None => Ok(raster),
+        });
+        let [left, right] = rasters;
+        let pair = left.and_then(|left| raster::pair(left, right?, mask.as_ref())).map_err(exception)?;
+        let given = max_disparity
+            .is_some()
+            .then(|| DisparityRange::new(min_disparity.unwrap_or(0), max_disparity.unwrap_or(0)));
+        let given = given.transpose().map_err(exception)?;
+        let range = match given {
+            Some(range) => range,
+            None => py.detach(|| found_range(&pair, min_disparity))?,
+        };
+        if warn {
+            self::warn(py, py.detach(|| check::warnings(&pair, given)))?;
+        }
         let matched = py.detach(|| {
-            let range = range(&pair, min_disparity, max_disparity)?;
             interruptible(|observer| {
                 let mut matcher = self.0.lock().unwrap_or_else(PoisonError::into_inner);
                 matcher.run(&pair, range, &method, observer)
             })
         })?;
-        PyMatched::new(py, matched)
+        if warn {
+            self::warn(py, check::clipped(&matched.maps, range))?;
+        }
+        PyMatched::of(py, matched)
     }
+}
+
+/// Matches one rectified pair, and returns its maps as a Matched.
+///
+/// It takes the arguments of Matcher.match, and those of Matcher; see help(mrfgs.Matcher). To match many pairs, keep a Matcher:
+/// it opens the device once.
+#[pyfunction]
+#[pyo3(
+    name = "match",
+    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
+                 options=None, warn=true, backend="auto", device=None, threads=None)
+)]
+#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+fn match_(
+    py: Python,
+    left: &Bound<PyAny>,
+    right: &Bound<PyAny>,
+    max_disparity: Option<i32>,
+    min_disparity: Option<i32>,
+    mask: Option<&Bound<PyAny>>,
+    no_data: Option<f64>,
+    preset: &str,
+    options: Option<&Bound<PyDict>>,
+    warn: bool,
+    backend: &str,
+    device: Option<String>,
+    threads: Option<usize>,
+) -> PyResult<PyMatched> {
+    let matcher = PyMatcher::new(py, backend, device, threads)?;
+    matcher.run(py, left, right, max_disparity, min_disparity, mask, no_data, preset, options, warn)
 }
 
 /// How long a Ctrl-C may wait until somebody looks.
@@ -241,25 +322,20 @@ fn interruptible(run: impl FnOnce(Observer) -> mrfgs::Result<Matched> + Send) ->
     })
 }
 
-/// The range to search: as told, else by sparse matches.
-fn range(pair: &Pair, min: Option<i32>, max: Option<i32>) -> PyResult<DisparityRange> {
-    let range = match max {
-        Some(max) => DisparityRange::new(min.unwrap_or(0), max),
-        None => match check::range(pair) {
-            Some(found) => DisparityRange::new(min.unwrap_or(found.min), found.max),
-            None => {
-                let reason = "max_disparity: give the largest disparity to search, in pixels: there are too few \
-                              matches to find it";
-                return Err(PyValueError::new_err(reason));
-            }
-        },
+/// The range that sparse matches find, from `min` on where that is given.
+fn found_range(pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
+    let Some(found) = check::range(pair).map_err(exception)? else {
+        let reason = "max_disparity: give the largest disparity to search, in pixels: there are too few matches to find it";
+        return Err(PyValueError::new_err(reason));
     };
-    range.map_err(exception)
+    DisparityRange::new(min.unwrap_or(found.min), found.max).map_err(exception)
 }
 
 #[pymodule]
 fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("MatchWarning", module.py().get_type::<MatchWarning>())?;
+    module.add_function(wrap_pyfunction!(match_, module)?)?;
     module.add_class::<PyMatched>()?;
     module.add_class::<PyMatcher>()
 }

@@ -1,6 +1,9 @@
 """The Python package against the command line: the same pair gives the same bits. MRFGS is the program's path."""
 
+import copy
+import inspect
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -8,6 +11,7 @@ import tempfile
 import threading
 import time
 import unittest
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +91,133 @@ class Match(unittest.TestCase):
         found = mrfgs.match(*grey, 15, backend="cpu").disparity
         self.assertLess(abs(np.median(found[32:, 16:]) - 9), 0.1)
 
+    def test_layouts_of_memory(self):
+        left, right = pair()
+        expected = mrfgs.match(left, right, 15, backend="cpu").disparity
+        # Control: a layout that is taken for another makes another map.
+        scrambled = left.reshape(left.shape[1], left.shape[0], 3).transpose(1, 0, 2)
+        self.assertFalse(np.array_equal(mrfgs.match(scrambled, right, 15, backend="cpu").disparity, expected))
+
+        def layouts(image):
+            yield "C", image.copy()
+            yield "Fortran", np.asfortranarray(image)
+            yield "transposed", np.ascontiguousarray(image.T).T
+            for axis in range(image.ndim):
+                yield f"negative stride {axis}", np.flip(np.flip(image, axis).copy(), axis)
+                wide = np.repeat(image, 2, axis)
+                yield f"every second {axis}", wide[(slice(None),) * axis + (slice(None, None, 2),)]
+            padded = np.zeros(tuple(n + 3 for n in image.shape), image.dtype)
+            view = padded[tuple(slice(1, n + 1) for n in image.shape)]
+            view[...] = image
+            yield "view", view
+            if image.ndim == 3:
+                yield "permuted channels", image[..., ::-1].copy()[..., ::-1]
+            odd = np.empty(image.nbytes + 1, np.uint8)[1:].view(image.dtype).reshape(image.shape)
+            odd[...] = image
+            yield "odd address", odd
+            yield "other byte order", image.astype(image.dtype.newbyteorder())
+            readonly = image.copy()
+            readonly.flags.writeable = False
+            yield "read-only", readonly
+
+        for dtype in (np.uint8, np.uint16, np.float32, np.float64):
+            images = [image.astype(dtype) for image in (left, right)]
+            expected = mrfgs.match(*images, 15, backend="cpu").disparity
+            for (name, l), (_, r) in zip(layouts(images[0]), layouts(images[1])):
+                np.testing.assert_array_equal(l, images[0])
+                for one, two in ((l, r), (l, images[1]), (images[0], r)):
+                    found = mrfgs.match(one, two, 15, backend="cpu", warn=False).disparity
+                    self.assertTrue(np.array_equal(found, expected), f"{dtype.__name__}, {name}")
+        grey = [image[..., 0] for image in (left, right)]
+        expected = mrfgs.match(*(image.copy() for image in grey), 15, backend="cpu").disparity
+        self.assertTrue(np.array_equal(mrfgs.match(*map(np.asfortranarray, grey), 15, backend="cpu").disparity, expected))
+        # The same row again and again, without a stride.
+        row = grey[0][:1].copy()
+        broadcast = np.broadcast_to(row, (60, 80))
+        self.assertEqual(broadcast.strides[0], 0)
+        expected = mrfgs.match(broadcast.copy(), grey[1].copy(), 15, backend="cpu", warn=False).disparity
+        self.assertTrue(np.array_equal(mrfgs.match(broadcast, grey[1], 15, backend="cpu", warn=False).disparity, expected))
+
+        mask = np.random.default_rng(1).random((60, 80)) < 0.1
+        expected = mrfgs.match(left, right, 15, mask=mask, backend="cpu").disparity
+        self.assertTrue(np.array_equal(np.isinf(expected), mask))
+        for name, other in layouts(mask):
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, mask=other, backend="cpu").disparity, expected), name)
+        for dtype in (np.uint8, np.int64, np.float32):
+            other = mask.astype(dtype) * 255
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, mask=other, backend="cpu").disparity, expected))
+
+    def test_masked_arrays(self):
+        left, right = pair()
+        mask = np.zeros((60, 80), bool)
+        mask[:, :10] = True
+        expected = mrfgs.match(left, right, 15, mask=mask, backend="cpu").disparity
+        masked = np.ma.masked_array(left, np.repeat(mask[..., None], 3, 2))
+        self.assertTrue(np.array_equal(mrfgs.match(masked, right, 15, backend="cpu").disparity, expected))
+        # One channel is enough, and none is nothing.
+        one = np.ma.masked_array(left, np.dstack([mask, mask & False, mask & False]))
+        self.assertTrue(np.array_equal(mrfgs.match(one, right, 15, backend="cpu").disparity, expected))
+        plain = mrfgs.match(left, right, 15, backend="cpu").disparity
+        self.assertTrue(np.array_equal(mrfgs.match(np.ma.masked_array(left), right, 15, backend="cpu").disparity, plain))
+        # In the right view there is nothing to match then.
+        both = mrfgs.match(left, np.ma.masked_array(right, np.repeat(mask[..., None], 3, 2)), 15, backend="cpu").disparity
+        self.assertFalse(np.array_equal(both, plain))
+        self.assertTrue(np.isfinite(both).all())
+        # By value.
+        holed = left.copy()
+        holed[:, :10] = 7
+        found = mrfgs.match(holed, right, 15, no_data=7, backend="cpu").disparity
+        self.assertTrue(np.array_equal(found, expected))
+
+    def test_more_than_memory_is_an_exception(self):
+        code = ("import numpy as np, mrfgs; a = np.broadcast_to(np.uint8(7), (200_000, 200_000));\n"
+                "try: mrfgs.match(a, a, 15, backend='cpu')\n"
+                "except MemoryError as e: print('told', e)")
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue(done.stdout.startswith("told left"), done.stdout)
+
+    def test_warnings(self):
+        def told(*arguments, **keywords):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                mrfgs.match(*arguments, backend="cpu", **keywords)
+            self.assertTrue(all(w.category is mrfgs.MatchWarning and w.filename == __file__ for w in caught))
+            return [str(w.message) for w in caught]
+
+        left, right = pair(200, 300)
+        self.assertEqual(told(left, right, 15), [])
+        self.assertIn("swapped", told(right, left, 15)[0])
+        self.assertIn("swapped", told(right, left)[0])
+        self.assertIn("not rectified", told(left, np.roll(right, 1, 0), 15)[0])
+        self.assertIn("upside down", told(left, right[::-1], 15)[0])
+        self.assertIn("the same", told(left, left, 15)[0])
+        self.assertIn("raise max_disparity", " ".join(told(left, right, 9)))
+        self.assertEqual(told(right, left, 15, warn=False), [])
+        self.assertTrue(issubclass(mrfgs.MatchWarning, UserWarning))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", mrfgs.MatchWarning)
+            with self.assertRaises(mrfgs.MatchWarning):
+                mrfgs.Matcher(backend="cpu").match(right, left, 15)
+
+    def test_results_pickle_and_copy(self):
+        matched = mrfgs.match(*pair(), 15, backend="cpu")
+        for other in (pickle.loads(pickle.dumps(matched)), copy.copy(matched), copy.deepcopy(matched)):
+            self.assertIsInstance(other, mrfgs.Matched)
+            for name in ("disparity", "raw", "confidence", "validity", "min_disparity", "max_disparity", "iterations",
+                         "tiles", "ran_on", "note"):
+                self.assertTrue(np.array_equal(getattr(other, name), getattr(matched, name)), name)
+        self.assertIn("80 x 60", repr(matched))
+
+    def test_help_explains_every_argument(self):
+        for function in (mrfgs.match, mrfgs.Matcher.match, mrfgs.Matcher):
+            for name in inspect.signature(function).parameters:
+                text = inspect.getdoc(mrfgs.Matcher) + inspect.getdoc(mrfgs.Matcher.match)
+                self.assertTrue(name == "self" or name in text, name)
+        self.assertIn("Matcher", inspect.getdoc(mrfgs.match))
+        for name in ("disparity", "confidence", "validity", "note"):
+            self.assertTrue(inspect.getdoc(getattr(mrfgs.Matched, name)), name)
+
     def test_options(self):
         left, right = pair()
         self.same(left, right, "--set", "fill=none", "--set", "sub-pixel=false", options={"fill": "none", "sub-pixel": False})
@@ -113,8 +244,13 @@ class Match(unittest.TestCase):
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0], right[:0], 15)),
             (ValueError, "float", lambda: mrfgs.match(left, right.astype(np.float32), 15)),
             (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((3, 3), bool))),
-            (TypeError, "uint8", lambda: mrfgs.match(left.astype(np.int64), right, 15)),
-            (TypeError, "", lambda: mrfgs.match([[1]], right, 15)),
+            (TypeError, "left: give an array of uint8, uint16, float32 or float64, not int64",
+             lambda: mrfgs.match(left.astype(np.int64), right, 15)),
+            (TypeError, "left", lambda: mrfgs.match([[1]], right, 15)),
+            (TypeError, "right", lambda: mrfgs.match(left, "right.png", 15)),
+            (TypeError, "mask: give an array of bool", lambda: mrfgs.match(left, right, 15, mask=np.full((60, 80), "a"))),
+            (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((3, 3), np.uint8))),
+            (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((60, 80, 3), bool))),
             (ValueError, "disparity", lambda: mrfgs.match(left, right, -5)),
             (ValueError, "no preset", lambda: mrfgs.match(left, right, 15, preset="best")),
             (ValueError, "no-such-key", lambda: mrfgs.match(left, right, 15, options={"no-such-key": 1})),
@@ -127,6 +263,17 @@ class Match(unittest.TestCase):
                 call()
             self.assertIn(words, str(raised.exception))
             self.assertNotIn("\n", str(raised.exception))
+            # In the words of Python.
+            self.assertNotIn("--", str(raised.exception))
+        with self.assertRaises(ValueError) as raised:
+            mrfgs.match(left, right, -5)
+        self.assertIn("max_disparity: -5 is below the minimum disparity 0: raise it or lower min_disparity", str(raised.exception))
+        with self.assertRaises(ValueError) as raised:
+            mrfgs.match(left, right, 15, options={"memory": 1})
+        self.assertIn('options["memory"]: 1 MiB', str(raised.exception))
+        with self.assertRaises(ValueError) as raised:
+            mrfgs.match(left, right, 15, backend="cpu", device="0")
+        self.assertIn('backend="cpu"', str(raised.exception))
 
     def test_other_threads_run_meanwhile(self):
         images = pair(400, 600)

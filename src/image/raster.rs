@@ -36,7 +36,7 @@ pub struct Raster<'a> {
     /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
     pub(super) channels: usize,
     pub(super) samples: Samples<'a>,
-    /// `true` where a pixel holds no data, row by row.
+    /// `true` where a pixel holds no data, row by row; of the size of the image.
     pub(super) no_data: Option<Vec<bool>>,
 }
 
@@ -69,6 +69,23 @@ impl<'a> Raster<'a> {
         let colours = if self.channels < 3 { 1 } else { 3 };
         let no_data = Some(holding(&self.samples, self.channels, colours, value)?);
         Ok(Self { no_data, ..self })
+    }
+
+    /// The image with the pixels masked where `ignored` is `true`.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] when the sizes differ.
+    pub fn masked_by(mut self, ignored: Plane<bool>) -> Result<Self> {
+        if ignored.size() != self.size() {
+            let ((w, h), (width, height)) = (ignored.size(), self.size());
+            return Err(Error::Mismatch(format!("the mask is {w} x {h} and its image {width} x {height}")));
+        }
+        let mut ignored = ignored.into_data();
+        for (ignored, no_data) in ignored.iter_mut().zip(self.no_data.iter().flatten()) {
+            *ignored |= no_data;
+        }
+        self.no_data = Some(ignored);
+        Ok(self)
     }
 
     pub(super) fn size(&self) -> (usize, usize) {
