@@ -382,7 +382,7 @@ fn pairs_that_are_not_rectified_are_told() {
     cases.extend(SCENES.map(Case::scene));
     for case in cases {
         assert_eq!(check::warnings(&case.pair, None), [], "{}", case.name);
-        for rows in [2, -5] {
+        for rows in [1, -1, 2, -5] {
             let right = moved(case.pair.right(), |x, y| (x, y - rows));
             let pair = Pair::new(case.pair.left().clone(), right).unwrap();
             let warnings = check::warnings(&pair, Some(case.range));
@@ -397,6 +397,30 @@ fn pairs_that_are_not_rectified_are_told() {
         let pair = Pair::new(case.pair.left().clone(), right).unwrap();
         let warnings = check::warnings(&pair, None);
         assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{}: {warnings:?}", case.name);
+    }
+}
+
+#[test]
+fn views_that_are_turned_are_told() {
+    let mut cases = real_pairs();
+    cases.extend(SCENES.map(Case::scene));
+    for case in cases {
+        let (left, right) = (case.pair.left(), case.pair.right());
+        for (how, turned) in [
+            ("upside down", right.flipped()),
+            ("mirrored", right.mirrored()),
+            ("turned by half a turn", right.flipped().mirrored()),
+        ] {
+            let pair = Pair::new(left.clone(), turned).unwrap();
+            for range in [None, Some(case.range)] {
+                assert_eq!(check::warnings(&pair, range), [Warning::Turned { how }], "{}", case.name);
+            }
+        }
+        // Whichever view it is; and both together are a pair like any other.
+        let pair = Pair::new(left.flipped(), right.clone()).unwrap();
+        assert_eq!(check::warnings(&pair, None), [Warning::Turned { how: "upside down" }], "{}", case.name);
+        let pair = Pair::new(left.flipped(), right.flipped()).unwrap();
+        assert_eq!(check::warnings(&pair, Some(case.range)), [], "{}", case.name);
     }
 }
 
@@ -432,6 +456,7 @@ fn warnings_are_one_line_with_the_remedy() {
     for (warning, words) in [
         (Warning::Identical, ["the same", "right view"]),
         (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
+        (Warning::Turned { how: "upside down" }, ["upside down", "turn it back"]),
         (Warning::Swapped { percent: 97 }, ["97 %", "exchange"]),
     ] {
         let line = warning.to_string();

@@ -28,10 +28,10 @@ use super::{ExecutionArgs, Failure, MethodArgs, ReadArgs};
 const EXAMPLES: &str = "\
 Examples:
   mrfgs batch pairs.csv maps
-  mrfgs batch pairs.csv maps                    (the same again: resumes what was stopped)
+  mrfgs batch pairs.csv maps              # again: resumes what was stopped
   mrfgs batch MiddEval3/trainingQ maps --format png --confidence --validity
   mrfgs batch pairs.csv maps --status
-  mrfgs batch pairs.csv maps --shard 3/8        (the third of eight machines)
+  mrfgs batch pairs.csv maps --shard 3/8  # the third of eight machines
 
 A list:
   name,left,right,max_disparity

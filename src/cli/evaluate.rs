@@ -25,13 +25,13 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs evaluate Teddy Cones
   mrfgs evaluate Teddy --preset paper --json figures.json
-  mrfgs evaluate Teddy Cones --report report      (then open report/index.html)
+  mrfgs evaluate Teddy Cones --report report  # then open report/index.html
   mrfgs evaluate Teddy Cones Dolls Rocks1 Motorcycle --tables
   mrfgs evaluate HalfSize/Art --truth-scale 2
   mrfgs evaluate Teddy Cones --breakdown
   mrfgs evaluate Teddy Cones --ablations --json ablations.json
   mrfgs evaluate MiddEval3/trainingQ/* --submission trainingQ MRFGS
-  mrfgs evaluate --disparity mine.pfm --truth Teddy/disp0GT.pfm --mask Teddy/mask0nocc.png";
+  mrfgs evaluate --disparity mine.pfm --truth disp0GT.pfm --mask mask0nocc.png";
 
 /// Match pairs with known truth, or take a finished map, and print its errors
 ///

@@ -24,12 +24,13 @@ use super::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
 const EXAMPLES: &str = "\
 Examples:
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
-  mrfgs match im0.png im1.png disparity.tif                     (with calib.txt beside im0.png)
-  mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25 --mask clouds.png
-  mrfgs match l.png r.png d.png --max-disparity 90 --no-fill --confidence c.png --preview p.png
-  mrfgs match im0.png im1.png d.pfm --depth z.tif --point-cloud cloud.ply      (cameras from calib.txt)
-  mrfgs match im0.png im1.png - --json match.json | other-program
-  mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run   (levels and memory, without running)";
+  mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25
+  mrfgs match l.png r.png d.png --max-disparity 90 --no-fill --confidence c.png
+  mrfgs match l.png r.png - --max-disparity 63 | other-program
+  # The plan, its memory included, without running:
+  mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run
+  # Range and cameras from the calib.txt beside im0.png:
+  mrfgs match im0.png im1.png d.pfm --depth z.tif --point-cloud cloud.ply";
 
 /// Match a rectified pair and write its disparity map
 ///

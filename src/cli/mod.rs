@@ -55,8 +55,8 @@ left (x, y) with disparity d is seen at right (x - d, y).";
 const EXAMPLES: &str = "\
 Examples:
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
-  mrfgs match im0.png im1.png disparity.png      (range from the calib.txt beside im0.png)
-  mrfgs batch pairs.csv maps                     (many pairs; run it again to resume)
+  mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
+  mrfgs batch pairs.csv maps                  # many pairs; again, it resumes
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 

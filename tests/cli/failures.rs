@@ -32,6 +32,12 @@ const FAILURES: &[Failure] = &[
         &["left.png is 60 x 40", "narrow.png is 30 x 40"],
     ),
     ("match cut.png right.png out.pfm --max-disparity 9", 1, &["cut.png", "truncated", "get the file again"]),
+    (
+        "match flipped.png right.png out.pfm --max-disparity 9",
+        1,
+        &["flipped.png", "CRC error", "while decoding IDAT chunk"],
+    ),
+    ("M out.pfm --no-data none", 2, &["--no-data", "none"]),
     ("match left.png empty.png out.pfm --max-disparity 9", 1, &["empty.png", "empty", "get it again"]),
     ("match text.png right.png out.pfm --max-disparity 9", 1, &["text.png", "not an image", "give PNG"]),
     ("match a.gif right.png out.pfm --max-disparity 9", 1, &["a.gif", "is a gif file", "give PNG"]),
@@ -282,6 +288,11 @@ fn every_failure_is_one_line_and_leaves_nothing() {
             continue;
         }
         told.failed(*code, words, line);
+        assert!(
+            !told.stderr.contains("{ ") && !told.stderr.contains("Some("),
+            "Rust's own words: {}",
+            told.stderr
+        );
         assert!(listing(folder.path()) == before, "{line}: the folder has changed");
     }
     assert!(other.is_empty(), "another exit status: {other:#?}");
@@ -350,10 +361,10 @@ fn an_unknown_device_is_named() {
     for device in ["no-such-device", "999"] {
         if has_gpu() {
             let args = ["bench", "misfit", "--device", device, "--json", "a.json"];
-            run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
+            run(folder.path(), &args).failed(2, &["--device", device, "mrfgs devices"], device);
         }
         let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", device];
-        run(folder.path(), &args).failed(1, &["--device", device, "mrfgs devices"], device);
+        run(folder.path(), &args).failed(2, &["--device", device, "mrfgs devices"], device);
     }
     assert!(listing(folder.path()) == before);
 }

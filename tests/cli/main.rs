@@ -16,6 +16,7 @@ mod plugin;
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;
 mod report;
+mod robust;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -167,6 +168,11 @@ fn workshop() -> TempDir {
     fs::write(at("a.pgm"), b"P5\n60 40\n255\n1234").unwrap();
     fs::write(at("a.pfm"), b"Pf\n60 40\n0\n1234").unwrap();
     fs::write(at("a.tif"), b"II*\0\x08\0\0\0\x01\0").unwrap();
+    // One bit of the pixels has flipped.
+    let mut flipped = left.clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 1;
+    fs::write(at("flipped.png"), flipped).unwrap();
     let size = [(256, 4, 1, 1), (257, 4, 1, 1), (258, 3, 1, 8), (262, 3, 1, 3), (277, 3, 1, 1)];
     let strip = [(273, 4, 1, 8), (278, 4, 1, 1), (279, 4, 1, 1)];
     fs::write(at("palette.tif"), files::tiff(&[&size[..], &strip].concat(), &[])).unwrap();
@@ -187,6 +193,24 @@ fn has_gpu() -> bool {
         let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: there is no driver");
     }
     found
+}
+
+#[test]
+fn help_fits_a_terminal_of_80_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["", "match", "batch", "evaluate", "bench", "devices", "presets", "completions", "man"] {
+        let args: Vec<_> = [command, "--help"].into_iter().filter(|arg| !arg.is_empty()).collect();
+        let help = run_with(folder.path(), &args, &[("COLUMNS", "80")]).succeeded().stdout;
+        let (_, examples) = help.split_once("Examples:\n").unwrap_or_default();
+        for line in help.lines() {
+            assert!(line.chars().count() <= 80, "{command}: {line}");
+        }
+        // An example that does not fit is wrapped, and goes on in a line of its own.
+        for line in examples.lines().take_while(|line| !line.is_empty()) {
+            let begins = ["  mrfgs ", "  # ", "  cargo "].iter().any(|begin| line.starts_with(begin));
+            assert!(begins, "{command}: {line}");
+        }
+    }
 }
 
 #[test]

@@ -136,7 +136,7 @@ fn a_range_is_found_where_none_is_given() {
 fn a_pair_that_is_not_rectified_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "47"];
-    for (shift, warns) in [(0, false), (2, true)] {
+    for (shift, warns) in [(0, false), (1, true), (2, true)] {
         for (from, to, top) in [("im0.png", "left.png", 0), ("im1.png", "right.png", shift)] {
             let image = image::open(scene("mixed").join(from)).unwrap();
             image.crop_imm(0, top, 320, 230).save(folder.path().join(to)).unwrap();
@@ -144,6 +144,60 @@ fn a_pair_that_is_not_rectified_is_named() {
         let said = run(folder.path(), &args).succeeded().stderr;
         assert_eq!(said.contains("not rectified"), warns, "{said}");
     }
+}
+
+/// A range that is found has negative disparities then, and says nothing of what the user knows.
+#[test]
+fn swapped_views_are_told_whatever_the_range() {
+    let folder = tempfile::tempdir().unwrap();
+    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
+    let list = format!("name,left,right,max_disparity\nauto,{right},{left},auto\ngiven,{right},{left},47\n");
+    fs::write(folder.path().join("list.csv"), list).unwrap();
+    for (range, told) in [(&["auto"][..], true), (&["47"], true), (&["0", "--min-disparity", "-47"], false)] {
+        let args = ["match", &right, &left, "out.pfm", "--backend", "cpu", "--max-disparity"];
+        let said = run(folder.path(), &[&args[..], range].concat()).succeeded().stderr;
+        assert_eq!(said.contains("warning: the views seem to be swapped"), told, "{range:?}: {said}");
+    }
+    run(folder.path(), &["batch", "list.csv", "maps", "--backend", "cpu"]).succeeded();
+    for name in ["auto", "given"] {
+        let record = fs::read_to_string(folder.path().join(format!("maps/{name}.json"))).unwrap();
+        assert!(record.contains("the views seem to be swapped"), "{name}: {record}");
+    }
+}
+
+#[test]
+fn what_stands_for_no_data_is_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // A border of 255 on the left, which no other pixel has.
+    for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
+        let mut image = image::open(scene("mixed").join(from)).unwrap().to_luma8();
+        for (x, _, pixel) in image.enumerate_pixels_mut() {
+            pixel.0[0] = if x < 9 { 255 } else { pixel.0[0].min(254) };
+        }
+        image.save(at(to)).unwrap();
+    }
+    let map = |more: &[&str]| {
+        let args = [
+            "match",
+            "left.png",
+            "right.png",
+            "out.tif",
+            "--max-disparity",
+            "47",
+            "--backend",
+            "cpu",
+            "--quiet",
+        ];
+        run(folder.path(), &[&args[..], more].concat()).succeeded();
+        mrfgs::image::read::read_disparity(&at("out.tif")).unwrap()
+    };
+    let border = |map: &mrfgs::image::Plane<f32>| {
+        (0..240).flat_map(|y| (0..9).map(move |x| (x, y))).all(|at| map[at].is_infinite())
+    };
+    let ignored = map(&["--no-data", "255"]);
+    assert!(border(&ignored) && ignored[(20, 20)].is_finite());
+    assert!(!border(&map(&[])) && !border(&map(&["--no-data", "-1"])));
 }
 
 #[test]
@@ -314,7 +368,7 @@ fn little_memory_makes_tiles() {
     // Steps of one piece are what the folder shows.
     let before = listing(folder.path());
     let refused = with(&["--memory", "12MiB", "--intermediates", "steps"]);
-    refused.failed(1, &["--intermediates", "4 tiles", "give --memory"], "intermediates of tiles");
+    refused.failed(2, &["--intermediates", "4 tiles", "give --memory"], "intermediates of tiles");
     assert!(listing(folder.path()) == before);
 }
 

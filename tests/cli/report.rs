@@ -95,7 +95,7 @@ fn a_report_that_cannot_be_leaves_nothing() {
     refused(folder.path(), &["Teddy", "--report", "none/out"], 1, &["none/out", "create it first"]);
     refused(folder.path(), &["Teddy", "--report", "Teddy/im0.png"], 1, &["im0.png", "is a file"]);
     let args = ["Teddy", "--report", "empty", "--json", "empty/a.json"];
-    refused(folder.path(), &args, 1, &["--json", "empty/a.json", "another name"]);
+    refused(folder.path(), &args, 2, &["--json", "empty/a.json", "another name"]);
 
     // What fails later: the second pair, or the JSON.
     for out in ["out", "empty"] {

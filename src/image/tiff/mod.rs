@@ -327,14 +327,12 @@ impl<'a> Layout<'a> {
             let rows = self.chunk.1.min(self.height - top);
             let data = usize::try_from(offset).ok().and_then(|start| file.get(start..));
             let data = data.ok_or_else(|| damaged("the TIFF pixels begin behind the end of the file"))?;
-            // Without compression what is needed is known, and byte counts are often wrong.
-            let end = match bytes {
-                Some(bytes) if self.packing.compression != chunks::UNCOMPRESSED => {
-                    usize::try_from(bytes).unwrap_or(usize::MAX)
-                }
-                _ => usize::MAX,
-            };
-            let data = &data[..end.min(data.len())];
+            let end = bytes.map_or(data.len(), |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
+            if end > data.len() {
+                return Err(damaged("the TIFF pixels end behind the end of the file"));
+            }
+            // Without compression what is needed is known, and byte counts may be wrong.
+            let data = if self.packing.compression == chunks::UNCOMPRESSED { data } else { &data[..end] };
             let stored =
                 self.packing.rows(data, rows.div_ceil(self.subsampling.map_or(1, |(_, down)| down)))?;
             let stored = match self.subsampling {

@@ -1,0 +1,204 @@
+//! What ends a run from outside: too little memory, a full disk, a signal; and what the outputs are then.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{listing, run, scene_file, workshop};
+
+fn shell(folder: &Path, before: &str, line: &str) -> Output {
+    Command::new("sh")
+        .current_dir(folder)
+        .args(["-c", &format!("{before} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")])
+        .args(line.split(' '))
+        .env_remove("RUST_BACKTRACE")
+        .output()
+        .unwrap()
+}
+
+/// Whatever the limit, a match ends well or says in one line that there is not enough; no allocation aborts.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_limit_of_memory_aborts() {
+    let folder = tempfile::tempdir().unwrap();
+    let large = |name: &str, ending: &str| {
+        let image = image::open(scene_file("mixed", name)).unwrap();
+        let image = image.resize_exact(640, 480, image::imageops::FilterType::Triangle);
+        image.to_rgb8().save(folder.path().join(format!("{name}.{ending}"))).unwrap();
+    };
+    for ending in ["jpg", "png", "tif"] {
+        large("im0.png", ending);
+        large("im1.png", ending);
+    }
+    let mut refused = 0;
+    for (ending, options) in [
+        ("jpg", "--max-disparity auto --memory 256MiB"),
+        ("png", "--max-disparity 15 --preview p.png --side-by-side --raw r.pfm"),
+        ("tif", "--max-disparity 7 --preset fgs"),
+    ] {
+        let line = format!(
+            "match im0.png.{ending} im1.png.{ending} out.pfm --backend cpu --threads 1 --quiet {options}"
+        );
+        // The program itself takes some 60 MiB of addresses.
+        let enough = (80..1024).step_by(20).find(|limit| {
+            let output = shell(folder.path(), &format!("ulimit -v {}", limit << 10), &line);
+            let said = String::from_utf8_lossy(&output.stderr);
+            let enough = output.status.success();
+            if enough {
+                assert_eq!(said, "", "{limit}");
+            } else {
+                refused += 1;
+                assert_eq!(output.status.code(), Some(1), "{ending}, {limit} MiB: {output:?}");
+                let told =
+                    said.starts_with("mrfgs: ") && said.lines().count() == 1 && said.contains("memory");
+                assert!(told, "{ending}, {limit} MiB: {said}");
+            }
+            assert_eq!(folder.path().join("out.pfm").exists(), enough, "{ending}, {limit} MiB");
+            let _ = fs::remove_file(folder.path().join("out.pfm"));
+            enough
+        });
+        assert!(enough.is_some(), "{ending}: 1 GiB is not enough");
+    }
+    assert!(refused > 15, "control: the limits are limits: {refused}");
+}
+
+/// A file that grows no further is told by its own name.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_with_the_name_of_the_output() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    // A file may have 4 KiB here, and the signal that says so is ignored.
+    for (line, name) in [
+        ("match left.png right.png out.pfm --max-disparity 9", "cannot write out.pfm: File too large"),
+        (
+            "match left.png right.png - --max-disparity 9 --depth z.pfm --calib camera/calib.txt",
+            "cannot write z.pfm: File",
+        ),
+        (
+            "match left.png right.png out.png --max-disparity 9 --intermediates steps",
+            "cannot write steps: File too large",
+        ),
+        ("batch camera.csv out", "cannot write out/camera.pfm: File too large"),
+    ] {
+        fs::write(folder.path().join("camera.csv"), "name,left,right\ncamera,camera/left.png,right.png\n")
+            .unwrap();
+        let output =
+            shell(folder.path(), "trap '' XFSZ; ulimit -f 8", &format!("{line} --backend cpu --quiet"));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert!(said.contains(name) && said.lines().count() == 1 && !said.contains(".tmp"), "{line}: {said}");
+        fs::remove_file(folder.path().join("camera.csv")).unwrap();
+        let _ = fs::remove_dir(folder.path().join("out"));
+        assert!(listing(folder.path()) == before, "{line}");
+    }
+}
+
+/// Starts a match and kills it after a time.
+#[cfg(unix)]
+fn killed(folder: &Path, after: Duration, line: &str) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
+        .current_dir(folder)
+        .args(line.split(' '))
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while start.elapsed() < after && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let _ = child.kill();
+    child.wait().unwrap();
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_killed_match_leaves_nothing_half_written() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let line =
+        "match left.png right.png out.pfm --max-disparity 9 --backend cpu --raw raw.tif --confidence c.png";
+    run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
+    let whole: Vec<_> =
+        ["out.pfm", "raw.tif", "c.png"].map(|name| fs::read(folder.path().join(name)).unwrap()).into();
+    for ms in [1, 5, 10, 15, 20, 25, 30, 40, 60] {
+        for name in ["out.pfm", "raw.tif", "c.png"] {
+            let _ = fs::remove_file(folder.path().join(name));
+        }
+        killed(folder.path(), Duration::from_millis(ms), line);
+        let mut after = listing(folder.path());
+        for (name, whole) in ["out.pfm", "raw.tif", "c.png"].into_iter().zip(&whole) {
+            if let Some(found) = after.remove(&folder.path().join(name)) {
+                assert!(found.as_ref() == Some(whole), "{name} after {ms} ms");
+            }
+        }
+        assert!(after == before, "{ms} ms: {:?}", after.keys());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
+    let folder = workshop();
+    let before = listing(folder.path());
+    let line =
+        "match left.png right.png out.pfm --max-disparity 9 --backend cpu --quiet --intermediates steps";
+    let args: Vec<_> = line.split(' ').collect();
+    // As a run leaves it that is killed on its way.
+    let staging = folder.path().join(".steps.tmp");
+    fs::create_dir_all(staging.join("new")).unwrap();
+    fs::write(staging.join("new/half.png"), "half").unwrap();
+    fs::write(staging.join("lock"), "").unwrap();
+    run(folder.path(), &args).succeeded();
+    assert!(!staging.exists() && folder.path().join("steps/change-per-iteration.csv").exists());
+    assert!(!folder.path().join("steps/half.png").exists());
+    // One that runs is left alone.
+    fs::remove_dir_all(folder.path().join("steps")).unwrap();
+    fs::remove_file(folder.path().join("out.pfm")).unwrap();
+    fs::create_dir(&staging).unwrap();
+    let lock = fs::File::create(staging.join("lock")).unwrap();
+    lock.lock().unwrap();
+    run(folder.path(), &args).failed(1, &["steps", "another run is writing it"], "locked");
+    drop(lock);
+    fs::remove_dir_all(&staging).unwrap();
+    assert!(listing(folder.path()) == before);
+}
+
+/// A link as output stays a link, and what it leads to is written, there already or not.
+#[cfg(unix)]
+#[test]
+fn links_are_followed_everywhere() {
+    use std::os::unix::fs::symlink;
+    let folder = workshop();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("below")).unwrap();
+    let is_link = |name: &str| fs::symlink_metadata(at(name)).unwrap().is_symlink();
+    let line = "match left.png right.png out.pfm --max-disparity 9 --backend cpu --quiet --preview p.png";
+    for _ in 0..2 {
+        for (link, to) in [("out.pfm", "below/map.pfm"), ("p.png", "below/picture.png")] {
+            let _ = symlink(to, at(link));
+        }
+        run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
+        assert!(is_link("out.pfm") && is_link("p.png"));
+        assert!(fs::read(at("below/map.pfm")).unwrap().starts_with(b"Pf\n"));
+        assert!(fs::read(at("below/picture.png")).unwrap().starts_with(b"\x89PNG"));
+    }
+    // An input is one by whatever name.
+    symlink("left.png", at("other.png")).unwrap();
+    let args = ["match", "left.png", "right.png", "other.png", "--max-disparity", "9"];
+    run(folder.path(), &args).failed(2, &["other.png is LEFT already"], "an input");
+
+    fs::create_dir(at("maps")).unwrap();
+    fs::write(at("list.csv"), "name,left,right,max_disparity\na,left.png,right.png,9\n").unwrap();
+    for name in ["a.pfm", "a.json"] {
+        symlink(Path::new("../below").join(name), at("maps").join(name)).unwrap();
+    }
+    let batch = ["batch", "list.csv", "maps", "--backend", "cpu", "--quiet"];
+    for more in [&[][..], &["--set", "temperature=0.3"]] {
+        run(folder.path(), &[&batch[..], more].concat()).succeeded();
+        assert!(is_link("maps/a.pfm") && is_link("maps/a.json"));
+        assert!(fs::read(at("below/a.pfm")).unwrap().starts_with(b"Pf\n"));
+        assert!(fs::read_to_string(at("below/a.json")).unwrap().contains("\"done\""));
+    }
+}
