@@ -24,6 +24,32 @@
 //! # }
 //! ```
 //!
+//! Frames that are in memory already are borrowed, and a [`Matcher`] keeps the device and its buffers from frame to frame:
+//!
+//! ```
+//! use mrfgs::Matcher;
+//! use mrfgs::image::raster::{self, Raster, Samples};
+//! use mrfgs::options::{DisparityRange, Execution, Method};
+//! use std::{borrow::Cow, ops::ControlFlow};
+//!
+//! # fn main() -> mrfgs::Result<()> {
+//! # let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 24) as u8;
+//! # let right: Vec<u8> = (0..64 * 48).map(noise).collect();
+//! # let left: Vec<u8> = (0..64 * 48_u32).map(|i| noise(i.saturating_sub(5))).collect();
+//! # let frames = [(&left[..], &right[..])];
+//! let (method, range) = (Method::default(), DisparityRange::new(0, 15)?);
+//! let mut matcher = Matcher::new(&Execution::default())?;
+//! for (left, right) in frames {
+//!     // 64 x 48 grey bytes, row by row.
+//!     let view = |bytes| Raster::new(64, 48, 1, Samples::Byte(Cow::Borrowed(bytes)));
+//!     let pair = raster::pair(view(left)?, view(right)?, None)?;
+//!     let matched = matcher.run(&pair, range, &method, &mut |_| ControlFlow::Continue(()))?;
+//!     assert_eq!(matched.maps.final_map()[(40, 20)].round(), 5.0);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # The way through
 //!
 //! ```text
