@@ -303,6 +303,7 @@ fn what_is_no_picture_is_refused() {
     }
     refused(&grey([1, 1], &[(284, Short(&[3]))], &[&[0]]), &["unknown configuration 3"]);
     refused(&grey([3, 1], &[(259, Short(&[5])), (317, Short(&[3]))], &[&[0]]), &["predictor 3"]);
+    refused(&grey([3, 1], &[(317, Short(&[2]))], &[&[1, 2, 3]]), &["predictor", "not packed by LZW"]);
 }
 
 #[test]

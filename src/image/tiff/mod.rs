@@ -169,9 +169,12 @@ impl<'a> Layout<'a> {
             return Err(unsupported(reason));
         }
         let predictor = match directory.first(tag::PREDICTOR, 1)? {
-            // Only of these does it mean anything.
-            _ if !matches!(compression, 5 | 8 | 32_946) => 1,
             1 => 1,
+            _ if compression == chunks::JPEG => 1,
+            // Some readers pass over it then, as libtiff does, and others do not.
+            _ if !matches!(compression, 5 | 8 | 32_946) => {
+                return Err(unsupported("names a predictor, and is not packed by LZW or Deflate"));
+            }
             2 if matches!(bits, 8 | 16 | 32 | 64) => 2,
             3 if format == Format::Float => 3,
             other => {
