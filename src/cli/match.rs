@@ -35,11 +35,12 @@ Examples:
 /// Match a rectified pair and write its disparity map
 ///
 /// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF or PFM, told apart by their
-/// content; pixels that are transparent or not finite are ignored.
+/// content; pixels that are transparent, not finite, or hold no data are ignored.
 ///
 /// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels,
 /// .tif or .tiff as float with NaN, .png as 16 bits with disparity times 256 and 0 for invalid ones, as KITTI has it (ranges
-/// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output.
+/// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output. Of a symbolic link the file is
+/// written that it leads to.
 ///
 /// Depth and points take the cameras from a calibration file in Middlebury's format: cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels),
 /// doffs (cx1 - cx0, pixels) and baseline. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the unit of the

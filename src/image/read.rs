@@ -45,14 +45,16 @@ impl Reader {
     /// - float, signed, or wider than 16 bits: linearly, from the least to the largest unmasked value of both images
     ///   to 0 ..= 65280.
     ///
-    /// Before that, whatever the file packs is unpacked: palettes become colours, 1, 2 and 4 bits of PNG and 1 bit of TIFF
-    /// span the levels of 8 bits, PNM counts up to what it says is white, YCbCr and CMYK (JPEG, TIFF) become RGB, and
-    /// interlaced rows come in order. TIFF of 2 or 4 bits, or with a palette, is refused. Pixels are taken as they are stored:
-    /// an orientation in Exif data turns nothing, for it is as stored that a pair is rectified.
+    /// Before that, whatever the file packs is unpacked: palettes become colours, fewer than 8 bits span the levels of 8,
+    /// those from 9 to 15 are words, PNM counts up to what it says is white, YCbCr and CMYK (JPEG, TIFF) become RGB, white
+    /// that is 0 becomes bright, alpha that the colours have been multiplied by is divided out, and rows, planes and tiles come
+    /// in order. Of several images in a TIFF file the first is read that is no reduced copy and no mask. Pixels are taken as
+    /// they are stored: an orientation in the file turns nothing, for it is as stored that a pair is rectified.
     ///
-    /// Masked are pixels with alpha 0, a transparent palette entry included, and pixels with a value that is not finite;
-    /// any other alpha says nothing. Negative values are values like others. `mask` is an image of the size of the
-    /// left one; where it is not black, the left image is masked as well. A masked pixel holds zeros.
+    /// Masked are pixels with alpha 0, a transparent palette entry included, pixels with a value that is not finite, and
+    /// those whose every sample stands for no data ([`Reader::no_data`]); any other alpha says nothing. Negative values are
+    /// values like others. `mask` is an image of the size of the left one; where it is not black, the left image is masked as
+    /// well. A masked pixel holds zeros.
     ///
     /// # Errors
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;

@@ -79,14 +79,7 @@ impl Temporary {
         if let Ok(file) = unnamed(folder) {
             return Ok(Self::Unnamed(file));
         }
-        let mut builder = builder();
-        #[cfg(unix)]
-        {
-            // Temporary files are private by default; an output is as open as the umask lets it be.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
-        builder.tempfile_in(folder).map(Self::Named).map_err(|e| {
+        builder().tempfile_in(folder).map(Self::Named).map_err(|e| {
             Error::write(path, format!("no file can be created in {}: {}", folder.display(), e.kind()))
         })
     }
@@ -122,6 +115,12 @@ impl Temporary {
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".mrfgs-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // Temporary files are private by default; an output is as open as the umask lets it be.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
     builder
 }
 
