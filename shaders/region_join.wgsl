@@ -29,7 +29,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let across = params.span == 0u;
     let x = select(params.first_column + id.x, SEGMENT * (id.x + 1u), across);
     let y = select(params.span * (2u * id.y + 1u), id.y, across);
-    if x >= params.level.width || y >= params.rows || !across && id.x >= params.columns {
+    if x >= params.level.width || y >= params.rows || (!across && id.x >= params.columns) {
         return;
     }
     let here = y * params.level.pixel_pitch + x;

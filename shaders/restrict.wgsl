@@ -17,7 +17,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let ends = support[id.y * params.level.pixel_pitch + x];
     let labels = labels_of(quad);
-    let inside = labels >= vec4(ends & 0xffffu) & labels <= vec4(ends >> 16u);
+    let inside = (labels >= vec4(ends & 0xffffu)) & (labels <= vec4(ends >> 16u));
     if all(inside) {
         return;
     }
