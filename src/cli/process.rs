@@ -40,8 +40,8 @@ pub(super) fn quiet_loader() {
     if let Some(name) = args.next() {
         command.arg0(name);
     }
-    // It returns where it fails, and then there is a line too many.
-    let _ = command.args(args).env("XDG_RUNTIME_DIR", env::temp_dir()).exec();
+    // A folder that nobody else can put a socket into. It returns where it fails, and then there is a line too many.
+    let _ = command.args(args).env("XDG_RUNTIME_DIR", "/").exec();
 }
 
 #[cfg(not(target_os = "linux"))]

@@ -190,7 +190,7 @@ fn what_stands_for_no_data_is_ignored() {
             "--quiet",
         ];
         run(folder.path(), &[&args[..], more].concat()).succeeded();
-        mrfgs::image::read::read_disparity(&at("out.tif")).unwrap()
+        read::read_disparity(&at("out.tif")).unwrap()
     };
     let border = |map: &mrfgs::image::Plane<f32>| {
         (0..240).flat_map(|y| (0..9).map(move |x| (x, y))).all(|at| map[at].is_infinite())
