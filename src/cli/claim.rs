@@ -10,6 +10,8 @@ use same_file::Handle;
 
 /// The file that is locked.
 const LOCK: &str = "lock";
+/// The folders that may be made: a new one, and the old one while the new one takes its place.
+pub(super) const FOLDERS: [&str; 2] = ["new", "old"];
 
 /// What this run is at, and the folder in which its files are made. While it lives the folder is locked, and
 /// afterwards gone. The lock goes with its process however that ends; then the folder is there without a lock.
@@ -70,7 +72,8 @@ impl Claim {
     fn clear(&self) -> io::Result<()> {
         for entry in fs::read_dir(&self.folder)? {
             let entry = entry?;
-            if entry.file_type()?.is_dir() {
+            // Folders of any other name are not ours, and nothing is claimed then.
+            if FOLDERS.iter().any(|name| entry.file_name() == *name) {
                 fs::remove_dir_all(entry.path())?;
             } else if entry.file_name() != LOCK {
                 fs::remove_file(entry.path())?;

@@ -8,7 +8,7 @@ use mrfgs::image::write;
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
-use super::claim::Claim;
+use super::claim::{Claim, FOLDERS};
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
 pub(super) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
@@ -193,7 +193,7 @@ impl StagedFolder {
 
     /// Where it is made.
     pub(super) fn path(&self) -> PathBuf {
-        self.staging.folder().join("new")
+        self.staging.folder().join(FOLDERS[0])
     }
 
     /// An error that tells the place of a file in the making as one that tells the folder.
@@ -209,7 +209,7 @@ impl StagedFolder {
     /// Puts it in its place; what was there goes, and comes back when that fails.
     pub(super) fn publish(self) -> Result<()> {
         let error = |e: std::io::Error| Error::write(&self.name, e);
-        let old = self.staging.folder().join("old");
+        let old = self.staging.folder().join(FOLDERS[1]);
         let replaces = self.place.exists();
         if replaces {
             fs::rename(&self.place, &old).map_err(error)?;

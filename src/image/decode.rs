@@ -7,15 +7,11 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::file::{self, check_claim, check_size, damaged, most_bytes, unsupported};
+use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, most_bytes, unsupported};
 use super::raster::{Raster, Samples};
 use super::{jpeg, pfm, tiff};
 use crate::error::{Error, Result, one_line};
 use crate::memory::Claim;
-
-/// No codec here packs more pixels than this into a byte; a header that claims more lies, and believing it
-/// would cost memory in vain.
-const MAX_PIXELS_PER_BYTE: u64 = 10_000;
 
 /// The same for files that do not compress, whose smallest pixel is a bit.
 const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;

@@ -10,6 +10,10 @@ use crate::memory;
 /// Most pixels of an image unless the caller says otherwise: as many as 16,384 x 16,384.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
+/// No codec here packs more pixels than this into a byte; a header that claims more lies, and believing it would cost memory in
+/// vain.
+pub(super) const MAX_PIXELS_PER_BYTE: u64 = 10_000;
+
 /// Bytes of a pixel at most: four channels of the widest kind.
 const PIXEL_BYTES: u64 = 32;
 

@@ -6,12 +6,9 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::file::{check_claim, damaged};
+use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged};
 use super::raster::{Raster, Samples};
 use crate::memory::{self, Claim};
-
-/// The most pixels that a byte of a file stands for: blocks of 64 without detail, subsampled, take a few bits.
-const MAX_PIXELS_PER_BYTE: u64 = 10_000;
 
 /// Bytes that the decoder takes for a pixel beside its samples, at most: the coefficients of a progressive image, and rows in
 /// between.

@@ -15,7 +15,7 @@ use half::f16;
 use self::chunks::Packing;
 use self::colours::Colours;
 use self::directory::{Directory, Order};
-use super::file::{check_claim, damaged, unsupported};
+use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
 use super::raster::{Raster, Samples, holding};
 use crate::error::quoted;
 use crate::memory;
@@ -52,10 +52,6 @@ mod tag {
     /// GDAL's, as text.
     pub(super) const NO_DATA: u16 = 42_113;
 }
-
-/// No compression here packs more pixels than this into a byte; a directory that claims more lies, and believing it would cost
-/// memory in vain.
-const MAX_PIXELS_PER_BYTE: u64 = 10_000;
 
 /// How samples are numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
