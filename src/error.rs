@@ -63,23 +63,3 @@ impl Error {
         Self::Option { name: name.into(), reason: reason.into() }
     }
 }
-
-/// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
-pub(crate) fn one_line(text: &str) -> String {
-    const MOST: usize = 160;
-    let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
-    let line = words.collect::<Vec<_>>().join(" ");
-    match line.char_indices().nth(MOST) {
-        Some((end, _)) => format!("{}...", &line[..end]),
-        None => line,
-    }
-}
-
-/// What a user gave, as a message may quote it: not longer than a glance, and without what a terminal would obey.
-pub(crate) fn quoted(text: &str) -> String {
-    const MOST: usize = 60;
-    let mut characters = text.escape_debug();
-    let shown: String = characters.by_ref().take(MOST).collect();
-    let more = if characters.next().is_some() { "..." } else { "" };
-    format!("`{shown}{more}`")
-}

@@ -67,7 +67,7 @@
 //! - [`roofline`] counts what the messages cost at least, to hold a machine against.
 //! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
-//! - [`evaluation`] compares maps with ground truth; [`list`] reads which pairs a batch is to match.
+//! - [`evaluation`] compares maps with ground truth.
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
@@ -79,7 +79,6 @@ pub mod evaluation;
 pub mod front;
 pub mod graph;
 pub mod image;
-pub mod list;
 pub mod maps;
 mod matcher;
 mod memory;
@@ -88,7 +87,7 @@ pub mod plan;
 pub mod roofline;
 pub mod solver;
 pub mod tables;
-mod text;
+pub mod text;
 pub mod tiles;
 
 pub use error::{Error, Result};

@@ -6,8 +6,9 @@
 //! Correspondence Algorithm*; where a meaning says "open", the paper leaves the matter open and the choice is
 //! this project's.
 
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result};
 use crate::text;
+use crate::text::one_line;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Small text files: calibrations, config files, lists.
+//! Text from outside: small files, such as calibrations, config files and lists, and what messages quote of them.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Read`] when it cannot be read or is larger.
-pub(crate) fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
+pub fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes)).map_err(|e| {
         match e.kind() {
@@ -22,4 +22,26 @@ pub(crate) fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
         return Err(Error::read(path, format!("larger than any {what}; is it one?")));
     }
     Ok(bytes)
+}
+
+/// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
+#[must_use]
+pub fn one_line(text: &str) -> String {
+    const MOST: usize = 160;
+    let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
+    let line = words.collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
+}
+
+/// What a user gave, as a message may quote it: not longer than a glance, and without what a terminal would obey.
+#[must_use]
+pub fn quoted(text: &str) -> String {
+    const MOST: usize = 60;
+    let mut characters = text.escape_debug();
+    let shown: String = characters.by_ref().take(MOST).collect();
+    let more = if characters.next().is_some() { "..." } else { "" };
+    format!("`{shown}{more}`")
 }

@@ -1,4 +1,4 @@
-//! What the fuzz targets do with an input, which is the content of a file. `tests/corpus.rs` replays the corpus through the
+//! What the fuzz targets do with an input, which is the content of a file. `cli/tests/corpus.rs` replays the corpus through the
 //! same functions.
 //!
 //! A file is read or refused: a refusal is one line that fits a screen, and what is read keeps its promises.
@@ -6,9 +6,9 @@
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::pfm::{self, Pfm};
 use mrfgs::image::read::Reader;
-use mrfgs::list::{self, Largest};
 use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::{Error, Result};
+use mrfgs_cli::list::{self, Largest};
 use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;

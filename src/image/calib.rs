@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Result, quoted};
+use crate::error::{Error, Result};
 use crate::text;
+use crate::text::quoted;
 
 /// A calibration file is a dozen lines; no more than this is read of one.
 const MAX_BYTES: u64 = 1 << 20;

@@ -10,8 +10,9 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Li
 use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, most_bytes, unsupported};
 use super::raster::{Raster, Samples};
 use super::{jpeg, pfm, tiff};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result};
 use crate::memory::Claim;
+use crate::text::one_line;
 
 /// The same for files that do not compress, whose smallest pixel is a bit.
 const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;

@@ -4,8 +4,9 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result};
 use crate::memory;
+use crate::text::one_line;
 
 /// Most pixels of an image unless the caller says otherwise: as many as 16,384 x 16,384.
 pub const MAX_PIXELS: u64 = 1 << 28;

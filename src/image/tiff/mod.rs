@@ -17,8 +17,8 @@ use self::colours::Colours;
 use self::directory::{Directory, Order};
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
 use super::raster::{Raster, Samples, holding};
-use crate::error::quoted;
 use crate::memory;
+use crate::text::quoted;
 
 /// The tags that are looked at.
 mod tag {

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use mrfgs::evaluation::{Breakdown, Detection, Report, Sparsification, breakdown::Class};
 
-use super::evaluate::Findings;
-use super::tables::{figure, push};
+use crate::evaluate::Findings;
+use crate::tables::{figure, push};
 
 /// What the tables show of a pair, or of all.
 type Line<'a> =

@@ -23,7 +23,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    super::print(&match &args.name {
+    crate::print(&match &args.name {
         Some(name) => file(name)?,
         None => listing()?,
     })

@@ -8,7 +8,7 @@ use mrfgs::image::write;
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
-use super::claim::{Claim, FOLDERS};
+use crate::claim::{Claim, FOLDERS};
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
 pub(super) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
@@ -126,7 +126,7 @@ pub(super) fn deliver(
     }
     more(&mut written)?;
     written.keep();
-    super::print(&printed)
+    crate::print(&printed)
 }
 
 /// Where a folder for outputs is, or would be.

@@ -7,8 +7,8 @@ use mrfgs::evaluation::Metrics;
 use mrfgs::options::Method;
 use serde::Serialize;
 
-use super::evaluate::Findings;
-use super::tables::{Each, entries, figure};
+use crate::evaluate::Findings;
+use crate::tables::{Each, entries, figure};
 
 /// A change to the default preset: its name, and the keys with their values.
 pub(super) type Row = (&'static str, &'static [(&'static str, &'static str)]);
@@ -97,7 +97,7 @@ impl Ablations {
         let width = |text: &dyn Fn(&Outcome) -> usize| self.rows.iter().map(text).max().unwrap_or(0);
         let (first, second) = (width(&|row| row.name.len()), width(&|row| changes(row).len()));
         let pairs = self.pairs.len();
-        let over = format!("{pairs} pair{}", super::plural(pairs));
+        let over = format!("{pairs} pair{}", crate::plural(pairs));
         let mut out = format!("Final maps, all pixels with known truth, means over {over}\n\n");
         let mut line = |name: &str, changes: &str, cells: [String; 5]| {
             let [avg, b05, b2, change, time] = cells;

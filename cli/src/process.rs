@@ -21,7 +21,7 @@ pub(crate) fn tell_panics_in_one_line() {
         let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
         let place =
             panic.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
-        let text = super::single_line(&format!("this is a defect of mrfgs, please report it: {text}{place}"));
+        let text = crate::single_line(&format!("this is a defect of mrfgs, please report it: {text}{place}"));
         let _ = writeln!(io::stderr(), "mrfgs: {text}");
     }));
 }

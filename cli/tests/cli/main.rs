@@ -6,13 +6,13 @@ mod batch;
 mod bench;
 mod evaluate;
 mod failures;
-#[path = "../common/files.rs"]
+#[path = "../../../tests/common/files.rs"]
 mod files;
 mod hostile;
 mod matching;
 mod outputs;
 mod plugin;
-#[path = "../../testdata/render-cloud.rs"]
+#[path = "../../../testdata/render-cloud.rs"]
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;
 mod report;
@@ -97,7 +97,7 @@ fn listing(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
 }
 
 fn scene(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)
 }
 
 /// The path of a file of a scene, as an argument.

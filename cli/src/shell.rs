@@ -10,8 +10,8 @@ use clap_mangen::Man;
 use mrfgs::image::write;
 use mrfgs::{Error, Result};
 
-use super::Cli;
-use super::outputs::Written;
+use crate::Cli;
+use crate::outputs::Written;
 
 const COMPLETIONS: &str = "\
 Examples:
@@ -37,7 +37,7 @@ pub(super) struct ManArgs {
 pub(super) fn completions(args: &CompletionsArgs) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "mrfgs", &mut script);
-    super::print(&String::from_utf8_lossy(&script))
+    crate::print(&String::from_utf8_lossy(&script))
 }
 
 pub(super) fn man(args: &ManArgs) -> Result<()> {

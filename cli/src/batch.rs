@@ -15,15 +15,15 @@ use mrfgs::maps::Maps;
 use mrfgs::options::Method;
 use mrfgs::{Error, Matched, Matcher, Result};
 
-use super::batch_list::{Input, List, Listed};
-use super::batch_record::{Request, State};
-use super::claim::Claim;
-use super::outputs;
-use super::progress::PairBar;
-use super::sidecar::Sidecar;
-use super::sign::Sign;
-use super::stop;
-use super::{ExecutionArgs, Failure, MethodArgs, ReadArgs};
+use crate::batch_list::{Input, List, Listed};
+use crate::batch_record::{Request, State};
+use crate::claim::Claim;
+use crate::outputs;
+use crate::progress::PairBar;
+use crate::sidecar::Sidecar;
+use crate::sign::Sign;
+use crate::stop;
+use crate::{ExecutionArgs, Failure, MethodArgs, ReadArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -269,7 +269,7 @@ impl Batch<'_> {
             };
         }
         let _ = writeln!(text, "{complete} complete, {failed} failed, {missing} missing");
-        super::print(&text)
+        crate::print(&text)
     }
 
     /// Does every pair that is not complete.
@@ -316,13 +316,13 @@ impl Batch<'_> {
                     done += 1;
                     // Why there is no device is the same for all that follow.
                     if note.is_some() && note != told && !self.args.quiet {
-                        bar.past(|| note.iter().for_each(|note| super::say(note)));
+                        bar.past(|| note.iter().for_each(|note| crate::say(note)));
                         told = note;
                     }
                 }
                 Ok(Err(error)) => {
                     failed.push(name);
-                    bar.past(|| super::say(&super::single_line(&format!("{name}: {error}"))));
+                    bar.past(|| crate::say(&crate::single_line(&format!("{name}: {error}"))));
                 }
                 Err(Error::Interrupted) => return Err(interrupted()),
                 Err(error) => return Err(error.into()),
@@ -336,7 +336,7 @@ impl Batch<'_> {
             return Err(Failure::Incomplete(text));
         }
         if !self.args.quiet {
-            super::say(&summary);
+            crate::say(&summary);
         }
         Ok(())
     }
@@ -363,7 +363,7 @@ impl Batch<'_> {
             }
         };
         if !matched.timings.is_empty() {
-            let table = super::timing_table(&matched, time);
+            let table = crate::timing_table(&matched, time);
             bar.past(|| {
                 let _ = io::stderr().write_all(format!("{}\n{table}", listed.name).as_bytes());
             });

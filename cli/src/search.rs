@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
+use crate::list::{self, Largest};
 use mrfgs::front::check;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::list::{self, Largest};
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
-use super::sign::Sign;
+use crate::sign::Sign;
 
 /// What the user says of the range.
 #[derive(clap::Args, Clone, Copy, Serialize)]
@@ -58,7 +58,7 @@ impl Search {
         let given = match near {
             Some(near) if !auto => Some(between(near, far.unwrap_or(0))?),
             None if !auto => calibration.map_or(Ok(None), |(path, c)| {
-                super::calibrated_range(path, c, sign.disparity(far.unwrap_or(0)))
+                crate::calibrated_range(path, c, sign.disparity(far.unwrap_or(0)))
             })?,
             _ => None,
         };

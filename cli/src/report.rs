@@ -13,9 +13,9 @@ use mrfgs::image::{Pair, Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::{Error, Result};
 
-use super::evaluate::{Figures, Findings};
-use super::outputs::StagedFolder;
-use super::tables::figure;
+use crate::evaluate::{Figures, Findings};
+use crate::outputs::StagedFolder;
+use crate::tables::figure;
 
 /// Errors beyond this, in pixels, take the last colour: one scale for all pairs, or they could not be compared.
 const ERROR_LIMIT: f32 = 4.0;

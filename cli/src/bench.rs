@@ -19,11 +19,11 @@ use mrfgs::plan::Plan;
 use mrfgs::{Error, Matched, Matcher, Result, Timing, roofline};
 use serde::{Deserialize, Serialize};
 
-use super::folder::{self, Folder};
-use super::process::{peak_memory, processor_time};
-use super::synthetic::{LARGE, SMALL, Synthetic};
-use super::tables::figure;
-use super::{MethodArgs, ReadArgs, ResourceArgs, outputs};
+use crate::folder::{self, Folder};
+use crate::process::{peak_memory, processor_time};
+use crate::synthetic::{LARGE, SMALL, Synthetic};
+use crate::tables::figure;
+use crate::{MethodArgs, ReadArgs, ResourceArgs, outputs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -209,7 +209,7 @@ fn made_up(args: &Args) -> Synthetic {
 fn backends(args: &Args) -> Result<Vec<&'static str>> {
     let device = args.resources.device.as_deref();
     if args.backend == Some(Which::Cpu) && device.is_some() {
-        return Err(super::no_device());
+        return Err(crate::no_device());
     }
     let (cpu, gpu) = match args.backend {
         Some(which) => (which != Which::Gpu, which != Which::Cpu),
@@ -299,13 +299,13 @@ impl Case<'_> {
         let what = format!("{name}, preset {preset}, {}", self.backend);
         let figures = match self.figures(args, &pair, range) {
             Err(Error::Memory(reason)) => {
-                super::say(&format!("{what}: left out: {reason}"));
+                crate::say(&format!("{what}: left out: {reason}"));
                 None
             }
             figures => Some(figures?),
         };
         if let Some(figures) = &figures {
-            super::say(&format!("{what}: {:.1} ms", figures.median_ms));
+            crate::say(&format!("{what}: {:.1} ms", figures.median_ms));
         }
         let (width, height) = pair.size();
         let backends = BTreeMap::from([(self.backend.into(), figures)]);
@@ -344,7 +344,7 @@ impl Case<'_> {
         let message_time = |timings: &Vec<Timing>| ms(messages(&plan, timings).map(|(_, t)| t.time).sum());
         let message_ms = median(timed.iter().map(message_time));
         let stages = timed[0].iter().enumerate().map(|(i, timing)| {
-            (super::stage_and_level(timing), median(timed.iter().map(|timings| ms(timings[i].time))))
+            (crate::stage_and_level(timing), median(timed.iter().map(|timings| ms(timings[i].time))))
         });
         let counted = |of: fn(&Plan, Stage) -> u64| -> u64 {
             // Every tile has run as often as any other.
@@ -428,18 +428,18 @@ const LINES: [Line; 16] = [
 ];
 
 fn size(bytes: Option<u64>) -> String {
-    bytes.map_or_else(|| "-".into(), super::bytes)
+    bytes.map_or_else(|| "-".into(), crate::bytes)
 }
 
 impl Findings {
     /// The figures for a terminal, the backends side by side.
     fn text(&self) -> String {
-        let (repeats, plural) = (self.repeats, super::plural(self.repeats.into()));
+        let (repeats, plural) = (self.repeats, crate::plural(self.repeats.into()));
         let mut out =
             format!("mrfgs {}, {repeats} repeat{plural} after one match to warm up\n", self.version);
         for row in &self.pairs {
             let Row { name, preset, width, height, labels, .. } = row;
-            let plural = super::plural(*labels);
+            let plural = crate::plural(*labels);
             let _ =
                 writeln!(out, "\n{name}, preset {preset}: {width} x {height} pixels, {labels} label{plural}");
             for (backend, figures) in &row.backends {

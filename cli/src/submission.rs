@@ -12,7 +12,7 @@ use mrfgs::image::{Plane, write};
 use mrfgs::options::Fill;
 use mrfgs::{Error, Result};
 
-use super::outputs::StagedFolder;
+use crate::outputs::StagedFolder;
 
 /// A folder of maps in the making.
 pub(super) struct Submission {

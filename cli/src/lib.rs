@@ -1,4 +1,4 @@
-//! The command line: one file a subcommand, and here what they share. Nothing else in the crate prints.
+//! The command line: one file a subcommand, and here what they share.
 
 mod ablations;
 mod batch;
@@ -11,6 +11,7 @@ mod devices;
 mod evaluate;
 mod folder;
 mod intermediates;
+pub mod list;
 mod r#match;
 mod match_outputs;
 mod outputs;
@@ -29,6 +30,7 @@ mod tables;
 
 use std::fmt::{self, Write as _};
 use std::io::Write;
+use std::panic;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -43,8 +45,6 @@ use mrfgs::options::{Choice, DisparityRange, Execution, MAX_MEMORY, Method};
 use mrfgs::solver::Inspector;
 use mrfgs::{Error, Matched, Matcher, Result, Timing};
 use progress::Bar;
-
-pub(crate) use process::tell_panics_in_one_line;
 
 const ABOUT: &str = "\
 Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
@@ -147,8 +147,23 @@ impl From<Error> for Failure {
     }
 }
 
-/// Does what the command line says.
-pub(crate) fn run() -> std::result::Result<(), Failure> {
+/// Does what the command line says; the exit status of the program.
+#[must_use]
+pub fn main() -> ExitCode {
+    process::tell_panics_in_one_line();
+    match panic::catch_unwind(run) {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        // It has been told.
+        Err(_) => ExitCode::FAILURE,
+        Ok(Err(failure)) => {
+            // Where standard error is closed there is nobody left to tell.
+            let _ = writeln!(std::io::stderr(), "mrfgs: {failure}");
+            failure.exit_code()
+        }
+    }
+}
+
+fn run() -> std::result::Result<(), Failure> {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(answer) if answer.use_stderr() => return Err(Failure::Usage(one_line(&answer))),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use mrfgs::solver::Progress;
 
-use super::stop;
+use crate::stop;
 
 /// What is over sooner than this needs no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -84,7 +84,7 @@ impl PairBar {
             bar.set_message(name.to_owned());
         }
         if let Some(line) = self.log.as_mut().and_then(|log| log.line(name, Instant::now())) {
-            super::say(&line);
+            crate::say(&line);
         }
     }
 

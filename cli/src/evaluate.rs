@@ -11,15 +11,15 @@ use mrfgs::options::Method;
 use mrfgs::{Error, Matcher, Result};
 use serde::Serialize;
 
-use super::ablations::{self, Ablations};
-use super::breakdown;
-use super::folder::{self, Folder, Scene};
-use super::outputs;
-use super::report::{self, Destination, Picture};
-use super::stop;
-use super::submission::Submission;
-use super::tables::{self, Comparison};
-use super::{ExecutionArgs, MethodArgs, ReadArgs};
+use crate::ablations::{self, Ablations};
+use crate::breakdown;
+use crate::folder::{self, Folder, Scene};
+use crate::outputs;
+use crate::report::{self, Destination, Picture};
+use crate::stop;
+use crate::submission::Submission;
+use crate::tables::{self, Comparison};
+use crate::{ExecutionArgs, MethodArgs, ReadArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -337,7 +337,7 @@ fn match_all(
         let scene = folder.read(args.reading.reader(), args.truth_scale)?;
         let name = called.map_or(scene.name.clone(), |called| format!("{}, {called}", scene.name));
         let (matched, time) =
-            super::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;
+            crate::match_and_tell(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;
         see(&scene, &matched.maps, time)?;
         let (ground, maps, estimate) = (&scene.ground, &matched.maps, matched.maps.final_map());
         figures.push(Figures {

@@ -74,7 +74,7 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
     for (view, name) in views.iter().zip(["left.tif", "right.tif"]) {
         write_view(&at(name), view);
     }
-    let plugin = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/asp-plugin");
+    let plugin = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/asp-plugin");
     let call = |options: &str| {
         let output = Command::new(&plugin)
             .current_dir(folder.path())

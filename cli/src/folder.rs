@@ -101,7 +101,7 @@ impl<'a> Folder<'a> {
         if !calib.is_file() {
             return Ok(None);
         }
-        let range = super::calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
+        let range = crate::calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
         let silent = || Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N");
         range.ok_or_else(silent).map(Some)
     }

@@ -24,8 +24,8 @@ pub(super) fn run() -> Result<()> {
         let _ = writeln!(
             out,
             "    largest buffer {}, largest binding {}",
-            super::bytes(device.max_buffer),
-            super::bytes(device.max_binding)
+            crate::bytes(device.max_buffer),
+            crate::bytes(device.max_binding)
         );
     }
     let _ = match devices.iter().find(|d| d.automatic) {
@@ -35,7 +35,7 @@ pub(super) fn run() -> Result<()> {
         }
         None => writeln!(out, "`auto` takes the CPU path"),
     };
-    super::print(&out)
+    crate::print(&out)
 }
 
 /// The version of wgpu that Cargo.toml asks for.
@@ -48,7 +48,7 @@ pub(super) fn print_versions() -> Result<()> {
         let driver = if device.driver.is_empty() { "unknown" } else { &device.driver };
         let _ = writeln!(out, "device {}: {}, {}, driver {driver}", device.index, device.name, device.api);
     }
-    super::print(&out)
+    crate::print(&out)
 }
 
 #[cfg(test)]

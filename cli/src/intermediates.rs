@@ -13,7 +13,7 @@ use mrfgs::image::{Pair, Plane, write};
 use mrfgs::plan::{Plan, UNITS_PER_NAT};
 use mrfgs::solver::Glimpse;
 
-use super::outputs::StagedFolder;
+use crate::outputs::StagedFolder;
 
 /// Quarters of the label range at which cost slices are cut.
 const SLICES: [usize; 3] = [1, 2, 3];

@@ -10,11 +10,11 @@ use mrfgs::image::{Image, pfm, ply, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
-use super::intermediates::Intermediates;
-use super::outputs::{self, StagedFolder, Written};
-use super::plural;
-use super::sidecar::Sidecar;
-use super::sign::Sign;
+use crate::intermediates::Intermediates;
+use crate::outputs::{self, StagedFolder, Written};
+use crate::plural;
+use crate::sidecar::Sidecar;
+use crate::sign::Sign;
 
 /// The outputs besides the map.
 #[derive(clap::Args)]
@@ -200,7 +200,7 @@ impl MoreOutputs {
         }
         written.keep();
         if let Some((_, text)) = json.filter(|(path, _)| outputs::is_printed(path)) {
-            super::print(&text)?;
+            crate::print(&text)?;
         }
         Ok(said.join("; "))
     }

@@ -3,17 +3,17 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::list::{self, Names, Row};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::Reader;
-use mrfgs::list::{self, Names, Row};
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 
-use super::folder::{self, Folder};
-use super::search::{Found, Search};
-use super::sidecar::Files;
-use super::sign::Sign;
+use crate::folder::{self, Folder};
+use crate::search::{Found, Search};
+use crate::sidecar::Files;
+use crate::sign::Sign;
 
 /// Many pairs.
 pub(super) struct List {

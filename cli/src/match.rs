@@ -13,13 +13,13 @@ use mrfgs::solver::{Glimpse, Inspector};
 use mrfgs::tiles::Tiles;
 use mrfgs::{Error, Matcher, Result};
 
-use super::intermediates::Intermediates;
-use super::match_outputs::{MoreOutputs, Outcome};
-use super::search::{Found, Search};
-use super::sidecar::{Files, Sidecar};
-use super::sign::Sign;
-use super::stop;
-use super::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
+use crate::intermediates::Intermediates;
+use crate::match_outputs::{MoreOutputs, Outcome};
+use crate::search::{Found, Search};
+use crate::sidecar::{Files, Sidecar};
+use crate::sign::Sign;
+use crate::stop;
+use crate::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let Found { range, by_matches } = args.search.range(&pair, known, args.sign)?;
     if by_matches && !args.quiet {
         let DisparityRange { min, max } = args.sign.range(range);
-        super::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
+        crate::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
     }
     let rig = rig(args, &pair, calibration.as_ref())?;
     let inputs = [
@@ -119,7 +119,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     if args.dry_run {
-        return super::print(&describe(&Tiles::new(&plan)?));
+        return crate::print(&describe(&Tiles::new(&plan)?));
     }
     let mut matcher = Matcher::new(&execution)?;
     let steps = args.more.intermediates.as_deref().map(|folder| Intermediates::new(folder, plan));
@@ -129,7 +129,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         Some(look) => Some(look),
         None => None,
     };
-    let (matched, time) = super::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, look)?;
+    let (matched, time) = crate::match_and_tell(&mut matcher, &pair, range, &method, None, args.quiet, look)?;
     if !args.quiet {
         warn(check::clipped(&matched.maps, range).into_iter().map(|warning| args.sign.warning(warning)));
     }
@@ -154,7 +154,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     };
     let said = args.more.write(&args.output, &outcome, steps)?;
     if let Some((file, _)) = calibration.filter(|_| !args.quiet && !said.is_empty()) {
-        super::say(&format!("{said}; unit: that of the baseline in {}", file.display()));
+        crate::say(&format!("{said}; unit: that of the baseline in {}", file.display()));
     }
     Ok(())
 }
@@ -203,7 +203,7 @@ fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Opt
 /// Says on standard error what is probably wrong.
 fn warn(warnings: impl IntoIterator<Item = Warning>) {
     for warning in warnings {
-        super::say(&format!("warning: {warning}"));
+        crate::say(&format!("warning: {warning}"));
     }
 }
 

@@ -10,10 +10,10 @@ use mrfgs::{Error, Result};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::batch_list::Listed;
-use super::outputs;
-use super::search::Search;
-use super::sidecar::Sidecar;
+use crate::batch_list::Listed;
+use crate::outputs;
+use crate::search::Search;
+use crate::sidecar::Sidecar;
 
 /// What a batch is to make of a pair. The record of a complete pair holds the same.
 #[derive(Serialize)]
@@ -123,7 +123,7 @@ impl Request {
 
     /// The text of the record `path` of a pair that failed.
     pub(super) fn failed(&self, path: &Path, method: &Method, reason: &Error) -> Result<String> {
-        let reason = &super::single_line(&reason.to_string());
+        let reason = &crate::single_line(&reason.to_string());
         let version = env!("CARGO_PKG_VERSION");
         outputs::json_text(path, &Failed { status: "failed", reason, request: self, version, method })
     }

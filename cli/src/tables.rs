@@ -7,7 +7,7 @@ use mrfgs::evaluation::paper::{Figures, Published, SOURCE, published};
 use mrfgs::options::Method;
 use serde::{Serialize, Serializer};
 
-use super::evaluate::Findings;
+use crate::evaluate::Findings;
 
 /// The presets that stand beside the paper's methods.
 pub(super) const COMPARED: [&str; 3] = ["fgs", "paper", "default"];

@@ -11,9 +11,9 @@ use std::str::FromStr;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use serde::Serialize;
 
-use crate::error::{Error, Result, quoted};
-use crate::options::{DisparityRange, MAX_DISPARITY};
-use crate::text;
+use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+use mrfgs::text::{self, quoted};
+use mrfgs::{Error, Result};
 
 /// What the header of a list may name; the first three it must.
 const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];

@@ -8,7 +8,7 @@ use mrfgs::maps::{flag, has_disparity};
 use mrfgs::options::{DisparityRange, Method};
 use serde::Serialize;
 
-use super::sign::Sign;
+use crate::sign::Sign;
 
 /// Where a match took its input from and put its map, as the user wrote it.
 #[derive(Serialize)]
@@ -71,7 +71,7 @@ impl<'a> Sidecar<'a> {
             tiles: matched.tiles.count(),
             iterations: matched.iterations,
             seconds: time.as_secs_f64(),
-            stages: matched.timings.iter().map(|t| (super::stage_and_level(t), ms(t.time))).collect(),
+            stages: matched.timings.iter().map(|t| (crate::stage_and_level(t), ms(t.time))).collect(),
             density: percent(count + filled),
             measured: percent(count),
             filled: percent(filled),

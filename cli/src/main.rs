@@ -1,0 +1,7 @@
+//! The program `mrfgs`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    mrfgs_cli::main()
+}
