@@ -37,8 +37,8 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
         ("resolution", vec![Stage::Resolution(1)]),
         ("belief", vec![Stage::Belief(0)]),
         ("flood", vec![Stage::Flood(0)]),
-        ("estimate", vec![Stage::Estimate, Stage::RightView, Stage::SubPixel]),
-        ("region filter", vec![Stage::Visibility, Stage::RegionFilter]),
+        ("winner_takes_all", vec![Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel]),
+        ("speckle_filter", vec![Stage::LeftRightCheck, Stage::SpeckleFilter]),
         ("fill", vec![Stage::Fill, Stage::FillMedian]),
         ("median", vec![Stage::Median]),
     ]

@@ -1,7 +1,7 @@
-// How far the best rival of every pixel is behind. One invocation a pixel.
+// How far the best runner-up of every pixel is behind. One invocation a pixel.
 
-// label | best << 16, rival.
-@group(0) @binding(1) var<storage, read> peaks: array<vec2<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> flags: array<u32>;
 
 @compute @workgroup_size(64)
@@ -14,7 +14,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var validity = flags[at] & VALIDITY;
     var confidence = 0u;
     if is_valid(validity) {
-        let peak = peaks[at];
+        let peak = optima[at];
         confidence = min(2u * (peak.y - (peak.x >> 16u)), 255u);
         if confidence < params.confidence_floor {
             validity |= LOW_CONFIDENCE;

@@ -2,8 +2,8 @@
 // pixel.
 
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
-// label | best << 16, rival.
-@group(0) @binding(2) var<storage, read> peaks: array<vec2<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(2) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read_write> raw: array<i32>;
 @group(0) @binding(4) var<storage, read_write> disparity: array<i32>;
 
@@ -17,13 +17,13 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let top = i32(halo_start(1u));
     let x = i32(id.x);
     let y = i32(params.first_row + id.y);
-    let label = i32(peaks[u32(y - top) * pitch + id.x].x & 0xffffu);
+    let label = i32(optima[u32(y - top) * pitch + id.x].x & 0xffffu);
     var offset = 0;
     if params.sub_pixel == 1u && label > 0 && label + 1 < i32(params.level.labels) {
         var sums = vec3<i32>();
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
             for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {
-                if abs(i32(peaks[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 1 {
+                if abs(i32(optima[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 1 {
                     let row = u32(v - top) * params.level.pitch;
                     for (var i = 0; i < 3; i++) {
                         let at = u32(label - 1 + i);

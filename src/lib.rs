@@ -86,9 +86,9 @@ pub mod options;
 pub mod plan;
 pub mod roofline;
 pub mod solver;
-pub mod tables;
 pub mod text;
 pub mod tiles;
+pub mod weights;
 
 pub use error::{Error, Result};
 pub use matcher::{Matched, Matcher, Timing, match_pair};

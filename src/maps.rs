@@ -12,7 +12,7 @@ pub mod flag {
     /// The right view disagrees: occluded, or mistaken.
     pub const OCCLUDED: u8 = 2;
     /// The pixel is in a region too small to be trusted.
-    pub const SMALL_REGION: u8 = 4;
+    pub const SPECKLE: u8 = 4;
     /// The confidence is below the floor; the disparity stays.
     pub const LOW_CONFIDENCE: u8 = 8;
     /// The disparity is filled in from other pixels.
@@ -20,7 +20,7 @@ pub mod flag {
     /// The pixel is masked in the input, and has no disparity.
     pub const MASKED: u8 = 32;
     /// Any of the reasons for which a disparity is given up before the fill.
-    pub const INVALID: u8 = OUTSIDE | OCCLUDED | SMALL_REGION | MASKED;
+    pub const INVALID: u8 = OUTSIDE | OCCLUDED | SPECKLE | MASKED;
 }
 
 /// What a match leaves behind; all maps have the size of the images.

@@ -137,7 +137,7 @@ pub enum Schedule {
 /// How the map of the right view is found, with which the disparities are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Visibility {
+pub enum LeftRightCheck {
     /// It is not: no comparison (the paper, section 2.5).
     Off,
     /// Off the same beliefs: the right pixel takes the best of the labels that see it.
@@ -146,7 +146,7 @@ pub enum Visibility {
     SecondMatch,
 }
 
-/// What becomes of the pixels that are invalid after visibility and region filter.
+/// What becomes of the pixels that are invalid after left-right check and region filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fill {
@@ -188,9 +188,9 @@ macro_rules! method {
 method! {
     illumination: Illumination, "none | homomorphic", "Correction of both images before all else (sections 2.4 and 3.1: \
          homomorphic filter, 21 x 21).";
-    zones: u32, "zones, 1 to 64", "Texture zones of the reference image, by K-means of Gabor responses; used where support \
+    zones: u32, "zones, 1 to 64", "Texture zones of the reference image, by K-means of Gabor responses; used where label_range \
          is (section 3.1: 15).";
-    support: f64, "standard deviations, 0 to 100", "Labels of a pixel are limited to the mean disparity of its zone's sparse \
+    zone_sigmas: f64, "standard deviations, 0 to 100", "Labels of a pixel are limited to the mean disparity of its zone's sparse \
          matches and this many standard deviations on either side; 0 keeps all labels (section 2.4: 1).";
     cost: Cost, "sad | census | ad-census", "Matching cost. The paper's is the SAD (section 2.4).";
     sad_window: u32, "pixels, odd, 1 to 31", "Side of the SAD window (section 3.1: 7).";
@@ -213,10 +213,10 @@ method! {
     sigma_range: f64, "of the intensity range 0 to 1", "Range parameter of the bilateral coefficients (section 3.1: \
          0.1).";
     potential: Potential, "soft | exact | hard", "Potential of factors whose members disagree (section 2.2: hard).";
-    dependency_cut: f64, "nats, up to 255.75", "What disagreement costs in a dependency factor; not used by hard \
+    dependency_truncation: f64, "nats, up to 255.75", "What disagreement costs in a dependency factor; not used by hard \
          potentials.";
     resolution: Resolution, "strict | interpolating", "Which labels of two levels agree (section 2.2: strict).";
-    resolution_cut: f64, "nats, up to 255.75", "What disagreement costs in a resolution factor; not used by hard \
+    resolution_truncation: f64, "nats, up to 255.75", "What disagreement costs in a resolution factor; not used by hard \
          potentials.";
     schedule: Schedule, "together | coarse-first", "Order of the flooding (algorithm 1: together).";
     iterations: u32, "iterations, 1 to 1000", "Iterations of all levels together, or of all levels so far after each \
@@ -225,9 +225,9 @@ method! {
          messages between levels, the others with those of the coarser levels; not used by the schedule together.";
     tolerance: f64, "pixels", "Stop when the RMS change of the finest map from one iteration to the next is at most \
          this; 0 runs all iterations (algorithm 1).";
-    visibility: Visibility, "off | right-view | second-match", "Compare with the map of the right view, and call what \
+    left_right_check: LeftRightCheck, "off | right-view | second-match", "Compare with the map of the right view, and call what \
          disagrees by more than one pixel occluded (the paper does without).";
-    region_size: u32, "pixels", "Regions smaller than this become invalid; 0 keeps all (open).";
+    speckle_size: u32, "pixels", "Regions smaller than this become invalid; 0 keeps all (open).";
     sub_pixel: bool, "true | false", "Place the disparity between the labels, by the matching cost around the optimum \
          (open).";
     fill: Fill, "none | row | median", "What becomes of invalid pixels.";
@@ -259,7 +259,7 @@ impl Default for Method {
         Self {
             illumination: Illumination::None,
             zones: 15,
-            support: 0.0,
+            zone_sigmas: 0.0,
             cost: Cost::AdCensus,
             sad_window: 7,
             colour_contrast: 5.0,
@@ -273,15 +273,15 @@ impl Default for Method {
             sigma_space: 3.0,
             sigma_range: 0.1,
             potential: Potential::Soft,
-            dependency_cut: 2.0,
+            dependency_truncation: 2.0,
             resolution: Resolution::Interpolating,
-            resolution_cut: 3.0,
+            resolution_truncation: 3.0,
             schedule: Schedule::CoarseFirst,
             iterations: 3,
             final_iterations: 3,
             tolerance: 0.0,
-            visibility: Visibility::RightView,
-            region_size: 200,
+            left_right_check: LeftRightCheck::RightView,
+            speckle_size: 200,
             sub_pixel: true,
             fill: Fill::Median,
             median: Median::All,
@@ -304,7 +304,7 @@ impl Method {
             "default" => Ok(Self::default()),
             "paper" => Ok(Self {
                 illumination: Illumination::Homomorphic,
-                support: 1.0,
+                zone_sigmas: 1.0,
                 cost: Cost::Sad,
                 outside_cost: 20.0,
                 temperature: 0.5,
@@ -316,13 +316,17 @@ impl Method {
                 schedule: Schedule::Together,
                 iterations: 30,
                 tolerance: 0.1,
-                visibility: Visibility::Off,
-                region_size: 0,
+                left_right_check: LeftRightCheck::Off,
+                speckle_size: 0,
                 sub_pixel: false,
                 fill: Fill::Row,
                 ..Self::default()
             }),
-            "fgs" => Ok(Self { levels: 1, visibility: Visibility::SecondMatch, ..Self::preset("paper")? }),
+            "fgs" => Ok(Self {
+                levels: 1,
+                left_right_check: LeftRightCheck::SecondMatch,
+                ..Self::preset("paper")?
+            }),
             _ => {
                 let names: Vec<_> = PRESETS.iter().map(|p| p.0).collect();
                 Err(Error::option(
@@ -450,7 +454,7 @@ impl Method {
             }
         };
         within("zones", 1.0, 64.0)?;
-        within("support", 0.0, 100.0)?;
+        within("zone-sigmas", 0.0, 100.0)?;
         within("sad-window", 1.0, 31.0)?;
         odd("sad-window", self.sad_window)?;
         within("colour-contrast", 0.0, 128.0)?;
@@ -462,8 +466,8 @@ impl Method {
         within("percentile", 0.0, 100.0)?;
         within("sigma-space", 0.1, 100.0)?;
         within("sigma-range", 1e-3, 10.0)?;
-        within("dependency-cut", 0.25, 255.75)?;
-        within("resolution-cut", 0.25, 255.75)?;
+        within("dependency-truncation", 0.25, 255.75)?;
+        within("resolution-truncation", 0.25, 255.75)?;
         within("iterations", 1.0, 1000.0)?;
         within("final-iterations", 0.0, 1000.0)?;
         within("tolerance", 0.0, 1e6)?;
@@ -512,12 +516,12 @@ mod tests {
         method.set("cost", "sad").unwrap();
         method.set("cost", "\"sad\"").unwrap();
         method.set("temperature", "2").unwrap();
-        method.set("visibility", "off").unwrap();
+        method.set("left-right-check", "off").unwrap();
         method.set_all([("levels", "3"), ("levels", "4")]).unwrap();
         let expected = Method {
             cost: Cost::Sad,
             temperature: 2.0,
-            visibility: Visibility::Off,
+            left_right_check: LeftRightCheck::Off,
             levels: 4,
             ..Method::default()
         };

@@ -145,30 +145,30 @@ impl VolumeWidth {
 
 /// How a sum of messages s becomes a message m(d) = min(s(d), high) - low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cut {
+pub struct Truncation {
     /// What disagreement costs, in units.
     pub tau: u16,
     /// Where to cut.
-    pub rule: CutRule,
+    pub rule: TruncationRule,
 }
 
 /// Where a message is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CutRule {
+pub enum TruncationRule {
     /// At tau above the smallest sum: high = min s + tau, low = min s.
     Relative,
     /// At tau, the members' messages having minimum 0: high = tau, low = min(min s, tau).
     Absolute,
 }
 
-impl Cut {
+impl Truncation {
     /// (high, low) for the smallest sum `min`.
     #[must_use]
     pub fn bounds(self, min: u32) -> (u32, u32) {
         let tau = u32::from(self.tau);
         match self.rule {
-            CutRule::Relative => (min + tau, min),
-            CutRule::Absolute => (tau, min.min(tau)),
+            TruncationRule::Relative => (min + tau, min),
+            TruncationRule::Absolute => (tau, min.min(tau)),
         }
     }
 }
@@ -195,10 +195,10 @@ pub struct Plan {
     pub neighbours: usize,
     /// Cost of labels outside the right image, in cost units of level 0.
     pub outside_cost: u8,
-    /// Cut of dependency messages.
-    pub dependency: Cut,
-    /// Cut of resolution messages.
-    pub resolution: Cut,
+    /// Truncation of dependency messages.
+    pub dependency: Truncation,
+    /// Truncation of resolution messages.
+    pub resolution: Truncation,
     /// Storage width of messages of both kinds, and of beliefs.
     pub volume_width: VolumeWidth,
     /// The flooding, in order.
@@ -245,11 +245,11 @@ impl Plan {
         let neighbours =
             (((window - 1) as f64 * (100.0 - method.percentile) / 100.0) - 1e-9).ceil().max(0.0) as usize;
         let cut = |nats: f64| match method.potential {
-            Potential::Hard => Cut { tau: HARD_CAP, rule: CutRule::Relative },
-            Potential::Soft => Cut { tau: units(nats), rule: CutRule::Relative },
-            Potential::Exact => Cut { tau: units(nats), rule: CutRule::Absolute },
+            Potential::Hard => Truncation { tau: HARD_CAP, rule: TruncationRule::Relative },
+            Potential::Soft => Truncation { tau: units(nats), rule: TruncationRule::Relative },
+            Potential::Exact => Truncation { tau: units(nats), rule: TruncationRule::Absolute },
         };
-        let (dependency, resolution) = (cut(method.dependency_cut), cut(method.resolution_cut));
+        let (dependency, resolution) = (cut(method.dependency_truncation), cut(method.resolution_truncation));
         // Where a pixel is in as many factors as a factor has members, as pixels are on average, nothing saturates.
         let usual = u32::from(levels[0].evidence.cap)
             + (neighbours + 1) as u32 * u32::from(dependency.tau)
@@ -320,8 +320,8 @@ impl Plan {
 
     /// Whether the texture zones limit the labels of their pixels.
     #[must_use]
-    pub fn restricted(&self) -> bool {
-        self.method.support > 0.0
+    pub fn limits_labels(&self) -> bool {
+        self.method.zone_sigmas > 0.0
     }
 
     /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
@@ -385,7 +385,7 @@ impl Plan {
         let graphs =
             self.levels.iter().map(|l| l.pixels() * (self.neighbours + 4 * self.slots() + 4)).sum::<usize>();
         let corrected = if self.method.illumination == Illumination::None { 0 } else { 66 };
-        let zones = if self.restricted() { 200 } else { 0 };
+        let zones = if self.limits_labels() { 200 } else { 0 };
         (17 + corrected + zones) * self.levels[0].pixels() as u64 + graphs as u64
     }
 
@@ -396,7 +396,7 @@ impl Plan {
     }
 
     /// Bytes that the maps of an image take which is matched tile by tile, at most. A pixel has 20 in the maps that its tiles
-    /// leave and those that are made of them (label, best, rival, right label and its belief 2 each, raw and final disparity
+    /// leave and those that are made of them (label, best, runner-up, right label and its belief 2 each, raw and final disparity
     /// 4 each, validity and confidence 1 each), and 12 while they are made; 9 more where the left view is corrected.
     #[must_use]
     pub fn mosaic_bytes(&self) -> u64 {

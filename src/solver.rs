@@ -4,14 +4,14 @@ use crate::backend::cpu::Mosaic;
 use crate::backend::{Backend, Map, Requested, Stage, Traffic};
 use crate::error::{Error, Result};
 use crate::front::illumination::homomorphic;
+use crate::front::label_range;
 use crate::front::matches::{self, Match};
-use crate::front::support;
 use crate::front::zones::{self, Zones};
 use crate::graph::{self, LevelGraph};
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
-use crate::options::{Fill, Illumination, Median, Method, Schedule, Visibility};
+use crate::options::{Fill, Illumination, LeftRightCheck, Median, Method, Schedule};
 use crate::plan::{Phase, Plan};
 use crate::tiles::Tiles;
 use std::iter;
@@ -56,7 +56,7 @@ pub enum Glimpse<'a> {
     /// The pair as it is matched, its texture zones and its sparse matches.
     Matches(&'a Pair, &'a Zones, &'a [Match]),
     /// First and last label of each pixel, by level.
-    Supports(&'a [Plane<[u16; 2]>]),
+    LabelRanges(&'a [Plane<[u16; 2]>]),
     /// A stage has run.
     Stage(&'a mut dyn Backend, Stage),
     /// This many iterations are done.
@@ -208,7 +208,7 @@ fn check_size(plan: &Plan, pair: &Pair) -> Result<()> {
 
 /// How often a pair is matched: once more, mirrored, where that is how its right view is found.
 fn matchings(plan: &Plan) -> usize {
-    if plan.method.visibility == Visibility::SecondMatch { 2 } else { 1 }
+    if plan.method.left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 }
 }
 
 /// The pair with its illumination corrected, where that is asked for.
@@ -230,26 +230,26 @@ fn estimate(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work
     let graphs = work.host("graph", || Ok(graph::build(pair.left(), plan)))?;
     work.look(&mut Glimpse::Graphs(&graphs))?;
     work.host("upload", || backend.prepare(plan, pair, graphs))?;
-    if plan.restricted() {
+    if plan.limits_labels() {
         let options = zones::Options { zones: method.zones as usize, ..zones::Options::default() };
         let zones = work.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
         let split = Some((&zones.map, zones.count));
         let matches = work.host("matches", || Ok(matches::find(pair, split, Some(plan.range))))?;
         work.look(&mut Glimpse::Matches(pair, &zones, &matches))?;
-        let supports = work.host("support", || Ok(support::levels(plan, &zones, &matches)))?;
-        work.look(&mut Glimpse::Supports(&supports))?;
-        work.host("upload", || backend.restrict(&supports))?;
+        let label_ranges = work.host("zone-sigmas", || Ok(label_range::levels(plan, &zones, &matches)))?;
+        work.look(&mut Glimpse::LabelRanges(&label_ranges))?;
+        work.host("upload", || backend.label_range(&label_ranges))?;
     }
     let levels = 0..plan.levels.len();
     let costs = levels.clone().flat_map(|z| {
         let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
-        iter::once(cost).chain(plan.restricted().then_some(Stage::Restrict(z)))
+        iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
     });
     for stage in costs.chain(levels.clone().map(Stage::Evidence)) {
         work.run(backend, plan, stage)?;
     }
     let iterations = propagate(backend, plan, work)?;
-    work.run(backend, plan, Stage::Estimate)?;
+    work.run(backend, plan, Stage::WinnerTakesAll)?;
     Ok(iterations)
 }
 
@@ -316,15 +316,15 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
 
 /// What follows the estimate and looks at volumes still.
 fn read_out(method: &Method) -> Vec<Stage> {
-    let right = (method.visibility == Visibility::RightView).then_some(Stage::RightView);
+    let right = (method.left_right_check == LeftRightCheck::RightView).then_some(Stage::RightView);
     right.into_iter().chain([Stage::SubPixel]).collect()
 }
 
 /// What follows that, and looks at maps alone.
 fn post_processing(method: &Method) -> Vec<Stage> {
-    let mut stages = vec![Stage::Visibility];
-    if method.region_size > 1 {
-        stages.push(Stage::RegionFilter);
+    let mut stages = vec![Stage::LeftRightCheck];
+    if method.speckle_size > 1 {
+        stages.push(Stage::SpeckleFilter);
     }
     stages.push(Stage::Confidence);
     match method.fill {

@@ -4,10 +4,10 @@
 //!
 //! ```text
 //! crop: ─────────────────────────────────────────────
-//!       │ reach │ collar │      core      │ collar │
+//!       │ reach │ overlap │      core      │ overlap │
 //! ```
 //!
-//! The cores share out the image; of its crop a tile leaves nothing else behind. The collar gives the core's outermost
+//! The cores share out the image; of its crop a tile leaves nothing else behind. The overlap gives the core's outermost
 //! pixels the surroundings that they have in the whole image. The reach is where their matches lie, as the right view is
 //! cropped alike: it is as wide as the largest disparity, and where disparities are negative there is one on the right too.
 //! At the borders of the image a crop ends.
@@ -17,14 +17,14 @@ use crate::image::Rect;
 use crate::plan::Plan;
 use std::ops::Range;
 
-/// Width of the collar in pixels, rounded up to whole pixels of the coarsest level (32 of them by default).
+/// Width of the overlap in pixels, rounded up to whole pixels of the coarsest level (32 of them by default).
 ///
 /// Measured by the share of pixels that a cut moves by more than 1 px (default preset; 0, 32, 64 and 96 px, as the grid has
-/// it). Five Middlebury pairs in 2 to 4 tiles: 0.00 to 0.19 % without a collar, at most 0.002 % with 32, at most 0.001 % with
+/// it). Five Middlebury pairs in 2 to 4 tiles: 0.00 to 0.19 % without a overlap, at most 0.002 % with 32, at most 0.001 % with
 /// 64 or 96. Seven rendered scenes in 2 to 12: 0.00 to 0.90 % without, none with 32. The plain wall, whose only hold is far
-/// away: 5 and 11 % without, 0.11 % and none with 32. No collar helps where labels are limited by texture zones, for each tile
+/// away: 5 and 11 % without, 0.11 % and none with 32. No overlap helps where labels are limited by texture zones, for each tile
 /// finds its own: of two pairs, a fifth to a half of the pixels move, towards the truth as often as away from it.
-pub const COLLAR: usize = 32;
+pub const OVERLAP: usize = 32;
 
 /// A part of the image that is matched by itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,14 +52,14 @@ impl Tiles {
     /// # Errors
     /// [`Error::Option`] when no tile is small enough.
     pub fn new(whole: &Plan) -> Result<Self> {
-        Self::with_collar(whole, COLLAR)
+        Self::with_overlap(whole, OVERLAP)
     }
 
-    /// As [`Tiles::new`], with a collar of at least `collar` pixels, to see what it is good for.
+    /// As [`Tiles::new`], with a overlap of at least `overlap` pixels, to see what it is good for.
     ///
     /// # Errors
     /// As [`Tiles::new`].
-    pub fn with_collar(whole: &Plan, collar: usize) -> Result<Self> {
+    pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
         let (width, height) = whole.size();
         let memory = u64::from(whole.method.memory) << 20;
         let all = Rect::whole((width, height));
@@ -70,8 +70,8 @@ impl Tiles {
         let step = 1 << (whole.levels.len() - 1);
         let reach = |disparity: i32| disparity.max(0) as usize;
         let range = whole.range;
-        let across = Axis::new(width, [collar + reach(range.max), collar + reach(-range.min)], step);
-        let down = Axis::new(height, [collar; 2], step);
+        let across = Axis::new(width, [overlap + reach(range.max), overlap + reach(-range.min)], step);
+        let down = Axis::new(height, [overlap; 2], step);
 
         let bytes = |(width, height): (usize, usize)| beside(whole) + whole.resized(width, height).bytes();
         let candidates = (1..=across.most()).filter_map(|columns| {

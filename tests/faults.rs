@@ -8,7 +8,7 @@ mod common;
 use common::devices::open as device;
 use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::{Gpu, Handicap};
+use mrfgs::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Execution, Method};
@@ -69,7 +69,7 @@ fn assert_falls_back(gpu: Result<Gpu>, says: &str) {
 
 #[test]
 fn a_good_device_is_used() {
-    let Some(gpu) = device(Handicap::default()) else { return };
+    let Some(gpu) = device(FaultInjection::default()) else { return };
     let (pair, range) = scene();
     let mut matcher = Matcher::on(Ok(gpu), true, &Execution::default()).unwrap();
     let matched = run(&mut matcher, &pair, range).unwrap();
@@ -81,14 +81,15 @@ fn a_good_device_is_used() {
 #[test]
 fn lost() {
     let (pair, range) = scene();
-    let Some(mut whole) = device(Handicap { lost_after: Some(10_000), ..Handicap::default() }) else {
+    let Some(mut whole) = device(FaultInjection { lost_after: Some(10_000), ..FaultInjection::default() })
+    else {
         return;
     };
     assert!(on(&mut whole, &pair, range).is_ok());
     let mut lost = 0;
     for lost_after in [0, 1, 5, 20, 60, 110, 150, 175, 180, 185, 190] {
-        let handicap = Handicap { lost_after: Some(lost_after), ..Handicap::default() };
-        let mut gpu = device(handicap).unwrap();
+        let faults = FaultInjection { lost_after: Some(lost_after), ..FaultInjection::default() };
+        let mut gpu = device(faults).unwrap();
         match on(&mut gpu, &pair, range) {
             Err(Error::Device(reason)) => {
                 lost += 1;
@@ -104,7 +105,7 @@ fn lost() {
     assert!(lost >= 7, "{lost}");
     for lost_after in [0, 30] {
         assert_falls_back(
-            Ok(device(Handicap { lost_after: Some(lost_after), ..Handicap::default() }).unwrap()),
+            Ok(device(FaultInjection { lost_after: Some(lost_after), ..FaultInjection::default() }).unwrap()),
             "lost",
         );
     }
@@ -113,7 +114,9 @@ fn lost() {
 /// Where falling back is not allowed, the failure is the answer.
 #[test]
 fn lost_without_a_way_back() {
-    let Some(gpu) = device(Handicap { lost_after: Some(3), ..Handicap::default() }) else { return };
+    let Some(gpu) = device(FaultInjection { lost_after: Some(3), ..FaultInjection::default() }) else {
+        return;
+    };
     let (pair, range) = scene();
     let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
     assert!(matches!(run(&mut matcher, &pair, range), Err(Error::Device(e)) if is_clear(&e)));
@@ -130,8 +133,8 @@ fn not_there() {
 #[test]
 fn out_of_memory() {
     let (pair, range) = scene();
-    let handicap = Handicap { memory: Some(12 << 20), ..Handicap::default() };
-    let Some(mut gpu) = device(handicap) else { return };
+    let faults = FaultInjection { memory: Some(12 << 20), ..FaultInjection::default() };
+    let Some(mut gpu) = device(faults) else { return };
     let error = on(&mut gpu, &pair, range).unwrap_err();
     assert!(matches!(&error, Error::Memory(e) if e.contains("12") && is_clear(e)), "{error}");
     assert_eq!(gpu.traffic().bytes_up, 0);
@@ -151,22 +154,22 @@ fn out_of_memory() {
 #[test]
 fn too_small() {
     let (pair, range) = scene();
-    for handicap in [
-        Handicap { max_buffer: Some(200_000), ..Handicap::default() },
-        Handicap { max_buffer: Some(700_000), ..Handicap::default() },
-        Handicap { max_binding: Some(100_000), ..Handicap::default() },
+    for faults in [
+        FaultInjection { max_buffer: Some(200_000), ..FaultInjection::default() },
+        FaultInjection { max_buffer: Some(700_000), ..FaultInjection::default() },
+        FaultInjection { max_binding: Some(100_000), ..FaultInjection::default() },
     ] {
-        let Some(mut gpu) = device(handicap) else { return };
+        let Some(mut gpu) = device(faults) else { return };
         let error = on(&mut gpu, &pair, range).unwrap_err();
-        assert!(matches!(&error, Error::Memory(e) if is_clear(e)), "{handicap:?}: {error}");
+        assert!(matches!(&error, Error::Memory(e) if is_clear(e)), "{faults:?}: {error}");
         assert_falls_back(Ok(gpu), "--backend cpu");
     }
 }
 
 #[test]
 fn hangs() {
-    let handicap = Handicap { patience: Some(Duration::ZERO), ..Handicap::default() };
-    let Some(mut gpu) = device(handicap) else { return };
+    let faults = FaultInjection { patience: Some(Duration::ZERO), ..FaultInjection::default() };
+    let Some(mut gpu) = device(faults) else { return };
     let (pair, range) = scene();
     let error = on(&mut gpu, &pair, range).unwrap_err();
     assert!(matches!(&error, Error::Device(e) if e.contains("hangs") && is_clear(e)), "{error}");
@@ -177,8 +180,8 @@ fn hangs() {
 /// A driver that does not take a shader: here for its workgroups.
 #[test]
 fn refuses_a_shader() {
-    let handicap = Handicap { max_invocations: Some(32), ..Handicap::default() };
-    let Some(mut gpu) = device(handicap) else { return };
+    let faults = FaultInjection { max_invocations: Some(32), ..FaultInjection::default() };
+    let Some(mut gpu) = device(faults) else { return };
     let (pair, range) = scene();
     let error = on(&mut gpu, &pair, range).unwrap_err();
     assert!(matches!(&error, Error::Device(e) if e.contains("workgroup") && is_clear(e)), "{error}");
@@ -188,8 +191,8 @@ fn refuses_a_shader() {
 /// A driver that takes everything and computes nothing, or something else: a small pair finds it out.
 #[test]
 fn computes_nothing() {
-    let handicap = Handicap { noop: true, ..Handicap::default() };
-    let gpu = || Gpu::with_handicap(None, handicap);
+    let faults = FaultInjection { noop: true, ..FaultInjection::default() };
+    let gpu = || Gpu::with_faults(None, faults);
     let (pair, range) = scene();
     // It does not even say so.
     assert!(on(&mut gpu().unwrap(), &pair, range).unwrap().maps != expected(&pair, range));
@@ -205,7 +208,7 @@ fn a_device_without_a_clock() {
     let (pair, range) = scene();
     let execution = Execution { timings: true, ..Execution::default() };
     for no_clock in [false, true] {
-        let Some(gpu) = device(Handicap { no_clock, ..Handicap::default() }) else { return };
+        let Some(gpu) = device(FaultInjection { no_clock, ..FaultInjection::default() }) else { return };
         let mut matcher = Matcher::on(Ok(gpu), true, &execution).unwrap();
         let matched = run(&mut matcher, &pair, range).unwrap();
         assert!(matched.maps == expected(&pair, range));

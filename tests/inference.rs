@@ -298,8 +298,8 @@ fn trees(potential: Potential, resolution: Resolution, schedule: Schedule) -> Ve
             let mut random = Random::new(out.len() as u64 + 1000);
             let mut method = method(potential, resolution, levels);
             method.schedule = schedule;
-            method.dependency_cut = random.pick(&[0.25, 1.0, 2.0, 4.5]);
-            method.resolution_cut = random.pick(&[0.5, 1.5, 8.0]);
+            method.dependency_truncation = random.pick(&[0.25, 1.0, 2.0, 4.5]);
+            method.resolution_truncation = random.pick(&[0.5, 1.5, 8.0]);
             let plan = random::plan(size, min, labels, &method);
             assert_eq!(plan.levels.len(), levels as usize);
             let tree = tree(&mut random, plan, most);

@@ -14,7 +14,7 @@ use mrfgs::backend::{Backend, Map, NO_LABEL, Stage};
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::maps::{Maps, flag};
 use mrfgs::options::{
-    Choice, Cost, DisparityRange, Execution, Fill, Median, Method, Potential, Schedule, Visibility,
+    Choice, Cost, DisparityRange, Execution, Fill, LeftRightCheck, Median, Method, Potential, Schedule,
 };
 use mrfgs::plan::Plan;
 use mrfgs::solver::{self, Solution};
@@ -37,8 +37,8 @@ fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
 
 /// The maps by the twins, from the estimate on, in the order in which the stages are described.
 fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
-    twin::visibility::visibility(plan, pair, maps);
-    twin::region::region_filter(plan, maps);
+    twin::left_right_check::left_right_check(plan, pair, maps);
+    twin::speckle_filter::speckle_filter(plan, maps);
     twin::confidence::confidence(plan, maps);
     if plan.method.fill != Fill::None {
         twin::fill::fill(maps);
@@ -91,9 +91,9 @@ fn the_stages_run_in_order() {
             let mut finest = Finest::zero(size);
             finest.label = backend.read_map(Map::Label).unwrap();
             finest.best = backend.read_map(Map::Best).unwrap();
-            finest.rival = backend.read_map(Map::Rival).unwrap();
-            finest.right_label = match plan.method.visibility {
-                Visibility::SecondMatch => second_match(&pair, &plan),
+            finest.runner_up = backend.read_map(Map::RunnerUp).unwrap();
+            finest.right_label = match plan.method.left_right_check {
+                LeftRightCheck::SecondMatch => second_match(&pair, &plan),
                 _ => backend.read_map(Map::RightLabel).unwrap(),
             };
             finest.raw = backend.read_map(Map::Raw).unwrap();
@@ -119,7 +119,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         (method.levels, method.memory) = (method.levels.min(3), 1);
         let plan =
             random::plan((width, height), random.pick(&[-12, -3, 0]), random.pick(&[2, 9, 17]), &method);
-        let Ok(tiles) = Tiles::with_collar(&plan, random.pick(&[0, 2, 5])) else { continue };
+        let Ok(tiles) = Tiles::with_overlap(&plan, random.pick(&[0, 2, 5])) else { continue };
         if tiles.count() == 1 {
             continue;
         }
@@ -142,7 +142,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
                 Pair::new(cut(pair.left()), cut(pair.right())).unwrap()
             };
             let mut cpu = Cpu::default();
-            if method.visibility == Visibility::SecondMatch {
+            if method.left_right_check == LeftRightCheck::SecondMatch {
                 estimated(&mut cpu, &part(&mirrored(&pair)), &tile.plan);
                 let labels = cpu.read_map(Map::Label).unwrap();
                 for (x, y) in places(core) {
@@ -150,14 +150,14 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
                 }
             }
             iterations = iterations.max(estimated(&mut cpu, &part(&pair), &tile.plan));
-            let maps = [Map::Label, Map::Best, Map::Rival, Map::Raw, Map::RightLabel, Map::RightBest]
+            let maps = [Map::Label, Map::Best, Map::RunnerUp, Map::Raw, Map::RightLabel, Map::RightBest]
                 .map(|map| cpu.read_map(map).unwrap());
             for (x, y) in places(core) {
                 let at = (x - crop.x.start, y - crop.y.start);
                 (finest.label[(x, y)], finest.best[(x, y)]) = (maps[0][at], maps[1][at]);
-                (finest.rival[(x, y)], finest.raw[(x, y)]) = (maps[2][at], maps[3][at]);
+                (finest.runner_up[(x, y)], finest.raw[(x, y)]) = (maps[2][at], maps[3][at]);
             }
-            if method.visibility != Visibility::SecondMatch {
+            if method.left_right_check != LeftRightCheck::SecondMatch {
                 for (x, y) in places(&Rect { x: crop.x.clone(), y: core.y.clone() }) {
                     let at = (x - crop.x.start, y - crop.y.start);
                     let (label, best) = (&mut finest.right_label[(x, y)], &mut finest.right_best[(x, y)]);
@@ -177,7 +177,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
             assert_eq!(actual.iterations, iterations, "{name}, seed {seed}");
         }
         tiled += 1;
-        twice += usize::from(method.visibility == Visibility::SecondMatch);
+        twice += usize::from(method.left_right_check == LeftRightCheck::SecondMatch);
         // Control: one piece is something else.
         other += usize::from(matched_whole(&pair, &plan) != expected);
     }
@@ -208,7 +208,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
         backend.run(Stage::Evidence(z)).unwrap();
     }
     let iterations = solver::flood(backend, plan).unwrap();
-    for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+    for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
         backend.run(stage).unwrap();
     }
     iterations
@@ -218,7 +218,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
 fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     let mirrored = mirrored(pair);
     let mut method = plan.method.clone();
-    (method.visibility, method.sub_pixel) = (Visibility::Off, false);
+    (method.left_right_check, method.sub_pixel) = (LeftRightCheck::Off, false);
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, plan.range, &method).unwrap();
     let raw = matched(&mirrored, &plan, 1).raw;
@@ -297,7 +297,7 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
             (method.outside_cost, method.temperature) = (20.0, 8.0);
         }
         // The region filter and the fill reach as far as they like.
-        (method.region_size, method.fill, method.median_window) = (0, Fill::None, 5);
+        (method.speckle_size, method.fill, method.median_window) = (0, Fill::None, 5);
         let iterations = 3;
         let per_iteration = (2 * 3 + 2) * shift;
         let margin = 4 + 2 * shift + iterations * per_iteration + (labels + shift) + 2 + labels + shift;
@@ -440,7 +440,7 @@ fn no_label_agrees_with_none() {
     for (name, mut backend) in backends() {
         backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
         maps.write(backend.as_mut());
-        backend.run(Stage::Visibility).unwrap();
+        backend.run(Stage::LeftRightCheck).unwrap();
         let validity = backend.read_map(Map::Validity).unwrap();
         assert!(validity.data().iter().all(|&f| f == i32::from(flag::OCCLUDED)), "{name}");
     }

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
 use mrfgs::front::check::{self, Warning};
+use mrfgs::front::label_range::{self, LabelRanges, MIN_MATCHES};
 use mrfgs::front::matches::{self, Match};
-use mrfgs::front::support::{self, MIN_MATCHES, Support};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, pfm, read};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
@@ -289,11 +289,11 @@ fn supports_are_mu_and_k_sigma() {
     let found = matches_of(&[4, 7, 4, 7, 4, 7, 4, 7, 4, 7].map(|d| d * FRACTION));
     let zones = Plane::new(12, 1, vec![0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 7]);
     let interval = |k: f64, found: &[Match]| {
-        let support = support::zonal(range, (&zones, 2), found, k);
+        let label_range = label_range::zonal(range, (&zones, 2), found, k);
         for x in [10, 11] {
-            assert_eq!((support.low[(x, 0)], support.high[(x, 0)]), (-4, 20));
+            assert_eq!((label_range.low[(x, 0)], label_range.high[(x, 0)]), (-4, 20));
         }
-        (support.low[(9, 0)], support.high[(9, 0)])
+        (label_range.low[(9, 0)], label_range.high[(9, 0)])
     };
     assert_eq!(interval(0.0, &found), (5, 6));
     assert_eq!(interval(1.0, &found), (4, 7));
@@ -311,7 +311,7 @@ fn a_coarse_support_is_the_hull_of_its_childrens() {
     for (width, height) in [(1, 1), (2, 2), (7, 5), (8, 3), (1, 6)] {
         let low = Plane::from_fn(width, height, |x, y| (bits(x, y) % 23) as i32 - 11);
         let high = Plane::from_fn(width, height, |x, y| low[(x, y)] + (bits(y, x) % 9) as i32);
-        let fine = Support { low, high };
+        let fine = LabelRanges { low, high };
         let coarse = fine.coarser();
         assert_eq!(coarse.low.size(), (width.div_ceil(2), height.div_ceil(2)));
         for y in 0..coarse.low.height() {
@@ -330,12 +330,12 @@ fn a_coarse_support_is_the_hull_of_its_childrens() {
     }
 }
 
-/// Shares of the true disparities inside the support and of the labels left, in percent.
+/// Shares of the true disparities inside the label_range and of the labels left, in percent.
 fn supported(case: &Case, k: f64) -> (f64, f64) {
     let zones = crude_zones(case.pair.left());
     let found = matches::find(&case.pair, Some((&zones, 15)), Some(case.range));
-    let support = support::zonal(case.range, (&zones, 15), &found, k);
-    let bounds = support.low.data().iter().zip(support.high.data());
+    let label_range = label_range::zonal(case.range, (&zones, 15), &found, k);
+    let bounds = label_range.low.data().iter().zip(label_range.high.data());
     let inside =
         case.truth.data().iter().zip(bounds).filter(|(t, (low, high))| {
             t.is_finite() && (**low..=**high).contains(&((**t + 0.5).floor() as i32))
@@ -343,7 +343,7 @@ fn supported(case: &Case, k: f64) -> (f64, f64) {
     let all = case.truth.data().len() * case.range.labels();
     (
         100.0 * inside.count() as f64 / case.truths().count() as f64,
-        100.0 * support.labels() as f64 / all as f64,
+        100.0 * label_range.labels() as f64 / all as f64,
     )
 }
 

@@ -7,7 +7,7 @@ mod common;
 
 use common::devices;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::Handicap;
+use mrfgs::backend::gpu::FaultInjection;
 use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::options::{DisparityRange, Method, PRESETS};
@@ -92,24 +92,24 @@ fn one_option_less_shows() {
 }
 
 /// What the least device of WebGPU has.
-fn minimum() -> Handicap {
-    Handicap { max_binding: Some(128 << 20), max_buffer: Some(256 << 20), ..Handicap::default() }
+fn minimum() -> FaultInjection {
+    FaultInjection { max_binding: Some(128 << 20), max_buffer: Some(256 << 20), ..FaultInjection::default() }
 }
 
 #[test]
 fn small_devices() {
     let (pair, range) = load(Path::new("testdata/mixed"));
-    let binding = |bytes| Handicap { max_binding: Some(bytes), ..Handicap::default() };
-    let buffer = |bytes| Handicap { max_buffer: Some(bytes), ..Handicap::default() };
+    let binding = |bytes| FaultInjection { max_binding: Some(bytes), ..FaultInjection::default() };
+    let buffer = |bytes| FaultInjection { max_buffer: Some(bytes), ..FaultInjection::default() };
     for &(preset, _) in PRESETS {
         let method = Method::preset(preset).unwrap();
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         let handicaps = [
-            Handicap {
+            FaultInjection {
                 max_binding: Some(700_000),
                 max_buffer: Some(2 << 20),
                 max_groups: Some(150),
-                ..Handicap::default()
+                ..FaultInjection::default()
             },
             minimum(),
             // From a few bands to bands of a row or two.
@@ -121,16 +121,16 @@ fn small_devices() {
             buffer(5 << 20),
             buffer(2 << 20),
             // Dispatches that fold.
-            Handicap { max_groups: Some(150), ..Handicap::default() },
+            FaultInjection { max_groups: Some(150), ..FaultInjection::default() },
         ];
         // The first has it all; the others tell what it was.
         let tried = if preset == "default" { handicaps.len() } else { 1 };
-        for handicap in handicaps.into_iter().take(tried) {
-            let Some(mut gpu) = devices::open(handicap) else { return };
+        for faults in handicaps.into_iter().take(tried) {
+            let Some(mut gpu) = devices::open(faults) else { return };
             let actual = matched(&mut gpu, &pair, range, &method);
             assert!(
                 differences(&actual, &expected).is_empty(),
-                "{preset} with {handicap:?}: {:?}",
+                "{preset} with {faults:?}: {:?}",
                 differences(&actual, &expected)
             );
         }
@@ -147,7 +147,7 @@ fn poisoned_buffers() {
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu::default())];
         for max_buffer in [None, Some(2 << 20)] {
-            let gpu = devices::open(Handicap { max_buffer, ..Handicap::default() });
+            let gpu = devices::open(FaultInjection { max_buffer, ..FaultInjection::default() });
             backends.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Backend>));
         }
         for backend in &mut backends {
@@ -179,7 +179,7 @@ fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
 /// The image goes up once, the maps come down once, and nothing between.
 #[test]
 fn nothing_leaves_the_device_in_between() {
-    let Some(mut gpu) = devices::open(Handicap::default()) else { return };
+    let Some(mut gpu) = devices::open(FaultInjection::default()) else { return };
     let (pair, range) = load(Path::new("testdata/slanted"));
     let method = Method::default();
     matched(&mut gpu, &pair, range, &method);
@@ -201,7 +201,9 @@ fn nothing_leaves_the_device_in_between() {
 
 #[test]
 fn a_device_that_shows_too_little_says_so() {
-    let Some(mut gpu) = devices::open(Handicap { max_binding: Some(100_000), ..Handicap::default() }) else {
+    let Some(mut gpu) =
+        devices::open(FaultInjection { max_binding: Some(100_000), ..FaultInjection::default() })
+    else {
         return;
     };
     let (pair, range) = load(Path::new("testdata/mixed"));
@@ -302,16 +304,16 @@ fn maps_of_real_pairs() {
         for (preset, _) in PRESETS.iter().filter(|(name, _)| everything || *name == "default") {
             let method = Method::preset(preset).unwrap();
             let expected = matched(&mut Cpu::default(), &pair, range, &method);
-            for handicap in [Handicap::default(), minimum()] {
-                let Some(mut gpu) = devices::open(handicap) else { return };
+            for faults in [FaultInjection::default(), minimum()] {
+                let Some(mut gpu) = devices::open(faults) else { return };
                 let actual = matched(&mut gpu, &pair, range, &method);
                 let name = folder.display();
                 assert!(
                     differences(&actual, &expected).is_empty(),
-                    "{name}, {preset}, {handicap:?}: {:?}",
+                    "{name}, {preset}, {faults:?}: {:?}",
                     differences(&actual, &expected)
                 );
-                println!("{name}, {preset}, {handicap:?}: the same maps");
+                println!("{name}, {preset}, {faults:?}: the same maps");
             }
         }
     }

@@ -47,7 +47,7 @@ struct Case {
     neighbours: usize,
     /// Corrected illumination and zones that limit the labels.
     front: bool,
-    /// In tiles, of which the memory is 1 MiB: without a collar, else none would be smaller than such an image.
+    /// In tiles, of which the memory is 1 MiB: without a overlap, else none would be smaller than such an image.
     tiled: bool,
 }
 
@@ -87,7 +87,7 @@ impl Case {
         if self.front {
             method.illumination = Illumination::Homomorphic;
             method.zones = random.within(1, 6);
-            method.support = f64::from(random.within(1, 3));
+            method.zone_sigmas = f64::from(random.within(1, 3));
         }
         method.tolerance = random.pick(&[0.0, 0.5]);
         method.validated().unwrap()
@@ -114,7 +114,7 @@ impl Case {
 fn tiles(case: &Case) -> mrfgs::Result<Tiles> {
     let (width, height) = case.size;
     let plan = Plan::new(width, height, case.range(), &case.method())?;
-    if case.tiled { Tiles::with_collar(&plan, 0) } else { Tiles::new(&plan) }
+    if case.tiled { Tiles::with_overlap(&plan, 0) } else { Tiles::new(&plan) }
 }
 
 /// The maps of a match on a backend.

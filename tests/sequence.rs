@@ -6,7 +6,7 @@ mod common;
 
 use common::devices::open as device;
 use common::random::{self, Random};
-use mrfgs::backend::gpu::Handicap;
+use mrfgs::backend::gpu::FaultInjection;
 use mrfgs::image::Pair;
 use mrfgs::maps::Maps;
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
@@ -81,7 +81,7 @@ fn a_sequence_is_its_pairs() {
     assert!(log.starts_with("ask 0, take 0, ask 1, take 1, "), "{log}");
     assert_same(found, &expected);
 
-    let Some(gpu) = device(Handicap::default()) else { return };
+    let Some(gpu) = device(FaultInjection::default()) else { return };
     let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
     let (result, found, log) = all(&mut matcher, pairs(), usize::MAX);
     result.unwrap();
@@ -112,7 +112,10 @@ fn a_device_lost_on_the_way_costs_no_pair() {
     let expected = one_by_one();
     let (mut by_device, mut by_cpu) = (false, false);
     for stages in [0, 30, 200, 250, 300, 400, 500, 700] {
-        let Some(gpu) = device(Handicap { lost_after: Some(stages), ..Handicap::default() }) else { return };
+        let Some(gpu) = device(FaultInjection { lost_after: Some(stages), ..FaultInjection::default() })
+        else {
+            return;
+        };
         let mut matcher = Matcher::on(Ok(gpu), true, &Execution::default()).unwrap();
         let (result, found, _) = all(&mut matcher, pairs(), usize::MAX);
         result.unwrap();
@@ -133,7 +136,8 @@ fn results_before_a_failure_are_handed_out() {
     let mut matchers =
         vec![Matcher::new(&Execution { backend: Choice::Cpu, ..Execution::default() }).unwrap()];
     matchers.extend(
-        device(Handicap::default()).map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap()),
+        device(FaultInjection::default())
+            .map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap()),
     );
     for mut matcher in matchers {
         let (result, found, _) = all(&mut matcher, with_a_bad_one.clone(), usize::MAX);

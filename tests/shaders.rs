@@ -117,7 +117,7 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
         pixel_pitch, starts_pitch);
     let params = fields!(Params: level, fine, first_row, rows, row_groups, grid, outside_cost, colour_weight,
         colour_variance, sad_radius, label_offset, evidence_multiplier, evidence_limit, evidence_up, evidence_down, evidence_cap, tau, sub_pixel,
-        visibility, median_all, region_size, confidence_floor, halo, span, first_column, columns, source_first_row,
+        left_right_check, median_all, speckle_size, confidence_floor, halo, span, first_column, columns, source_first_row,
         source_rows, median_radius, median_step_bits, median_scale, median_doublings, median_row_bits, belief_most);
     for_every_shader(|_, module, _| {
         let expected =

@@ -10,10 +10,10 @@ use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::image::{Pair, Plane, calib::Calibration, read};
 use mrfgs::maps::{Maps, has_disparity};
-use mrfgs::options::{Choice, DisparityRange, Execution, Method, PRESETS, Visibility};
+use mrfgs::options::{Choice, DisparityRange, Execution, LeftRightCheck, Method, PRESETS};
 use mrfgs::plan::Plan;
 use mrfgs::solver::{Progress, Solution, solve, solve_tiles};
-use mrfgs::tiles::{COLLAR, Tiles};
+use mrfgs::tiles::{OVERLAP, Tiles};
 use mrfgs::{Error, Matcher};
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
@@ -29,8 +29,8 @@ fn plan((width, height): (usize, usize), range: DisparityRange, method: &Method,
     Plan::new(width, height, range, &method).unwrap()
 }
 
-/// Whether the tiles of `plan` are what they should be; they have a collar of `collar`.
-fn check(tiles: &Tiles, collar: usize) -> Result<(), String> {
+/// Whether the tiles of `plan` are what they should be; they have a overlap of `overlap`.
+fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
     let whole = tiles.whole();
     let ((width, height), range) = (whole.size(), whole.range);
     let memory = u64::from(whole.method.memory) << 20;
@@ -51,18 +51,18 @@ fn check(tiles: &Tiles, collar: usize) -> Result<(), String> {
             let (first, last) = (core.start as i64 - before, core.end as i64 + after);
             crop.start as i64 <= first.max(0) && crop.end as i64 >= last.min(length as i64)
         };
-        let collar = collar as i64;
+        let overlap = overlap as i64;
         let (left, right) = (i64::from(range.max.max(0)), i64::from(-range.min.min(0)));
-        ensure(holds(&crop.y, &core.y, collar, collar, height), "the collar above and below")?;
-        ensure(holds(&crop.x, &core.x, collar + left, collar + right, width), "collar and matches")?;
+        ensure(holds(&crop.y, &core.y, overlap, overlap, height), "the overlap above and below")?;
+        ensure(holds(&crop.x, &core.x, overlap + left, overlap + right, width), "overlap and matches")?;
         ensure(tile.plan.bytes() <= memory, "each tile within the memory")?;
         let (w, h) = crop.size();
         let expected = Plan {
             core: core.x.start - crop.x.start..core.x.end - crop.x.start,
             ..Plan::new(w, h, range, &whole.method).unwrap()
         };
-        // Without a collar a crop may be too small for all levels.
-        ensure(collar == 0 || tile.plan == expected, "the plan of the crop")?;
+        // Without a overlap a crop may be too small for all levels.
+        ensure(overlap == 0 || tile.plan == expected, "the plan of the crop")?;
     }
     ensure(covered.data().iter().all(|&n| n == 1), "every pixel in one core")?;
     let one = whole.bytes() <= memory;
@@ -86,13 +86,13 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
         method.levels = random.pick(&[1, 2, 3, 6, 6, 6, 9, 16]);
         method.memory = random.log_within(1.0, 4096.0) as u32;
         let plan = Plan::new(size.0, size.1, range, &method).unwrap();
-        let collar = random.pick(&[0, COLLAR, COLLAR, 100]);
-        match Tiles::with_collar(&plan, collar) {
+        let overlap = random.pick(&[0, OVERLAP, OVERLAP, 100]);
+        match Tiles::with_overlap(&plan, overlap) {
             Ok(tiles) => {
                 cut += usize::from(tiles.count() > 1);
                 wide += usize::from(tiles.count() > 1 && range.max > size.0 as i32);
-                if let Err(what) = check(&tiles, collar) {
-                    panic!("seed {seed}, {size:?}, {range:?}, collar {collar}: {what}\n{method:?}");
+                if let Err(what) = check(&tiles, overlap) {
+                    panic!("seed {seed}, {size:?}, {range:?}, overlap {overlap}: {what}\n{method:?}");
                 }
             }
             Err(error) => {
@@ -104,7 +104,7 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
                 assert!(error.starts_with("--memory: ") && needed > method.memory, "{error}");
                 for (memory, enough) in [(needed, true), (needed - 1, false)] {
                     let plan = self::plan(size, range, &method, memory);
-                    assert_eq!(Tiles::with_collar(&plan, collar).is_ok(), enough, "{memory} MiB: {error}");
+                    assert_eq!(Tiles::with_overlap(&plan, overlap).is_ok(), enough, "{memory} MiB: {error}");
                 }
             }
         }
@@ -115,17 +115,17 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
     );
 }
 
-/// Controls: the check sees a crop that lacks its collar or its matches, and cores that overlap or are off the grid.
+/// Controls: the check sees a crop that lacks its overlap or its matches, and cores that overlap or are off the grid.
 #[test]
 fn wrong_tiles_are_seen() {
     let range = DisparityRange::new(-20, 63).unwrap();
     let plan = plan((900, 700), range, &Method::default(), 128);
     let tiles = Tiles::new(&plan).unwrap();
     assert!(tiles.count() >= 6, "{}", tiles.count());
-    check(&tiles, COLLAR).unwrap();
-    assert_eq!(check(&tiles, COLLAR + 40).unwrap_err(), "the collar above and below");
-    let bare = Tiles::with_collar(&plan, 0).unwrap();
-    assert_eq!(check(&bare, COLLAR).unwrap_err(), "the collar above and below");
+    check(&tiles, OVERLAP).unwrap();
+    assert_eq!(check(&tiles, OVERLAP + 40).unwrap_err(), "the overlap above and below");
+    let bare = Tiles::with_overlap(&plan, 0).unwrap();
+    assert_eq!(check(&bare, OVERLAP).unwrap_err(), "the overlap above and below");
 }
 
 #[test]
@@ -175,13 +175,13 @@ fn every_backend_leaves_the_same_maps() {
             let actual = in_tiles(&mut gpu, &tiles, &pair);
             assert!(actual.maps == expected.maps && actual.iterations == expected.iterations, "{preset}");
         }
-        // Control: without a collar there are other maps.
-        let bare = Tiles::with_collar(&plan, 0).unwrap();
+        // Control: without a overlap there are other maps.
+        let bare = Tiles::with_overlap(&plan, 0).unwrap();
         assert!(in_tiles(&mut Cpu::default(), &bare, &pair).maps != expected.maps, "{preset}");
     }
 }
 
-/// Scenes and real pairs in tiles: hardly anything shows, which without a collar it does.
+/// Scenes and real pairs in tiles: hardly anything shows, which without a overlap it does.
 #[test]
 fn hardly_anything_differs_from_one_piece() {
     let mut folders: Vec<_> = std::fs::read_dir("testdata").unwrap().map(|e| e.unwrap().path()).collect();
@@ -198,15 +198,15 @@ fn hardly_anything_differs_from_one_piece() {
         let expected = solve(&mut cpu, &whole, &pair, &mut quiet).unwrap();
         // A plain wall is found from its borders, wherever they are.
         let most = if folder.ends_with("wall") { 0.5 } else { 0.01 };
-        for (quarters, collar) in [(3, COLLAR), (2, COLLAR), (2, 0)] {
+        for (quarters, overlap) in [(3, OVERLAP), (2, OVERLAP), (2, 0)] {
             let memory = (whole.bytes() >> 20) as u32 * quarters / 4;
             let tiles =
-                Tiles::with_collar(&plan(pair.size(), range, &Method::default(), memory), collar).unwrap();
+                Tiles::with_overlap(&plan(pair.size(), range, &Method::default(), memory), overlap).unwrap();
             let differ = difference(&in_tiles(&mut cpu, &tiles, &pair).maps, &expected.maps);
             let name = folder.file_name().unwrap().display();
-            println!("{name}, collar {collar}: {differ:.3} % differ in {} tiles", tiles.count());
+            println!("{name}, overlap {overlap}: {differ:.3} % differ in {} tiles", tiles.count());
             assert!(tiles.count() > 1);
-            if collar == 0 {
+            if overlap == 0 {
                 bare.push(differ);
             } else {
                 assert!(differ <= most, "{name}: {differ} %");
@@ -220,11 +220,11 @@ fn hardly_anything_differs_from_one_piece() {
 #[test]
 fn progress_names_the_tiles_and_goes_over_all_of_them() {
     let (pair, range) = load(Path::new("testdata/slanted"));
-    for visibility in [Visibility::RightView, Visibility::SecondMatch] {
+    for left_right_check in [LeftRightCheck::RightView, LeftRightCheck::SecondMatch] {
         let mut method = Method::default();
-        (method.visibility, method.iterations) = (visibility, 1);
+        (method.left_right_check, method.iterations) = (left_right_check, 1);
         let tiles = Tiles::new(&plan(pair.size(), range, &method, 12)).unwrap();
-        let count = tiles.count() * if visibility == Visibility::SecondMatch { 2 } else { 1 };
+        let count = tiles.count() * if left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 };
         let mut seen = Vec::new();
         let mut observer = |progress: Progress| {
             seen.push(progress);

@@ -42,9 +42,9 @@ impl Intermediates {
         match glimpse {
             Glimpse::Corrected(pair) => self.corrected(pair),
             Glimpse::Matches(pair, zones, matches) => self.zones(pair, zones, matches),
-            Glimpse::Supports(supports) => {
-                let widths = supports[0].map(|&[first, last]| f32::from(last - first) + 1.0);
-                self.map("support-width", &widths, 1.0, self.plan.levels[0].labels as f32)
+            Glimpse::LabelRanges(label_ranges) => {
+                let widths = label_ranges[0].map(|&[first, last]| f32::from(last - first) + 1.0);
+                self.map("label-range-width", &widths, 1.0, self.plan.levels[0].labels as f32)
             }
             Glimpse::Graphs(graphs) => {
                 graphs.iter().enumerate().try_for_each(|(z, graph)| self.degree(z, graph))
@@ -55,7 +55,7 @@ impl Intermediates {
                 }
                 self.slices(*backend, *z)
             }
-            Glimpse::Stage(backend, Stage::Estimate) => self.levels(*backend),
+            Glimpse::Stage(backend, Stage::WinnerTakesAll) => self.levels(*backend),
             Glimpse::Stage(..) => Ok(()),
             Glimpse::Iteration(backend, iteration) => self.change(*backend, *iteration),
         }

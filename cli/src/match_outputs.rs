@@ -30,14 +30,14 @@ pub(super) struct MoreOutputs {
     /// forward of the left camera. What is invalid, filled in or of low confidence is left out
     #[arg(long, value_name = "FILE")]
     point_cloud: Option<PathBuf>,
-    /// Writes the confidence too: 8-bit PNG, 0 to 255, how far the best rival is behind in 1/8 nat
+    /// Writes the confidence too: 8-bit PNG, 0 to 255, how far the best runner-up is behind in 1/8 nat
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
     /// Writes why each pixel is what it is: 8-bit PNG, the sum of 1 match outside the right image, 2 occluded, 4 in a
     /// small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted
     #[arg(long, value_name = "FILE")]
     validity: Option<PathBuf>,
-    /// Writes every step as a picture or a small table into a new folder: corrected images, zones, matches, supports, costs,
+    /// Writes every step as a picture or a small table into a new folder: corrected images, zones, matches, label_ranges, costs,
     /// graphs, a map for each level, the change of each iteration. Takes a multiple of the time
     #[arg(long, value_name = "DIR")]
     pub(super) intermediates: Option<PathBuf>,

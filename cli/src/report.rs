@@ -111,7 +111,7 @@ pub(super) fn pictures(
             "confidence",
             "Confidence",
             format!("{name}: confidence of every pixel, bright is sure"),
-            "0 to 255, bright is sure: how far the best rival is behind, in 1/8 nat.".into(),
+            "0 to 255, bright is sure: how far the best runner_up is behind, in 1/8 nat.".into(),
             &colour::grey(&maps.confidence),
         )?);
         all.push(Picture::new(

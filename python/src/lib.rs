@@ -79,7 +79,7 @@ struct PyMatched {
     disparity: Py<PyArray2<f32>>,
     /// Disparity before post-processing in pixels, float32, +inf where the left image is masked.
     raw: Py<PyArray2<f32>>,
-    /// How far the best rival is behind, in 1/8 nat, uint8; 0 where there is no measurement.
+    /// How far the best runner-up is behind, in 1/8 nat, uint8; 0 where there is no measurement.
     confidence: Py<PyArray2<u8>>,
     /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
     /// confidence, 16 filled, 32 masked; 0 is measured and trusted.

@@ -4,11 +4,11 @@ const FRACTION: i32 = 256;
 
 const OUTSIDE: u32 = 1u;
 const OCCLUDED: u32 = 2u;
-const SMALL_REGION: u32 = 4u;
+const SPECKLE: u32 = 4u;
 const LOW_CONFIDENCE: u32 = 8u;
 const FILLED: u32 = 16u;
 const MASKED: u32 = 32u;
-const INVALID: u32 = OUTSIDE | OCCLUDED | SMALL_REGION | MASKED;
+const INVALID: u32 = OUTSIDE | OCCLUDED | SPECKLE | MASKED;
 const VALIDITY: u32 = 0xffu;
 
 fn is_valid(flags: u32) -> bool {

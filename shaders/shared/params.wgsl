@@ -43,14 +43,14 @@ struct Params {
     evidence_up: u32,
     evidence_down: u32,
     evidence_cap: u32,
-    // Cut of the messages that the stage writes.
+    // Truncation of the messages that the stage writes.
     tau: u32,
     // What of the method is wanted, 1 or 0.
     sub_pixel: u32,
-    visibility: u32,
+    left_right_check: u32,
     median_all: u32,
     // Regions of fewer pixels are too small.
-    region_size: u32,
+    speckle_size: u32,
     confidence_floor: u32,
     // Rows around the band that the stage sees.
     halo: u32,

@@ -58,7 +58,7 @@ pub enum Map {
     /// Its belief, in units.
     Best,
     /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
-    Rival,
+    RunnerUp,
     /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
     RightLabel,
     /// Its belief, in units; [`u16::MAX`] where no left pixel projects.
@@ -78,7 +78,7 @@ impl Map {
     pub const ALL: [Self; 9] = [
         Self::Label,
         Self::Best,
-        Self::Rival,
+        Self::RunnerUp,
         Self::RightLabel,
         Self::RightBest,
         Self::Raw,
@@ -114,16 +114,16 @@ pub enum Stage {
     /// low-pass their binomial mean over the fine labels 2 z - 2 ..= 2 z + 2, labels clamped to the fine range, rounded as
     /// (sum + 8) >> 4; with the minimum, the smallest at those labels of 2 z - 1 ..= 2 z + 1 that are in the range.
     Pyramid(usize),
-    /// Costs of a level at labels outside the pixel's support, as given to [`Backend::restrict`], become the highest there
+    /// Costs of a level at labels outside the pixel's label_range, as given to [`Backend::label_range`], become the highest there
     /// is: [`crate::plan::COST_MAX`] (256 times that at coarser levels).
-    Restrict(usize),
+    LabelRange(usize),
     /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
     /// beliefs equal to the evidence.
     Evidence(usize),
     /// Messages of the dependency factors of a level, from the beliefs and their own old messages.
     ///
     /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
-    /// [`crate::plan::CutRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
+    /// [`crate::plan::TruncationRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
     /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), cut by [`Plan::dependency`] with its bounds for the smallest s. A factor of
     /// one member, and a slot without one, keep the message they have: 0, from the start.
     Dependency(usize),
@@ -146,8 +146,8 @@ pub enum Stage {
     /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
     /// time (of label indices; from 0 the first time), which [`Backend::change`] returns.
     Change,
-    /// [`Map::Label`], [`Map::Best`] and [`Map::Rival`] of level 0.
-    Estimate,
+    /// [`Map::Label`], [`Map::Best`] and [`Map::RunnerUp`] of level 0.
+    WinnerTakesAll,
     /// [`Map::RightLabel`] and [`Map::RightBest`]: at (x, y) the label with the smallest belief of left pixel (x + d, y) among
     /// those in the columns [`Plan::core`], the lowest on ties, and that belief.
     RightView,
@@ -161,19 +161,19 @@ pub enum Stage {
     /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
     SubPixel,
     /// [`Map::Validity`]: [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
-    /// [`crate::options::Method::visibility`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
+    /// [`crate::options::Method::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
     /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
     ///
     /// [`flag::MASKED`]: crate::maps::flag::MASKED
     /// [`flag::OUTSIDE`]: crate::maps::flag::OUTSIDE
     /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
-    Visibility,
-    /// Sets [`flag::SMALL_REGION`](crate::maps::flag::SMALL_REGION) on every pixel of each region of fewer than
-    /// [`crate::options::Method::region_size`] pixels. Regions are of the pixels that [`Stage::Visibility`] left without a
+    LeftRightCheck,
+    /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE) on every pixel of each region of fewer than
+    /// [`crate::options::Method::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
     /// flag, 4-connected; labels that differ by at most one connect.
-    RegionFilter,
-    /// [`Map::Confidence`]: how far the best rival is behind the optimum, in half units (eighths of a nat), at most 255;
-    /// 255 where there is no rival, 0 for invalid pixels. Sets
+    SpeckleFilter,
+    /// [`Map::Confidence`]: how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
+    /// 255 where there is no runner-up, 0 for invalid pixels. Sets
     /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
     /// [`crate::options::Method::confidence_floor`].
     Confidence,
@@ -187,7 +187,7 @@ pub enum Stage {
     FillMedian,
     /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::Method::median`] names and that have a
     /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
-    /// smallest value at which half of the weight is reached. Weights are [`crate::tables::MedianWeights`] of the left image.
+    /// smallest value at which half of the weight is reached. Weights are [`crate::weights::MedianWeights`] of the left image.
     Median,
 }
 
@@ -198,21 +198,21 @@ impl Stage {
         match self {
             Self::Cost => "cost",
             Self::Pyramid(_) => "pyramid",
-            Self::Restrict(_) => "restrict",
+            Self::LabelRange(_) => "label_range",
             Self::Evidence(_) => "evidence",
             Self::Dependency(_) => "dependency",
             Self::Resolution(_) => "resolution",
             Self::Belief(_) => "belief",
             Self::Flood(_) => "flood",
             Self::Change => "change",
-            Self::Estimate => "estimate",
-            Self::RightView => "right view",
-            Self::SubPixel => "sub-pixel",
-            Self::Visibility => "visibility",
-            Self::RegionFilter => "region filter",
+            Self::WinnerTakesAll => "winner_takes_all",
+            Self::RightView => "right_view",
+            Self::SubPixel => "sub_pixel",
+            Self::LeftRightCheck => "left_right_check",
+            Self::SpeckleFilter => "speckle_filter",
             Self::Confidence => "confidence",
             Self::Fill => "fill",
-            Self::FillMedian => "fill median",
+            Self::FillMedian => "fill_median",
             Self::Median => "median",
         }
     }
@@ -222,7 +222,7 @@ impl Stage {
     pub fn level(self) -> Option<usize> {
         match self {
             Self::Pyramid(z)
-            | Self::Restrict(z)
+            | Self::LabelRange(z)
             | Self::Evidence(z)
             | Self::Dependency(z)
             | Self::Resolution(z)
@@ -286,9 +286,9 @@ pub trait Backend {
     /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
 
-    /// Takes the support of every pixel for [`Stage::Restrict`], once the pair is prepared: at each level the first and the
-    /// last label index that it may have. Only for plans whose method has a [`crate::options::Method::support`].
-    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()>;
+    /// Takes the label_range of every pixel for [`Stage::LabelRange`], once the pair is prepared: at each level the first and the
+    /// last label index that it may have. Only for plans whose method has a [`crate::options::Method::zone_sigmas`].
+    fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()>;
 
     /// Runs a stage. Devices may still be at it when this returns.
     fn run(&mut self, stage: Stage) -> Result<()>;

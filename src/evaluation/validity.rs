@@ -8,7 +8,7 @@ use crate::image::Plane;
 use crate::maps::flag;
 
 /// The flags that say that a pixel has no match of its own.
-const FLAGGED: u8 = flag::OUTSIDE | flag::OCCLUDED | flag::SMALL_REGION;
+const FLAGGED: u8 = flag::OUTSIDE | flag::OCCLUDED | flag::SPECKLE;
 
 /// How well the flags for pixels outside, occluded or in a small region find the pixels that one view does not see.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -61,7 +61,7 @@ mod tests {
         let flags = [
             flag::OUTSIDE,
             flag::OCCLUDED | flag::FILLED,
-            flag::SMALL_REGION | flag::LOW_CONFIDENCE,
+            flag::SPECKLE | flag::LOW_CONFIDENCE,
             flag::LOW_CONFIDENCE | flag::FILLED,
             flag::MASKED,
             0,

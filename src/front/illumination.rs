@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use crate::image::{Image, Pixel, Plane, grey};
-use crate::tables::{exp_neg, ln};
+use crate::weights::{exp_neg, ln};
 
 /// Pixels to each side of the centre: 21 x 21 in all, as in the paper.
 const RADIUS: usize = 10;

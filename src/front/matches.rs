@@ -35,9 +35,9 @@ const PEAK_RADIUS: usize = 2;
 const RADIUS: usize = TENSOR_RADIUS + 1;
 /// Least ZNCC of a match.
 const MIN_SCORE: f64 = 0.8;
-/// How far a match is from a perfect score, at most, as a share of how far its best rival is.
+/// How far a match is from a perfect score, at most, as a share of how far its best runner-up is.
 const RATIO: f64 = 0.7;
-/// Places this close to the best, in pixels along both axes, belong to the same peak and are no rivals.
+/// Places this close to the best, in pixels along both axes, belong to the same peak and are no runners-up.
 const PEAK_REACH: usize = 2;
 /// A match is compared with this many of those around it.
 const NEIGHBOURS: usize = 8;
@@ -231,18 +231,18 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
                 for x in left..(left + side).min(width) {
                     let zone = zones.map_or(0, |(map, _)| map[(x, y)]);
                     if zones.is_none_or(|(_, count)| usize::from(zone) < count) {
-                        let (pixels, peaks) = of_zone.entry(zone).or_default();
+                        let (pixels, optima) = of_zone.entry(zone).or_default();
                         *pixels += 1;
                         if is_peak(x, y) {
-                            peaks.push((x, y));
+                            optima.push((x, y));
                         }
                     }
                 }
             }
-            of_zone.into_values().flat_map(|(pixels, mut peaks)| {
-                peaks.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
-                peaks.truncate(pixels.div_ceil(spacing));
-                peaks
+            of_zone.into_values().flat_map(|(pixels, mut optima)| {
+                optima.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
+                optima.truncate(pixels.div_ceil(spacing));
+                optima
             })
         })
         .collect();
@@ -251,7 +251,7 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
 }
 
 /// Where a window is found again.
-struct Peak {
+struct Optimum {
     x: usize,
     y: usize,
     /// How much further right the top of the peak lies, in 1/256 px.
@@ -262,14 +262,14 @@ struct Peak {
 }
 
 /// The one place in `columns` and within `rows` of its own row where the window of `of` around (x, y) is found in
-/// `within`. `None` where the best one scores too low, has a rival, or is no peak along the row.
+/// `within`. `None` where the best one scores too low, has a runner-up, or is no peak along the row.
 fn peak(
     of: &View,
     (x, y): (usize, usize),
     within: &View,
     columns: RangeInclusive<i32>,
     rows: usize,
-) -> Option<Peak> {
+) -> Option<Optimum> {
     let (width, height) = within.grey.size();
     // As much again on either side: what repeats there is no sure match here, and a peak needs columns around it.
     let aside = columns.end() - columns.start() + 1;
@@ -285,14 +285,14 @@ fn peak(
         (top..=bottom).map(|v| correlation(of, (x, y), within, v, first..=last)).collect();
 
     let places = || (0..scores.len()).flat_map(|v| (0..scores[v].len()).map(move |u| (u, v)));
-    // Of equal scores the last one; the rival settles that there is none.
+    // Of equal scores the last one; the runner-up settles that there is none.
     let (u, v) = places().max_by(|a, b| scores[a.1][a.0].total_cmp(&scores[b.1][b.0]))?;
     let score = scores[v][u];
-    let rival = places()
+    let runner_up = places()
         .filter(|p| p.0.abs_diff(u) > PEAK_REACH || p.1.abs_diff(v) > PEAK_REACH)
         .map(|p| scores[p.1][p.0])
         .fold(-1.0, f64::max);
-    let sure = score >= MIN_SCORE && 1.0 - score <= RATIO * (1.0 - rival);
+    let sure = score >= MIN_SCORE && 1.0 - score <= RATIO * (1.0 - runner_up);
     let is_peak = u > 0 && u + 1 < scores[v].len();
     if !sure || !is_peak || !columns.contains(&((first + u) as i32)) {
         return None;
@@ -300,7 +300,7 @@ fn peak(
     let right = vertex(scores[v][u - 1], score, scores[v][u + 1]);
     let down =
         if v == 0 || v + 1 == scores.len() { 0 } else { vertex(scores[v - 1][u], score, scores[v + 1][u]) };
-    Some(Peak { x: first + u, y: top + v, right, down, score })
+    Some(Optimum { x: first + u, y: top + v, right, down, score })
 }
 
 /// ZNCC of the window of `of` around (x, y) with those of `within` on row `v`; 0 where there is no window.

@@ -2,6 +2,6 @@
 
 pub mod check;
 pub mod illumination;
+pub mod label_range;
 pub mod matches;
-pub mod support;
 pub mod zones;

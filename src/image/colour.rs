@@ -172,7 +172,7 @@ pub const VALIDITY: [(u32, [u8; 3]); 6] = [
     (0, [226, 226, 226]),
     (flag::OUTSIDE as u32, [0, 114, 178]),
     (flag::OCCLUDED as u32, [230, 159, 0]),
-    (flag::SMALL_REGION as u32, [204, 121, 167]),
+    (flag::SPECKLE as u32, [204, 121, 167]),
     (flag::LOW_CONFIDENCE as u32, [0, 158, 115]),
     (flag::MASKED as u32, [0, 0, 0]),
 ];
@@ -181,8 +181,7 @@ pub const VALIDITY: [(u32, [u8; 3]); 6] = [
 /// trusted, the one that it was given up for first. A pixel without a disparity in the end is half as bright.
 #[must_use]
 pub fn validity(map: &Plane<u8>) -> Plane<[u8; 3]> {
-    const FIRST: [u8; 5] =
-        [flag::MASKED, flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION, flag::LOW_CONFIDENCE];
+    const FIRST: [u8; 5] = [flag::MASKED, flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::LOW_CONFIDENCE];
     let decisive = |flags: u8| FIRST.into_iter().find(|bit| flags & bit != 0).unwrap_or(0);
     let place = |flags: &u8| {
         VALIDITY.iter().position(|entry| entry.0 == decisive(*flags) as u32).unwrap_or(VALIDITY.len())

@@ -120,7 +120,7 @@ impl Reader {
         Ok(plane)
     }
 
-    /// Reads 8-bit levels, such as those of Middlebury's visibility masks, from any integer image that [`Reader::pair`] reads:
+    /// Reads 8-bit levels, such as those of Middlebury's left-right check masks, from any integer image that [`Reader::pair`] reads:
     /// of 16 bits the upper 8, of colours the grey.
     ///
     /// # Errors

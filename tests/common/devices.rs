@@ -2,7 +2,7 @@
 
 use mrfgs::Result;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::{Gpu, Handicap};
+use mrfgs::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::backend::{Backend, Map, Requested, Stage, Traffic, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Pair, Plane};
@@ -15,10 +15,10 @@ use std::time::Duration;
 /// Devices that no test is using: opening one and compiling its shaders takes longer than most tests.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
-/// A GPU of its own, with a handicap. `None`, said on stderr, where there is no driver; a panic where
+/// A GPU of its own, with a faults. `None`, said on stderr, where there is no driver; a panic where
 /// `MRFGS_REQUIRE_GPU` is set and not 0.
-pub fn open(handicap: Handicap) -> Option<Gpu> {
-    match Gpu::with_handicap(None, handicap) {
+pub fn open(faults: FaultInjection) -> Option<Gpu> {
+    match Gpu::with_faults(None, faults) {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
@@ -33,7 +33,7 @@ pub fn open(handicap: Handicap) -> Option<Gpu> {
 /// A device, an idle one if there is one.
 pub fn gpu() -> Option<Pooled> {
     let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
-    idle.or_else(|| open(Handicap::default())).map(|gpu| Pooled(Some(gpu)))
+    idle.or_else(|| open(FaultInjection::default())).map(|gpu| Pooled(Some(gpu)))
 }
 
 /// Name and a fresh instance of every backend.
@@ -74,8 +74,8 @@ impl Backend for Pooled {
         self.gpu().prepare(plan, pair, graphs)
     }
 
-    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()> {
-        self.gpu().restrict(supports)
+    fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()> {
+        self.gpu().label_range(label_ranges)
     }
 
     fn run(&mut self, stage: Stage) -> Result<()> {

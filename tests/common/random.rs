@@ -6,7 +6,7 @@ use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::flag;
 use mrfgs::options::{
-    Cost, DisparityRange, Fill, Median, Method, Potential, Pyramid, Resolution, Schedule, Visibility,
+    Cost, DisparityRange, Fill, LeftRightCheck, Median, Method, Potential, Pyramid, Resolution, Schedule,
 };
 use mrfgs::plan::Plan;
 
@@ -126,19 +126,19 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     m.sigma_space = random.log_within(0.5, 30.0);
     m.sigma_range = random.log_within(0.01, 3.0);
     m.potential = random.pick(&[Potential::Soft, Potential::Exact, Potential::Hard]);
-    m.dependency_cut = random.pick(&[0.25, 2.0, 10.0, 63.75, 64.0, 255.75]);
+    m.dependency_truncation = random.pick(&[0.25, 2.0, 10.0, 63.75, 64.0, 255.75]);
     m.resolution = random.pick(&[Resolution::Strict, Resolution::Interpolating]);
-    m.resolution_cut = random.pick(&[0.25, 8.0, 63.75, 255.75]);
+    m.resolution_truncation = random.pick(&[0.25, 8.0, 63.75, 255.75]);
     m.schedule = random.pick(&[Schedule::Together, Schedule::CoarseFirst]);
     m.iterations = random.within(1, 3);
     m.final_iterations = random.within(0, 3);
-    m.visibility = random.pick(&[
-        Visibility::Off,
-        Visibility::RightView,
-        Visibility::RightView,
-        Visibility::SecondMatch,
+    m.left_right_check = random.pick(&[
+        LeftRightCheck::Off,
+        LeftRightCheck::RightView,
+        LeftRightCheck::RightView,
+        LeftRightCheck::SecondMatch,
     ]);
-    m.region_size = random.pick(&[0, 3, 20]);
+    m.speckle_size = random.pick(&[0, 3, 20]);
     m.sub_pixel = random.pick(&[false, true]);
     m.fill = random.pick(&[Fill::None, Fill::Row, Fill::Median, Fill::Median]);
     m.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
@@ -362,7 +362,7 @@ pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
             let at = (x, y);
             maps.label[at] = patches[(x / patch, y / patch)] as i32;
             maps.best[at] = random.within(0, 50_000) as i32;
-            maps.rival[at] = match (labels, maps.label[at]) {
+            maps.runner_up[at] = match (labels, maps.label[at]) {
                 (1 | 2, _) | (3, 1) => 65_535,
                 _ => maps.best[at] + random.within(0, spread) as i32,
             };
@@ -387,7 +387,7 @@ fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plan
         } else if random.one_in(6) {
             flag::MASKED
         } else {
-            let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION]);
+            let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE]);
             if filled && !random.one_in(4) { reason | flag::FILLED } else { reason }
         };
         validity.into()

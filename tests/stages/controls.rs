@@ -10,7 +10,7 @@ use mrfgs::backend::Volume;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
 use mrfgs::options::{Cost, Method, Pyramid, Resolution, Schedule};
-use mrfgs::plan::{CutRule, Plan};
+use mrfgs::plan::{Plan, TruncationRule};
 
 /// A change of a plan, as a negative control makes it.
 type Change = fn(&mut Plan);
@@ -97,9 +97,9 @@ fn control_a_changed_parameter_is_found() {
         ("evidence down", "Evidence(1)", |p| p.levels[1].evidence.down += 1),
         ("evidence multiplier", "Evidence(2)", |p| p.levels[2].evidence.multiplier -= 1000),
         ("dependency tau", "Dependency(0)", |p| p.dependency.tau += 1),
-        ("dependency rule", "Dependency(0)", |p| p.dependency.rule = CutRule::Absolute),
+        ("dependency rule", "Dependency(0)", |p| p.dependency.rule = TruncationRule::Absolute),
         ("resolution tau", "Up(2)", |p| p.resolution.tau += 1),
-        ("resolution rule", "Down(0)", |p| p.resolution.rule = CutRule::Absolute),
+        ("resolution rule", "Down(0)", |p| p.resolution.rule = TruncationRule::Absolute),
         ("resolution kind", "Down(1)", |p| p.method.resolution = Resolution::Strict),
         ("iterations", "Belief(0)", |p| p.method.iterations += 1),
         ("final iterations", "Belief(0)", |p| p.method.final_iterations += 1),

@@ -138,7 +138,7 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
                 same(plan, backend, volume, expected)?;
             }
             twin::Finest::zero(plan.size()).write(backend);
-            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+            for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
                 backend.run(stage).unwrap();
             }
             compare_finest(backend, &maps)
@@ -192,7 +192,8 @@ fn floods_that_stop_by_themselves() {
             let mut random = Random::new(i as u64 + 7);
             let mut method = random::method(&mut random, 4);
             (method.cost, method.outside_cost, method.temperature) = (Cost::AdCensus, 0.8, 0.8);
-            (method.potential, method.dependency_cut, method.schedule) = (Potential::Soft, 2.0, schedule);
+            (method.potential, method.dependency_truncation, method.schedule) =
+                (Potential::Soft, 2.0, schedule);
             (method.levels, method.iterations, method.final_iterations) = (3, 5, 5);
             method.tolerance = tolerance;
             let pair = random::pair(&mut random, 24, 17);

@@ -203,14 +203,14 @@ fn pyramid() {
 }
 
 #[test]
-fn restrict() {
+fn label_range() {
     on_all(|case, backend, random| {
         let mut method = case.plan.method.clone();
-        method.support = 1.0;
+        method.zone_sigmas = 1.0;
         let (width, height) = case.plan.size();
         let plan = Plan::new(width, height, case.plan.range, &method).unwrap();
         backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();
-        let supports: Vec<Plane<[u16; 2]>> = plan
+        let label_ranges: Vec<Plane<[u16; 2]>> = plan
             .levels
             .iter()
             .map(|level| {
@@ -221,20 +221,25 @@ fn restrict() {
                 })
             })
             .collect();
-        backend.restrict(&supports).unwrap();
-        for (z, support) in supports.iter().enumerate() {
+        backend.label_range(&label_ranges).unwrap();
+        for (z, label_range) in label_ranges.iter().enumerate() {
             let cost = random_cost(random, &plan, z);
             backend.write(Volume::Cost(z), &cost).unwrap();
-            backend.run(Stage::Restrict(z)).unwrap();
-            let expected = twin::restrict::restrict(&plan, z, support, &cost);
+            backend.run(Stage::LabelRange(z)).unwrap();
+            let expected = twin::label_range::label_range(&plan, z, label_range, &cost);
             same(&plan, backend, Volume::Cost(z), &expected)?;
-            // Control: the support does matter.
+            // Control: the label_range does matter.
             if expected != cost {
-                let mut other = support.clone();
+                let mut other = label_range.clone();
                 other.data_mut().fill([0, plan.levels[z].labels as u16 - 1]);
                 assert!(
-                    same(&plan, backend, Volume::Cost(z), &twin::restrict::restrict(&plan, z, &other, &cost))
-                        .is_err()
+                    same(
+                        &plan,
+                        backend,
+                        Volume::Cost(z),
+                        &twin::label_range::label_range(&plan, z, &other, &cost)
+                    )
+                    .is_err()
                 );
             }
         }
@@ -400,14 +405,14 @@ fn estimate() {
             backend.write(Volume::Cost(0), &cost).unwrap();
             let mut maps = random::finest(random, &plan, false);
             maps.write(backend);
-            for stage in [Stage::Estimate, Stage::RightView, Stage::SubPixel] {
+            for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
                 backend.run(stage).unwrap();
             }
             twin_estimate(&plan, &cost, &belief, &mut maps);
             compare_finest(backend, &maps)?;
             // Control: with all columns it is another right view.
             let mut all = maps.clone();
-            twin::estimate::right_view(&case.plan, &belief, &mut all);
+            twin::winner_takes_all::right_view(&case.plan, &belief, &mut all);
             narrower.set(narrower.get() + usize::from(all != maps));
             // Then a tile with a core of its own, in the same buffers.
             let start = random.within(0, width as u32 - 1) as usize;
@@ -420,8 +425,8 @@ fn estimate() {
 }
 
 fn twin_estimate(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {
-    twin::estimate::estimate(plan, belief, maps);
-    twin::estimate::right_view(plan, belief, maps);
+    twin::winner_takes_all::winner_takes_all(plan, belief, maps);
+    twin::winner_takes_all::right_view(plan, belief, maps);
     twin::sub_pixel::sub_pixel(plan, cost, maps);
 }
 

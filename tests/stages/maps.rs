@@ -10,7 +10,7 @@ use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::flag;
 use mrfgs::options::{Median, Method};
 use mrfgs::plan::Plan;
-use mrfgs::tables::MedianWeights;
+use mrfgs::weights::MedianWeights;
 
 const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (24, 31), (150, 4)];
 
@@ -59,24 +59,26 @@ fn on_all(
 }
 
 #[test]
-fn visibility() {
+fn left_right_check() {
     let input = |random: &mut Random, plan: &Plan| random::finest(random, plan, false);
-    on_all(Stage::Visibility, 20, |_, _| (), input, twin::visibility::visibility);
+    on_all(Stage::LeftRightCheck, 20, |_, _| (), input, twin::left_right_check::left_right_check);
 }
 
 #[test]
-fn region_filter() {
+fn speckle_filter() {
     let sizes = [0, 1, 2, 3, 5, 20, 10_000];
-    let change = |random: &mut Random, method: &mut Method| method.region_size = random.pick(&sizes);
+    let change = |random: &mut Random, method: &mut Method| method.speckle_size = random.pick(&sizes);
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, false);
-        // As the visibility leaves it.
+        // As the left-right check leaves it.
         for validity in maps.validity.data_mut() {
             *validity &= i32::from(flag::OUTSIDE | flag::OCCLUDED | flag::MASKED);
         }
         maps
     };
-    on_all(Stage::RegionFilter, 40, change, input, |plan, _, maps| twin::region::region_filter(plan, maps));
+    on_all(Stage::SpeckleFilter, 40, change, input, |plan, _, maps| {
+        twin::speckle_filter::speckle_filter(plan, maps)
+    });
 }
 
 /// Which pixels belong to a region.
@@ -100,20 +102,20 @@ fn regions_that_wind() {
     let pair = random::pair(&mut random, width, height);
     for (shape, inside) in shapes {
         let area = (0..width * height).filter(|i| inside(i % width, i / width)).count() as u32;
-        for region_size in [2, 3, area / 2, area, area + 1] {
-            let plan = small_plan(&mut random, (width, height), |m| m.region_size = region_size);
+        for speckle_size in [2, 3, area / 2, area, area + 1] {
+            let plan = small_plan(&mut random, (width, height), |m| m.speckle_size = speckle_size);
             let labels = plan.levels[0].labels as i32;
             let mut maps = Finest::zero((width, height));
             maps.validity = Plane::from_fn(width, height, |x, y| i32::from(!inside(x, y)) * 2);
             maps.label = Plane::from_fn(width, height, |x, _| (x as i32 / 50).min(labels - 1));
             let mut expected = maps.clone();
-            twin::region::region_filter(&plan, &mut expected);
+            twin::speckle_filter::speckle_filter(&plan, &mut expected);
             for (name, mut backend) in backends() {
                 backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
                 maps.write(backend.as_mut());
-                backend.run(Stage::RegionFilter).unwrap();
+                backend.run(Stage::SpeckleFilter).unwrap();
                 if let Err(e) = compare_finest(backend.as_mut(), &expected) {
-                    panic!("{name}, {shape}, {region_size}: {e}");
+                    panic!("{name}, {shape}, {speckle_size}: {e}");
                 }
             }
         }
@@ -210,9 +212,9 @@ fn median_weights() {
 fn nothing_valid() {
     for &size in SIZES {
         let mut random = Random::new(1);
-        let plan = small_plan(&mut random, size, |m| (m.median, m.region_size) = (Median::All, 100));
+        let plan = small_plan(&mut random, size, |m| (m.median, m.speckle_size) = (Median::All, 100));
         let pair = random::pair(&mut random, size.0, size.1);
-        for all in [flag::MASKED, flag::OCCLUDED, flag::OUTSIDE | flag::LOW_CONFIDENCE, flag::SMALL_REGION] {
+        for all in [flag::MASKED, flag::OCCLUDED, flag::OUTSIDE | flag::LOW_CONFIDENCE, flag::SPECKLE] {
             let mut maps = random::finest(&mut random, &plan, false);
             maps.validity = Plane::filled(size.0, size.1, all.into());
             let mut expected = maps.clone();
@@ -221,7 +223,7 @@ fn nothing_valid() {
                 backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
                 maps.write(backend.as_mut());
                 for stage in
-                    [Stage::RegionFilter, Stage::Fill, Stage::FillMedian, Stage::Median, Stage::Confidence]
+                    [Stage::SpeckleFilter, Stage::Fill, Stage::FillMedian, Stage::Median, Stage::Confidence]
                 {
                     backend.run(stage).unwrap();
                 }
@@ -233,7 +235,7 @@ fn nothing_valid() {
     }
 }
 
-/// A stage, whether its input has visibility flags alone, its twin, and what makes that one differ.
+/// A stage, whether its input has left-right check flags alone, its twin, and what makes that one differ.
 type Control = (Stage, bool, Twin, fn(&mut Plan));
 
 /// Negative control: every stage notices a parameter that is a little off, or a value that is.
@@ -248,7 +250,7 @@ fn control_changes_are_found() {
     let pair = Pair::new(Image::from_rgb8(&faint), texture(&mut random, 24, 31)).unwrap();
     let maps = loop {
         let mut maps = random::finest(&mut random, &plan, true);
-        maps.rival = maps.best.map(|best| best + best % 20);
+        maps.runner_up = maps.best.map(|best| best + best % 20);
         let valid = maps.validity.data().iter().filter(|&&f| f & i32::from(flag::INVALID) == 0).count();
         if valid > 300 && valid < 600 {
             break maps;
@@ -256,7 +258,7 @@ fn control_changes_are_found() {
     };
     let mut unflagged = maps.clone();
     unflagged.validity = unflagged.validity.map(|v| v & i32::from(flag::OCCLUDED));
-    let region: Twin = |plan, _, maps| twin::region::region_filter(plan, maps);
+    let region: Twin = |plan, _, maps| twin::speckle_filter::speckle_filter(plan, maps);
     let confidence: Twin = |plan, _, maps| twin::confidence::confidence(plan, maps);
     // The larger of two instead of the smaller.
     let larger: Twin = |_, _, maps| {
@@ -265,8 +267,8 @@ fn control_changes_are_found() {
         maps.disparity = maps.disparity.map(|d| -d);
     };
     let changes: &[Control] = &[
-        (Stage::Visibility, false, twin::visibility::visibility, |p| p.range.min += 1),
-        (Stage::RegionFilter, true, region, |p| p.method.region_size += 1),
+        (Stage::LeftRightCheck, false, twin::left_right_check::left_right_check, |p| p.range.min += 1),
+        (Stage::SpeckleFilter, true, region, |p| p.method.speckle_size += 1),
         (Stage::Fill, false, larger, |_| ()),
         (Stage::Confidence, false, confidence, |p| p.method.confidence_floor += 4),
         (Stage::FillMedian, false, twin::median::fill_median, |p| p.method.median_window = 7),
@@ -277,7 +279,7 @@ fn control_changes_are_found() {
         (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_range = 0.02),
     ];
     let mut plan = plan;
-    plan.method.region_size = 3;
+    plan.method.speckle_size = 3;
     for (name, mut backend) in backends() {
         for (stage, bare, twin, change) in changes {
             let input = if *bare { &unflagged } else { &maps };

@@ -9,7 +9,7 @@ use crate::{NEIGHBOURS, cells, resolve, same};
 use mrfgs::backend::{Stage, Volume, volume_shape};
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::options::{Method, Resolution};
-use mrfgs::plan::{Cut, CutRule, LevelPlan, Plan, VolumeWidth};
+use mrfgs::plan::{LevelPlan, Plan, Truncation, TruncationRule, VolumeWidth};
 use mrfgs::solver;
 use std::collections::HashSet;
 
@@ -79,7 +79,7 @@ fn wide_beliefs_stay_below_their_largest() {
 }
 
 /// A plan of either width whose cuts are larger than a plan's own: beliefs exceed what it stores on full graphs.
-fn saturating(neighbours: usize, width: VolumeWidth, rule: CutRule, resolution: Resolution) -> Plan {
+fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resolution: Resolution) -> Plan {
     let mut method = Method::default();
     method.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
     method.evidence_cap = 10.0;
@@ -90,14 +90,15 @@ fn saturating(neighbours: usize, width: VolumeWidth, rule: CutRule, resolution: 
         VolumeWidth::Narrow => 40,
         VolumeWidth::Wide => 5000,
     };
-    (plan.dependency, plan.resolution, plan.volume_width) = (Cut { tau, rule }, Cut { tau, rule }, width);
+    (plan.dependency, plan.resolution, plan.volume_width) =
+        (Truncation { tau, rule }, Truncation { tau, rule }, width);
     plan
 }
 
 #[test]
 fn beliefs_that_saturate() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
-        for rule in [CutRule::Relative, CutRule::Absolute] {
+        for rule in [TruncationRule::Relative, TruncationRule::Absolute] {
             for resolution in [Resolution::Strict, Resolution::Interpolating] {
                 let plan = saturating(48, width, rule, resolution);
                 assert_eq!(flood_of_the_sure(&plan), belief_most(&plan));
@@ -112,7 +113,7 @@ fn beliefs_that_saturate() {
 fn control_saturated_sums_say_nothing() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         for resolution in [Resolution::Strict, Resolution::Interpolating] {
-            let plan = saturating(48, width, CutRule::Relative, resolution);
+            let plan = saturating(48, width, TruncationRule::Relative, resolution);
             let pair = random::pair(&mut Random::new(3), 15, 13);
             let graphs = full_graphs(&plan);
             let tau = u32::from(plan.dependency.tau);
@@ -164,7 +165,7 @@ fn control_saturated_sums_say_nothing() {
 #[test]
 fn control_padding_stays_behind_beliefs_that_saturate() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
-        let plan = saturating(1, width, CutRule::Relative, Resolution::Interpolating);
+        let plan = saturating(1, width, TruncationRule::Relative, Resolution::Interpolating);
         let level = &plan.levels[0];
         assert!(level.labels < level.stride);
         let graphs: Vec<LevelGraph> = plan
@@ -222,7 +223,7 @@ fn every_plan_leaves_room_for_its_beliefs() {
 /// Negative control: twins that saturate later than a narrow plan does give other volumes.
 #[test]
 fn control_saturation_in_8_bits_is_found() {
-    let plan = saturating(48, VolumeWidth::Narrow, CutRule::Relative, Resolution::Interpolating);
+    let plan = saturating(48, VolumeWidth::Narrow, TruncationRule::Relative, Resolution::Interpolating);
     let mut wider = plan.clone();
     wider.volume_width = VolumeWidth::Wide;
     let graphs = full_graphs(&plan);

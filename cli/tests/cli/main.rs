@@ -277,7 +277,7 @@ fn help_teaches() {
     for (bit, what) in [
         (flag::OUTSIDE, "match outside the right image"),
         (flag::OCCLUDED, "occluded"),
-        (flag::SMALL_REGION, "in a small region"),
+        (flag::SPECKLE, "in a small region"),
         (flag::LOW_CONFIDENCE, "low confidence"),
         (flag::FILLED, "filled"),
         (flag::MASKED, "masked"),

@@ -230,7 +230,7 @@ fn intermediates_show_every_step() {
         "match left.png right.png out.pfm --max-disparity 20 --quiet --intermediates steps --set levels=3";
     let args: Vec<&str> = args.split_whitespace().collect();
     for (preset, more) in
-        [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "support-width"][..])]
+        [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "label-range-width"][..])]
     {
         run(folder.path(), &[&args[..], &["--preset", preset]].concat()).succeeded();
         let steps = folder.path().join("steps");
@@ -360,7 +360,7 @@ fn little_memory_makes_tiles() {
     assert!(told.stderr.contains("32 labels, 18 iterations"), "{told:?}");
     let told = with(&["--memory", "12MiB", "--timings"]).succeeded();
     assert!(told.stderr.contains("32 labels, 4 tiles, 18 iterations"), "{told:?}");
-    for (stage, runs) in [("cost", 4), ("right view", 4), ("visibility", 1), ("median", 1)] {
+    for (stage, runs) in [("cost", 4), ("right_view", 4), ("left_right_check", 1), ("median", 1)] {
         let row = told.stderr.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }

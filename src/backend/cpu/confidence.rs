@@ -4,10 +4,10 @@ use super::Finest;
 use crate::maps::flag;
 
 pub(super) fn run(floor: u32, maps: &mut Finest) {
-    let Finest { peaks, validity, confidence, .. } = maps;
-    let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(peaks.data());
+    let Finest { optima, validity, confidence, .. } = maps;
+    let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(optima.data());
     for ((confidence, flags), peak) in pixels {
-        let lead = (2 * u32::from(peak.rival - peak.best)).min(255);
+        let lead = (2 * u32::from(peak.runner_up - peak.best)).min(255);
         if *flags & flag::INVALID != 0 {
             *confidence = 0;
         } else {

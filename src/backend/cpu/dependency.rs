@@ -4,9 +4,9 @@
 //! place. Padding labels go through the same arithmetic as labels; their belief is the largest there is, and no label's
 //! exceeds [`Plan::belief_most`], so that no minimum is theirs alone.
 
-use super::units::{Blocks, Cutting, Least, Units, block, block_mut, keep_least, smallest};
+use super::units::{Blocks, Least, Truncating, Units, block, block_mut, keep_least, smallest};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
-use crate::plan::{Cut, CutRule, GRAPH_WINDOW, LABEL_BLOCK, Plan};
+use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::array::from_fn;
 
@@ -92,7 +92,7 @@ pub(super) fn row<U: Units>(
         };
         let belief = |(row, start): (usize, usize)| &around[row][start..][..stride];
         match *graph.neighbours_of(x, y) {
-            [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == CutRule::Relative => {
+            [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == TruncationRule::Relative => {
                 let beliefs = [belief((REACH, own)), belief(place(a)), belief(place(b))];
                 three(cut, beliefs, messages, &mut scratch.sums);
             }
@@ -158,7 +158,7 @@ impl<U: Units> Three<'_, U> {
 
 /// The messages of a factor of three.
 #[inline(always)]
-fn three<U: Units>(cut: Cut, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut [U]) {
+fn three<U: Units>(cut: Truncation, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut [U]) {
     let stride = beliefs[0].len();
     let mut factor = Three { beliefs, messages: &*messages, sums, least: [[U::MOST; LABEL_BLOCK]; 3] };
     factor.all(stride);
@@ -179,7 +179,7 @@ fn least_in_all<U: Units>(mut lanes: Least<U>) -> Least<U> {
     lanes
 }
 
-/// [`Cutting`] by [`CutRule::Relative`], with bounds that are vectors.
+/// [`Truncating`] by [`TruncationRule::Relative`], with bounds that are vectors.
 struct RelativeCutting<'a, U> {
     sums: &'a [U],
     least: Least<U>,
@@ -199,7 +199,13 @@ impl<U: Units> Blocks for RelativeCutting<'_, U> {
 }
 
 /// The messages of a factor of any number of members.
-fn any<U: Units>(cut: Cut, stride: usize, around: &Around<U>, messages: &mut [U], scratch: &mut Scratch<U>) {
+fn any<U: Units>(
+    cut: Truncation,
+    stride: usize,
+    around: &Around<U>,
+    messages: &mut [U],
+    scratch: &mut Scratch<U>,
+) {
     let Scratch { q, after, before, sums, members } = scratch;
     for (q, &(slot, row, start)) in q.chunks_exact_mut(stride).zip(members.iter()) {
         let b = &around[row][start..][..stride];
@@ -207,7 +213,7 @@ fn any<U: Units>(cut: Cut, stride: usize, around: &Around<U>, messages: &mut [U]
         for ((q, &b), &f) in q.iter_mut().zip(b).zip(f) {
             *q = b.less(f);
         }
-        if cut.rule == CutRule::Absolute {
+        if cut.rule == TruncationRule::Absolute {
             let least = smallest(q);
             for q in q.iter_mut() {
                 *q = q.less(least);
@@ -228,7 +234,7 @@ fn any<U: Units>(cut: Cut, stride: usize, around: &Around<U>, messages: &mut [U]
         sum.copy_from_slice(&after[i * stride..][..stride]);
         add(sum, before);
         add(before, &q[i * stride..][..stride]);
-        Cutting::new(sum, smallest(sum), cut, &mut messages[slot * stride..][..stride]).all(stride);
+        Truncating::new(sum, smallest(sum), cut, &mut messages[slot * stride..][..stride]).all(stride);
     }
 }
 

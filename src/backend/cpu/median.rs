@@ -7,7 +7,7 @@ use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
 use crate::plan::Plan;
-use crate::tables::{MEDIAN_WEIGHT, MedianWeights};
+use crate::weights::{MEDIAN_WEIGHT, MedianWeights};
 use rayon::prelude::*;
 use std::array::from_fn;
 

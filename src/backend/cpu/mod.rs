@@ -4,20 +4,20 @@ mod belief;
 mod confidence;
 mod cost;
 mod dependency;
-mod estimate;
 mod evidence;
 mod fill;
 mod flood;
+mod label_range;
+mod left_right_check;
 mod median;
 mod mosaic;
+mod pages;
 mod pyramid;
-mod region_filter;
 mod resolution;
-mod restrict;
+mod speckle_filter;
 mod sub_pixel;
 mod units;
-mod visibility;
-mod zeroed;
+mod winner_takes_all;
 
 use super::{Backend, Map, PaddedRows, Requested, Stage, Traffic, Volume, volume_shape};
 use crate::error::Result;
@@ -28,12 +28,12 @@ use crate::memory;
 use crate::plan::{COST_FRACTION_BITS, COST_MAX, Plan, VolumeWidth};
 use belief::Summands;
 pub use mosaic::Mosaic;
+use pages::Pages;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::mem;
 use std::time::{Duration, Instant};
 use units::Units;
-use zeroed::Zeroed;
 
 /// What [`Cpu::copy_rate`] copies, and how often.
 const COPIED_BYTES: usize = 1 << 28;
@@ -78,10 +78,10 @@ struct Volumes<U> {
     plan: Plan,
     pair: Pair,
     /// Cost of level 0; coarser ones are in `levels`.
-    fine_cost: Zeroed<u8>,
+    fine_cost: Pages<u8>,
     levels: Vec<Level<U>>,
     /// First and last label of each pixel, by level; empty where all labels are in question.
-    supports: Vec<Plane<[u16; 2]>>,
+    label_ranges: Vec<Plane<[u16; 2]>>,
     /// Label map of the last change, and its sum.
     labels: Vec<u16>,
     change: u64,
@@ -90,7 +90,7 @@ struct Volumes<U> {
 
 /// What the finest level knows of each pixel, at last.
 struct Finest {
-    peaks: Plane<Peak>,
+    optima: Plane<Optimum>,
     right: Plane<u16>,
     /// Belief of the right labels.
     right_best: Plane<u16>,
@@ -102,16 +102,16 @@ struct Finest {
 
 /// The belief of one pixel around its optimum, in units.
 #[derive(Clone, Copy, Default)]
-struct Peak {
+struct Optimum {
     label: u16,
     best: u16,
-    rival: u16,
+    runner_up: u16,
 }
 
 impl Finest {
     fn new((width, height): (usize, usize)) -> Self {
         Self {
-            peaks: Plane::filled(width, height, Peak::default()),
+            optima: Plane::filled(width, height, Optimum::default()),
             right: Plane::filled(width, height, 0),
             right_best: Plane::filled(width, height, 0),
             raw: Plane::filled(width, height, 0),
@@ -123,9 +123,9 @@ impl Finest {
 
     fn read(&self, map: Map) -> Plane<i32> {
         match map {
-            Map::Label => self.peaks.map(|p| p.label.into()),
-            Map::Best => self.peaks.map(|p| p.best.into()),
-            Map::Rival => self.peaks.map(|p| p.rival.into()),
+            Map::Label => self.optima.map(|p| p.label.into()),
+            Map::Best => self.optima.map(|p| p.best.into()),
+            Map::RunnerUp => self.optima.map(|p| p.runner_up.into()),
             Map::RightLabel => self.right.map(|&v| v.into()),
             Map::RightBest => self.right_best.map(|&v| v.into()),
             Map::Raw => self.raw.clone(),
@@ -136,7 +136,7 @@ impl Finest {
     }
 
     fn write(&mut self, map: Map, values: &Plane<i32>) {
-        assert_eq!(self.peaks.size(), values.size(), "a map of the size of the images");
+        assert_eq!(self.optima.size(), values.size(), "a map of the size of the images");
         self.write_part(map, values, &Rect::whole(values.size()), (0, 0));
     }
 
@@ -154,9 +154,9 @@ impl Finest {
         }
         let from = (values, part, corner);
         match map {
-            Map::Label => put(&mut self.peaks, from, |p, v| p.label = v as u16),
-            Map::Best => put(&mut self.peaks, from, |p, v| p.best = v as u16),
-            Map::Rival => put(&mut self.peaks, from, |p, v| p.rival = v as u16),
+            Map::Label => put(&mut self.optima, from, |p, v| p.label = v as u16),
+            Map::Best => put(&mut self.optima, from, |p, v| p.best = v as u16),
+            Map::RunnerUp => put(&mut self.optima, from, |p, v| p.runner_up = v as u16),
             Map::RightLabel => put(&mut self.right, from, |old, v| *old = v as u16),
             Map::RightBest => put(&mut self.right_best, from, |old, v| *old = v as u16),
             Map::Raw => put(&mut self.raw, from, |old, v| *old = v),
@@ -169,8 +169,8 @@ impl Finest {
     /// Runs a stage that needs maps and the left view alone: those after [`Stage::SubPixel`].
     fn run(&mut self, plan: &Plan, left: &Image, stage: Stage) {
         match stage {
-            Stage::Visibility => visibility::run(plan, left, self),
-            Stage::RegionFilter => region_filter::run(plan.method.region_size as usize, self),
+            Stage::LeftRightCheck => left_right_check::run(plan, left, self),
+            Stage::SpeckleFilter => speckle_filter::run(plan.method.speckle_size as usize, self),
             Stage::Confidence => confidence::run(plan.method.confidence_floor, self),
             Stage::Fill => fill::run(self),
             Stage::FillMedian => median::fill(plan, left, self),
@@ -184,18 +184,18 @@ impl Finest {
 struct Level<U> {
     graph: LevelGraph,
     /// In 1/256 cost units; empty at level 0.
-    cost: Zeroed<u16>,
-    evidence: Zeroed<u8>,
-    dependency: Zeroed<U>,
+    cost: Pages<u16>,
+    evidence: Pages<u8>,
+    dependency: Pages<U>,
     /// Whether a dependency factor has spoken yet: until then all messages are 0, whatever is stored.
     spoken: bool,
     /// The same of the resolution factors between this level and the next finer one: of its `up` and that one's `down`.
     resolved: bool,
     /// Empty at the coarsest level.
-    down: Zeroed<U>,
+    down: Pages<U>,
     /// Empty at level 0.
-    up: Zeroed<U>,
-    belief: Zeroed<U>,
+    up: Pages<U>,
+    belief: Pages<U>,
 }
 
 impl<U: Units> Volumes<U> {
@@ -208,14 +208,14 @@ impl<U: Units> Volumes<U> {
                 let level = &plan.levels[z];
                 let cells = level.pixels() * level.stride;
                 Ok(Level {
-                    cost: Zeroed::new(if z == 0 { 0 } else { cells })?,
-                    evidence: Zeroed::new(cells)?,
-                    dependency: Zeroed::new(cells * graph.slots())?,
+                    cost: Pages::new(if z == 0 { 0 } else { cells })?,
+                    evidence: Pages::new(cells)?,
+                    dependency: Pages::new(cells * graph.slots())?,
                     spoken: false,
                     resolved: false,
-                    down: Zeroed::new(if z == last { 0 } else { cells })?,
-                    up: Zeroed::new(if z == 0 { 0 } else { cells })?,
-                    belief: Zeroed::new(cells)?,
+                    down: Pages::new(if z == last { 0 } else { cells })?,
+                    up: Pages::new(if z == 0 { 0 } else { cells })?,
+                    belief: Pages::new(cells)?,
                     graph,
                 })
             })
@@ -224,9 +224,9 @@ impl<U: Units> Volumes<U> {
         Ok(Self {
             plan: plan.clone(),
             pair: pair.clone(),
-            fine_cost: Zeroed::new(fine.pixels() * fine.stride)?,
+            fine_cost: Pages::new(fine.pixels() * fine.stride)?,
             levels,
-            supports: Vec::new(),
+            label_ranges: Vec::new(),
             labels: vec![0; fine.pixels()],
             change: 0,
             maps: Finest::new(plan.size()),
@@ -263,7 +263,7 @@ impl<U: Units> Volumes<U> {
     }
 
     fn run(&mut self, stage: Stage) {
-        let Self { plan, pair, fine_cost, levels, supports, labels, change, maps } = self;
+        let Self { plan, pair, fine_cost, levels, label_ranges, labels, change, maps } = self;
         match stage {
             Stage::Cost => cost::run(plan, pair, fine_cost),
             Stage::Pyramid(z) => {
@@ -275,10 +275,10 @@ impl<U: Units> Volumes<U> {
                     pyramid::run(plan, z, &finer[z - 1].cost, out);
                 }
             }
-            Stage::Restrict(0) => restrict::run(&plan.levels[0], &supports[0], fine_cost, COST_MAX),
-            Stage::Restrict(z) => {
+            Stage::LabelRange(0) => label_range::run(&plan.levels[0], &label_ranges[0], fine_cost, COST_MAX),
+            Stage::LabelRange(z) => {
                 let highest = u16::from(COST_MAX) << COST_FRACTION_BITS;
-                restrict::run(&plan.levels[z], &supports[z], &mut levels[z].cost, highest);
+                label_range::run(&plan.levels[z], &label_ranges[z], &mut levels[z].cost, highest);
             }
             Stage::Evidence(z) => {
                 let l = &mut levels[z];
@@ -314,12 +314,12 @@ impl<U: Units> Volumes<U> {
                     flood::run(plan, z, &summands, &mut l.dependency, &mut l.belief, fresh);
                 }
             }
-            Stage::Change => *change = estimate::change(plan, &levels[0].belief, labels),
-            Stage::Estimate => estimate::run(plan, &levels[0].belief, maps),
-            Stage::RightView => estimate::right_view(plan, &levels[0].belief, maps),
+            Stage::Change => *change = winner_takes_all::change(plan, &levels[0].belief, labels),
+            Stage::WinnerTakesAll => winner_takes_all::run(plan, &levels[0].belief, maps),
+            Stage::RightView => winner_takes_all::right_view(plan, &levels[0].belief, maps),
             Stage::SubPixel => sub_pixel::run(plan, fine_cost, maps),
-            Stage::Visibility
-            | Stage::RegionFilter
+            Stage::LeftRightCheck
+            | Stage::SpeckleFilter
             | Stage::Confidence
             | Stage::Fill
             | Stage::FillMedian
@@ -408,8 +408,8 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()> {
-        on_volumes!(self, v => v.supports = supports.to_vec());
+    fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()> {
+        on_volumes!(self, v => v.label_ranges = label_ranges.to_vec());
         Ok(())
     }
 

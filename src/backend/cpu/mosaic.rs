@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
-use crate::options::{Illumination, Visibility};
+use crate::options::{Illumination, LeftRightCheck};
 use crate::plan::Plan;
 use crate::tiles::Tile;
 use std::sync::Arc;
@@ -43,10 +43,10 @@ impl Mosaic {
     pub fn place(&mut self, tile: &Tile, pair: &Pair, backend: &mut dyn Backend) -> Result<()> {
         let Tile { core, crop, .. } = tile;
         let part = core.within(crop);
-        for map in [Map::Label, Map::Best, Map::Rival, Map::Raw] {
+        for map in [Map::Label, Map::Best, Map::RunnerUp, Map::Raw] {
             self.maps.write_part(map, &backend.read_map(map)?, &part, (core.x.start, core.y.start));
         }
-        if self.plan.method.visibility == Visibility::RightView {
+        if self.plan.method.left_right_check == LeftRightCheck::RightView {
             let (labels, best) = (backend.read_map(Map::RightLabel)?, backend.read_map(Map::RightBest)?);
             for (y, row) in core.y.clone().zip(part.y.clone()) {
                 let old_best = self.maps.right_best.row_mut(y)[crop.x.clone()].iter_mut();
@@ -84,7 +84,7 @@ impl Mosaic {
 
     /// Runs a stage that follows [`Stage::SubPixel`], once all tiles are in place.
     pub fn run(&mut self, stage: Stage) {
-        if stage == Stage::Visibility {
+        if stage == Stage::LeftRightCheck {
             self.maps.disparity = self.maps.raw.clone();
             self.maps.right_best = Plane::filled(0, 0, 0);
         }

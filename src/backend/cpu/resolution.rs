@@ -2,8 +2,8 @@
 //!
 //! Rows of labels are worked on with their padding; what belongs to no label counts as infinite.
 
-use super::units::{Blocks, Cutting, Units, block, block_mut, keep_least, least_of, padding, smallest};
-use crate::plan::{Cut, CutRule, LABEL_BLOCK, Plan};
+use super::units::{Blocks, Truncating, Units, block, block_mut, keep_least, least_of, padding, smallest};
+use crate::plan::{LABEL_BLOCK, Plan, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::array::from_fn;
 
@@ -22,7 +22,7 @@ struct Scratch<U> {
 
 /// What all factors between two levels share.
 struct Between<U> {
-    cut: Cut,
+    cut: Truncation,
     interpolating: bool,
     /// Fine label 2 z - `lead` agrees best with coarse label z; 0 or 1.
     lead: usize,
@@ -137,7 +137,7 @@ fn factor<U: Units>(
         }
     }
     // The padding of the sums to the parent is infinite, as all that agrees with it is.
-    Cutting::new(&sums[0], least_of(&[least])[0], cut, up).all(coarse_stride);
+    Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(coarse_stride);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
             for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
@@ -156,7 +156,7 @@ fn factor<U: Units>(
     }
     for ((place, fine), least) in children.into_iter().zip(fine).zip(least_of(&least)) {
         let Some(at) = place else { continue };
-        Cutting::new(fine, least, cut, &mut down[at..][..fine_stride]).all(fine_stride);
+        Truncating::new(fine, least, cut, &mut down[at..][..fine_stride]).all(fine_stride);
     }
 }
 
@@ -186,13 +186,13 @@ fn spread<U: Units>(t: &[U; LABEL_BLOCK + 1], interpolating: bool, fine: &mut [U
 
 /// q: the belief less the factor's old message; infinite where there is no label.
 #[inline(always)]
-fn variable_message<U: Units>(belief: &[U], message: &[U], q: &mut [U], padding: &[U], cut: Cut) {
+fn variable_message<U: Units>(belief: &[U], message: &[U], q: &mut [U], padding: &[U], cut: Truncation) {
     for at in (0..belief.len()).step_by(LABEL_BLOCK) {
         let (b, m) = (block::<U, LABEL_BLOCK>(belief, at), block::<U, LABEL_BLOCK>(message, at));
         let padding = block::<U, LABEL_BLOCK>(padding, at);
         *block_mut(q, at) = from_fn::<U, LABEL_BLOCK, _>(|i| b[i].less(m[i]).max(padding[i]));
     }
-    if cut.rule == CutRule::Absolute {
+    if cut.rule == TruncationRule::Absolute {
         let least = smallest(q);
         for (q, &padding) in q.iter_mut().zip(padding) {
             *q = q.less(least).max(padding);

@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 pub(super) fn run(plan: &Plan, cost: &[u8], maps: &mut Finest) {
     let width = plan.levels[0].width;
-    let Finest { peaks, raw, disparity, .. } = maps;
+    let Finest { optima, raw, disparity, .. } = maps;
     raw.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, raw) in row.iter_mut().enumerate() {
-            let label = |x: usize, y: usize| peaks[(x, y)].label;
+            let label = |x: usize, y: usize| optima[(x, y)].label;
             *raw = FRACTION * (plan.range.min + i32::from(label(x, y)));
             if plan.method.sub_pixel {
                 *raw += offset(plan, cost, label, (x, y));

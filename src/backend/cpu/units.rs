@@ -1,6 +1,6 @@
 //! Amounts of cost in the two widths of volumes, and rows of them.
 
-use crate::plan::{Cut, LABEL_BLOCK};
+use crate::plan::{LABEL_BLOCK, Truncation};
 use std::array::from_fn;
 
 /// An amount of cost, in units, as a volume stores it. Its sums saturate and its differences stop at 0.
@@ -140,22 +140,22 @@ pub(super) trait Blocks {
 }
 
 /// Cuts sums into a message.
-pub(super) struct Cutting<'a, U> {
+pub(super) struct Truncating<'a, U> {
     sums: &'a [U],
     high: U,
     low: U,
     out: &'a mut [U],
 }
 
-impl<'a, U: Units> Cutting<'a, U> {
+impl<'a, U: Units> Truncating<'a, U> {
     #[inline(always)]
-    pub(super) fn new(sums: &'a [U], least: U, cut: Cut, out: &'a mut [U]) -> Self {
+    pub(super) fn new(sums: &'a [U], least: U, cut: Truncation, out: &'a mut [U]) -> Self {
         let (high, low) = cut.bounds(least.into());
         Self { sums, high: U::of(high), low: U::of(low), out }
     }
 }
 
-impl<U: Units> Blocks for Cutting<'_, U> {
+impl<U: Units> Blocks for Truncating<'_, U> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
         let sums = block::<U, N>(self.sums, at);

@@ -161,7 +161,7 @@ pub(super) struct Buffers {
     pub(super) squares: Rows,
     /// Sums of the squared changes of each row, lower and upper half.
     pub(super) change_sums: wgpu::Buffer,
-    pub(super) peaks: Rows,
+    pub(super) optima: Rows,
     pub(super) right_labels: Rows,
     pub(super) raw: Rows,
     pub(super) disparity: Rows,
@@ -170,8 +170,8 @@ pub(super) struct Buffers {
     /// What a stage that looks around writes, before it takes the place of what it looked at.
     pub(super) spare_disparity: Rows,
     pub(super) spare_flags: Rows,
-    pub(super) region_parents: Rows,
-    pub(super) region_sizes: Rows,
+    pub(super) speckle_parents: Rows,
+    pub(super) speckle_sizes: Rows,
     /// Whether each row holds a valid pixel, and where it takes its values from.
     pub(super) filled_rows: wgpu::Buffer,
     pub(super) source_rows: wgpu::Buffer,
@@ -188,7 +188,7 @@ pub(super) struct LevelBuffers {
     pub(super) up: Rows,
     pub(super) belief: Rows,
     /// First and last label of each pixel; nothing where all labels are in question.
-    pub(super) support: Rows,
+    pub(super) label_range: Rows,
     pub(super) members: Rows,
     pub(super) starts: Rows,
     /// Entries of the transposed table, of what each part holds.
@@ -324,7 +324,11 @@ impl Buffers {
                 down: a.rows("messages from above", values, if z == last { &none } else { &starts })?,
                 up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
                 belief: a.rows("belief", values, &starts)?,
-                support: a.rows("support", p.pixel_pitch, if plan.restricted() { &starts } else { &none })?,
+                label_range: a.rows(
+                    "zone-sigmas",
+                    p.pixel_pitch,
+                    if plan.limits_labels() { &starts } else { &none },
+                )?,
                 members: a.rows("members", p.member_pitch, &starts)?,
                 starts: a.rows("starts", p.starts_pitch, &starts)?,
                 incoming,
@@ -339,10 +343,10 @@ impl Buffers {
         let census = [map("left census", 2)?, map("right census", 2)?];
         let contrast = map("contrast", 1)?;
         let (labels, squares) = (map("labels", 1)?, map("squares", 1)?);
-        let (peaks, right_labels) = (map("peaks", 2)?, map("right labels", 1)?);
+        let (optima, right_labels) = (map("optima", 2)?, map("right labels", 1)?);
         let (raw, disparity, flags) = (map("raw", 1)?, map("disparity", 1)?, map("flags", 1)?);
         let (spare_disparity, spare_flags) = (map("spare disparity", 1)?, map("spare flags", 1)?);
-        let (region_parents, region_sizes) = (map("region parents", 1)?, map("region sizes", 1)?);
+        let (speckle_parents, speckle_sizes) = (map("region parents", 1)?, map("region sizes", 1)?);
         let rows = u64::from(fine.height);
         Ok(Self {
             median_weights: a.buffer("median weights", MEDIAN_WORDS)?,
@@ -357,15 +361,15 @@ impl Buffers {
             contrast,
             labels,
             squares,
-            peaks,
+            optima,
             right_labels,
             raw,
             disparity,
             flags,
             spare_disparity,
             spare_flags,
-            region_parents,
-            region_sizes,
+            speckle_parents,
+            speckle_sizes,
             all: allocator.all,
         })
     }

@@ -177,7 +177,7 @@ pub fn has_automatic() -> bool {
 
 /// What a device is denied, or does wrong, on purpose: tests run the engine as if on a lesser device, or a failing one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Handicap {
+pub struct FaultInjection {
     /// Largest binding in bytes.
     pub max_binding: Option<u64>,
     /// Largest buffer in bytes.
@@ -229,8 +229,8 @@ pub(super) struct Device {
 }
 
 impl Device {
-    pub(super) fn open(wanted: Option<&str>, handicap: Handicap) -> Result<Self> {
-        let adapter = if handicap.noop {
+    pub(super) fn open(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
+        let adapter = if faults.noop {
             let noop = adapters_of(wgpu::Backends::NOOP).pop();
             noop.ok_or_else(|| Error::Device("this build has no device that computes nothing".into()))?
         } else {
@@ -240,18 +240,18 @@ impl Device {
         let offered = adapter.limits();
         // No more than every device of WebGPU has, but for the sizes of buffers and bindings.
         let mut limits = wgpu::Limits::default().or_worse_values_from(&offered);
-        limits.max_buffer_size = offered.max_buffer_size.min(handicap.max_buffer.unwrap_or(u64::MAX));
+        limits.max_buffer_size = offered.max_buffer_size.min(faults.max_buffer.unwrap_or(u64::MAX));
         limits.max_storage_buffer_binding_size =
-            offered.max_storage_buffer_binding_size.min(handicap.max_binding.unwrap_or(u64::MAX));
-        if let Some(groups) = handicap.max_groups {
+            offered.max_storage_buffer_binding_size.min(faults.max_binding.unwrap_or(u64::MAX));
+        if let Some(groups) = faults.max_groups {
             limits.max_compute_workgroups_per_dimension = groups;
         }
-        if let Some(invocations) = handicap.max_invocations {
+        if let Some(invocations) = faults.max_invocations {
             limits.max_compute_invocations_per_workgroup = invocations;
             limits.max_compute_workgroup_size_x = invocations;
         }
         let clock = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
-        let features = if handicap.no_clock { wgpu::Features::empty() } else { clock };
+        let features = if faults.no_clock { wgpu::Features::empty() } else { clock };
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("mrfgs"),
             required_features: features,
@@ -294,10 +294,10 @@ impl Device {
             max_binding: limits.max_storage_buffer_binding_size,
             max_buffer: limits.max_buffer_size,
             max_groups: limits.max_compute_workgroups_per_dimension,
-            memory: handicap.memory,
+            memory: faults.memory,
             tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
-            patience: handicap.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
-            lost_after: handicap.lost_after,
+            patience: faults.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
+            lost_after: faults.lost_after,
             under_way: VecDeque::new(),
             submitted: 0,
             failure,
@@ -411,7 +411,7 @@ impl Device {
         failed(&self.name, &format!("it did not finish its work within {:?}: it hangs", self.patience))
     }
 
-    /// Loses the device once it has run as many stages as its handicap allows.
+    /// Loses the device once it has run as many stages as its faults allows.
     pub(super) fn count_stage(&mut self) {
         if let (Some(left), Some((device, _))) = (&mut self.lost_after, &self.open) {
             match left.checked_sub(1) {

@@ -16,7 +16,7 @@
 //! | `dependency` | 1 + 3 + 3 | 15 | 50 | beliefs of three members, all of it again after the minimum |
 //! | `belief` | 1 + 3 + 1 + 1 | 6 | 20 | nothing but the table of the graph |
 //! | `resolution` (level 1, a fine label) | 1 + 1 + 1 + 3/8 | 17 | 100 | words of four labels, once a label and once more after the minimum |
-//! | `estimate` | 1 | 2 | 15 | the beliefs, for the rival |
+//! | `winner_takes_all` | 1 | 2 | 15 | the beliefs, for the runner_up |
 //! | `right_view` | 1 | 4 | 20 | words of four labels of which it wants one |
 //! | `median` | 28 a pixel | 3,000 a pixel and pass | 2,500 a pixel and pass | the 105 places, in up to nine passes |
 //!
@@ -26,7 +26,7 @@
 //! What they ask more than once is near, and left to the caches. [`crate::roofline`] adds the least bytes of the message stages
 //! up for a plan, and `mrfgs bench` holds them against the rate at which the device copies.
 
-use crate::plan::{CutRule, LABEL_BLOCK, LevelPlan, Plan, VolumeWidth};
+use crate::plan::{LABEL_BLOCK, LevelPlan, Plan, TruncationRule, VolumeWidth};
 use bytemuck::{Pod, Zeroable};
 
 const PARAMS: &str = include_str!("../../../shaders/shared/params.wgsl");
@@ -34,9 +34,9 @@ const NARROW: &str = include_str!("../../../shaders/shared/narrow.wgsl");
 const WIDE: &str = include_str!("../../../shaders/shared/wide.wgsl");
 const IMAGE: &str = include_str!("../../../shaders/shared/image.wgsl");
 const MAPS: &str = include_str!("../../../shaders/shared/maps.wgsl");
-const REGION: &str = include_str!("../../../shaders/shared/region.wgsl");
+const REGION: &str = include_str!("../../../shaders/shared/speckle.wgsl");
 
-/// Pixels of a segment of a row, `SEGMENT` of `shaders/shared/region.wgsl`.
+/// Pixels of a segment of a row, `SEGMENT` of `shaders/shared/speckle.wgsl`.
 pub(super) const SEGMENT: u32 = 64;
 /// Columns in which blocks of rows are joined in one go: it bounds the chains that the shader follows.
 pub(super) const JOINED_COLUMNS: u32 = 4096;
@@ -50,22 +50,22 @@ pub enum Kernel {
     AdCensus,
     Sad,
     Pyramid,
-    Restrict,
+    LabelRange,
     Evidence,
     Dependency,
     Resolution,
     Belief,
-    Estimate,
+    WinnerTakesAll,
     SubPixel,
     RightView,
     Change,
     ChangeSum,
-    RegionRuns,
-    RegionJoin,
-    RegionFlatten,
-    RegionCount,
-    RegionFilter,
-    Visibility,
+    SpeckleRuns,
+    SpeckleJoin,
+    SpeckleFlatten,
+    SpeckleCount,
+    SpeckleFilter,
+    LeftRightCheck,
     Confidence,
     FillRows,
     FillSources,
@@ -81,22 +81,22 @@ impl Kernel {
         Self::AdCensus,
         Self::Sad,
         Self::Pyramid,
-        Self::Restrict,
+        Self::LabelRange,
         Self::Evidence,
         Self::Dependency,
         Self::Resolution,
         Self::Belief,
-        Self::Estimate,
+        Self::WinnerTakesAll,
         Self::SubPixel,
         Self::RightView,
         Self::Change,
         Self::ChangeSum,
-        Self::RegionRuns,
-        Self::RegionJoin,
-        Self::RegionFlatten,
-        Self::RegionCount,
-        Self::RegionFilter,
-        Self::Visibility,
+        Self::SpeckleRuns,
+        Self::SpeckleJoin,
+        Self::SpeckleFlatten,
+        Self::SpeckleCount,
+        Self::SpeckleFilter,
+        Self::LeftRightCheck,
         Self::Confidence,
         Self::FillRows,
         Self::FillSources,
@@ -113,22 +113,22 @@ impl Kernel {
             Self::AdCensus => "ad_census",
             Self::Sad => "sad",
             Self::Pyramid => "pyramid",
-            Self::Restrict => "restrict",
+            Self::LabelRange => "label_range",
             Self::Evidence => "evidence",
             Self::Dependency => "dependency",
             Self::Resolution => "resolution",
             Self::Belief => "belief",
-            Self::Estimate => "estimate",
+            Self::WinnerTakesAll => "winner_takes_all",
             Self::SubPixel => "sub_pixel",
             Self::RightView => "right_view",
             Self::Change => "change",
             Self::ChangeSum => "change_sum",
-            Self::RegionRuns => "region_runs",
-            Self::RegionJoin => "region_join",
-            Self::RegionFlatten => "region_flatten",
-            Self::RegionCount => "region_count",
-            Self::RegionFilter => "region_filter",
-            Self::Visibility => "visibility",
+            Self::SpeckleRuns => "speckle_runs",
+            Self::SpeckleJoin => "speckle_join",
+            Self::SpeckleFlatten => "speckle_flatten",
+            Self::SpeckleCount => "speckle_count",
+            Self::SpeckleFilter => "speckle_filter",
+            Self::LeftRightCheck => "left_right_check",
             Self::Confidence => "confidence",
             Self::FillRows => "fill_rows",
             Self::FillSources => "fill_sources",
@@ -144,22 +144,22 @@ impl Kernel {
             Self::AdCensus => include_str!("../../../shaders/ad_census.wgsl"),
             Self::Sad => include_str!("../../../shaders/sad.wgsl"),
             Self::Pyramid => include_str!("../../../shaders/pyramid.wgsl"),
-            Self::Restrict => include_str!("../../../shaders/restrict.wgsl"),
+            Self::LabelRange => include_str!("../../../shaders/label_range.wgsl"),
             Self::Evidence => include_str!("../../../shaders/evidence.wgsl"),
             Self::Dependency => include_str!("../../../shaders/dependency.wgsl"),
             Self::Resolution => include_str!("../../../shaders/resolution.wgsl"),
             Self::Belief => include_str!("../../../shaders/belief.wgsl"),
-            Self::Estimate => include_str!("../../../shaders/estimate.wgsl"),
+            Self::WinnerTakesAll => include_str!("../../../shaders/winner_takes_all.wgsl"),
             Self::SubPixel => include_str!("../../../shaders/sub_pixel.wgsl"),
             Self::RightView => include_str!("../../../shaders/right_view.wgsl"),
             Self::Change => include_str!("../../../shaders/change.wgsl"),
             Self::ChangeSum => include_str!("../../../shaders/change_sum.wgsl"),
-            Self::RegionRuns => include_str!("../../../shaders/region_runs.wgsl"),
-            Self::RegionJoin => include_str!("../../../shaders/region_join.wgsl"),
-            Self::RegionFlatten => include_str!("../../../shaders/region_flatten.wgsl"),
-            Self::RegionCount => include_str!("../../../shaders/region_count.wgsl"),
-            Self::RegionFilter => include_str!("../../../shaders/region_filter.wgsl"),
-            Self::Visibility => include_str!("../../../shaders/visibility.wgsl"),
+            Self::SpeckleRuns => include_str!("../../../shaders/speckle_runs.wgsl"),
+            Self::SpeckleJoin => include_str!("../../../shaders/speckle_join.wgsl"),
+            Self::SpeckleFlatten => include_str!("../../../shaders/speckle_flatten.wgsl"),
+            Self::SpeckleCount => include_str!("../../../shaders/speckle_count.wgsl"),
+            Self::SpeckleFilter => include_str!("../../../shaders/speckle_filter.wgsl"),
+            Self::LeftRightCheck => include_str!("../../../shaders/left_right_check.wgsl"),
             Self::Confidence => include_str!("../../../shaders/confidence.wgsl"),
             Self::FillRows => include_str!("../../../shaders/fill_rows.wgsl"),
             Self::FillSources => include_str!("../../../shaders/fill_sources.wgsl"),
@@ -197,9 +197,10 @@ impl Kernel {
                 (window + 7) * (1 + 5 * window + 8) + 8 * 5
             }
             Self::Pyramid => 7 * 31,
-            Self::Evidence | Self::Estimate => 2 * quads,
+            Self::Evidence | Self::WinnerTakesAll => 2 * quads,
             Self::Dependency => {
-                let floors = if plan.dependency.rule == CutRule::Absolute { slots * (quads + 1) } else { 0 };
+                let floors =
+                    if plan.dependency.rule == TruncationRule::Absolute { slots * (quads + 1) } else { 0 };
                 floors + 3 * slots + 2 * quads * (2 * slots + 1)
             }
             Self::Resolution => fine_labels + 3 * l.stride + fine_labels / 2,
@@ -210,13 +211,15 @@ impl Kernel {
             Self::Change => quads,
             Self::ChangeSum | Self::FillRows | Self::Fill => l.width,
             Self::FillSources => l.height,
-            Self::RegionRuns => SEGMENT as usize,
+            Self::SpeckleRuns => SEGMENT as usize,
             // The pixels on both sides of a border, or the segments of a row, followed from two pixels.
-            Self::RegionJoin => 4 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 8,
-            Self::RegionFlatten => 2 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 4,
-            Self::Restrict | Self::RegionCount | Self::RegionFilter | Self::Visibility | Self::Confidence => {
-                0
-            }
+            Self::SpeckleJoin => 4 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 8,
+            Self::SpeckleFlatten => 2 * (JOINED_COLUMNS as usize).max(l.width / SEGMENT as usize) + 4,
+            Self::LabelRange
+            | Self::SpeckleCount
+            | Self::SpeckleFilter
+            | Self::LeftRightCheck
+            | Self::Confidence => 0,
             Self::Median => {
                 // One pass, and one for every three bits of what the disparities of a window may span.
                 let window = plan.method.median_window as usize;
@@ -236,7 +239,7 @@ pub struct Variant {
     pub fine_narrow: bool,
     /// Members of a dependency factor.
     pub slots: usize,
-    /// The cut is [`CutRule::Absolute`].
+    /// The cut is [`TruncationRule::Absolute`].
     pub absolute: bool,
     /// Odd labels agree with both their coarse neighbours.
     pub interpolating: bool,
@@ -258,7 +261,7 @@ impl Variant {
             Kernel::Dependency,
             Kernel::Resolution,
             Kernel::Belief,
-            Kernel::Estimate,
+            Kernel::WinnerTakesAll,
             Kernel::RightView,
             Kernel::Change,
         ]);
@@ -266,12 +269,12 @@ impl Variant {
         Self {
             narrow: volumes && plan.volume_width == VolumeWidth::Narrow,
             fine_narrow: match kernel {
-                Kernel::Restrict | Kernel::Evidence => level == 0,
+                Kernel::LabelRange | Kernel::Evidence => level == 0,
                 Kernel::Pyramid => level == 1,
                 _ => false,
             },
             slots: if looks(&[Kernel::Dependency, Kernel::Belief]) { plan.slots() } else { 1 },
-            absolute: potentials && plan.dependency.rule == CutRule::Absolute,
+            absolute: potentials && plan.dependency.rule == TruncationRule::Absolute,
             interpolating: kernel == Kernel::Resolution && plan.interpolating(),
             low_pass: kernel == Kernel::Pyramid && !plan.minimum_over_d(),
             has_down: kernel == Kernel::Belief && level + 1 < plan.levels.len(),
@@ -347,9 +350,9 @@ pub struct Params {
     pub evidence_cap: u32,
     pub tau: u32,
     pub sub_pixel: u32,
-    pub visibility: u32,
+    pub left_right_check: u32,
     pub median_all: u32,
-    pub region_size: u32,
+    pub speckle_size: u32,
     pub confidence_floor: u32,
     pub halo: u32,
     pub span: u32,

@@ -22,10 +22,10 @@ use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::Plan;
-use crate::tables::MedianWeights;
+use crate::weights::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
-pub use device::{DeviceInfo, Handicap, devices, has_automatic, may_have_gpu};
+pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
 pub use kernels::{Kernel, LevelParams, Params, Variant};
 use stages::{Step, Steps};
 use std::collections::HashMap;
@@ -73,16 +73,16 @@ impl Gpu {
     /// [`Error::Device`] when there is no driver or the device cannot be opened, [`Error::Option`] when no device has
     /// that name.
     pub fn new(wanted: Option<&str>) -> Result<Self> {
-        Self::with_handicap(wanted, Handicap::default())
+        Self::with_faults(wanted, FaultInjection::default())
     }
 
-    /// As [`Gpu::new`], with a handicap.
+    /// As [`Gpu::new`], with a faults.
     ///
     /// # Errors
     /// As [`Gpu::new`].
-    pub fn with_handicap(wanted: Option<&str>, handicap: Handicap) -> Result<Self> {
+    pub fn with_faults(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         Ok(Self {
-            device: Device::open(wanted, handicap)?,
+            device: Device::open(wanted, faults)?,
             pipelines: HashMap::new(),
             encoder: None,
             passes: 0,
@@ -351,13 +351,13 @@ impl Backend for Gpu {
         Ok(())
     }
 
-    fn restrict(&mut self, supports: &[Plane<[u16; 2]>]) -> Result<()> {
-        for (z, support) in supports.iter().enumerate() {
+    fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()> {
+        for (z, label_range) in label_ranges.iter().enumerate() {
             let level = &self.state().buffers.levels[z];
-            let (rows, pitch) = (level.support.clone(), level.params.pixel_pitch as usize);
-            let mut words = vec![0; pitch * support.height()];
+            let (rows, pitch) = (level.label_range.clone(), level.params.pixel_pitch as usize);
+            let mut words = vec![0; pitch * label_range.height()];
             for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
-                for (word, &[first, last]) in row.iter_mut().zip(support.row(y)) {
+                for (word, &[first, last]) in row.iter_mut().zip(label_range.row(y)) {
                     *word = u32::from(first) | u32::from(last) << 16;
                 }
             }

@@ -6,9 +6,9 @@ use super::kernels::{JOINED_COLUMNS, Kernel, Params, SEGMENT};
 use super::{Gpu, WORKGROUP};
 use crate::backend::Stage;
 use crate::error::{Error, Result};
-use crate::options::{Cost, Median, Visibility};
+use crate::options::{Cost, LeftRightCheck, Median};
 use crate::plan::Plan;
-use crate::tables::MedianWeights;
+use crate::weights::MedianWeights;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
@@ -57,8 +57,8 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         evidence_cap: scale.cap.into(),
         belief_most: plan.belief_most().into(),
         sub_pixel: method.sub_pixel.into(),
-        visibility: (method.visibility != Visibility::Off).into(),
-        region_size: method.region_size,
+        left_right_check: (method.left_right_check != LeftRightCheck::Off).into(),
+        speckle_size: method.speckle_size,
         confidence_floor: method.confidence_floor,
         ..Params::default()
     }
@@ -87,8 +87,8 @@ impl Gpu {
                 add(Stage::Pyramid(z), self.pyramid(plan, buffers, z, &cuts)?);
                 add(Stage::Resolution(z), self.resolution(plan, buffers, z, &cuts)?);
             }
-            if plan.restricted() {
-                add(Stage::Restrict(z), self.restrict(plan, buffers, z, &cuts)?);
+            if plan.limits_labels() {
+                add(Stage::LabelRange(z), self.label_range(plan, buffers, z, &cuts)?);
             }
             add(Stage::Evidence(z), self.evidence(plan, buffers, z, &cuts)?);
             add(Stage::Dependency(z), self.dependency(plan, buffers, z, &cuts)?);
@@ -101,32 +101,33 @@ impl Gpu {
         let l = base.level;
         let job = |kernel| Job { kernel, plan, level: 0, params: base, cuts: &cuts };
         let belief = &buffers.levels[0].belief;
-        let estimate = self
-            .stage(&job(Kernel::Estimate), Some(l.width), |r| vec![belief.bind(r), buffers.peaks.bind(r)])?;
-        add(Stage::Estimate, estimate);
+        let estimate = self.stage(&job(Kernel::WinnerTakesAll), Some(l.width), |r| {
+            vec![belief.bind(r), buffers.optima.bind(r)]
+        })?;
+        add(Stage::WinnerTakesAll, estimate);
         add(Stage::RightView, self.right_view(plan, buffers)?);
         let sub_pixel = self.stage(&job(Kernel::SubPixel), Some(l.width), |rows| {
             let seen = with_halo(rows, 1, l.height);
             vec![
                 buffers.levels[0].cost.bind(&seen),
-                buffers.peaks.bind(&seen),
+                buffers.optima.bind(&seen),
                 buffers.raw.bind(rows),
                 buffers.disparity.bind(rows),
             ]
         })?;
         add(Stage::SubPixel, sub_pixel);
-        let visibility = self.stage(&job(Kernel::Visibility), Some(l.width), |rows| {
+        let left_right_check = self.stage(&job(Kernel::LeftRightCheck), Some(l.width), |rows| {
             vec![
-                buffers.peaks.bind(rows),
+                buffers.optima.bind(rows),
                 buffers.right_labels.bind(rows),
                 buffers.left.bind(rows),
                 buffers.flags.bind(rows),
             ]
         })?;
-        add(Stage::Visibility, visibility);
-        add(Stage::RegionFilter, self.region_filter(plan, buffers)?);
+        add(Stage::LeftRightCheck, left_right_check);
+        add(Stage::SpeckleFilter, self.speckle_filter(plan, buffers)?);
         let confidence = self.stage(&job(Kernel::Confidence), Some(l.width), |rows| {
-            vec![buffers.peaks.bind(rows), buffers.flags.bind(rows)]
+            vec![buffers.optima.bind(rows), buffers.flags.bind(rows)]
         })?;
         add(Stage::Confidence, confidence);
         add(Stage::Fill, self.fill(plan, buffers)?);
@@ -189,11 +190,12 @@ impl Gpu {
         Ok(steps)
     }
 
-    fn restrict(&mut self, plan: &Plan, buffers: &Buffers, z: usize, cuts: &[u32]) -> Result<Vec<Step>> {
+    fn label_range(&mut self, plan: &Plan, buffers: &Buffers, z: usize, cuts: &[u32]) -> Result<Vec<Step>> {
         let b = &buffers.levels[z];
-        let job = Job { kernel: Kernel::Restrict, plan, level: z, params: params(plan, buffers, z), cuts };
+        let job = Job { kernel: Kernel::LabelRange, plan, level: z, params: params(plan, buffers, z), cuts };
         let threads = Some(b.params.width * b.params.quads);
-        let mut steps = self.stage(&job, threads, |rows| vec![b.cost.bind(rows), b.support.bind(rows)])?;
+        let mut steps =
+            self.stage(&job, threads, |rows| vec![b.cost.bind(rows), b.label_range.bind(rows)])?;
         steps.extend(renewed(&b.cost));
         Ok(steps)
     }
@@ -290,16 +292,16 @@ impl Gpu {
 
     /// Regions are found anew in every band, among its rows and so many around it that a region which leaves them is
     /// large enough.
-    fn region_filter(&mut self, plan: &Plan, buffers: &Buffers) -> Result<Vec<Step>> {
-        let halo = plan.method.region_size;
+    fn speckle_filter(&mut self, plan: &Plan, buffers: &Buffers) -> Result<Vec<Step>> {
+        let halo = plan.method.speckle_size;
         let base = Params { halo, ..params(plan, buffers, 0) };
         let l = base.level;
-        let Buffers { peaks, flags, region_parents: parents, region_sizes: sizes, .. } = buffers;
+        let Buffers { optima, flags, speckle_parents: parents, speckle_sizes: sizes, .. } = buffers;
         // What is found in a band goes to the first rows of the scratch maps.
         let scratch = |seen: &Range<u32>| 0..seen.end - seen.start;
         let bands = self.bands(&[0, l.height], |rows| {
             let seen = with_halo(rows, halo, l.height);
-            vec![peaks.bind(&seen), flags.bind(&seen), parents.bind(&scratch(&seen))]
+            vec![optima.bind(&seen), flags.bind(&seen), parents.bind(&scratch(&seen))]
         })?;
         let mut steps = Vec::new();
         for rows in bands {
@@ -313,12 +315,12 @@ impl Gpu {
                 Ok::<_, Error>(())
             };
             let segments = l.width.div_ceil(SEGMENT);
-            let runs = vec![peaks.bind(&seen), flags.bind(&seen), found(parents), found(sizes)];
-            add(Kernel::RegionRuns, there, (segments, height), runs)?;
-            let joined = || vec![peaks.bind(&seen), found(parents)];
+            let runs = vec![optima.bind(&seen), flags.bind(&seen), found(parents), found(sizes)];
+            add(Kernel::SpeckleRuns, there, (segments, height), runs)?;
+            let joined = || vec![optima.bind(&seen), found(parents)];
             if segments > 1 {
-                add(Kernel::RegionJoin, there, (segments - 1, height), joined())?;
-                add(Kernel::RegionFlatten, there, (l.width, height), vec![found(parents)])?;
+                add(Kernel::SpeckleJoin, there, (segments - 1, height), joined())?;
+                add(Kernel::SpeckleFlatten, there, (l.width, height), vec![found(parents)])?;
             }
             let spans = (0..).map(|k| 1 << k).take_while(|&span: &u32| span < height);
             for span in spans {
@@ -326,14 +328,14 @@ impl Gpu {
                     let columns = JOINED_COLUMNS.min(l.width - first_column);
                     let borders = (height - span).div_ceil(2 * span);
                     let params = Params { span, first_column, columns, ..there };
-                    add(Kernel::RegionJoin, params, (columns, borders), joined())?;
-                    add(Kernel::RegionFlatten, there, (l.width, height), vec![found(parents)])?;
+                    add(Kernel::SpeckleJoin, params, (columns, borders), joined())?;
+                    add(Kernel::SpeckleFlatten, there, (l.width, height), vec![found(parents)])?;
                 }
             }
-            add(Kernel::RegionCount, there, (l.width, height), vec![found(parents), found(sizes)])?;
+            add(Kernel::SpeckleCount, there, (l.width, height), vec![found(parents), found(sizes)])?;
             let here = Params { first_row: rows.start, rows: rows.end - rows.start, ..base };
             let bindings = vec![found(parents), found(sizes), flags.bind(&rows)];
-            add(Kernel::RegionFilter, here, (l.width, here.rows), bindings)?;
+            add(Kernel::SpeckleFilter, here, (l.width, here.rows), bindings)?;
         }
         Ok(steps)
     }

@@ -93,9 +93,9 @@ impl Gpu {
     fn map(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
         let b = &self.state().buffers;
         let (rows, words, word, bit, mask) = match map {
-            Map::Label => (&b.peaks, 2, 0, 0, 0xffff),
-            Map::Best => (&b.peaks, 2, 0, 16, 0xffff),
-            Map::Rival => (&b.peaks, 2, 1, 0, 0xffff),
+            Map::Label => (&b.optima, 2, 0, 0, 0xffff),
+            Map::Best => (&b.optima, 2, 0, 16, 0xffff),
+            Map::RunnerUp => (&b.optima, 2, 1, 0, 0xffff),
             Map::RightLabel => (&b.right_labels, 1, 0, 0, 0xffff),
             Map::RightBest => (&b.right_labels, 1, 0, 16, 0xffff),
             Map::Raw => (&b.raw, 1, 0, 0, u32::MAX),

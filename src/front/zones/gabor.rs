@@ -19,7 +19,7 @@ use rustfft::{Fft, FftPlannerScalar};
 
 use crate::front::illumination::{gaussian, smooth};
 use crate::image::Plane;
-use crate::tables::exp_neg;
+use crate::weights::exp_neg;
 
 /// The shortest wavelength, 4 / sqrt 2 pixels, squared (paper, section 3.1).
 const SHORTEST_SQUARED: usize = 8;

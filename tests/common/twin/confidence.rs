@@ -3,13 +3,13 @@ use super::fill::invalid;
 use mrfgs::maps::flag;
 use mrfgs::plan::Plan;
 
-/// Confidence of each pixel: 16 for every 8 units that the rival is behind.
+/// Confidence of each pixel: 16 for every 8 units that the runner-up is behind.
 pub fn confidence(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     for y in 0..height {
         for x in 0..width {
             let at = (x, y);
-            let lead = ((maps.rival[at] - maps.best[at]) * 16 / 8).min(255);
+            let lead = ((maps.runner_up[at] - maps.best[at]) * 16 / 8).min(255);
             maps.confidence[at] = if invalid(maps.validity[at]) { 0 } else { lead };
             if !invalid(maps.validity[at]) && i64::from(lead) < i64::from(plan.method.confidence_floor) {
                 maps.validity[at] |= i32::from(flag::LOW_CONFIDENCE);

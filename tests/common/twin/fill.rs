@@ -3,7 +3,7 @@ use mrfgs::maps::flag;
 
 /// Whether a pixel's disparity is given up before the fill.
 pub fn invalid(validity: i32) -> bool {
-    [flag::OUTSIDE, flag::OCCLUDED, flag::SMALL_REGION, flag::MASKED]
+    [flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::MASKED]
         .iter()
         .any(|&bit| validity & i32::from(bit) != 0)
 }

@@ -10,29 +10,29 @@ pub mod change;
 pub mod confidence;
 pub mod cost;
 pub mod dependency;
-pub mod estimate;
 pub mod evidence;
 pub mod fill;
 pub mod graph;
+pub mod label_range;
+pub mod left_right_check;
 pub mod median;
 pub mod pyramid;
-pub mod region;
 pub mod resolution;
-pub mod restrict;
+pub mod speckle_filter;
 pub mod sub_pixel;
-pub mod visibility;
+pub mod winner_takes_all;
 
 use mrfgs::backend::{Backend, Map};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::Plane;
-use mrfgs::plan::{Cut, CutRule, Plan, VolumeWidth};
+use mrfgs::plan::{Plan, Truncation, TruncationRule, VolumeWidth};
 
 /// What the finest level knows of each pixel: the plane of every [`Map`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finest {
     pub label: Plane<i32>,
     pub best: Plane<i32>,
-    pub rival: Plane<i32>,
+    pub runner_up: Plane<i32>,
     pub right_label: Plane<i32>,
     pub right_best: Plane<i32>,
     pub raw: Plane<i32>,
@@ -48,7 +48,7 @@ impl Finest {
         Self {
             label: zero(),
             best: zero(),
-            rival: zero(),
+            runner_up: zero(),
             right_label: zero(),
             right_best: zero(),
             raw: zero(),
@@ -63,7 +63,7 @@ impl Finest {
         [
             (Map::Label, &self.label),
             (Map::Best, &self.best),
-            (Map::Rival, &self.rival),
+            (Map::RunnerUp, &self.runner_up),
             (Map::RightLabel, &self.right_label),
             (Map::RightBest, &self.right_best),
             (Map::Raw, &self.raw),
@@ -100,13 +100,13 @@ pub fn most(plan: &Plan) -> u32 {
 }
 
 /// Cuts the sums `s` into a message.
-pub fn cut(s: &[i64], cut: Cut) -> Vec<u32> {
+pub fn cut(s: &[i64], cut: Truncation) -> Vec<u32> {
     let tau = i64::from(cut.tau);
     let smallest = *s.iter().min().unwrap();
     s.iter()
         .map(|&s| match cut.rule {
-            CutRule::Relative => s.min(smallest + tau) - smallest,
-            CutRule::Absolute => s.min(tau) - smallest.min(tau),
+            TruncationRule::Relative => s.min(smallest + tau) - smallest,
+            TruncationRule::Absolute => s.min(tau) - smallest.min(tau),
         })
         .map(|m| u32::try_from(m).unwrap())
         .collect()
@@ -114,12 +114,12 @@ pub fn cut(s: &[i64], cut: Cut) -> Vec<u32> {
 
 /// What a variable says to a factor: its belief less the factor's old message, and where the cut is absolute less
 /// the minimum of that.
-pub fn variable_message(belief: &[u32], old: &[u32], cut: Cut) -> Vec<i64> {
+pub fn variable_message(belief: &[u32], old: &[u32], cut: Truncation) -> Vec<i64> {
     let q: Vec<i64> = belief.iter().zip(old).map(|(&b, &m)| i64::from(b) - i64::from(m)).collect();
     assert!(q.iter().all(|&q| q >= 0), "a belief below a message that is part of it");
     match cut.rule {
-        CutRule::Relative => q,
-        CutRule::Absolute => {
+        TruncationRule::Relative => q,
+        TruncationRule::Absolute => {
             let smallest = *q.iter().min().unwrap();
             q.iter().map(|q| q - smallest).collect()
         }

@@ -1,11 +1,11 @@
 use super::Finest;
 use mrfgs::image::Pair;
 use mrfgs::maps::flag;
-use mrfgs::options::Visibility;
+use mrfgs::options::LeftRightCheck;
 use mrfgs::plan::Plan;
 
 /// Validity of each pixel by the mask and the map of the right view.
-pub fn visibility(plan: &Plan, pair: &Pair, maps: &mut Finest) {
+pub fn left_right_check(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let (width, height) = pair.size();
     for y in 0..height {
         for x in 0..width {
@@ -14,7 +14,7 @@ pub fn visibility(plan: &Plan, pair: &Pair, maps: &mut Finest) {
             let inside = right >= 0 && right < width as i64;
             let reason = if pair.left().masked[(x, y)] {
                 flag::MASKED
-            } else if plan.method.visibility == Visibility::Off {
+            } else if plan.method.left_right_check == LeftRightCheck::Off {
                 0
             } else if !inside {
                 flag::OUTSIDE

@@ -1,7 +1,7 @@
 // Runs of connected pixels within segments of a row. One invocation a segment.
 
-// label | best << 16, rival.
-@group(0) @binding(1) var<storage, read> peaks: array<vec2<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> parents: array<u32>;
 // At the first pixel of a run its length, elsewhere 0.
@@ -23,7 +23,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         if (flags[here] & VALIDITY) != 0u {
             run = NOWHERE;
         } else {
-            let label = i32(peaks[here].x & 0xffffu);
+            let label = i32(optima[here].x & 0xffffu);
             if run == NOWHERE || abs(label - last) > 1 {
                 run = here;
             }

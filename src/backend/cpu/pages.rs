@@ -8,13 +8,13 @@ use std::ops::{Deref, DerefMut};
 
 /// Values that are 0 at first, in large pages where the system has them: it hands out small ones at their first touch, one
 /// by one, and that takes longer than a match.
-pub(super) struct Zeroed<T> {
+pub(super) struct Pages<T> {
     /// `None` where there are none.
     bytes: Option<MmapMut>,
     values: PhantomData<T>,
 }
 
-impl<T: Pod> Zeroed<T> {
+impl<T: Pod> Pages<T> {
     /// `len` values.
     ///
     /// # Errors
@@ -33,7 +33,7 @@ impl<T: Pod> Zeroed<T> {
     }
 }
 
-impl<T: Pod> Deref for Zeroed<T> {
+impl<T: Pod> Deref for Pages<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
@@ -42,7 +42,7 @@ impl<T: Pod> Deref for Zeroed<T> {
     }
 }
 
-impl<T: Pod> DerefMut for Zeroed<T> {
+impl<T: Pod> DerefMut for Pages<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         self.bytes.as_mut().map_or(&mut [], |bytes| bytemuck::cast_slice_mut(bytes))
     }

@@ -1,8 +1,8 @@
-// The optimum of every pixel and its best rival. One invocation a pixel.
+// The optimum of every pixel and its best runner-up. One invocation a pixel.
 
 @group(0) @binding(1) var<storage, read> belief: array<Quad>;
-// label | best << 16, rival.
-@group(0) @binding(2) var<storage, read_write> peaks: array<vec2<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(2) var<storage, read_write> optima: array<vec2<u32>>;
 
 const NONE: u32 = 0xffffu;
 
@@ -24,10 +24,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let key = smallest(least);
     let label = i32(key & 0xffffu);
-    var rival = vec4(NONE);
+    var runner_up = vec4(NONE);
     for (var quad = 0u; quad < params.level.quads; quad++) {
         let away = abs(vec4<i32>(labels_of(quad)) - vec4(label)) > vec4(1);
-        rival = min(rival, select(vec4(NONE), load(row + place_of(quad, id.x), quad), away));
+        runner_up = min(runner_up, select(vec4(NONE), load(row + place_of(quad, id.x), quad), away));
     }
-    peaks[id.y * params.level.pixel_pitch + id.x] = vec2(u32(label) | (key & 0xffff0000u), smallest(rival));
+    optima[id.y * params.level.pixel_pitch + id.x] = vec2(u32(label) | (key & 0xffff0000u), smallest(runner_up));
 }

@@ -4,8 +4,8 @@ use mrfgs::backend::NO_LABEL;
 use mrfgs::image::Plane;
 use mrfgs::plan::Plan;
 
-/// The optimum of every pixel and its best rival.
-pub fn estimate(plan: &Plan, belief: &[u32], maps: &mut Finest) {
+/// The optimum of every pixel and its best runner-up.
+pub fn winner_takes_all(plan: &Plan, belief: &[u32], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, height, count) = (level.width, level.height, level.labels as i64);
     let optima = labels(belief, level.labels);
@@ -16,7 +16,7 @@ pub fn estimate(plan: &Plan, belief: &[u32], maps: &mut Finest) {
     };
     maps.label = Plane::from_fn(width, height, |x, y| optima[y * width + x] as i32);
     maps.best = Plane::from_fn(width, height, |x, y| smallest_of(x, y, &|step| step == 0));
-    maps.rival = Plane::from_fn(width, height, |x, y| smallest_of(x, y, &|step| step.abs() > 1));
+    maps.runner_up = Plane::from_fn(width, height, |x, y| smallest_of(x, y, &|step| step.abs() > 1));
 }
 
 /// The map of the right view.

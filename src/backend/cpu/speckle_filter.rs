@@ -1,11 +1,11 @@
-//! Regions too small to be trusted: see [`crate::backend::Stage::RegionFilter`].
+//! Regions too small to be trusted: see [`crate::backend::Stage::SpeckleFilter`].
 
 use super::Finest;
 use crate::maps::flag;
 
 pub(super) fn run(size: usize, maps: &mut Finest) {
-    let Finest { peaks, validity, .. } = maps;
-    let (width, height) = peaks.size();
+    let Finest { optima, validity, .. } = maps;
+    let (width, height) = optima.size();
     let flags = validity.data_mut();
     // With a border of what belongs to no region, so that every pixel has four neighbours.
     let pitch = width + 2;
@@ -13,7 +13,7 @@ pub(super) fn run(size: usize, maps: &mut Finest) {
     let mut seen = vec![true; labels.len()];
     for y in 0..height {
         let inside = (y + 1) * pitch + 1..(y + 2) * pitch - 1;
-        let pixels = peaks.row(y).iter().zip(&flags[y * width..]);
+        let pixels = optima.row(y).iter().zip(&flags[y * width..]);
         for ((label, seen), (peak, &flags)) in
             labels[inside.clone()].iter_mut().zip(&mut seen[inside]).zip(pixels)
         {
@@ -40,7 +40,7 @@ pub(super) fn run(size: usize, maps: &mut Finest) {
         }
         if region.len() < size {
             for &at in &region {
-                flags[(at / pitch - 1) * width + at % pitch - 1] |= flag::SMALL_REGION;
+                flags[(at / pitch - 1) * width + at % pitch - 1] |= flag::SPECKLE;
             }
         }
     }

@@ -16,14 +16,14 @@ pub const MIN_MATCHES: usize = 10;
 /// An interval of labels for each pixel of one level. Labels are disparities in pixels of that level, not indices:
 /// subtract the level's smallest label for those.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Support {
+pub struct LabelRanges {
     /// Smallest label of each pixel.
     pub low: Plane<i32>,
     /// Largest label of each pixel, not below `low`.
     pub high: Plane<i32>,
 }
 
-/// The support at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded outwards and
+/// The label_range at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded outwards and
 /// clipped to `range`. `k` is not negative; the paper's is 1.
 ///
 /// `zones` is a map of zone indices and their number. The full range remains to a pixel whose index is out of range,
@@ -33,7 +33,7 @@ pub struct Support {
 /// # Panics
 /// When a match lies outside the map of zones.
 #[must_use]
-pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match], k: f64) -> Support {
+pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match], k: f64) -> LabelRanges {
     let (map, count) = zones;
     // Number, sum and sum of squares: integers, so that their order is of no consequence.
     let mut sums = vec![(0_i64, 0_i64, 0_i64); count];
@@ -62,28 +62,28 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match
         })
         .collect();
     let interval = |zone: &u8| intervals.get(usize::from(*zone)).copied().unwrap_or((range.min, range.max));
-    Support { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
+    LabelRanges { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
 }
 
 /// First and last label index of each pixel, at every level of `plan`, as backends take them.
 #[must_use]
 pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 2]>> {
-    let mut support = zonal(plan.range, (&zones.map, zones.count), matches, plan.method.support);
+    let mut label_range = zonal(plan.range, (&zones.map, zones.count), matches, plan.method.zone_sigmas);
     let mut levels = Vec::new();
     for level in &plan.levels {
         if !levels.is_empty() {
-            support = support.coarser();
+            label_range = label_range.coarser();
         }
         let index = |label: i32| (label - level.min).clamp(0, level.labels as i32 - 1) as u16;
         levels.push(Plane::from_fn(level.width, level.height, |x, y| {
-            [index(support.low[(x, y)]), index(support.high[(x, y)])]
+            [index(label_range.low[(x, y)]), index(label_range.high[(x, y)])]
         }));
     }
     levels
 }
 
-impl Support {
-    /// The support at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2 children, in coarse
+impl LabelRanges {
+    /// The label_range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2 children, in coarse
     /// labels (floor(low / 2) to ceil(high / 2)).
     #[must_use]
     pub fn coarser(&self) -> Self {

@@ -13,7 +13,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let pitch = params.level.pixel_pitch;
     let seen = params.first_row + id.y - halo_start(params.halo);
     let root = parents[seen * pitch + id.x];
-    if root != NOWHERE && sizes[root] < params.region_size {
-        flags[id.y * pitch + id.x] |= SMALL_REGION;
+    if root != NOWHERE && sizes[root] < params.speckle_size {
+        flags[id.y * pitch + id.x] |= SPECKLE;
     }
 }

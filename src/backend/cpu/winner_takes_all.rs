@@ -1,17 +1,17 @@
-//! The optimum of the beliefs: see [`crate::backend::Stage::Estimate`], [`crate::backend::Stage::RightView`] and
+//! The optimum of the beliefs: see [`crate::backend::Stage::WinnerTakesAll`], [`crate::backend::Stage::RightView`] and
 //! [`crate::backend::Stage::Change`].
 
 use super::units::{Units, smallest};
-use super::{Finest, Peak};
+use super::{Finest, Optimum};
 use crate::plan::{LABEL_BLOCK, LevelPlan, Plan};
 use rayon::prelude::*;
 
 pub(super) fn run<U: Units>(plan: &Plan, belief: &[U], maps: &mut Finest) {
     let level = &plan.levels[0];
-    let peaks = maps.peaks.data_mut().par_chunks_mut(level.width);
-    peaks
+    let optima = maps.optima.data_mut().par_chunks_mut(level.width);
+    optima
         .zip(belief.par_chunks_exact(level.width * level.stride))
-        .for_each(|(peaks, beliefs)| peak_row(level, beliefs, peaks));
+        .for_each(|(optima, beliefs)| peak_row(level, beliefs, optima));
 }
 
 #[pulp::with_simd(peak_row = pulp::Arch::new())]
@@ -20,9 +20,9 @@ fn peak_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,
     level: &'a LevelPlan,
     beliefs: &'a [U],
-    peaks: &'a mut [Peak],
+    optima: &'a mut [Optimum],
 ) {
-    for (peak, belief) in peaks.iter_mut().zip(beliefs.chunks_exact(level.stride)) {
+    for (peak, belief) in optima.iter_mut().zip(beliefs.chunks_exact(level.stride)) {
         *peak = peak_of(&belief[..level.labels]);
     }
 }
@@ -77,16 +77,16 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
 }
 
 #[inline(always)]
-fn peak_of<U: Units>(belief: &[U]) -> Peak {
+fn peak_of<U: Units>(belief: &[U]) -> Optimum {
     let (label, best) = optimum(belief);
     let below = &belief[..label.saturating_sub(1)];
     let above = belief.get(label + 2..).unwrap_or_default();
-    let rival = if below.is_empty() && above.is_empty() {
+    let runner_up = if below.is_empty() && above.is_empty() {
         u16::MAX
     } else {
         smallest(below).min(smallest(above)).into()
     };
-    Peak { label: label as u16, best: best.into(), rival }
+    Optimum { label: label as u16, best: best.into(), runner_up }
 }
 
 /// Index and value of the smallest belief, the lowest index on ties.

@@ -1,22 +1,22 @@
-//! What the right view says of each pixel: see [`crate::backend::Stage::Visibility`].
+//! What the right view says of each pixel: see [`crate::backend::Stage::LeftRightCheck`].
 
 use super::Finest;
 use crate::image::Image;
 use crate::maps::flag;
-use crate::options::Visibility;
+use crate::options::LeftRightCheck;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
 pub(super) fn run(plan: &Plan, left: &Image, maps: &mut Finest) {
     let (width, min) = (plan.levels[0].width, i64::from(plan.range.min));
-    let Finest { peaks, right, validity, .. } = maps;
+    let Finest { optima, right, validity, .. } = maps;
     validity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, flags) in row.iter_mut().enumerate() {
-            let label = peaks[(x, y)].label;
+            let label = optima[(x, y)].label;
             let xr = x as i64 - min - i64::from(label);
             *flags = if left.masked[(x, y)] {
                 flag::MASKED
-            } else if plan.method.visibility == Visibility::Off {
+            } else if plan.method.left_right_check == LeftRightCheck::Off {
                 0
             } else if xr < 0 || xr >= width as i64 {
                 flag::OUTSIDE

@@ -5,7 +5,7 @@ use mrfgs::plan::Plan;
 
 /// Flags small regions. Every pixel starts as its own region; regions that touch take the smaller number until
 /// nothing changes.
-pub fn region_filter(plan: &Plan, maps: &mut Finest) {
+pub fn speckle_filter(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     let mut region = Plane::from_fn(width, height, |x, y| y * width + x);
     let connected = |a: (usize, usize), b: (usize, usize)| {
@@ -34,8 +34,8 @@ pub fn region_filter(plan: &Plan, maps: &mut Finest) {
         members[r] += 1;
     }
     for (validity, &r) in maps.validity.data_mut().iter_mut().zip(region.data()) {
-        if *validity == 0 && members[r] < plan.method.region_size {
-            *validity |= i32::from(flag::SMALL_REGION);
+        if *validity == 0 && members[r] < plan.method.speckle_size {
+            *validity |= i32::from(flag::SPECKLE);
         }
     }
 }

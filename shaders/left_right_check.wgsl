@@ -1,7 +1,7 @@
 // What the right view says of every pixel. One invocation a pixel.
 
-// label | best << 16, rival.
-@group(0) @binding(1) var<storage, read> peaks: array<vec2<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 // label | belief << 16.
 @group(0) @binding(2) var<storage, read> right_labels: array<u32>;
 @group(0) @binding(3) var<storage, read> left: array<vec4<u32>>;
@@ -17,8 +17,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var reason = 0u;
     if left[row + id.x].z != 0u {
         reason = MASKED;
-    } else if params.visibility == 1u {
-        let label = i32(peaks[row + id.x].x & 0xffffu);
+    } else if params.left_right_check == 1u {
+        let label = i32(optima[row + id.x].x & 0xffffu);
         let x = i32(id.x) - params.level.low - label;
         if x < 0 || x >= i32(params.level.width) {
             reason = OUTSIDE;

@@ -1,8 +1,8 @@
 // Joins the regions on the two sides of borders: between the segments of a row, or between blocks of rows. One invocation
 // a pixel at such a border.
 
-// label | best << 16, rival.
-@group(0) @binding(1) var<storage, read> peaks: array<vec2<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> parents: array<atomic<u32>>;
 
 fn root(start: u32) -> u32 {
@@ -20,7 +20,7 @@ fn connected(a: u32, b: u32) -> bool {
     if atomicLoad(&parents[a]) == NOWHERE || atomicLoad(&parents[b]) == NOWHERE {
         return false;
     }
-    return abs(i32(peaks[a].x & 0xffffu) - i32(peaks[b].x & 0xffffu)) <= 1;
+    return abs(i32(optima[a].x & 0xffffu) - i32(optima[b].x & 0xffffu)) <= 1;
 }
 
 @compute @workgroup_size(64)

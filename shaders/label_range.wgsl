@@ -1,9 +1,9 @@
-// Costs outside the support of their pixel become the highest there is. One invocation a pixel and quad of labels.
+// Costs outside the label_range of their pixel become the highest there is. One invocation a pixel and quad of labels.
 
 // 8-bit at level 0, 16-bit at coarser ones.
 @group(0) @binding(1) var<storage, read_write> cost: array<u32>;
 // First and last label of each pixel, first | last << 16.
-@group(0) @binding(2) var<storage, read> support: array<u32>;
+@group(0) @binding(2) var<storage, read> label_range: array<u32>;
 
 const COST_MAX: u32 = 254u;
 
@@ -15,7 +15,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if quad >= params.level.quads || id.y >= params.rows {
         return;
     }
-    let ends = support[id.y * params.level.pixel_pitch + x];
+    let ends = label_range[id.y * params.level.pixel_pitch + x];
     let labels = labels_of(quad);
     let inside = (labels >= vec4(ends & 0xffffu)) & (labels <= vec4(ends >> 16u));
     if all(inside) {
