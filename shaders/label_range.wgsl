@@ -1,4 +1,4 @@
-// Costs outside the label_range of their pixel become the highest there is. One invocation a pixel and quad of labels.
+// Costs outside the label range of their pixel become the highest there is. One invocation a pixel and quad of labels.
 
 // 8-bit at level 0, 16-bit at coarser ones.
 @group(0) @binding(1) var<storage, read_write> cost: array<u32>;

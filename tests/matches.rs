@@ -330,7 +330,7 @@ fn a_coarse_support_is_the_hull_of_its_childrens() {
     }
 }
 
-/// Shares of the true disparities inside the label_range and of the labels left, in percent.
+/// Shares of the true disparities inside the label range and of the labels left, in percent.
 fn supported(case: &Case, k: f64) -> (f64, f64) {
     let zones = crude_zones(case.pair.left());
     let found = matches::find(&case.pair, Some((&zones, 15)), Some(case.range));

@@ -37,7 +37,7 @@ pub(super) struct MoreOutputs {
     /// small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted
     #[arg(long, value_name = "FILE")]
     validity: Option<PathBuf>,
-    /// Writes every step as a picture or a small table into a new folder: corrected images, zones, matches, label_ranges, costs,
+    /// Writes every step as a picture or a small table into a new folder: corrected images, zones, matches, label ranges, costs,
     /// graphs, a map for each level, the change of each iteration. Takes a multiple of the time
     #[arg(long, value_name = "DIR")]
     pub(super) intermediates: Option<PathBuf>,

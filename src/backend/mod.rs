@@ -114,7 +114,7 @@ pub enum Stage {
     /// low-pass their binomial mean over the fine labels 2 z - 2 ..= 2 z + 2, labels clamped to the fine range, rounded as
     /// (sum + 8) >> 4; with the minimum, the smallest at those labels of 2 z - 1 ..= 2 z + 1 that are in the range.
     Pyramid(usize),
-    /// Costs of a level at labels outside the pixel's label_range, as given to [`Backend::label_range`], become the highest there
+    /// Costs of a level at labels outside the pixel's label range, as given to [`Backend::label_range`], become the highest there
     /// is: [`crate::plan::COST_MAX`] (256 times that at coarser levels).
     LabelRange(usize),
     /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
@@ -286,7 +286,7 @@ pub trait Backend {
     /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
 
-    /// Takes the label_range of every pixel for [`Stage::LabelRange`], once the pair is prepared: at each level the first and the
+    /// Takes the label range of every pixel for [`Stage::LabelRange`], once the pair is prepared: at each level the first and the
     /// last label index that it may have. Only for plans whose method has a [`crate::options::Method::zone_sigmas`].
     fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()>;
 

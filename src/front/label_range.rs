@@ -23,7 +23,7 @@ pub struct LabelRanges {
     pub high: Plane<i32>,
 }
 
-/// The label_range at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded outwards and
+/// The label range at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded outwards and
 /// clipped to `range`. `k` is not negative; the paper's is 1.
 ///
 /// `zones` is a map of zone indices and their number. The full range remains to a pixel whose index is out of range,
@@ -83,7 +83,7 @@ pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 
 }
 
 impl LabelRanges {
-    /// The label_range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2 children, in coarse
+    /// The label range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2 children, in coarse
     /// labels (floor(low / 2) to ceil(high / 2)).
     #[must_use]
     pub fn coarser(&self) -> Self {

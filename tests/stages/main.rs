@@ -228,7 +228,7 @@ fn label_range() {
             backend.run(Stage::LabelRange(z)).unwrap();
             let expected = twin::label_range::label_range(&plan, z, label_range, &cost);
             same(&plan, backend, Volume::Cost(z), &expected)?;
-            // Control: the label_range does matter.
+            // Control: the label range does matter.
             if expected != cost {
                 let mut other = label_range.clone();
                 other.data_mut().fill([0, plan.levels[z].labels as u16 - 1]);

@@ -77,7 +77,7 @@ fn speckle_filter() {
         maps
     };
     on_all(Stage::SpeckleFilter, 40, change, input, |plan, _, maps| {
-        twin::speckle_filter::speckle_filter(plan, maps)
+        twin::speckle_filter::speckle_filter(plan, maps);
     });
 }
 

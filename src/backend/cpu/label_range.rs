@@ -1,4 +1,4 @@
-//! Costs within the pixels' label_range alone: see [`crate::backend::Stage::LabelRange`].
+//! Costs within the pixels' label range alone: see [`crate::backend::Stage::LabelRange`].
 
 use crate::image::Plane;
 use crate::plan::LevelPlan;

@@ -16,7 +16,7 @@
 //! | `dependency` | 1 + 3 + 3 | 15 | 50 | beliefs of three members, all of it again after the minimum |
 //! | `belief` | 1 + 3 + 1 + 1 | 6 | 20 | nothing but the table of the graph |
 //! | `resolution` (level 1, a fine label) | 1 + 1 + 1 + 3/8 | 17 | 100 | words of four labels, once a label and once more after the minimum |
-//! | `winner_takes_all` | 1 | 2 | 15 | the beliefs, for the runner_up |
+//! | `winner_takes_all` | 1 | 2 | 15 | the beliefs, for the runner-up |
 //! | `right_view` | 1 | 4 | 20 | words of four labels of which it wants one |
 //! | `median` | 28 a pixel | 3,000 a pixel and pass | 2,500 a pixel and pass | the 105 places, in up to nine passes |
 //!
