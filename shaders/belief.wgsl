@@ -1,5 +1,15 @@
 // Beliefs: evidence plus all messages. One invocation a pixel and block of 16 labels.
 
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // Largest belief: a larger sum counts as this one.
+    most: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> evidence: array<u32>;
 @group(0) @binding(2) var<storage, read> dependency: array<Quad>;
 // Where each pixel's entries start in the transposed table, and one more a row.
@@ -10,10 +20,7 @@
 @group(0) @binding(6) var<storage, read> up: array<Quad>;
 @group(0) @binding(7) var<storage, read_write> belief: array<Quad>;
 
-const RADIUS: u32 = 3u;
-const QUADS: u32 = 4u;
-
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     let quads = params.level.quads;
@@ -22,7 +29,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let block = id.x / width;
     let x = id.x - block * width;
     let first = block * QUADS;
-    if block >= blocks || id.y >= params.rows {
+    if block >= blocks || id.y >= params.band.rows {
         return;
     }
     let row = id.y * params.level.pitch;
@@ -37,7 +44,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             sums[i] += unpack(up[at]);
         }
     }
-    let y = params.first_row + id.y;
+    let y = params.band.first_row + id.y;
     let top = halo_start(RADIUS);
     let start = id.y * params.level.starts_pitch + x;
     // The bound entries are those of the bound rows.
@@ -52,7 +59,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
     }
     for (var i = 0u; i < QUADS; i++) {
-        let sum = min(sums[i], vec4(params.belief_most));
+        let sum = min(sums[i], vec4(params.most));
         belief[row + place_of(first + i, x)] = pack(select(vec4(MOST), sum, are_labels(first + i)));
     }
 }

@@ -1,13 +1,25 @@
-// The label map, and per pixel the squared difference from the one before. One invocation a pixel.
+// The label map of level 0 and how much it changed: `labels`, then `sums`.
+
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 
 @group(0) @binding(1) var<storage, read> belief: array<Quad>;
-@group(0) @binding(2) var<storage, read_write> labels: array<u32>;
+@group(0) @binding(2) var<storage, read_write> label_map: array<u32>;
 @group(0) @binding(3) var<storage, read_write> squares: array<u32>;
+// Lower and upper half.
+@group(0) @binding(4) var<storage, read_write> row_sums: array<vec2<u32>>;
 
-@compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+// The label map, and per pixel the squared difference from the one before. One invocation a pixel.
+@compute @workgroup_size(GROUP)
+fn labels(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let first = id.y * params.level.pitch;
@@ -18,7 +30,22 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let label = smallest(least) & 0xffffu;
     let pixel = id.y * params.level.pixel_pitch + id.x;
-    let difference = abs(i32(label) - i32(labels[pixel]));
-    labels[pixel] = label;
+    let difference = abs(i32(label) - i32(label_map[pixel]));
+    label_map[pixel] = label;
     squares[pixel] = u32(difference * difference);
+}
+
+// Sums the squared differences of each row, in 64 bits. One invocation a row.
+@compute @workgroup_size(GROUP)
+fn sums(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.band.rows || id.y > 0u {
+        return;
+    }
+    var sum = vec2<u32>();
+    for (var x = 0u; x < params.level.width; x++) {
+        let low = sum.x + squares[id.x * params.level.pixel_pitch + x];
+        sum = vec2(low, sum.y + u32(low < sum.x));
+    }
+    row_sums[params.band.first_row + id.x] = sum;
 }

@@ -1,15 +1,22 @@
 // Messages of the dependency factors. One invocation a factor. It reads old beliefs and its own old messages and
 // writes its own messages only, so flooding is exact in place.
 
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // What disagreement costs.
+    tau: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 // Codes of the neighbours, four a word.
 @group(0) @binding(1) var<storage, read> members: array<u32>;
 @group(0) @binding(2) var<storage, read> belief: array<Quad>;
 @group(0) @binding(3) var<storage, read_write> messages: array<Quad>;
 
-const NO_MEMBER: u32 = 0xffu;
 const ABSENT: u32 = 0xffffffffu;
-const WINDOW: u32 = 7u;
-const RADIUS: u32 = 3u;
 
 // A member's message to the factor: its belief less the factor's old message, less its minimum where the cut wants that.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
@@ -20,14 +27,14 @@ fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
     return q;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let quads = params.level.quads;
-    let y = params.first_row + id.y;
+    let y = params.band.first_row + id.y;
     let top = halo_start(RADIUS);
     let width = params.level.width;
     // First quad of the factor's messages, and of each member's belief.

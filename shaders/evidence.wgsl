@@ -1,27 +1,38 @@
 // Evidence from cost, and beliefs that start from it. One invocation a pixel.
 
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    multiplier: u32,
+    limit: u32,
+    up: u32,
+    down: u32,
+    cap: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 // 8-bit at level 0, 16-bit at coarser ones.
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> evidence: array<u32>;
 @group(0) @binding(3) var<storage, read_write> belief: array<Quad>;
 
-const PADDING: u32 = 255u;
-
 // Costs of a quad in 1/256 cost units; padding is above every cost.
 fn load_cost(row: u32, index: u32, quad: u32) -> vec4<u32> {
     var c: vec4<u32>;
     if FINE_NARROW {
-        c = unpack_narrow(cost[row + index]) << vec4(8u);
+        c = unpack_narrow(cost[row + index]) << vec4(COST_FRACTION_BITS);
     } else {
         c = unpack_wide(vec2(cost[row + 2u * index], cost[row + 2u * index + 1u]));
     }
     return select(vec4(1u << 16u), c, are_labels(quad));
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let quads = params.level.quads;
@@ -34,10 +45,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let base = vec4(smallest(least));
     for (var quad = 0u; quad < quads; quad++) {
         let index = place_of(quad, id.x);
-        let difference = min(load_cost(row, index, quad) - base, vec4(params.evidence_limit));
-        let product = ((difference << vec4(params.evidence_up)) * params.evidence_multiplier) >> vec4(16u);
-        let scaled = (product + vec4((1u << params.evidence_down) >> 1u)) >> vec4(params.evidence_down);
-        let e = min(scaled, vec4(params.evidence_cap));
+        let difference = min(load_cost(row, index, quad) - base, vec4(params.limit));
+        let product = ((difference << vec4(params.up)) * params.multiplier) >> vec4(16u);
+        let scaled = (product + vec4((1u << params.down) >> 1u)) >> vec4(params.down);
+        let e = min(scaled, vec4(params.cap));
         evidence[id.y * pitch + index] = pack_narrow(select(vec4(PADDING), e, are_labels(quad)));
         belief[id.y * pitch + index] = pack(select(vec4(MOST), e, are_labels(quad)));
     }

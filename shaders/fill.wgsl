@@ -1,21 +1,75 @@
-// The farther of the two nearest valid disparities for what is invalid. One invocation a pixel; those whose row takes its
-// values from outside the source rows have another dispatch.
+// Fills what is invalid from the nearest valid pixels: `rows` finds the rows that have one, `sources` the row that each row
+// takes its values from, and `fill` fills.
+
+#import band maps
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // Rows of the map that `fill` takes values from.
+    source_first_row: u32,
+    source_rows: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 
 @group(0) @binding(1) var<storage, read> disparity: array<i32>;
 @group(0) @binding(2) var<storage, read> flags: array<u32>;
 @group(0) @binding(3) var<storage, read> source_disparity: array<i32>;
 @group(0) @binding(4) var<storage, read> source_flags: array<u32>;
-@group(0) @binding(5) var<storage, read> sources: array<u32>;
-@group(0) @binding(6) var<storage, read_write> filled_disparity: array<i32>;
-@group(0) @binding(7) var<storage, read_write> filled_flags: array<u32>;
+@group(0) @binding(5) var<storage, read_write> filled_disparity: array<i32>;
+@group(0) @binding(6) var<storage, read_write> filled_flags: array<u32>;
+// Of every row: whether it holds a valid pixel, 1 or 0, and the row that it takes its values from.
+@group(0) @binding(7) var<storage, read_write> is_known: array<u32>;
+@group(0) @binding(8) var<storage, read_write> source_of: array<u32>;
 
-@compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+// Whether each row holds any valid pixel. One invocation a row.
+@compute @workgroup_size(GROUP)
+fn rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.band.rows || id.y > 0u {
         return;
     }
-    let source = sources[params.first_row + id.y];
+    var x = 0u;
+    while x < params.level.width && !is_valid(flags[id.x * params.level.pixel_pitch + x]) {
+        x++;
+    }
+    is_known[params.band.first_row + id.x] = u32(x < params.level.width);
+}
+
+// The row that each row takes its values from: the nearest that holds a valid pixel, the upper of two; itself where
+// none does. One invocation a row.
+@compute @workgroup_size(GROUP)
+fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let y = id.x;
+    let height = params.level.height;
+    if y >= height || id.y > 0u {
+        return;
+    }
+    var source = y;
+    for (var step = 0u; step < height; step++) {
+        if step <= y && is_known[y - step] == 1u {
+            source = y - step;
+            break;
+        }
+        if y + step < height && is_known[y + step] == 1u {
+            source = y + step;
+            break;
+        }
+    }
+    source_of[y] = source;
+}
+
+// The farther of the two nearest valid disparities for what is invalid. One invocation a pixel; those whose row takes its
+// values from outside the source rows have another dispatch.
+@compute @workgroup_size(GROUP)
+fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.level.width || id.y >= params.band.rows {
+        return;
+    }
+    let source = source_of[params.band.first_row + id.y];
     if source < params.source_first_row || source >= params.source_first_row + params.source_rows {
         return;
     }

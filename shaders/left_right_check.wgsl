@@ -1,5 +1,15 @@
 // What the right view says of every pixel. One invocation a pixel.
 
+#import band maps
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // 1, or 0 to flag masked pixels alone.
+    is_on: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 // label | best << 16, runner-up.
 @group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 // label | belief << 16.
@@ -7,17 +17,17 @@
 @group(0) @binding(3) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read_write> flags: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let row = id.y * params.level.pixel_pitch;
     var reason = 0u;
     if left[row + id.x].z != 0u {
         reason = MASKED;
-    } else if params.left_right_check == 1u {
+    } else if params.is_on == 1u {
         let label = i32(optima[row + id.x].x & 0xffffu);
         let x = i32(id.x) - params.level.low - label;
         if x < 0 || x >= i32(params.level.width) {

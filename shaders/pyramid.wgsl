@@ -1,6 +1,17 @@
 // Cost of a level from the next finer one: low-pass in x and y, then low-pass or minimum in d. One invocation a
 // coarse pixel and pair of coarse labels, which share the fine labels between them.
 
+#import band volume
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    @align(16) fine: Level,
+    // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
+    @align(16) label_offset: i32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 // 8-bit at level 0, 16-bit at coarser ones.
 @group(0) @binding(1) var<storage, read> fine_cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> cost: array<u32>;
@@ -8,7 +19,7 @@
 // The binomial mean over x and y around twice (x, y) of the fine cost of the label with this index, clamped.
 fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
     let label = u32(clamp(index, 0, i32(params.fine.labels) - 1));
-    let top = max(2 * params.first_row, 2u) - 2u;
+    let top = max(2 * params.band.first_row, 2u) - 2u;
     let words = select(2u, 1u, FINE_NARROW);
     let pitch = params.fine.pitch * words;
     var sum = 128u;
@@ -31,15 +42,15 @@ fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
 
 var<private> WEIGHTS: array<u32, 5> = array(1u, 4u, 6u, 4u, 1u);
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     let quad = id.x / 2u / params.level.width;
     let x = id.x / 2u - quad * params.level.width;
-    if quad >= params.level.quads || id.y >= params.rows {
+    if quad >= params.level.quads || id.y >= params.band.rows {
         return;
     }
-    let y = params.first_row + id.y;
+    let y = params.band.first_row + id.y;
     // Smoothed costs at the fine labels from two below the first coarse label to two above the second.
     let base = i32(8u * quad + 4u * (id.x % 2u)) + params.label_offset - 2;
     var s: array<u32, 7>;

@@ -2,6 +2,19 @@
 // coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster order.
 // Where no label agrees, sums are infinite: the largest value, at which they saturate.
 
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    @align(16) fine: Level,
+    // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
+    @align(16) label_offset: i32,
+    // What disagreement costs.
+    tau: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> fine_belief: array<u32>;
 @group(0) @binding(2) var<storage, read> coarse_belief: array<u32>;
 @group(0) @binding(3) var<storage, read_write> down: array<u32>;
@@ -106,10 +119,10 @@ fn emit_down(index: i32, sums: vec4<u32>, least: vec4<u32>) {
     }
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let fine = params.fine;
@@ -117,7 +130,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     // The bound rows of the finer level start at twice the band's first row.
     let y = 2u * id.y;
     let right = x + 1u < fine.width;
-    let below = 2u * params.first_row + y + 1u < fine.height;
+    let below = 2u * params.band.first_row + y + 1u < fine.height;
     exists = vec4(true, right, below, right && below);
     let rows = vec4(y) + select(vec4<u32>(), vec4(0u, 0u, 1u, 1u), exists);
     let columns = vec4(x) + select(vec4<u32>(), vec4(0u, 1u, 0u, 1u), exists);

@@ -1,13 +1,24 @@
 // The map of the right view, read off the same beliefs of the columns that count. One invocation a right pixel.
 
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // The columns of the left view that count.
+    first_column: u32,
+    columns: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> belief: array<u32>;
 // label | belief << 16, all bits set where no left pixel projects.
 @group(0) @binding(2) var<storage, read_write> labels: array<u32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let row = id.y * params.level.pitch * QUAD_WORDS;

@@ -1,19 +1,173 @@
-// Flags the pixels of small regions. One invocation a pixel of the band.
+// Flags the pixels of small regions: `runs`, then `join` and `flatten` in turns, then `count` and `flag`.
+//
+// Regions are found by union-find (after Playne and Hawick 2018): every pixel of a region points at a smaller place of it
+// until it points at the root, which points at itself. First each row's segments get their runs, then the segments of
+// a row are joined, then ever higher blocks of rows; in between all pointers are made to lead straight to their
+// roots. What is joined in one go are two blocks along one border, so a chain never gets longer than that border has
+// pixels on its two sides: this bounds the loops.
+//
+// Places count from the first row of the rows seen, the band and as many rows around it as a region may be high
+// before it is large enough.
 
-@group(0) @binding(1) var<storage, read> parents: array<u32>;
-@group(0) @binding(2) var<storage, read> sizes: array<u32>;
-@group(0) @binding(3) var<storage, read_write> flags: array<u32>;
+#import band maps
 
-@compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // Rows around the band that the stage sees.
+    halo: u32,
+    // Rows of the blocks that are joined, 0 to join the segments of each row, and the columns to join them in.
+    span: u32,
+    first_column: u32,
+    columns: u32,
+    // Regions of fewer pixels are small.
+    size: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+
+// label | best << 16, runner-up.
+@group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read_write> flags: array<u32>;
+@group(0) @binding(3) var<storage, read_write> parents: array<atomic<u32>>;
+// At the first pixel of a run its length, elsewhere 0; in the end at each root the pixels of its region.
+@group(0) @binding(4) var<storage, read_write> sizes: array<atomic<u32>>;
+
+// A pixel that is in no region.
+const NOWHERE: u32 = 0xffffffffu;
+
+// Runs of connected pixels within segments of a row. One invocation a segment.
+@compute @workgroup_size(GROUP)
+fn runs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    let start = id.x * SEGMENT;
+    if start >= params.level.width || id.y >= params.band.rows {
+        return;
+    }
+    let row = id.y * params.level.pixel_pitch;
+    var run = NOWHERE;
+    var length = 0u;
+    var last = 0;
+    for (var x = start; x < min(start + SEGMENT, params.level.width); x++) {
+        let here = row + x;
+        atomicStore(&sizes[here], 0u);
+        if (flags[here] & VALIDITY) != 0u {
+            run = NOWHERE;
+        } else {
+            let label = i32(optima[here].x & 0xffffu);
+            if run == NOWHERE || abs(label - last) > 1 {
+                run = here;
+                length = 0u;
+            }
+            length++;
+            atomicStore(&sizes[run], length);
+            last = label;
+        }
+        atomicStore(&parents[here], run);
+    }
+}
+
+// The root of the region that holds the pixel at `start`.
+fn root(start: u32) -> u32 {
+    var here = start;
+    var next = atomicLoad(&parents[here]);
+    while next != here {
+        here = next;
+        next = atomicLoad(&parents[here]);
+    }
+    return here;
+}
+
+// Whether two neighbours are in a region, and in the same one.
+fn connected(a: u32, b: u32) -> bool {
+    if atomicLoad(&parents[a]) == NOWHERE || atomicLoad(&parents[b]) == NOWHERE {
+        return false;
+    }
+    return abs(i32(optima[a].x & 0xffffu) - i32(optima[b].x & 0xffffu)) <= 1;
+}
+
+// Joins the regions on the two sides of borders: between the segments of a row, or between blocks of rows. One invocation
+// a pixel at such a border.
+@compute @workgroup_size(GROUP)
+fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let across = params.span == 0u;
+    let x = select(params.first_column + id.x, SEGMENT * (id.x + 1u), across);
+    let y = select(params.span * (2u * id.y + 1u), id.y, across);
+    if x >= params.level.width || y >= params.band.rows || (!across && id.x >= params.columns) {
+        return;
+    }
+    let here = y * params.level.pixel_pitch + x;
+    let other = here - select(params.level.pixel_pitch, 1u, across);
+    if !connected(here, other) {
+        return;
+    }
+    // Where the pixels before are joined in the same way, they see to it.
+    if !across && id.x > 0u
+        && atomicLoad(&parents[here - 1u]) == atomicLoad(&parents[here])
+        && atomicLoad(&parents[other - 1u]) == atomicLoad(&parents[other])
+        && connected(here - 1u, other - 1u) {
+        return;
+    }
+    var a = root(here);
+    var b = root(other);
+    while a != b {
+        let larger = max(a, b);
+        let smaller = min(a, b);
+        let before = atomicMin(&parents[larger], smaller);
+        if before == larger {
+            return;
+        }
+        // Somebody else had given it a parent: those two belong together as well.
+        a = root(before);
+        b = root(smaller);
+    }
+}
+
+// Makes every pixel point at its root. One invocation a pixel.
+@compute @workgroup_size(GROUP)
+fn flatten(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.level.width || id.y >= params.band.rows {
+        return;
+    }
+    let start = id.y * params.level.pixel_pitch + id.x;
+    let parent = atomicLoad(&parents[start]);
+    if parent != NOWHERE {
+        // Roots stay roots meanwhile, so a pointer that others follow leads there whether they see it old or new.
+        atomicStore(&parents[start], root(parent));
+    }
+}
+
+// Adds the lengths of all runs to the sizes at their roots. One invocation a pixel.
+@compute @workgroup_size(GROUP)
+fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.level.width || id.y >= params.band.rows {
+        return;
+    }
+    let here = id.y * params.level.pixel_pitch + id.x;
+    let to = atomicLoad(&parents[here]);
+    // Roots begin a run and have its length already; only they are added to.
+    if to != NOWHERE && to != here {
+        let length = atomicLoad(&sizes[here]);
+        if length > 0u {
+            atomicAdd(&sizes[to], length);
+        }
+    }
+}
+
+// Flags the pixels of small regions. One invocation a pixel of the band.
+@compute @workgroup_size(GROUP)
+fn flag(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let pitch = params.level.pixel_pitch;
-    let seen = params.first_row + id.y - halo_start(params.halo);
-    let root = parents[seen * pitch + id.x];
-    if root != NOWHERE && sizes[root] < params.speckle_size {
+    let seen = params.band.first_row + id.y - halo_start(params.halo);
+    let at = atomicLoad(&parents[seen * pitch + id.x]);
+    if at != NOWHERE && atomicLoad(&sizes[at]) < params.size {
         flags[id.y * pitch + id.x] |= SPECKLE;
     }
 }

@@ -1,25 +1,35 @@
 // Every pixel's disparity: its label, and how far it is above that by the matching cost around it. One invocation a
 // pixel.
 
+#import band volume maps
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    // 1, or 0 to leave the disparity at its label.
+    is_on: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
 // label | best << 16, runner-up.
 @group(0) @binding(2) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read_write> raw: array<i32>;
 @group(0) @binding(4) var<storage, read_write> disparity: array<i32>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let pitch = params.level.pixel_pitch;
     let top = i32(halo_start(1u));
     let x = i32(id.x);
-    let y = i32(params.first_row + id.y);
+    let y = i32(params.band.first_row + id.y);
     let label = i32(optima[u32(y - top) * pitch + id.x].x & 0xffffu);
     var offset = 0;
-    if params.sub_pixel == 1u && label > 0 && label + 1 < i32(params.level.labels) {
+    if params.is_on == 1u && label > 0 && label + 1 < i32(params.level.labels) {
         var sums = vec3<i32>();
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
             for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {

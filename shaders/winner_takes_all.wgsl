@@ -1,19 +1,25 @@
 // The optimum of every pixel and its best runner-up. One invocation a pixel.
 
+#import band volume messages
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> belief: array<Quad>;
 // label | best << 16, runner-up.
 @group(0) @binding(2) var<storage, read_write> optima: array<vec2<u32>>;
 
-const NONE: u32 = 0xffffu;
-
 fn load(index: u32, quad: u32) -> vec4<u32> {
-    return select(vec4(NONE), unpack(belief[index]), are_labels(quad));
+    return select(vec4(NO_RUNNER_UP), unpack(belief[index]), are_labels(quad));
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
-    if id.x >= params.level.width || id.y >= params.rows {
+    if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let row = id.y * params.level.pitch;
@@ -24,10 +30,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let key = smallest(least);
     let label = i32(key & 0xffffu);
-    var runner_up = vec4(NONE);
+    var runner_up = vec4(NO_RUNNER_UP);
     for (var quad = 0u; quad < params.level.quads; quad++) {
         let away = abs(vec4<i32>(labels_of(quad)) - vec4(label)) > vec4(1);
-        runner_up = min(runner_up, select(vec4(NONE), load(row + place_of(quad, id.x), quad), away));
+        runner_up = min(runner_up, select(vec4(NO_RUNNER_UP), load(row + place_of(quad, id.x), quad), away));
     }
     optima[id.y * params.level.pixel_pitch + id.x] = vec2(u32(label) | (key & 0xffff0000u), smallest(runner_up));
 }

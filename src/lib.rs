@@ -74,6 +74,7 @@
 
 pub mod backend;
 pub mod depth;
+pub mod engine;
 pub mod error;
 pub mod evaluation;
 pub mod front;
@@ -88,6 +89,7 @@ pub mod roofline;
 pub mod solver;
 pub mod text;
 pub mod tiles;
+pub mod watch;
 pub mod weights;
 
 pub use error::{Error, Result};

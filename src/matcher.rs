@@ -3,13 +3,15 @@
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, Gpu};
 use crate::backend::{Backend, Stage, Traffic};
+use crate::engine::{self, Solution, Started};
 use crate::error::{Error, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::options::{Choice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
-use crate::solver::{self, Inspector, Observer, Solution, Started};
+use crate::solver::Inspector;
 use crate::tiles::Tiles;
+use crate::watch::Observer;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -233,7 +235,7 @@ impl Matcher {
         let started = pool.install(|| {
             check(device, &plan.method, checked)?;
             device.keep_time(false)?;
-            solver::start(device, &plan, pair, observer)
+            engine::start(device, &plan, pair, observer)
         });
         match started {
             Ok(started) => Ok(Some((tiles, started))),
@@ -245,7 +247,7 @@ impl Matcher {
     fn land(&mut self, flight: Flight, method: &Method, observer: Observer) -> Result<Matched> {
         let Flight { pair, range, tiles, started } = flight;
         if let Some(device) = &mut self.gpu {
-            match self.pool.install(|| solver::finish(device, started)) {
+            match self.pool.install(|| engine::finish(device, started)) {
                 Ok(solution) => return Ok(matched(device, &tiles, solution, Vec::new())),
                 Err(e) => self.without_device(e)?,
             };
@@ -304,9 +306,9 @@ fn timed(
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
     let solution = if tiles.count() == 1 {
-        solver::inspect(backend, tiles.whole(), pair, observer, inspector)?
+        engine::inspect(backend, tiles.whole(), pair, observer, inspector)?
     } else {
-        solver::solve_tiles(backend, tiles, pair, observer)?
+        engine::solve_tiles(backend, tiles, pair, observer)?
     };
     let timings = if timings { summed(&solution, &backend.times()?) } else { Vec::new() };
     Ok(matched(backend, tiles, solution, timings))
@@ -337,9 +339,9 @@ fn again<'a>(inspector: &'a mut Option<Inspector>) -> Option<Inspector<'a>> {
 /// One entry a stage and level.
 fn summed(solution: &Solution, times: &[(Stage, Duration)]) -> Vec<Timing> {
     let mut all: Vec<Timing> = Vec::new();
-    let host = solution.around.iter().map(|&(name, time)| (name, None, time));
+    let host = solution.host_times.iter().map(|&(name, time)| (name, None, time));
     let stages =
-        times.iter().chain(&solution.finish).map(|&(stage, time)| (stage.name(), stage.level(), time));
+        times.iter().chain(&solution.mosaic_times).map(|&(stage, time)| (stage.name(), stage.level(), time));
     for (stage, level, time) in host.chain(stages) {
         match all.iter_mut().find(|t| (t.stage, t.level) == (stage, level)) {
             Some(timing) => {
@@ -370,8 +372,8 @@ fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>) -> Result
     let pair = Pair::new(left, right)?;
     let plan = Plan::new(width, height, DisparityRange::new(-1, 16)?, method)?;
     let quiet = &mut |_| ControlFlow::Continue(());
-    let expected = solver::solve(&mut Cpu::default(), &plan, &pair, quiet)?;
-    let found = solver::solve(gpu, &plan, &pair, quiet)?;
+    let expected = engine::solve(&mut Cpu::default(), &plan, &pair, quiet)?;
+    let found = engine::solve(gpu, &plan, &pair, quiet)?;
     if found.maps != expected.maps {
         return Err(Error::Device(format!(
             "{} computes other maps than the CPU path on a test pair: update its driver, or use --backend cpu",

@@ -29,8 +29,12 @@ pub const CENSUS_BITS: u32 = 40;
 pub const COLOUR_WEIGHT: u32 = 48;
 /// The largest colour difference that counts, in 8-bit levels summed over the channels.
 pub const COLOUR_MOST: u32 = 64;
-/// Places of the window of census and contrast, 9 x 7.
-pub const CENSUS_PLACES: u32 = 63;
+/// How far the window of census and contrast, 9 x 7, reaches to either side.
+pub const CENSUS_RADIUS_X: u32 = 4;
+/// How far it reaches up and down.
+pub const CENSUS_RADIUS_Y: u32 = 3;
+/// Places of that window.
+pub const CENSUS_PLACES: u32 = (2 * CENSUS_RADIUS_X + 1) * (2 * CENSUS_RADIUS_Y + 1);
 /// Fractional bits of the costs of level 1 and coarser.
 pub const COST_FRACTION_BITS: u32 = 8;
 /// Side of the window that holds a dependency factor's members.
@@ -62,6 +66,12 @@ impl LevelPlan {
     #[must_use]
     pub fn pixels(&self) -> usize {
         self.width * self.height
+    }
+
+    /// Blocks of four labels, with padding.
+    #[must_use]
+    pub fn quads(&self) -> usize {
+        self.stride / 4
     }
 
     /// Largest label.
@@ -115,7 +125,7 @@ impl EvidenceScale {
 }
 
 /// Storage width of messages and beliefs, and where their sums saturate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VolumeWidth {
     /// 8 bits.
     Narrow,

@@ -7,7 +7,8 @@
 //! the rate at which the machine copies, it is the shortest time that the stage can take; where the volumes of a level fit
 //! a cache, it can be beaten.
 
-use crate::backend::{Stage, Volume, volume_shape};
+use crate::backend::Stage;
+use crate::backend::probe::{Volume, volume_shape};
 use crate::plan::Plan;
 
 /// The stages of the flooding of `plan`, level by level: of [`Stage::Flood`] and the two that it consists of, a backend keeps

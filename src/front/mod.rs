@@ -1,7 +1,78 @@
-//! The front end of the paper (section 2.4): what is worked out from the images alone, before there are costs.
+//! The front end (section 2.4): everything that a match needs and that follows from the images alone, before there are costs.
 
 pub mod check;
 pub mod illumination;
 pub mod label_range;
 pub mod matches;
 pub mod zones;
+
+use crate::error::{Error, Result};
+use crate::graph::{self, LevelGraph};
+use crate::image::{Pair, Plane};
+use crate::memory;
+use crate::options::Illumination;
+use crate::plan::Plan;
+use crate::watch::Watch;
+use illumination::homomorphic;
+use matches::Match;
+use zones::Zones;
+
+/// What a backend needs for a match.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The pair as it is matched, its illumination corrected where the method asks for it.
+    pub pair: Pair,
+    /// The graph of every level.
+    pub graphs: Vec<LevelGraph>,
+    /// First and last label index of each pixel, by level; empty where every label is allowed.
+    pub label_ranges: Vec<Plane<[u16; 2]>>,
+    /// What the label ranges follow from: texture zones and sparse matches.
+    pub zones: Option<(Zones, Vec<Match>)>,
+}
+
+impl Prepared {
+    /// A pair that needs no more than its graphs.
+    #[must_use]
+    pub fn new(pair: &Pair, graphs: Vec<LevelGraph>) -> Self {
+        Self { pair: pair.clone(), graphs, label_ranges: Vec::new(), zones: None }
+    }
+
+    /// The same with these label ranges.
+    #[must_use]
+    pub fn within(self, label_ranges: Vec<Plane<[u16; 2]>>) -> Self {
+        Self { label_ranges, ..self }
+    }
+}
+
+/// Prepares a match of `pair` by `plan`.
+///
+/// # Errors
+/// [`Error::Mismatch`] when the plan is for another size, [`Error::Memory`] when the machine cannot hold it, and
+/// [`Error::Interrupted`] when the observer breaks.
+pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
+    if plan.size() != pair.size() {
+        let (plan, pair) = (plan.size(), pair.size());
+        return Err(Error::Mismatch(format!("a plan for {plan:?} and a pair of {pair:?}")));
+    }
+    memory::check(plan.front_bytes(), memory::SMALLER_MATCH)?;
+    let method = &plan.method;
+    let pair = match method.illumination {
+        Illumination::None => pair,
+        Illumination::Homomorphic => {
+            let both = || Pair::new(homomorphic(pair.left()), homomorphic(pair.right()));
+            watch.host("illumination", both)?
+        }
+    };
+    let graphs = watch.host("graph", || Ok(graph::build(pair.left(), plan)))?;
+    let mut prepared = Prepared::new(&pair, graphs);
+    if plan.limits_labels() {
+        let options = zones::Options { zones: method.zones as usize, ..zones::Options::default() };
+        let zones = watch.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
+        let split = Some((&zones.map, zones.count));
+        let matches = watch.host("matches", || Ok(matches::find(&pair, split, Some(plan.range))))?;
+        prepared.label_ranges =
+            watch.host("label_range", || Ok(label_range::levels(plan, &zones, &matches)))?;
+        prepared.zones = Some((zones, matches));
+    }
+    Ok(prepared)
+}

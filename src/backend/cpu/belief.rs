@@ -1,6 +1,7 @@
 //! Beliefs: see [`crate::backend::Stage::Belief`].
 
 use super::units::{Blocks, Units, block, block_mut, padding};
+use super::volumes::{Level, Volumes};
 use crate::graph::LevelGraph;
 use crate::plan::Plan;
 use rayon::prelude::*;
@@ -10,9 +11,9 @@ use std::array::from_fn;
 pub(super) struct Summands<'a, U> {
     pub(super) graph: &'a LevelGraph,
     evidence: &'a [u8],
-    /// Empty at the coarsest level.
+    /// Empty where nothing came from above.
     down: &'a [U],
-    /// Empty at level 0.
+    /// Empty where nothing came from below.
     up: &'a [U],
     stride: usize,
     most: U,
@@ -20,20 +21,31 @@ pub(super) struct Summands<'a, U> {
 }
 
 impl<'a, U: Units> Summands<'a, U> {
-    pub(super) fn new(
+    /// Those of level `z`; beside them its dependency messages and its beliefs, and whether the factors have sent the messages.
+    pub(super) fn of(
         plan: &Plan,
-        level: usize,
-        graph: &'a LevelGraph,
-        evidence: &'a [u8],
-        [down, up]: [&'a [U]; 2],
-    ) -> Self {
-        let l = &plan.levels[level];
-        let (most, padding) = (U::of(plan.belief_most().into()), padding(l.labels, l.stride));
-        Self { graph, evidence, down, up, stride: l.stride, most, padding }
+        levels: &'a mut [Level<U>],
+        z: usize,
+    ) -> (Self, [&'a mut [U]; 2], &'a mut bool) {
+        let above = levels.get(z + 1).is_some_and(|above| above.resolution_sent);
+        let l = &plan.levels[z];
+        let Level { graph, evidence, dependency, dependency_sent, resolution_sent, down, up, belief, .. } =
+            &mut levels[z];
+        let summands = Self {
+            graph,
+            evidence,
+            // What holds nothing yet is no summand.
+            down: if above { down } else { &[] },
+            up: if *resolution_sent { up } else { &[] },
+            stride: l.stride,
+            most: U::of(plan.belief_most().into()),
+            padding: padding(l.labels, l.stride),
+        };
+        (summands, [dependency, belief], dependency_sent)
     }
 }
 
-/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on; none has spoken yet where there
+/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on; the factors have sent none yet where there
 /// are no messages.
 pub(super) fn row<U: Units>(
     summands: &Summands<U>,
@@ -63,9 +75,11 @@ pub(super) fn row<U: Units>(
     }
 }
 
-pub(super) fn run<U: Units>(summands: &Summands<U>, dependency: Option<&[U]>, belief: &mut [U]) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let (summands, [dependency, belief], sent) = Summands::of(&v.plan, &mut v.levels, level);
+    let dependency = sent.then_some(&*dependency);
     let cells = summands.graph.width() * summands.stride;
-    belief.par_chunks_mut(cells).enumerate().for_each(|(y, belief)| row(summands, y, 0, dependency, belief));
+    belief.par_chunks_mut(cells).enumerate().for_each(|(y, belief)| row(&summands, y, 0, dependency, belief));
 }
 
 /// A pixel's belief, and what it is the sum of.

@@ -1,13 +1,16 @@
 //! How sure each pixel is: see [`crate::backend::Stage::Confidence`].
 
 use super::Finest;
+use crate::image::Image;
 use crate::maps::flag;
+use crate::plan::Plan;
 
-pub(super) fn run(floor: u32, maps: &mut Finest) {
+pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
+    let floor = plan.method.confidence_floor;
     let Finest { optima, validity, confidence, .. } = maps;
     let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(optima.data());
-    for ((confidence, flags), peak) in pixels {
-        let lead = (2 * u32::from(peak.runner_up - peak.best)).min(255);
+    for ((confidence, flags), optimum) in pixels {
+        let lead = (2 * u32::from(optimum.runner_up - optimum.best)).min(255);
         if *flags & flag::INVALID != 0 {
             *confidence = 0;
         } else {

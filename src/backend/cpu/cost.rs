@@ -1,16 +1,21 @@
 //! Matching cost of level 0: see [`crate::backend::Stage::Cost`].
 
-use super::units::{Blocks, block, block_mut};
+use super::units::{Blocks, Units, block, block_mut};
+use super::volumes::Volumes;
 use crate::image::{Image, Pair, Pixel};
 use crate::options::Cost;
-use crate::plan::{CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, COLOUR_MOST, COST_MAX, Plan};
+use crate::plan::{
+    CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, CENSUS_RADIUS_X, CENSUS_RADIUS_Y, COLOUR_MOST, COST_MAX,
+    Plan,
+};
 use rayon::prelude::*;
 use std::array::from_fn;
 
-const CENSUS_X: usize = 4;
-const CENSUS_Y: isize = 3;
+const CENSUS_X: usize = CENSUS_RADIUS_X as usize;
+const CENSUS_Y: isize = CENSUS_RADIUS_Y as isize;
 
-pub(super) fn run(plan: &Plan, pair: &Pair, out: &mut [u8]) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
+    let Volumes { plan, pair, fine_cost: out, .. } = v;
     match plan.method.cost {
         Cost::Census | Cost::AdCensus => census(plan, pair, out),
         Cost::Sad => sad(plan, pair, out),

@@ -5,10 +5,12 @@
 //! exceeds [`Plan::belief_most`], so that no minimum is theirs alone.
 
 use super::units::{Blocks, Least, Truncating, Units, block, block_mut, keep_least, smallest};
+use super::volumes::{Level, Volumes};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::array::from_fn;
+use std::mem;
 
 /// What a thread needs for its factors.
 pub(super) struct Scratch<U> {
@@ -41,21 +43,16 @@ pub(super) const REACH: usize = GRAPH_WINDOW / 2;
 /// Beliefs of the rows around a factor's, [`REACH`] above to as many below; empty outside the image.
 pub(super) type Around<'a, U> = [&'a [U]; GRAPH_WINDOW];
 
-/// Messages that are `fresh` are 0 before, whatever is stored.
-pub(super) fn run<U: Units>(
-    plan: &Plan,
-    level: usize,
-    graph: &LevelGraph,
-    belief: &[U],
-    messages: &mut [U],
-    fresh: bool,
-) {
-    let l = &plan.levels[level];
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let (plan, l) = (&v.plan, &v.plan.levels[level]);
+    let Level { graph, belief, dependency: messages, dependency_sent, .. } = &mut v.levels[level];
+    // The messages before the first are 0, whatever is stored.
+    let initial = !mem::replace(dependency_sent, true);
     let cells = l.width * l.stride;
     messages.par_chunks_mut(cells * graph.slots()).enumerate().for_each_init(
         || Scratch::new(l.stride, graph.slots()),
         |scratch, (y, messages)| {
-            if fresh {
+            if initial {
                 messages.fill(U::default());
             }
             let around: Around<U> = from_fn(|k| {

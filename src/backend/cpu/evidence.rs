@@ -2,15 +2,20 @@
 
 use super::pyramid::StoredCost;
 use super::units::Units;
+use super::volumes::Volumes;
 use crate::plan::LevelPlan;
 use rayon::prelude::*;
 
-pub(super) fn run<C: StoredCost, U: Units>(
-    level: &LevelPlan,
-    cost: &[C],
-    evidence: &mut [u8],
-    belief: &mut [U],
-) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let (plan, l) = (&v.plan.levels[level], &mut v.levels[level]);
+    if level == 0 {
+        evidence(plan, &v.fine_cost, &mut l.evidence, &mut l.belief);
+    } else {
+        evidence(plan, &l.cost, &mut l.evidence, &mut l.belief);
+    }
+}
+
+fn evidence<C: StoredCost, U: Units>(level: &LevelPlan, cost: &[C], evidence: &mut [u8], belief: &mut [U]) {
     let row = level.width * level.stride;
     cost.par_chunks(row)
         .zip(evidence.par_chunks_mut(row))

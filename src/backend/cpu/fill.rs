@@ -1,10 +1,12 @@
 //! The farther of two neighbours for what has no disparity of its own: see [`crate::backend::Stage::Fill`].
 
 use super::Finest;
+use crate::image::Image;
 use crate::maps::flag;
+use crate::plan::Plan;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut Finest) {
+pub(super) fn run(maps: &mut Finest, _: &Plan, _: &Image) {
     let Finest { disparity, validity: flags, .. } = maps;
     let (width, height) = disparity.size();
     let valid_rows: Vec<usize> =

@@ -1,15 +1,17 @@
 //! Messages of the dependency factors and beliefs in one sweep: see [`crate::backend::Stage::Flood`].
 //!
-//! A belief is summed up as soon as the last factor that holds its pixel has spoken, three rows below: by then no factor
+//! A belief is summed up as soon as the last factor that holds its pixel has sent its messages, three rows below: by then no factor
 //! needs the old belief any more, and the messages are still in the cache. Every thread sweeps a band of rows. What is within
 //! three rows of where two bands meet waits until all have swept.
 
 use super::belief::{self, Summands};
 use super::dependency::{self, Around, REACH, Scratch};
 use super::units::Units;
+use super::volumes::Volumes;
 use crate::plan::Plan;
 use rayon::prelude::*;
 use std::array::from_fn;
+use std::mem;
 
 /// Bands a thread, so that one that is held up does not hold up all.
 const BANDS: usize = 4;
@@ -25,14 +27,12 @@ struct Band<'a, U> {
     own: &'a mut [U],
 }
 
-pub(super) fn run<U: Units>(
-    plan: &Plan,
-    level: usize,
-    summands: &Summands<U>,
-    messages: &mut [U],
-    belief: &mut [U],
-    fresh: bool,
-) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let plan = &v.plan;
+    let (summands, [messages, belief], sent) = Summands::of(plan, &mut v.levels, level);
+    let summands = &summands;
+    // The messages before the first are 0, whatever is stored.
+    let initial = !mem::replace(sent, true);
     let l = &plan.levels[level];
     let (cells, height) = (l.width * l.stride, l.height);
     let slots = summands.graph.slots();
@@ -64,7 +64,7 @@ pub(super) fn run<U: Units>(
     bands.into_par_iter().enumerate().for_each(|(i, mut band)| {
         let above = if i == 0 { &[][..] } else { shared[i - 1] };
         let below = shared.get(i).copied().unwrap_or_default();
-        band.sweep(plan, level, summands, [above, below], fresh);
+        band.sweep(plan, level, summands, [above, below], initial);
     });
 
     let messages = &*messages;
@@ -76,9 +76,9 @@ pub(super) fn run<U: Units>(
 }
 
 impl<U: Units> Band<'_, U> {
-    /// Sweeps the band; `edges` are the beliefs around its borders. Messages that are `fresh` are 0 before, whatever is stored:
+    /// Sweeps the band; `edges` are the beliefs around its borders. Messages that are `initial` are 0 before, whatever is stored:
     /// nothing has to come from memory for them.
-    fn sweep(&mut self, plan: &Plan, level: usize, summands: &Summands<U>, edges: [&[U]; 2], fresh: bool) {
+    fn sweep(&mut self, plan: &Plan, level: usize, summands: &Summands<U>, edges: [&[U]; 2], initial: bool) {
         let l = &plan.levels[level];
         let (cells, slots) = (l.width * l.stride, summands.graph.slots());
         let mut scratch = Scratch::new(l.stride, slots);
@@ -97,12 +97,12 @@ impl<U: Units> Band<'_, U> {
                         .map_or(&[][..], |rows| rows.get(..cells).unwrap_or_default()),
                 });
                 let messages = &mut self.messages[(y - self.first) * cells * slots..][..cells * slots];
-                if fresh {
+                if initial {
                     messages.fill(U::default());
                 }
                 dependency::row(plan, level, summands.graph, y, &around, messages, &mut scratch);
             }
-            // All factors of this row's pixels have spoken.
+            // All factors of this row's pixels have sent their messages.
             if let Some(done) = y.checked_sub(REACH).filter(|done| (self.first_own..end_own).contains(done)) {
                 let belief = &mut self.own[(done - self.first_own) * cells..][..cells];
                 belief::row(summands, done, self.first, Some(&*self.messages), belief);

@@ -1,10 +1,21 @@
 //! Costs within the pixels' label range alone: see [`crate::backend::Stage::LabelRange`].
 
+use super::units::Units;
+use super::volumes::Volumes;
 use crate::image::Plane;
-use crate::plan::LevelPlan;
+use crate::plan::{COST_FRACTION_BITS, COST_MAX, LevelPlan};
 use rayon::prelude::*;
 
-pub(super) fn run<C: Copy + Send + Sync>(
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let (plan, ranges) = (&v.plan.levels[level], &v.label_ranges[level]);
+    if level == 0 {
+        limit(plan, ranges, &mut v.fine_cost, COST_MAX);
+    } else {
+        limit(plan, ranges, &mut v.levels[level].cost, u16::from(COST_MAX) << COST_FRACTION_BITS);
+    }
+}
+
+fn limit<C: Copy + Send + Sync>(
     level: &LevelPlan,
     label_range: &Plane<[u16; 2]>,
     cost: &mut [C],

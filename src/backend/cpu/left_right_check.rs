@@ -7,7 +7,7 @@ use crate::options::LeftRightCheck;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
-pub(super) fn run(plan: &Plan, left: &Image, maps: &mut Finest) {
+pub(super) fn run(maps: &mut Finest, plan: &Plan, left: &Image) {
     let (width, min) = (plan.levels[0].width, i64::from(plan.range.min));
     let Finest { optima, right, validity, .. } = maps;
     validity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {

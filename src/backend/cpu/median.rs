@@ -1,5 +1,4 @@
-//! Weighted medians of the disparities: see [`crate::backend::Stage::Median`] and
-//! [`crate::backend::Stage::FillMedian`].
+//! The weighted median of the disparities: see [`crate::backend::Stage::Median`].
 
 use super::Finest;
 use super::units::block;
@@ -11,7 +10,7 @@ use crate::weights::{MEDIAN_WEIGHT, MedianWeights};
 use rayon::prelude::*;
 use std::array::from_fn;
 
-pub(super) fn run(plan: &Plan, guide: &Image, maps: &mut Finest) {
+pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
     let touched = |f: u8| match plan.method.median {
         Median::Off => false,
         Median::Filled => f & flag::FILLED != 0,
@@ -20,12 +19,13 @@ pub(super) fn run(plan: &Plan, guide: &Image, maps: &mut Finest) {
     smooth(&MedianWeights::of(&plan.method), touched, guide, maps);
 }
 
-pub(super) fn fill(plan: &Plan, guide: &Image, maps: &mut Finest) {
-    smooth(&MedianWeights::stretched(&plan.method), |f| f & flag::FILLED != 0, guide, maps);
-}
-
 /// Replaces the disparity of every pixel whose flags are `touched`.
-fn smooth(weights: &MedianWeights, touched: impl Fn(u8) -> bool + Sync, guide: &Image, maps: &mut Finest) {
+pub(super) fn smooth(
+    weights: &MedianWeights,
+    touched: impl Fn(u8) -> bool + Sync,
+    guide: &Image,
+    maps: &mut Finest,
+) {
     // Rows of the window are vectors of one length or another.
     match 2 * weights.radius() + 1 {
         ..=16 => smooth_by::<16>(weights, touched, guide, maps),

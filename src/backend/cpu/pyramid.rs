@@ -1,5 +1,7 @@
 //! Cost of a level from the next finer one: see [`crate::backend::Stage::Pyramid`].
 
+use super::units::Units;
+use super::volumes::Volumes;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
@@ -79,7 +81,17 @@ impl StoredCost for u16 {
     }
 }
 
-pub(super) fn run<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mut [u16]) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let (finer, coarser) = v.levels.split_at_mut(level);
+    let out = &mut coarser[0].cost;
+    if level == 1 {
+        reduce(&v.plan, level, &v.fine_cost, out);
+    } else {
+        reduce(&v.plan, level, &finer[level - 1].cost, out);
+    }
+}
+
+fn reduce<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mut [u16]) {
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
     let offset = plan.label_offset(level);
     let minimum = plan.minimum_over_d();

@@ -3,9 +3,11 @@
 //! Rows of labels are worked on with their padding; what belongs to no label counts as infinite.
 
 use super::units::{Blocks, Truncating, Units, block, block_mut, keep_least, least_of, padding, smallest};
-use crate::plan::{LABEL_BLOCK, Plan, Truncation, TruncationRule};
+use super::volumes::{Level, Volumes};
+use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::array::from_fn;
+use std::mem;
 
 struct Scratch<U> {
     /// q of the parent, by coarse label.
@@ -32,15 +34,13 @@ struct Between<U> {
     coarse_padding: Vec<U>,
 }
 
-/// Messages that are `fresh` are 0 before, whatever is stored.
-pub(super) fn run<U: Units>(
-    plan: &Plan,
-    level: usize,
-    [fine_belief, coarse_belief]: [&[U]; 2],
-    down: &mut [U],
-    up: &mut [U],
-    fresh: bool,
-) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let plan = &v.plan;
+    let (finer, coarser) = v.levels.split_at_mut(level);
+    let (Level { belief: fine_belief, down, .. }, coarse) = (&mut finer[level - 1], &mut coarser[0]);
+    let Level { belief: coarse_belief, up, resolution_sent, .. } = coarse;
+    // The messages before the first are 0, whatever is stored.
+    let initial = !mem::replace(resolution_sent, true);
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
     let between = Between {
         cut: plan.resolution,
@@ -68,7 +68,7 @@ pub(super) fn run<U: Units>(
             }
         },
         |scratch, (y, (up, down))| {
-            if fresh {
+            if initial {
                 up.fill(U::default());
                 down.fill(U::default());
             }

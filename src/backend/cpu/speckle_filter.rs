@@ -1,9 +1,12 @@
 //! Regions too small to be trusted: see [`crate::backend::Stage::SpeckleFilter`].
 
 use super::Finest;
+use crate::image::Image;
 use crate::maps::flag;
+use crate::plan::Plan;
 
-pub(super) fn run(size: usize, maps: &mut Finest) {
+pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
+    let size = plan.method.speckle_size as usize;
     let Finest { optima, validity, .. } = maps;
     let (width, height) = optima.size();
     let flags = validity.data_mut();
@@ -14,10 +17,10 @@ pub(super) fn run(size: usize, maps: &mut Finest) {
     for y in 0..height {
         let inside = (y + 1) * pitch + 1..(y + 2) * pitch - 1;
         let pixels = optima.row(y).iter().zip(&flags[y * width..]);
-        for ((label, seen), (peak, &flags)) in
+        for ((label, seen), (optimum, &flags)) in
             labels[inside.clone()].iter_mut().zip(&mut seen[inside]).zip(pixels)
         {
-            (*label, *seen) = (peak.label, flags != 0);
+            (*label, *seen) = (optimum.label, flags != 0);
         }
     }
     let mut region = Vec::new();

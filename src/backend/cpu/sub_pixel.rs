@@ -1,11 +1,14 @@
 //! Disparities between the labels: see [`crate::backend::Stage::SubPixel`].
 
 use super::Finest;
+use super::units::Units;
+use super::volumes::Volumes;
 use crate::maps::FRACTION;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
-pub(super) fn run(plan: &Plan, cost: &[u8], maps: &mut Finest) {
+pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
+    let Volumes { plan, fine_cost: cost, maps, .. } = v;
     let width = plan.levels[0].width;
     let Finest { optima, raw, disparity, .. } = maps;
     raw.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {

@@ -162,3 +162,14 @@ impl<U: Units> Blocks for Truncating<'_, U> {
         *block_mut(self.out, at) = from_fn::<U, N, _>(|i| sums[i].min(self.high).less(self.low));
     }
 }
+
+/// Index and value of the smallest value, the lowest index on ties.
+#[inline(always)]
+pub(super) fn argmin<U: Units>(belief: &[U]) -> (usize, U) {
+    let best = smallest(belief);
+    // By blocks: whether one holds it is a vector's question.
+    let holds = |block: &[U]| smallest(block) == best;
+    let block = belief.chunks(LABEL_BLOCK).position(holds);
+    let start = block.unwrap_or(0) * LABEL_BLOCK;
+    (start + belief[start..].iter().position(|&b| b == best).unwrap_or(0), best)
+}

@@ -5,7 +5,7 @@
 //! around in ends with copies of those rows.
 
 use super::device::Device;
-use super::kernels::{ALIGN_WORDS, LevelParams};
+use super::uniform::{ALIGN_WORDS, LevelParams};
 use super::upload::Incoming;
 use crate::error::{Error, Result};
 use crate::plan::{GRAPH_WINDOW, Plan};
@@ -325,7 +325,7 @@ impl Buffers {
                 up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
                 belief: a.rows("belief", values, &starts)?,
                 label_range: a.rows(
-                    "zone-sigmas",
+                    "label ranges",
                     p.pixel_pitch,
                     if plan.limits_labels() { &starts } else { &none },
                 )?,
@@ -346,7 +346,7 @@ impl Buffers {
         let (optima, right_labels) = (map("optima", 2)?, map("right labels", 1)?);
         let (raw, disparity, flags) = (map("raw", 1)?, map("disparity", 1)?, map("flags", 1)?);
         let (spare_disparity, spare_flags) = (map("spare disparity", 1)?, map("spare flags", 1)?);
-        let (speckle_parents, speckle_sizes) = (map("region parents", 1)?, map("region sizes", 1)?);
+        let (speckle_parents, speckle_sizes) = (map("speckle parents", 1)?, map("speckle sizes", 1)?);
         let rows = u64::from(fine.height);
         Ok(Self {
             median_weights: a.buffer("median weights", MEDIAN_WORDS)?,

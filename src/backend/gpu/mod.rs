@@ -9,16 +9,18 @@
 
 mod buffers;
 mod device;
-mod kernels;
-mod stages;
+mod probe;
+mod shader;
+mod steps;
 mod timer;
+mod uniform;
 mod upload;
-mod values;
 
-use super::{Backend, Map, Requested, Stage, Traffic, Volume};
-use crate::error::{Error, Result};
-use crate::graph::LevelGraph;
-use crate::image::{Pair, Plane};
+use super::probe::Probe;
+use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
+use crate::error::Result;
+use crate::front::Prepared;
+use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::Plan;
@@ -26,13 +28,47 @@ use crate::weights::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
 pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
-pub use kernels::{Kernel, LevelParams, Params, Variant};
-use stages::{Step, Steps};
+pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+pub use steps::Job;
+use steps::{Pipelines, Recorder, Step};
 use timer::Timer;
-use upload::{image_words, member_words, transposed};
+pub use uniform::UniformLayout;
+use upload::{image_words, label_range_words, member_words, transposed};
+
+macro_rules! declare {
+    (
+        levels { $( $(#[$_of_level:meta])* $level:ident $level_name:ident; )* }
+        finest { $( $(#[$_of_finest:meta])* $finest:ident $finest_name:ident; )* }
+        maps { $( $(#[$_of_map:meta])* $map:ident $map_name:ident; )* }
+    ) => {
+        $( mod $level_name; )*
+        $( mod $finest_name; )*
+        $( mod $map_name; )*
+
+        /// What `stage` runs of its shader, for `plan`, without a device.
+        #[must_use]
+        pub fn jobs(stage: Stage, plan: &Plan) -> Vec<Job> {
+            match stage {
+                $( Stage::$level(z) => $level_name::jobs(plan, z), )*
+                $( Stage::$finest => $finest_name::jobs(plan, 0), )*
+                $( Stage::$map => $map_name::jobs(plan, 0), )*
+            }
+        }
+
+        fn record(recorder: &mut Recorder, stage: Stage) -> Result<()> {
+            match stage {
+                $( Stage::$level(_) => $level_name::record(recorder), )*
+                $( Stage::$finest => $finest_name::record(recorder), )*
+                $( Stage::$map => $map_name::record(recorder), )*
+            }
+        }
+    };
+}
+
+crate::for_every_stage!(declare);
 
 /// Largest number of iterations of all loops of one invocation together.
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
@@ -41,29 +77,24 @@ const PASSES_PER_SUBMIT: usize = 16;
 /// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop
 /// long jobs, and for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 30;
-const WORKGROUP: u32 = 64;
-/// What [`Gpu::copy_rate`] copies, how often it tries, and how long the copies of a try must take together, so that what a
-/// submission takes of itself no longer counts.
-const COPIED_BYTES: u64 = 1 << 28;
-const COPY_TRIES: u32 = 12;
-const LONG_COPY: Duration = Duration::from_millis(100);
 
 /// The GPU path on one device.
 pub struct Gpu {
     device: Device,
-    pipelines: HashMap<(Kernel, Variant), wgpu::ComputePipeline>,
+    pipelines: Pipelines,
     encoder: Option<wgpu::CommandEncoder>,
     passes: usize,
     work: u64,
     timer: Option<Timer>,
     state: Option<State>,
+    requests: Requests<RequestedMaps>,
 }
 
 /// Everything that belongs to one plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
-    steps: Steps,
+    steps: HashMap<Stage, Arc<[Step]>>,
 }
 
 impl Gpu {
@@ -89,77 +120,17 @@ impl Gpu {
             work: 0,
             timer: None,
             state: None,
+            requests: Requests::default(),
         })
     }
 
-    /// The rate at which the device copies from one large buffer to another: bytes read and written a second.
-    ///
-    /// # Errors
-    /// [`Error::Memory`] when there is no room for two such buffers, [`Error::Device`] when the device fails.
-    pub fn copy_rate(&mut self) -> Result<f64> {
-        let size = COPIED_BYTES.min(self.device.max_buffer) & !3;
-        let buffer = || {
-            let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some("copy"), size, usage, mapped_at_creation: false };
-            Ok::<_, Error>(self.device.inner()?.create_buffer(&descriptor))
-        };
-        let (from, to) = (buffer()?, buffer()?);
-        let mut time = |copies: u64| {
-            let start = Instant::now();
-            for _ in 0..copies {
-                self.encoder()?.copy_buffer_to_buffer(&from, 0, &to, 0, size);
-            }
-            self.wait()?;
-            Ok::<_, Error>(start.elapsed())
-        };
-        // Memory is given at first touch.
-        time(1)?;
-        let (mut best, mut copies) = (0.0, 1);
-        for _ in 0..COPY_TRIES {
-            let time = time(copies)?;
-            best = f64::max(best, (2 * copies * size) as f64 / time.as_secs_f64());
-            if time < LONG_COPY {
-                copies *= 2;
-            }
-        }
-        Ok(best)
-    }
-
-    /// The pipeline of `kernel` at `level`, compiled on first use.
-    fn pipeline(&mut self, kernel: Kernel, plan: &Plan, level: usize) -> Result<wgpu::ComputePipeline> {
-        let loops = kernel.loop_iterations(plan, level);
-        if loops > MAX_LOOP_ITERATIONS {
-            return Err(Error::Device(format!(
-                "{} x {} pixels and {} labels with {} neighbours are too many for one invocation of the shader `{}`: use \
-                 --backend cpu",
-                plan.levels[0].width,
-                plan.levels[0].height,
-                plan.levels[0].labels,
-                plan.neighbours,
-                kernel.name()
-            )));
-        }
-        let variant = Variant::new(kernel, plan, level);
-        if let Some(pipeline) = self.pipelines.get(&(kernel, variant)) {
-            return Ok(pipeline.clone());
-        }
-        let device = self.device.inner()?;
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(kernel.name()),
-            source: wgpu::ShaderSource::Wgsl(kernel.source(variant).into()),
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(kernel.name()),
-            layout: None,
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        });
-        self.device.check()?;
-        self.pipelines.insert((kernel, variant), pipeline.clone());
-        Ok(pipeline)
+    /// The steps of `stage` for `plan` on these buffers.
+    fn steps(&mut self, stage: Stage, plan: &Plan, buffers: &Buffers) -> Result<Arc<[Step]>> {
+        let level = stage.level().unwrap_or(0);
+        let Self { device, pipelines, .. } = self;
+        let mut recorder = Recorder { device, pipelines, plan, buffers, level, steps: Vec::new() };
+        record(&mut recorder, stage)?;
+        Ok(recorder.steps.into())
     }
 
     fn encoder(&mut self) -> Result<&mut wgpu::CommandEncoder> {
@@ -267,25 +238,29 @@ impl Gpu {
         self.state.as_ref().expect("prepare comes before every stage")
     }
 
-    /// Puts the pair and its graphs into the buffers, and messages at their start.
-    fn load(&mut self, state: &mut State, pair: &Pair, graphs: &[LevelGraph]) -> Result<()> {
+    /// Puts the pair, its graphs and its label ranges into the buffers, and messages at their start.
+    fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
         let State { plan, buffers, steps } = state;
         let device = &mut self.device;
         let pitch = buffers.levels[0].params.pixel_pitch;
-        buffers.left.write(device, &image_words(pair.left(), pitch))?;
-        buffers.right.write(device, &image_words(pair.right(), pitch))?;
+        buffers.left.write(device, &image_words(prepared.pair.left(), pitch))?;
+        buffers.right.write(device, &image_words(prepared.pair.right(), pitch))?;
         for (weights, buffer) in [
             (MedianWeights::of(&plan.method), &buffers.median_weights),
             (MedianWeights::stretched(&plan.method), &buffers.stretched_weights),
         ] {
             device.write(buffer, bytemuck::cast_slice(&weights.words()))?;
         }
-        for (level, graph) in buffers.levels.iter_mut().zip(graphs) {
+        for (level, ranges) in buffers.levels.iter().zip(&prepared.label_ranges) {
+            level.label_range.write(device, &label_range_words(ranges, &level.params))?;
+        }
+        for (level, graph) in buffers.levels.iter_mut().zip(&prepared.graphs) {
             level.members.write(device, &member_words(graph, &level.params))?;
             level.write_incoming(device, transposed(graph, &level.params))?;
         }
         for z in 0..plan.levels.len() {
-            steps.insert(Stage::Belief(z), self.belief(plan, buffers, z)?.into());
+            // The transposed table of this pair has rows of its own.
+            steps.insert(Stage::Belief(z), self.steps(Stage::Belief(z), plan, buffers)?);
         }
         let zeroed = buffers.levels.iter().flat_map(LevelBuffers::messages).chain([&buffers.labels]);
         let encoder = self.encoder()?;
@@ -309,7 +284,7 @@ struct RequestedRows {
 }
 
 /// Maps on their way from the device.
-pub struct RequestedMaps {
+struct RequestedMaps {
     rows: RequestedRows,
     shape: (usize, usize, usize),
 }
@@ -323,14 +298,15 @@ impl Backend for Gpu {
         Some(self.device.driver.clone())
     }
 
-    fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
+    fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
         (self.encoder, self.passes, self.work) = (None, 0, 0);
         self.device.traffic = Traffic::default();
         let mut state = match self.state.take() {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
-                    state.steps.insert(Stage::RightView, self.right_view(plan, &state.buffers)?.into());
+                    let steps = self.steps(Stage::RightView, plan, &state.buffers)?;
+                    state.steps.insert(Stage::RightView, steps);
                 }
                 state
             }
@@ -341,36 +317,23 @@ impl Backend for Gpu {
                     memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
                 }
                 let buffers = Buffers::new(&self.device, plan)?;
-                let steps = self.steps(plan, &buffers)?;
+                let mut steps = HashMap::new();
+                // Beliefs wait for the graph.
+                for stage in Stage::all(plan).into_iter().filter(|stage| !matches!(stage, Stage::Belief(_))) {
+                    steps.insert(stage, self.steps(stage, plan, &buffers)?);
+                }
                 State { plan: plan.clone(), buffers, steps }
             }
         };
-        self.load(&mut state, pair, &graphs)?;
+        self.load(&mut state, &prepared)?;
         self.device.traffic.bytes_held = state.buffers.all().iter().map(wgpu::Buffer::size).sum();
         self.state = Some(state);
         Ok(())
     }
 
-    fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()> {
-        for (z, label_range) in label_ranges.iter().enumerate() {
-            let level = &self.state().buffers.levels[z];
-            let (rows, pitch) = (level.label_range.clone(), level.params.pixel_pitch as usize);
-            let mut words = vec![0; pitch * label_range.height()];
-            for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
-                for (word, &[first, last]) in row.iter_mut().zip(label_range.row(y)) {
-                    *word = u32::from(first) | u32::from(last) << 16;
-                }
-            }
-            rows.write(&mut self.device, &words)?;
-        }
-        Ok(())
-    }
-
     fn run(&mut self, stage: Stage) -> Result<()> {
         if let Stage::Flood(z) = stage {
-            // The device goes over all pixels at once: there is nothing to gain by going over them together.
-            self.run(Stage::Dependency(z))?;
-            return self.run(Stage::Belief(z));
+            return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
         }
         self.device.count_stage();
         let steps = Arc::clone(&self.state().steps[&stage]);
@@ -402,18 +365,24 @@ impl Backend for Gpu {
         self.device.wait()
     }
 
-    fn request_maps(&mut self) -> Result<Requested> {
+    fn map(&mut self, map: Map) -> Result<Plane<i32>> {
+        self.map_values(map)
+    }
+
+    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()> {
+        self.write_map(Map::RightLabel, labels)
+    }
+
+    fn request_maps(&mut self) -> Result<Ticket> {
         let b = &self.state().buffers;
         let (disparity, raw, flags) = (b.disparity.clone(), b.raw.clone(), b.flags.clone());
         let rows = self.request_rows(&[&disparity, &raw, &flags])?;
-        Ok(Requested::Device(RequestedMaps { rows, shape: self.map_shape() }))
+        let shape = self.map_shape();
+        Ok(self.requests.add(RequestedMaps { rows, shape }))
     }
 
-    fn maps(&mut self, requested: Requested) -> Result<Maps> {
-        let RequestedMaps { rows, shape: (width, height, pitch) } = match requested {
-            Requested::Here(maps) => return Ok(maps),
-            Requested::Device(requested) => requested,
-        };
+    fn maps(&mut self, ticket: Ticket) -> Result<Maps> {
+        let RequestedMaps { rows, shape: (width, height, pitch) } = self.requests.take(&ticket);
         let words = self.collect_rows(rows)?;
         let plane = |i: usize| Plane::from_fn(width, height, |x, y| words[i][y * pitch + x].cast_signed());
         let byte =
@@ -435,28 +404,7 @@ impl Backend for Gpu {
         self.device.traffic
     }
 
-    fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
-        self.volume_values(volume)
-    }
-
-    fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
-        self.set_volume_values(volume, values)
-    }
-
-    fn read_map(&mut self, map: Map) -> Result<Plane<i32>> {
-        self.map_values(map)
-    }
-
-    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
-        self.set_map_values(map, values)
-    }
-
-    fn poison(&mut self, byte: u8) -> Result<()> {
-        self.submit()?;
-        let all = self.state().buffers.all().to_vec();
-        for buffer in all {
-            self.device.write(&buffer, &vec![byte; buffer.size() as usize])?;
-        }
-        Ok(())
+    fn probe(&mut self) -> &mut dyn Probe {
+        self
     }
 }

@@ -1,8 +1,8 @@
-//! Images and graphs as the shaders read them.
+//! Images, graphs and label ranges as the shaders read them.
 
-use super::kernels::{ALIGN_WORDS, LevelParams};
+use super::uniform::{ALIGN_WORDS, LevelParams};
 use crate::graph::LevelGraph;
-use crate::image::Image;
+use crate::image::{Image, Plane};
 
 /// Pixels as the shaders read them: red | green << 16, blue | grey << 16, 1 if masked, 0.
 pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
@@ -66,4 +66,16 @@ pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> Incoming {
         rows.push(entries.len() as u32);
     }
     Incoming { starts, entries, rows }
+}
+
+/// First and last label of each pixel, first | last << 16.
+pub(super) fn label_range_words(label_ranges: &Plane<[u16; 2]>, params: &LevelParams) -> Vec<u32> {
+    let pitch = params.pixel_pitch as usize;
+    let mut words = vec![0; pitch * label_ranges.height()];
+    for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
+        for (word, &[first, last]) in row.iter_mut().zip(label_ranges.row(y)) {
+            *word = u32::from(first) | u32::from(last) << 16;
+        }
+    }
+    words
 }

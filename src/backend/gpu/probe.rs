@@ -1,15 +1,22 @@
-//! Volumes and maps as a device holds them, value by value: for tests, which look at every stage by itself.
+//! Volumes and maps as a device holds them, value by value, and the rate at which it copies.
 
 use super::Gpu;
 use super::buffers::Rows;
-use crate::backend::{Map, PaddedRows, Volume, volume_shape};
-use crate::error::Result;
+use crate::backend::probe::{PaddedRows, Probe, Volume, volume_shape};
+use crate::backend::{Backend, Map};
+use crate::error::{Error, Result};
 use crate::image::Plane;
 use crate::plan::Plan;
+use std::time::{Duration, Instant};
 
-impl Gpu {
-    /// The values of a volume, as [`Backend::read`](crate::backend::Backend::read) gives them.
-    pub(super) fn volume_values(&mut self, volume: Volume) -> Result<Vec<u32>> {
+/// What [`Gpu::copy_rate`] copies, how often it tries, and how long the copies of a try must take together, so that what a
+/// submission takes of itself no longer counts.
+const COPIED_BYTES: u64 = 1 << 28;
+const COPY_TRIES: u32 = 12;
+const LONG_COPY: Duration = Duration::from_millis(100);
+
+impl Probe for Gpu {
+    fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
         let (buffer, pitch, per_word) = self.volume(volume);
         let words = self.rows(&[&buffer])?.remove(0);
         let plan = &self.state().plan;
@@ -26,8 +33,7 @@ impl Gpu {
         Ok(values)
     }
 
-    /// Sets them, after everything recorded so far.
-    pub(super) fn set_volume_values(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
+    fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         self.submit()?;
         let (buffer, pitch, per_word) = self.volume(volume);
         let plan = &self.state().plan;
@@ -45,18 +51,8 @@ impl Gpu {
         buffer.write(&mut self.device, &words)
     }
 
-    /// The values of a map, which may share its words with others.
-    pub(super) fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
-        let (rows, words, word, bit, mask) = self.map(map);
-        let data = self.rows(&[&rows])?.remove(0);
-        let (width, height, pitch) = self.map_shape();
-        let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
-        Ok(Plane::from_fn(width, height, value))
-    }
-
-    /// Sets them, and nothing else in these words.
-    pub(super) fn set_map_values(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
-        let (rows, words, word, bit, mask) = self.map(map);
+    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
+        let (rows, words, word, bit, mask) = self.place_of(map);
         let mut data = self.rows(&[&rows])?.remove(0);
         let (width, height, pitch) = self.map_shape();
         assert_eq!(values.size(), (width, height), "a map of the size of the images");
@@ -67,6 +63,60 @@ impl Gpu {
             }
         }
         rows.write(&mut self.device, &data)
+    }
+
+    fn poison(&mut self, byte: u8) -> Result<()> {
+        self.submit()?;
+        let all = self.state().buffers.all().to_vec();
+        for buffer in all {
+            self.device.write(&buffer, &vec![byte; buffer.size() as usize])?;
+        }
+        Ok(())
+    }
+}
+
+impl Gpu {
+    /// The rate at which the device copies from one large buffer to another: bytes read and written a second.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when there is no room for two such buffers, [`Error::Device`] when the device fails.
+    pub fn copy_rate(&mut self) -> Result<f64> {
+        let size = COPIED_BYTES.min(self.device.max_buffer) & !3;
+        let buffer = || {
+            let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some("copy"), size, usage, mapped_at_creation: false };
+            Ok::<_, Error>(self.device.inner()?.create_buffer(&descriptor))
+        };
+        let (from, to) = (buffer()?, buffer()?);
+        let mut time = |copies: u64| {
+            let start = Instant::now();
+            for _ in 0..copies {
+                self.encoder()?.copy_buffer_to_buffer(&from, 0, &to, 0, size);
+            }
+            self.wait()?;
+            Ok::<_, Error>(start.elapsed())
+        };
+        // Memory is given at first touch.
+        time(1)?;
+        let (mut best, mut copies) = (0.0, 1);
+        for _ in 0..COPY_TRIES {
+            let time = time(copies)?;
+            best = f64::max(best, (2 * copies * size) as f64 / time.as_secs_f64());
+            if time < LONG_COPY {
+                copies *= 2;
+            }
+        }
+        Ok(best)
+    }
+
+    /// The values of a map, which may share its words with others.
+    pub(super) fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
+        let (rows, words, word, bit, mask) = self.place_of(map);
+        let data = self.rows(&[&rows])?.remove(0);
+        let (width, height, pitch) = self.map_shape();
+        let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
+        Ok(Plane::from_fn(width, height, value))
     }
 
     /// Where a volume is, words a row and values a word.
@@ -90,7 +140,7 @@ impl Gpu {
     }
 
     /// Where a map is: the buffer, words a pixel, the word, the lowest bit and the mask.
-    fn map(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
+    fn place_of(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
         let b = &self.state().buffers;
         let (rows, words, word, bit, mask) = match map {
             Map::Label => (&b.optima, 2, 0, 0, 0xffff),

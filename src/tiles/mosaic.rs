@@ -1,14 +1,14 @@
 //! The maps of an image that is matched tile by tile, and the stages that finish them.
 
-use super::Finest;
+use super::Tile;
+use crate::backend::cpu::Finest;
 use crate::backend::{Backend, Map, NO_LABEL, Stage};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
 use crate::options::{Illumination, LeftRightCheck};
 use crate::plan::Plan;
-use crate::tiles::Tile;
 use std::sync::Arc;
 
 /// The maps of a whole image, put together from those of its tiles, without any volume: no stage after
@@ -23,8 +23,12 @@ impl Mosaic {
     /// Empty maps for a match of `pair` by `plan`, the plan for the whole image.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`] when the machine cannot hold them.
+    /// [`Error::Memory`] when the machine cannot hold them, and [`Error::Mismatch`] when the plan is for another size.
     pub fn new(plan: &Plan, pair: &Pair) -> Result<Self> {
+        if plan.size() != pair.size() {
+            let (plan, pair) = (plan.size(), pair.size());
+            return Err(Error::Mismatch(format!("a plan for {plan:?} and a pair of {pair:?}")));
+        }
         memory::check(plan.mosaic_bytes(), memory::SMALLER_MATCH)?;
         let (width, height) = plan.size();
         let maps = Finest {
@@ -44,10 +48,10 @@ impl Mosaic {
         let Tile { core, crop, .. } = tile;
         let part = core.within(crop);
         for map in [Map::Label, Map::Best, Map::RunnerUp, Map::Raw] {
-            self.maps.write_part(map, &backend.read_map(map)?, &part, (core.x.start, core.y.start));
+            self.maps.write_part(map, &backend.map(map)?, &part, (core.x.start, core.y.start));
         }
         if self.plan.method.left_right_check == LeftRightCheck::RightView {
-            let (labels, best) = (backend.read_map(Map::RightLabel)?, backend.read_map(Map::RightBest)?);
+            let (labels, best) = (backend.map(Map::RightLabel)?, backend.map(Map::RightBest)?);
             for (y, row) in core.y.clone().zip(part.y.clone()) {
                 let old_best = self.maps.right_best.row_mut(y)[crop.x.clone()].iter_mut();
                 let old = old_best.zip(&mut self.maps.right.row_mut(y)[crop.x.clone()]);
@@ -77,7 +81,7 @@ impl Mosaic {
     pub fn place_mirrored(&mut self, tile: &Tile, backend: &mut dyn Backend) -> Result<()> {
         let (width, _) = self.plan.size();
         let (core, crop) = (tile.core.mirrored(width), tile.crop.mirrored(width));
-        let labels = backend.read_map(Map::Label)?.mirrored();
+        let labels = backend.map(Map::Label)?.mirrored();
         self.maps.write_part(Map::RightLabel, &labels, &core.within(&crop), (core.x.start, core.y.start));
         Ok(())
     }
@@ -88,7 +92,7 @@ impl Mosaic {
             self.maps.disparity = self.maps.raw.clone();
             self.maps.right_best = Plane::filled(0, 0, 0);
         }
-        self.maps.run(&self.plan, &self.left, stage);
+        self.maps.run(stage, &self.plan, &self.left);
     }
 
     /// The maps, once all stages have run.

@@ -12,6 +12,8 @@
 //! cropped alike: it is as wide as the largest disparity, and where disparities are negative there is one on the right too.
 //! At the borders of the image a crop ends.
 
+pub mod mosaic;
+
 use crate::error::{Error, Result};
 use crate::image::Rect;
 use crate::plan::Plan;

@@ -1,0 +1,185 @@
+// Matching cost of level 0: `sad`, or `census` of both images and `contrast` of the left one, then `ad_census`.
+
+#import band volume image
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+    outside_cost: u32,
+    // Cost of the largest colour difference that counts, and the variance from which on it counts in full.
+    colour_weight: u32,
+    colour_variance: u32,
+    sad_radius: i32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read> right: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read_write> cost: array<u32>;
+@group(0) @binding(4) var<storage, read> left_census: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> right_census: array<vec2<u32>>;
+// How much colour counts at each pixel.
+@group(0) @binding(6) var<storage, read> weight: array<u32>;
+// Either image, its census, and its contrast as a weight of colour.
+@group(0) @binding(7) var<storage, read> image: array<vec4<u32>>;
+@group(0) @binding(8) var<storage, read_write> image_census: array<vec2<u32>>;
+@group(0) @binding(9) var<storage, read_write> image_weight: array<u32>;
+
+// Matching cost of level 0 by the mean colour difference over a window. One invocation for RUN pixels of a row and a
+// quad of labels: a column of the window serves all of them.
+@compute @workgroup_size(GROUP)
+fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let width = i32(params.level.width);
+    let runs = u32((width + SAD_RUN - 1) / SAD_RUN);
+    let quad = id.x / runs;
+    let x0 = i32(id.x - quad * runs) * SAD_RUN;
+    if quad >= params.level.quads || id.y >= params.band.rows {
+        return;
+    }
+    let pitch = i32(params.level.pixel_pitch);
+    let radius = params.sad_radius;
+    let top = i32(halo_start(u32(radius)));
+    let y = i32(params.band.first_row + id.y);
+    let y_first = max(y - radius, 0);
+    let y_last = min(y + radius, i32(params.level.height) - 1);
+    let shifts = vec4(params.level.low + i32(4u * quad)) + vec4(0, 1, 2, 3);
+    var sums: array<vec4<u32>, SAD_RUN>;
+    var counts: array<vec4<u32>, SAD_RUN>;
+    for (var x = max(x0 - radius, 0); x <= min(x0 + SAD_RUN - 1 + radius, width - 1); x++) {
+        var sum = vec4<u32>();
+        var count = vec4<u32>();
+        for (var v = y_first; v <= y_last; v++) {
+            let row = (v - top) * pitch;
+            let pixel = left[row + x];
+            for (var i = 0; i < 4; i++) {
+                let xr = x - shifts[i];
+                if xr >= 0 && xr < width {
+                    let other = right[row + xr];
+                    if (pixel.z | other.z) == 0u {
+                        sum[i] += difference(channels(pixel), channels(other));
+                        count[i] += 1u;
+                    }
+                }
+            }
+        }
+        for (var i = 0; i < SAD_RUN; i++) {
+            if abs(x - (x0 + i)) <= radius {
+                sums[i] += sum;
+                counts[i] += count;
+            }
+        }
+    }
+    for (var i = 0; i < SAD_RUN; i++) {
+        let x = x0 + i;
+        if x < width {
+            let pixel = left[(y - top) * pitch + x];
+            var costs = vec4<u32>();
+            for (var j = 0; j < 4; j++) {
+                let xr = x - shifts[j];
+                var c = params.outside_cost;
+                if xr >= 0 && xr < width {
+                    if (pixel.z | right[(y - top) * pitch + xr].z) == 0u {
+                        let n = counts[i][j];
+                        c = min((sums[i][j] + 384u * n) / (768u * n), COST_MAX);
+                    }
+                }
+                costs[j] = c;
+            }
+            cost[id.y * params.level.pitch + place_of(quad, u32(x))] = pack_narrow(costs);
+        }
+    }
+}
+
+// Census of every pixel of one image: a bit for each other place of a 9 x 7 window in raster order, set where its
+// grey is below the centre's. One invocation a pixel.
+@compute @workgroup_size(GROUP)
+fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let width = params.level.width;
+    if id.x >= width || id.y >= params.band.rows {
+        return;
+    }
+    let x = i32(id.x);
+    let y = i32(params.band.first_row + id.y);
+    let top = halo_start(u32(CENSUS_RADIUS_Y));
+    let pitch = params.level.pixel_pitch;
+    let centre = image[(u32(y) - top) * pitch + id.x].y >> 16u;
+    var bits = vec2<u32>();
+    for (var dy = -CENSUS_RADIUS_Y; dy <= CENSUS_RADIUS_Y; dy++) {
+        let row = (u32(clamp(y + dy, 0, i32(params.level.height) - 1)) - top) * pitch;
+        for (var dx = -CENSUS_RADIUS_X; dx <= CENSUS_RADIUS_X; dx++) {
+            if dx != 0 || dy != 0 {
+                let pixel = image[row + u32(clamp(x + dx, 0, i32(width) - 1))];
+                let below = (pixel.y >> 16u) < centre && pixel.z == 0u;
+                bits = vec2((bits.x << 1u) | u32(below), (bits.y << 1u) | (bits.x >> 31u));
+            }
+        }
+    }
+    image_census[id.y * pitch + id.x] = bits;
+}
+
+// How much colour counts at every pixel of the left image: by the variance of grey in the window of the census. One
+// invocation a pixel.
+@compute @workgroup_size(GROUP)
+fn contrast(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let width = params.level.width;
+    if id.x >= width || id.y >= params.band.rows {
+        return;
+    }
+    let x = i32(id.x);
+    let y = i32(params.band.first_row + id.y);
+    let top = halo_start(u32(CENSUS_RADIUS_Y));
+    let pitch = params.level.pixel_pitch;
+    let centre = image[(u32(y) - top) * pitch + id.x].y >> 24u;
+    var sum = 0u;
+    var squares = 0u;
+    for (var dy = -CENSUS_RADIUS_Y; dy <= CENSUS_RADIUS_Y; dy++) {
+        let row = (u32(clamp(y + dy, 0, i32(params.level.height) - 1)) - top) * pitch;
+        for (var dx = -CENSUS_RADIUS_X; dx <= CENSUS_RADIUS_X; dx++) {
+            let pixel = image[row + u32(clamp(x + dx, 0, i32(width) - 1))];
+            let grey = select(centre, pixel.y >> 24u, pixel.z == 0u);
+            sum += grey;
+            squares += grey * grey;
+        }
+    }
+    let most = params.colour_variance;
+    var w = params.colour_weight;
+    if most > 0u {
+        w = w * min(CENSUS_PLACES * squares - sum * sum, most) / most;
+    }
+    image_weight[id.y * pitch + id.x] = w;
+}
+
+// Matching cost of level 0 by census and colour difference. One invocation a pixel and quad of labels.
+@compute @workgroup_size(GROUP)
+fn ad_census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let width = params.level.width;
+    let quad = id.x / width;
+    let x = id.x - quad * width;
+    if quad >= params.level.quads || id.y >= params.band.rows {
+        return;
+    }
+    let row = id.y * params.level.pixel_pitch;
+    let pixel = left[row + x];
+    let levels = channels(pixel) >> vec3(8u);
+    let bits = left_census[row + x];
+    let w = weight[row + x];
+    var costs = vec4<u32>();
+    for (var i = 0u; i < 4u; i++) {
+        let xr = i32(x) - params.level.low - i32(4u * quad + i);
+        var c = params.outside_cost;
+        if xr >= 0 && xr < i32(width) {
+            let other = right[row + u32(xr)];
+            if (pixel.z | other.z) == 0u {
+                let ones = countOneBits(bits ^ right_census[row + u32(xr)]);
+                let colour = min(difference(levels, channels(other) >> vec3(8u)), COLOUR_MOST);
+                c = CENSUS_BIT_COST * min(ones.x + ones.y, CENSUS_BITS) + (w * colour + COLOUR_MOST / 2u) / COLOUR_MOST;
+            }
+        }
+        costs[i] = c;
+    }
+    cost[id.y * params.level.pitch + id.x] = pack_narrow(costs);
+}

@@ -1,0 +1,11 @@
+// Weighted median over a window that is stretched, for the pixels that were filled. One invocation a pixel.
+
+#import band weighted_median
+
+@compute @workgroup_size(GROUP)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x < params.level.width && id.y < params.band.rows {
+        median(id);
+    }
+}

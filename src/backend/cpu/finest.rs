@@ -1,0 +1,83 @@
+//! What a match knows of each pixel once the labels are found.
+
+use crate::backend::Map;
+use crate::image::{Plane, Rect};
+
+/// What the finest level knows of each pixel, at last.
+pub(crate) struct Finest {
+    pub(crate) optima: Plane<Optimum>,
+    pub(crate) right: Plane<u16>,
+    /// Belief of the right labels.
+    pub(crate) right_best: Plane<u16>,
+    pub(crate) raw: Plane<i32>,
+    pub(crate) disparity: Plane<i32>,
+    pub(crate) validity: Plane<u8>,
+    pub(crate) confidence: Plane<u8>,
+}
+
+/// The belief of one pixel around its optimum, in units.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Optimum {
+    pub(super) label: u16,
+    pub(super) best: u16,
+    pub(super) runner_up: u16,
+}
+
+impl Finest {
+    pub(crate) fn new((width, height): (usize, usize)) -> Self {
+        Self {
+            optima: Plane::filled(width, height, Optimum::default()),
+            right: Plane::filled(width, height, 0),
+            right_best: Plane::filled(width, height, 0),
+            raw: Plane::filled(width, height, 0),
+            disparity: Plane::filled(width, height, 0),
+            validity: Plane::filled(width, height, 0),
+            confidence: Plane::filled(width, height, 0),
+        }
+    }
+
+    pub(crate) fn read(&self, map: Map) -> Plane<i32> {
+        match map {
+            Map::Label => self.optima.map(|p| p.label.into()),
+            Map::Best => self.optima.map(|p| p.best.into()),
+            Map::RunnerUp => self.optima.map(|p| p.runner_up.into()),
+            Map::RightLabel => self.right.map(|&v| v.into()),
+            Map::RightBest => self.right_best.map(|&v| v.into()),
+            Map::Raw => self.raw.clone(),
+            Map::Disparity => self.disparity.clone(),
+            Map::Validity => self.validity.map(|&v| v.into()),
+            Map::Confidence => self.confidence.map(|&v| v.into()),
+        }
+    }
+
+    pub(super) fn write(&mut self, map: Map, values: &Plane<i32>) {
+        assert_eq!(self.optima.size(), values.size(), "a map of the size of the images");
+        self.write_part(map, values, &Rect::whole(values.size()), (0, 0));
+    }
+
+    /// Replaces the values of `map` from `corner` on by `part` of `values`.
+    pub(crate) fn write_part(&mut self, map: Map, values: &Plane<i32>, part: &Rect, corner: (usize, usize)) {
+        fn put<T>(
+            plane: &mut Plane<T>,
+            (values, part, (x, y)): (&Plane<i32>, &Rect, (usize, usize)),
+            set: impl Fn(&mut T, i32),
+        ) {
+            for (row, y) in part.y.clone().zip(y..) {
+                let old = plane.row_mut(y)[x..].iter_mut();
+                old.zip(&values.row(row)[part.x.clone()]).for_each(|(old, &new)| set(old, new));
+            }
+        }
+        let from = (values, part, corner);
+        match map {
+            Map::Label => put(&mut self.optima, from, |p, v| p.label = v as u16),
+            Map::Best => put(&mut self.optima, from, |p, v| p.best = v as u16),
+            Map::RunnerUp => put(&mut self.optima, from, |p, v| p.runner_up = v as u16),
+            Map::RightLabel => put(&mut self.right, from, |old, v| *old = v as u16),
+            Map::RightBest => put(&mut self.right_best, from, |old, v| *old = v as u16),
+            Map::Raw => put(&mut self.raw, from, |old, v| *old = v),
+            Map::Disparity => put(&mut self.disparity, from, |old, v| *old = v),
+            Map::Validity => put(&mut self.validity, from, |old, v| *old = v as u8),
+            Map::Confidence => put(&mut self.confidence, from, |old, v| *old = v as u8),
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The volumes of a match, in the width that its plan asks for.
+
+use super::finest::Finest;
+use super::pages::Pages;
+use super::units::Units;
+use crate::error::Result;
+use crate::front::Prepared;
+use crate::graph::LevelGraph;
+use crate::image::{Pair, Plane};
+use crate::plan::Plan;
+
+/// All volumes of a match.
+pub(super) struct Volumes<U> {
+    pub(super) plan: Plan,
+    pub(super) pair: Pair,
+    /// Cost of level 0; coarser ones are in `levels`.
+    pub(super) fine_cost: Pages<u8>,
+    pub(super) levels: Vec<Level<U>>,
+    /// First and last label of each pixel, by level; empty where all labels are in question.
+    pub(super) label_ranges: Vec<Plane<[u16; 2]>>,
+    /// Label map of the last change, and its sum.
+    pub(super) labels: Vec<u16>,
+    pub(super) change: u64,
+    pub(super) maps: Finest,
+}
+
+/// Volumes of one level, each \[y\]\[x\]\[slot\]\[label\] with padded labels.
+pub(super) struct Level<U> {
+    pub(super) graph: LevelGraph,
+    /// In 1/256 cost units; empty at level 0.
+    pub(super) cost: Pages<u16>,
+    pub(super) evidence: Pages<u8>,
+    pub(super) dependency: Pages<U>,
+    /// Whether the dependency factors have sent their messages: until then all are 0, whatever is stored.
+    pub(super) dependency_sent: bool,
+    /// The same of the resolution factors between this level and the next finer one: of its `up` and that one's `down`.
+    pub(super) resolution_sent: bool,
+    /// Empty at the coarsest level.
+    pub(super) down: Pages<U>,
+    /// Empty at level 0.
+    pub(super) up: Pages<U>,
+    pub(super) belief: Pages<U>,
+}
+
+impl<U: Units> Volumes<U> {
+    pub(super) fn new(plan: &Plan, prepared: Prepared) -> Result<Self> {
+        let Prepared { pair, graphs, label_ranges, .. } = prepared;
+        let last = plan.levels.len() - 1;
+        let levels = graphs
+            .into_iter()
+            .enumerate()
+            .map(|(z, graph)| {
+                let level = &plan.levels[z];
+                let cells = level.pixels() * level.stride;
+                Ok(Level {
+                    cost: Pages::new(if z == 0 { 0 } else { cells })?,
+                    evidence: Pages::new(cells)?,
+                    dependency: Pages::new(cells * graph.slots())?,
+                    dependency_sent: false,
+                    resolution_sent: false,
+                    down: Pages::new(if z == last { 0 } else { cells })?,
+                    up: Pages::new(if z == 0 { 0 } else { cells })?,
+                    belief: Pages::new(cells)?,
+                    graph,
+                })
+            })
+            .collect::<Result<_>>()?;
+        let fine = &plan.levels[0];
+        Ok(Self {
+            plan: plan.clone(),
+            pair,
+            fine_cost: Pages::new(fine.pixels() * fine.stride)?,
+            levels,
+            label_ranges,
+            labels: vec![0; fine.pixels()],
+            change: 0,
+            maps: Finest::new(plan.size()),
+        })
+    }
+
+    /// Ready for another pair whose plan fits, as [`Self::new`] would be.
+    pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
+        let Prepared { pair, graphs, label_ranges, .. } = prepared;
+        self.plan = plan.clone();
+        (self.pair, self.label_ranges) = (pair, label_ranges);
+        self.labels.fill(0);
+        for (level, graph) in self.levels.iter_mut().zip(graphs) {
+            (level.graph, level.dependency_sent, level.resolution_sent) = (graph, false, false);
+        }
+    }
+}

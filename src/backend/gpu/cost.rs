@@ -1,0 +1,85 @@
+//! Matching cost: see [`Stage::Cost`](crate::backend::Stage::Cost).
+//!
+//! Floor: `census` moves 24 bytes a pixel, `contrast` 20, at 1,000 operations each, and asks for 400, the 63 places of the
+//! window; `ad_census` moves 1 byte a label at 100 operations for four, and asks for 32, the right row once a label.
+
+use super::buffers::with_halo;
+use super::shader::Kernel;
+use super::steps::{Job, Recorder};
+use super::uniform::uniform;
+use crate::error::Result;
+use crate::options::Cost;
+use crate::plan::{
+    CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, CENSUS_RADIUS_X, CENSUS_RADIUS_Y, COLOUR_MOST, COST_MAX,
+    Plan,
+};
+
+const SHADER: &str = include_str!("../../../shaders/cost.wgsl");
+/// Pixels of a row that share an invocation of `sad`.
+const SAD_RUN: u32 = 8;
+
+uniform! { outside_cost: u32, colour_weight: u32, colour_variance: u32, sad_radius: i32 }
+
+/// `sad`; or `census`, `contrast` and `ad_census`.
+pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
+    let job = |entry: &'static str, loops| {
+        let kernel = Kernel::new("cost", entry, SHADER)
+            .with("SAD_RUN", SAD_RUN as i32)
+            .with("COST_MAX", u32::from(COST_MAX))
+            .with("CENSUS_RADIUS_X", CENSUS_RADIUS_X as i32)
+            .with("CENSUS_RADIUS_Y", CENSUS_RADIUS_Y as i32)
+            .with("CENSUS_PLACES", CENSUS_PLACES)
+            .with("CENSUS_BITS", CENSUS_BITS)
+            .with("CENSUS_BIT_COST", CENSUS_BIT_COST)
+            .with("COLOUR_MOST", COLOUR_MOST);
+        Job::new::<Uniform>(kernel, loops)
+    };
+    if plan.method.cost == Cost::Sad {
+        let (window, run) = (plan.method.sad_window as usize, SAD_RUN as usize);
+        return vec![job("sad", (window + run - 1) * (1 + 5 * window + run) + run * 5)];
+    }
+    let window = (2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2);
+    vec![job("census", window), job("contrast", window), job("ad_census", 4)]
+}
+
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (plan, b, l) = (r.plan, r.buffers, r.params());
+    let own = Uniform {
+        outside_cost: plan.outside_cost.into(),
+        colour_weight: plan.colour_weight(),
+        colour_variance: plan.colour_variance(),
+        sad_radius: (plan.method.sad_window / 2) as i32,
+    };
+    let cost = &r.here().cost;
+    match &jobs(plan, 0)[..] {
+        [census, contrast, ad_census] => {
+            let around = |rows: &_| with_halo(rows, CENSUS_RADIUS_Y, l.height);
+            for (image, bits) in [&b.left, &b.right].into_iter().zip(&b.census) {
+                r.rows(census, &own, l.width, |rows| {
+                    vec![(7, image.bind(&around(rows))), (8, bits.bind(rows))]
+                })?;
+            }
+            r.rows(contrast, &own, l.width, |rows| {
+                vec![(7, b.left.bind(&around(rows))), (9, b.contrast.bind(rows))]
+            })?;
+            r.rows(ad_census, &own, l.width * l.quads, |rows| {
+                vec![
+                    (1, b.left.bind(rows)),
+                    (2, b.right.bind(rows)),
+                    (3, cost.bind(rows)),
+                    (4, b.census[0].bind(rows)),
+                    (5, b.census[1].bind(rows)),
+                    (6, b.contrast.bind(rows)),
+                ]
+            })?;
+        }
+        jobs => {
+            r.rows(&jobs[0], &own, l.width.div_ceil(SAD_RUN) * l.quads, |rows| {
+                let seen = with_halo(rows, plan.method.sad_window / 2, l.height);
+                vec![(1, b.left.bind(&seen)), (2, b.right.bind(&seen)), (3, cost.bind(rows))]
+            })?;
+        }
+    }
+    r.renew(cost);
+    Ok(())
+}

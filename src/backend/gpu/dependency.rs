@@ -1,0 +1,41 @@
+//! Messages of the dependency factors: see [`Stage::Dependency`](crate::backend::Stage::Dependency).
+//!
+//! Floor, a label and three members: 7 bytes moved, 15 asked for (the beliefs of three members, all of it again after the
+//! minimum), 50 operations for four labels.
+
+use super::buffers::{HALO, with_halo};
+use super::shader::Kernel;
+use super::steps::{Job, Recorder};
+use super::uniform::uniform;
+use crate::error::Result;
+use crate::graph::NO_MEMBER;
+use crate::plan::{GRAPH_WINDOW, Plan, TruncationRule};
+
+const SHADER: &str = include_str!("../../../shaders/dependency.wgsl");
+
+uniform! { tau: u32 }
+
+pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
+    let absolute = plan.dependency.rule == TruncationRule::Absolute;
+    let (quads, slots) = (plan.levels[level].quads(), plan.slots());
+    let kernel = Kernel::new("dependency", "main", SHADER)
+        .of_width(plan.volume_width)
+        .with("SLOTS", slots as u32)
+        .with("ABSOLUTE", absolute)
+        .with("NO_MEMBER", u32::from(NO_MEMBER))
+        .with("WINDOW", GRAPH_WINDOW as u32)
+        .with("RADIUS", HALO);
+    let floors = if absolute { slots * (quads + 1) } else { 0 };
+    vec![Job::new::<Uniform>(kernel, floors + 3 * slots + 2 * quads * (2 * slots + 1))]
+}
+
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (here, l) = (r.here(), r.params());
+    let own = Uniform { tau: r.plan.dependency.tau.into() };
+    r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
+        let seen = with_halo(rows, HALO, l.height);
+        vec![(1, here.members.bind(rows)), (2, here.belief.bind(&seen)), (3, here.dependency.bind(rows))]
+    })?;
+    r.renew(&here.dependency);
+    Ok(())
+}

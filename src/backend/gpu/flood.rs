@@ -1,0 +1,22 @@
+//! One sweep of a level: see [`Stage::Flood`].
+//!
+//! A device goes over all pixels at once, so it gains nothing by going over messages and beliefs together: the stage has no
+//! shader of its own.
+
+use super::steps::{Job, Recorder};
+use crate::backend::Stage;
+use crate::error::Result;
+use crate::plan::Plan;
+
+/// The stages that it consists of.
+pub(super) fn parts(level: usize) -> [Stage; 2] {
+    [Stage::Dependency(level), Stage::Belief(level)]
+}
+
+pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
+    Vec::new()
+}
+
+pub(super) fn record(_: &mut Recorder) -> Result<()> {
+    Ok(())
+}

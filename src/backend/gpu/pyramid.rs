@@ -1,0 +1,33 @@
+//! Costs of the coarser levels: see [`Stage::Pyramid`](crate::backend::Stage::Pyramid).
+//!
+//! Floor, for a fine label of level 1: 1 + 2/8 bytes moved, 31 asked for (the 5 x 5 window), 100 operations for four labels.
+
+use super::buffers::with_halo;
+use super::shader::Kernel;
+use super::steps::{Job, Recorder};
+use super::uniform::{LevelParams, uniform};
+use crate::error::Result;
+use crate::plan::Plan;
+
+const SHADER: &str = include_str!("../../../shaders/pyramid.wgsl");
+
+uniform! { fine: LevelParams, padding: [u32; 2], label_offset: i32 }
+
+pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
+    let kernel = Kernel::new("pyramid", "main", SHADER)
+        .with("FINE_NARROW", level == 1)
+        .with("LOW_PASS", !plan.minimum_over_d());
+    vec![Job::new::<Uniform>(kernel, 7 * 31)]
+}
+
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (finer, here, l) = (r.finer(), r.here(), r.params());
+    let own =
+        Uniform { fine: finer.params, label_offset: r.plan.label_offset(r.level), ..Uniform::default() };
+    r.rows(&jobs(r.plan, r.level)[0], &own, 2 * l.width * l.quads, |rows| {
+        let fine_rows = 2 * rows.start..(2 * rows.end).min(finer.params.height);
+        vec![(1, finer.cost.bind(&with_halo(&fine_rows, 2, finer.params.height))), (2, here.cost.bind(rows))]
+    })?;
+    r.renew(&here.cost);
+    Ok(())
+}

@@ -1,0 +1,182 @@
+//! Shaders, put together from their files: a stage's own, the shared parts that it imports, and constants from Rust.
+
+use crate::maps::{FRACTION, flag};
+use crate::plan::VolumeWidth;
+use crate::weights::MEDIAN_WEIGHT;
+use std::fmt::Write;
+
+/// Invocations of a workgroup.
+pub(super) const WORKGROUP: u32 = 64;
+
+/// What a shader may import, by the word of its `#import` line.
+const SHARED: [(&str, &str); 6] = [
+    ("band", include_str!("../../../shaders/shared/band.wgsl")),
+    ("image", include_str!("../../../shaders/shared/image.wgsl")),
+    ("maps", include_str!("../../../shaders/shared/maps.wgsl")),
+    ("messages", include_str!("../../../shaders/shared/messages.wgsl")),
+    ("volume", include_str!("../../../shaders/shared/volume.wgsl")),
+    ("weighted_median", include_str!("../../../shaders/shared/weighted_median.wgsl")),
+];
+/// What `messages` stands on, by the width of messages and beliefs.
+const NARROW: &str = include_str!("../../../shaders/shared/narrow.wgsl");
+const WIDE: &str = include_str!("../../../shaders/shared/wide.wgsl");
+
+/// A constant of a shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Constant {
+    /// `bool`.
+    Bool(bool),
+    /// `i32`.
+    I32(i32),
+    /// `u32`.
+    U32(u32),
+}
+
+impl From<bool> for Constant {
+    fn from(value: bool) -> Self {
+        Self::Bool(value)
+    }
+}
+
+impl From<i32> for Constant {
+    fn from(value: i32) -> Self {
+        Self::I32(value)
+    }
+}
+
+impl From<u32> for Constant {
+    fn from(value: u32) -> Self {
+        Self::U32(value)
+    }
+}
+
+/// The constants of the shared part `name`.
+fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
+    match name {
+        "band" => vec![("GROUP", WORKGROUP.into())],
+        "maps" => {
+            let flags = [
+                ("OUTSIDE", flag::OUTSIDE),
+                ("OCCLUDED", flag::OCCLUDED),
+                ("SPECKLE", flag::SPECKLE),
+                ("LOW_CONFIDENCE", flag::LOW_CONFIDENCE),
+                ("FILLED", flag::FILLED),
+                ("MASKED", flag::MASKED),
+                ("INVALID", flag::INVALID),
+                ("VALIDITY", u8::MAX),
+            ];
+            let flags = flags.map(|(name, bits)| (name, u32::from(bits).into()));
+            flags.into_iter().chain([("FRACTION", FRACTION.into())]).collect()
+        }
+        "weighted_median" => vec![("MEDIAN_WEIGHT", u32::from(MEDIAN_WEIGHT).into())],
+        _ => Vec::new(),
+    }
+}
+
+/// An entry point of a stage's shader, with the constants that specialise it. Equal kernels compile once.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Kernel {
+    stage: &'static str,
+    entry: &'static str,
+    text: &'static str,
+    width: Option<VolumeWidth>,
+    constants: Vec<(&'static str, Constant)>,
+}
+
+impl Kernel {
+    /// The entry point `entry` of the shader of `stage`, whose file holds `text`.
+    pub(super) fn new(stage: &'static str, entry: &'static str, text: &'static str) -> Self {
+        Self { stage, entry, text, width: None, constants: Vec::new() }
+    }
+
+    /// The same for messages and beliefs of this width.
+    pub(super) fn of_width(self, width: VolumeWidth) -> Self {
+        Self { width: Some(width), ..self }
+    }
+
+    /// The same with a constant more.
+    pub(super) fn with(mut self, name: &'static str, value: impl Into<Constant>) -> Self {
+        self.constants.push((name, value.into()));
+        self
+    }
+
+    /// Name of the stage whose shader it is.
+    #[must_use]
+    pub fn stage(&self) -> &'static str {
+        self.stage
+    }
+
+    /// The function that starts it.
+    #[must_use]
+    pub fn entry(&self) -> &'static str {
+        self.entry
+    }
+
+    /// The shader, as the device gets it: constants, then what it imports, then its own file.
+    #[must_use]
+    pub fn source(&self) -> String {
+        let mut parts = Vec::new();
+        let body = without_imports(self.text, &mut parts);
+        let mut source = String::new();
+        let shared = parts.iter().flat_map(|part| constants_of(part));
+        for (name, value) in shared.chain(self.constants.iter().copied()) {
+            let _ = match value {
+                Constant::Bool(value) => writeln!(source, "const {name} = {value};"),
+                Constant::I32(value) => writeln!(source, "const {name}: i32 = {value};"),
+                Constant::U32(value) => writeln!(source, "const {name}: u32 = {value}u;"),
+            };
+        }
+        if let Some(width) = self.width {
+            source += match width {
+                VolumeWidth::Narrow => NARROW,
+                VolumeWidth::Wide => WIDE,
+            };
+        }
+        for part in &parts {
+            source += &without_imports(shared_part(part), &mut Vec::new());
+        }
+        source + &body
+    }
+}
+
+fn shared_part(name: &str) -> &'static str {
+    SHARED.iter().find(|part| part.0 == name).expect("an import names a file in shaders/shared").1
+}
+
+/// `text` without its `#import` lines; what they name, and what that imports itself, goes to `parts`, each once.
+fn without_imports<'a>(text: &'a str, parts: &mut Vec<&'a str>) -> String {
+    let mut body = String::with_capacity(text.len());
+    for line in text.lines() {
+        let Some(names) = line.strip_prefix("#import ") else {
+            body += line;
+            body.push('\n');
+            continue;
+        };
+        for name in names.split_whitespace() {
+            if !parts.contains(&name) {
+                without_imports(shared_part(name), parts);
+                parts.push(name);
+            }
+        }
+    }
+    body
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn imports_come_once_and_before_their_users() {
+        let text = "#import messages volume\n#import band\nfn main() {}\n";
+        let mut parts = Vec::new();
+        assert_eq!(without_imports(text, &mut parts), "fn main() {}\n");
+        assert_eq!(parts, ["volume", "messages", "band"]);
+    }
+
+    #[test]
+    fn constants_have_their_types() {
+        let kernel = Kernel::new("a", "main", "").with("A", 3).with("B", 4u32).with("C", true);
+        assert_eq!(kernel.source(), "const A: i32 = 3;\nconst B: u32 = 4u;\nconst C = true;\n");
+    }
+}

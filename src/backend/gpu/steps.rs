@@ -1,0 +1,244 @@
+//! From a stage to dispatches: in bands of rows where a buffer exceeds what a device lets a shader see.
+
+use super::MAX_LOOP_ITERATIONS;
+use super::buffers::{Binding, Buffers, Copy, LevelBuffers, Rows};
+use super::device::Device;
+use super::shader::{Kernel, WORKGROUP};
+use super::uniform::{self, Band, Header, Layout, LevelParams, UniformLayout};
+use crate::error::{Error, Result};
+use crate::plan::Plan;
+use std::collections::{BTreeSet, HashMap};
+use std::ops::Range;
+
+/// What a stage has a device do, in order.
+pub(super) enum Step {
+    Dispatch(Dispatch),
+    Copy(Copy),
+}
+
+pub(super) struct Dispatch {
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) bind_group: wgpu::BindGroup,
+    pub(super) groups: (u32, u32),
+    /// Iterations of all loops of all invocations, at most.
+    pub(super) work: u64,
+}
+
+/// Compiled kernels.
+pub(super) type Pipelines = HashMap<Kernel, wgpu::ComputePipeline>;
+
+/// What a kernel is for a plan, before there is a device.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The entry point and its constants.
+    pub kernel: Kernel,
+    /// How often all loops of one invocation run at most, together. Mesa 22 stops a shader silently after about 65,000.
+    pub loops: usize,
+    /// The uniform that it reads.
+    pub uniform: UniformLayout,
+}
+
+impl Job {
+    /// `kernel` with a uniform `U` of the stage's own, whose loops run at most `loops` times.
+    pub(super) fn new<U: Layout>(kernel: Kernel, loops: usize) -> Self {
+        Self { kernel, loops, uniform: UniformLayout::of::<U>() }
+    }
+}
+
+/// Buffers to bind, each at the number that it has in the shader.
+pub(super) type Bindings = Vec<(u32, Binding)>;
+
+/// Collects the steps of a stage at a level.
+pub(super) struct Recorder<'a> {
+    pub(super) device: &'a mut Device,
+    pub(super) pipelines: &'a mut Pipelines,
+    pub(super) plan: &'a Plan,
+    pub(super) buffers: &'a Buffers,
+    pub(super) level: usize,
+    pub(super) steps: Vec<Step>,
+}
+
+impl<'a> Recorder<'a> {
+    /// The buffers of the level.
+    pub(super) fn here(&self) -> &'a LevelBuffers {
+        &self.buffers.levels[self.level]
+    }
+
+    /// Those of the next finer one.
+    pub(super) fn finer(&self) -> &'a LevelBuffers {
+        &self.buffers.levels[self.level - 1]
+    }
+
+    /// The level as shaders are told of it.
+    pub(super) fn params(&self) -> LevelParams {
+        self.here().params
+    }
+
+    /// Dispatches `job` for all rows of the level, `threads` invocations a row, a dispatch a band. `bind` names the buffers for
+    /// rows of the level.
+    pub(super) fn rows<U: Layout>(
+        &mut self,
+        job: &Job,
+        own: &U,
+        threads: u32,
+        bind: impl Fn(&Range<u32>) -> Bindings,
+    ) -> Result<()> {
+        for rows in self.bands(&self.cuts(), &bind)? {
+            let bindings = bind(&rows);
+            let height = rows.end - rows.start;
+            self.dispatch(job, own, rows, (threads, height), &bindings)?;
+        }
+        Ok(())
+    }
+
+    /// The same with one invocation for each row.
+    pub(super) fn one_a_row<U: Layout>(
+        &mut self,
+        job: &Job,
+        own: &U,
+        bind: impl Fn(&Range<u32>) -> Bindings,
+    ) -> Result<()> {
+        for rows in self.bands(&self.cuts(), &bind)? {
+            let bindings = bind(&rows);
+            let height = rows.end - rows.start;
+            self.dispatch(job, own, rows, (height, 1), &bindings)?;
+        }
+        Ok(())
+    }
+
+    /// Records a copy.
+    pub(super) fn copies(&mut self, copies: impl IntoIterator<Item = Copy>) {
+        self.steps.extend(copies.into_iter().map(Step::Copy));
+    }
+
+    /// Renews what the parts of `written` hold of each other.
+    pub(super) fn renew(&mut self, written: &Rows) {
+        self.copies(written.exchange());
+    }
+
+    /// Rows at which a band must end: where a part of the level's volumes or of the next finer one's starts, and the height.
+    fn cuts(&self) -> Vec<u32> {
+        let mut cuts: BTreeSet<u32> = self.here().belief.starts().collect();
+        if self.level > 0 {
+            cuts.extend(self.finer().belief.starts().map(|row| row / 2));
+        }
+        cuts.insert(self.params().height);
+        cuts.into_iter().collect()
+    }
+
+    /// Bands of all rows, as few as possible, for which no binding exceeds what the device lets a shader see; volumes are not
+    /// among what is bound.
+    pub(super) fn map_bands(&self, bind: impl Fn(&Range<u32>) -> Bindings) -> Result<Vec<Range<u32>>> {
+        self.bands(&[0, self.params().height], bind)
+    }
+
+    /// The same between `cuts`.
+    fn bands(&self, cuts: &[u32], bind: impl Fn(&Range<u32>) -> Bindings) -> Result<Vec<Range<u32>>> {
+        let largest = |rows: &Range<u32>| bind(rows).iter().map(|(_, b)| b.size()).max().unwrap_or(0);
+        let mut bands = Vec::new();
+        for part in cuts.windows(2).map(|ends| ends[0]..ends[1]) {
+            let mut rows = part.end - part.start;
+            loop {
+                let starts = part.clone().step_by(rows as usize);
+                let cut: Vec<_> = starts.map(|start| start..(start + rows).min(part.end)).collect();
+                let most = cut.iter().map(largest).max().unwrap_or(0);
+                if most <= self.device.max_binding {
+                    bands.extend(cut);
+                    break;
+                }
+                if rows == 1 {
+                    return Err(Error::Memory(format!(
+                        "what a row of the image depends on takes {} KiB and {} lets a shader see {} KiB at once: use \
+                         --backend cpu, or a smaller image or range",
+                        most >> 10,
+                        self.device.name,
+                        self.device.max_binding >> 10
+                    )));
+                }
+                rows -= rows.div_ceil(8).min(rows - 1);
+            }
+        }
+        Ok(bands)
+    }
+
+    /// Dispatches `job` for the band `rows`, as invocations in `size.1` rows of `size.0`.
+    pub(super) fn dispatch<U: Layout>(
+        &mut self,
+        job: &Job,
+        own: &U,
+        rows: Range<u32>,
+        size: (u32, u32),
+        bindings: &[(u32, Binding)],
+    ) -> Result<()> {
+        let pipeline = self.pipeline(job)?;
+        let row_groups = size.0.div_ceil(WORKGROUP).max(1);
+        let total = u64::from(row_groups) * u64::from(size.1);
+        let most = u64::from(self.device.max_groups);
+        let grid = total.min(most).max(1) as u32;
+        let band = Band { first_row: rows.start, rows: rows.end - rows.start, row_groups, grid };
+        let bytes = uniform::bytes(&Header { level: self.params(), band, ..Header::default() }, own);
+        let device = self.device.inner()?;
+        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("uniform"),
+            size: bytes.len() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
+        entries.extend(
+            bindings.iter().map(|(place, binding)| wgpu::BindGroupEntry {
+                binding: *place,
+                resource: binding.resource(),
+            }),
+        );
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        self.device.write(&uniform, &bytes)?;
+        self.steps.push(Step::Dispatch(Dispatch {
+            pipeline,
+            bind_group,
+            groups: (grid, total.div_ceil(u64::from(grid)) as u32),
+            work: job.loops.max(1) as u64 * u64::from(size.0) * u64::from(size.1),
+        }));
+        Ok(())
+    }
+
+    /// The compiled kernel of `job`, compiled on first use.
+    fn pipeline(&mut self, job: &Job) -> Result<wgpu::ComputePipeline> {
+        let Job { kernel, loops, .. } = job;
+        if *loops > MAX_LOOP_ITERATIONS {
+            let plan = self.plan;
+            return Err(Error::Device(format!(
+                "{} x {} pixels and {} labels with {} neighbours are too many for one invocation of the shader `{}`: use \
+                 --backend cpu",
+                plan.levels[0].width,
+                plan.levels[0].height,
+                plan.levels[0].labels,
+                plan.neighbours,
+                kernel.stage()
+            )));
+        }
+        if let Some(pipeline) = self.pipelines.get(kernel) {
+            return Ok(pipeline.clone());
+        }
+        let device = self.device.inner()?;
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(kernel.stage()),
+            source: wgpu::ShaderSource::Wgsl(kernel.source().into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(kernel.stage()),
+            layout: None,
+            module: &module,
+            entry_point: Some(kernel.entry()),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        self.device.check()?;
+        self.pipelines.insert(kernel.clone(), pipeline.clone());
+        Ok(pipeline)
+    }
+}

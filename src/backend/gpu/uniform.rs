@@ -1,0 +1,141 @@
+//! What a kernel is told: one uniform buffer a dispatch. It begins alike for all; the rest is the stage's own.
+
+use crate::plan::{LABEL_BLOCK, LevelPlan, Plan};
+use bytemuck::{Pod, Zeroable};
+
+/// Rows of every buffer start at a multiple of this many 32-bit words: the alignment of bindings everywhere.
+pub(super) const ALIGN_WORDS: usize = 64;
+
+/// Declares fields with their names and offsets, for the tests that hold them against the shaders.
+macro_rules! layout {
+    ($type:ident: $($field:ident),*) => {
+        impl $crate::backend::gpu::uniform::Layout for $type {
+            const FIELDS: &'static [(&'static str, usize)] =
+                &[$( (stringify!($field), std::mem::offset_of!($type, $field)), )*];
+        }
+    };
+}
+
+/// Declares `Uniform`, the fields of a stage's own in the order of its shader.
+macro_rules! uniform {
+    ($( $field:ident: $type:ty ),* $(,)?) => {
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+        pub(super) struct Uniform {
+            $( $field: $type, )*
+        }
+
+        $crate::backend::gpu::uniform::layout!(Uniform: $($field),*);
+    };
+}
+
+pub(super) use {layout, uniform};
+
+/// Names and offsets of the fields of a struct, in bytes. Names that start with `padding` are no fields of the shader's.
+pub(super) trait Layout: Pod {
+    /// Every field.
+    const FIELDS: &'static [(&'static str, usize)];
+}
+
+impl Layout for () {
+    const FIELDS: &'static [(&'static str, usize)] = &[];
+}
+
+/// `Level` of `shaders/shared/band.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct LevelParams {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) low: i32,
+    pub(super) labels: u32,
+    pub(super) quads: u32,
+    pub(super) pitch: u32,
+    pub(super) dependency_pitch: u32,
+    pub(super) member_pitch: u32,
+    pub(super) pixel_pitch: u32,
+    pub(super) starts_pitch: u32,
+}
+
+layout!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch, pixel_pitch, starts_pitch);
+
+impl LevelParams {
+    /// Parameters of `level`.
+    pub(super) fn new(plan: &Plan, level: &LevelPlan) -> Self {
+        const { assert!(LABEL_BLOCK.is_multiple_of(16)) };
+        let quads = level.stride / 4;
+        let pitch = |words: usize| words.next_multiple_of(ALIGN_WORDS) as u32;
+        Self {
+            width: level.width as u32,
+            height: level.height as u32,
+            low: level.min,
+            labels: level.labels as u32,
+            quads: quads as u32,
+            pitch: pitch(level.width * quads),
+            dependency_pitch: pitch(level.width * plan.slots() * quads),
+            member_pitch: pitch(level.width * plan.neighbours.div_ceil(4)),
+            pixel_pitch: pitch(level.width),
+            starts_pitch: pitch(level.width + 1),
+        }
+    }
+}
+
+/// `Band` of `shaders/shared/band.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct Band {
+    pub(super) first_row: u32,
+    pub(super) rows: u32,
+    pub(super) row_groups: u32,
+    pub(super) grid: u32,
+}
+
+layout!(Band: first_row, rows, row_groups, grid);
+
+/// What every uniform begins with.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub(super) struct Header {
+    pub(super) level: LevelParams,
+    pub(super) padding: [u32; 2],
+    pub(super) band: Band,
+}
+
+layout!(Header: level, padding, band);
+
+/// A uniform as a shader declares it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UniformLayout {
+    /// Its fields with their offsets in bytes.
+    pub fields: Vec<(&'static str, usize)>,
+    /// The bytes of a uniform.
+    pub bytes: usize,
+}
+
+impl UniformLayout {
+    /// The layout of a header and `U`.
+    pub(super) fn of<U: Layout>() -> Self {
+        let own = U::FIELDS.iter().map(|(name, offset)| (*name, size_of::<Header>() + offset));
+        let all = Header::FIELDS.iter().copied().chain(own);
+        Self {
+            fields: all.filter(|(name, _)| !name.starts_with("padding")).collect(),
+            bytes: (size_of::<Header>() + size_of::<U>()).next_multiple_of(16),
+        }
+    }
+
+    /// Layouts of the structs inside: `Level` and `Band`.
+    #[must_use]
+    pub fn inner() -> [(&'static str, Self); 2] {
+        fn of<T: Layout>() -> UniformLayout {
+            UniformLayout { fields: T::FIELDS.to_vec(), bytes: size_of::<T>() }
+        }
+        [("Level", of::<LevelParams>()), ("Band", of::<Band>())]
+    }
+}
+
+/// The bytes of a uniform.
+pub(super) fn bytes<U: Layout>(header: &Header, own: &U) -> Vec<u8> {
+    let mut bytes = [bytemuck::bytes_of(header), bytemuck::bytes_of(own)].concat();
+    bytes.resize(bytes.len().next_multiple_of(16), 0);
+    bytes
+}

@@ -1,0 +1,173 @@
+//! The stages of the method: the one table that lists them, and the exact definition of each.
+//!
+//! A row gives the variant of [`Stage`] and the name of its files: `cpu/NAME.rs`, `gpu/NAME.rs`, `shaders/NAME.wgsl`, and the
+//! twin and the test of that name. Whatever needs a list of all stages follows from [`for_every_stage`](crate::for_every_stage).
+
+use crate::plan::Plan;
+
+/// Calls the macro `$then` with all rows: those that run at a level, those that run on the volumes of level 0, and those that
+/// look at maps alone.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! for_every_stage {
+    ($then:ident) => {
+        $then! {
+            levels {
+                /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
+                /// 256 times).
+                ///
+                /// First x and y: for each fine label the 5 x 5 binomial mean (1 4 6 4 1, outer product) around (2 x, 2 y),
+                /// coordinates clamped to the image, rounded as (sum + 128) >> 8. Then d, from those means: for coarse label z, with
+                /// low-pass their binomial mean over the fine labels 2 z - 2 ..= 2 z + 2, labels clamped to the fine range, rounded as
+                /// (sum + 8) >> 4; with the minimum, the smallest at those labels of 2 z - 1 ..= 2 z + 1 that are in the range.
+                Pyramid pyramid;
+                /// Costs of a level at labels outside the pixel's label range, become the highest there
+                /// is: [`crate::plan::COST_MAX`] (256 times that at coarser levels).
+                LabelRange label_range;
+                /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
+                /// beliefs equal to the evidence.
+                Evidence evidence;
+                /// Messages of the dependency factors of a level, from the beliefs and their own old messages.
+                ///
+                /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
+                /// [`crate::plan::TruncationRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
+                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), cut by [`Plan::dependency`](crate::plan::Plan::dependency) with its bounds for the smallest s. A factor of
+                /// one member, and a slot without one, keep the message they have: 0, from the start.
+                Dependency dependency;
+                /// Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both directions,
+                /// from the beliefs and their own old messages.
+                ///
+                /// Each coarse pixel (x, y) has one factor with its children (2 x, 2 y) to (2 x + 1, 2 y + 1), as far as they are
+                /// inside. q is the belief less the factor's old message (less its minimum where the rule is absolute). Labels d
+                /// and z agree when |d - 2 z| is at most 1 (interpolating) or 0 (strict). U\[c\](z) is the smallest q\[c\](d) of
+                /// the d that agree with z, infinite if none does. To the parent: s(z) = the sum of U\[c\](z). To child c:
+                /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
+                /// infinite if none does. Each s is cut by [`Plan::resolution`](crate::plan::Plan::resolution) with its bounds for the smallest s. Infinite is
+                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), and sums saturate there; where every s is infinite, the message is 0.
+                Resolution resolution;
+                /// Beliefs of a level: evidence, plus every dependency message to the pixel, plus the resolution messages from
+                /// above and from below; at most [`Plan::belief_most`](crate::plan::Plan::belief_most).
+                Belief belief;
+                /// [`Stage::Dependency`] and then [`Stage::Belief`] of a level.
+                Flood flood;
+            }
+            finest {
+                /// Matching cost of level 0, 0 ..= [`crate::plan::COST_MAX`].
+                ///
+                /// The cost of pixel (x, y) and disparity d compares left (x, y) with right (x - d, y). It is
+                /// [`Plan::outside_cost`](crate::plan::Plan::outside_cost) when x - d is outside the image or either pixel is masked. Otherwise:
+                /// - SAD: round(S / (768 n)), at most [`crate::plan::COST_MAX`], ties up, where n counts the places (i, j) of the
+                ///   window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked, and S sums
+                ///   |dr| + |dg| + |db| over them.
+                /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each other
+                ///   place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is below the
+                ///   centre's.
+                /// - AD-census: that plus (w min(|dr| + |dg| + |db|, 64) + 32) >> 6, channels in whole 8-bit levels (>> 8), with the
+                ///   weight w = floor(48 min(v, t) / t) of the left pixel, 48 where t = [`Plan::colour_variance`](crate::plan::Plan::colour_variance) is 0. Over the same
+                ///   window, clamped places again,
+                ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
+                Cost cost;
+                /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
+                /// time (of label indices; from 0 the first time), which [`Backend::change`](super::Backend::change) returns.
+                Change change;
+                /// [`Map::Label`](super::Map::Label), [`Map::Best`](super::Map::Best) and [`Map::RunnerUp`](super::Map::RunnerUp) of level 0.
+                WinnerTakesAll winner_takes_all;
+                /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest): at (x, y) the label with the smallest belief of left pixel (x + d, y) among
+                /// those in the columns [`Plan::core`](crate::plan::Plan::core), the lowest on ties, and that belief.
+                RightView right_view;
+                /// [`Map::Raw`](super::Map::Raw), and [`Map::Disparity`](super::Map::Disparity) equal to it: the label and, where [`crate::options::Method::sub_pixel`] asks
+                /// for it, its offset.
+                ///
+                /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
+                /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 3 x 3
+                /// neighbourhood, as far as it is inside, whose own label is at most one away. With s = max(a, c) - b it is
+                /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0 or at an end of the range. (The cost and
+                /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
+                SubPixel sub_pixel;
+            }
+            maps {
+                /// [`Map::Validity`](super::Map::Validity): [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
+                /// [`crate::options::Method::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
+                /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
+                ///
+                /// [`flag::MASKED`]: crate::maps::flag::MASKED
+                /// [`flag::OUTSIDE`]: crate::maps::flag::OUTSIDE
+                /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
+                LeftRightCheck left_right_check;
+                /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE) on every pixel of each region of fewer than
+                /// [`crate::options::Method::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
+                /// flag, 4-connected; labels that differ by at most one connect.
+                SpeckleFilter speckle_filter;
+                /// [`Map::Confidence`](super::Map::Confidence): how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
+                /// 255 where there is no runner-up, 0 for invalid pixels. Sets
+                /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
+                /// [`crate::options::Method::confidence_floor`].
+                Confidence confidence;
+                /// Fills [`Map::Disparity`](super::Map::Disparity) on every invalid pixel that is not masked with the smaller of the nearest valid
+                /// disparities to the left and to the right on its row, or the one there is: what is occluded belongs to the
+                /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
+                /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
+                Fill fill;
+                /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
+                /// apart, distance counts in places, and the range parameter is a quarter.
+                FillMedian fill_median;
+                /// Weighted median of [`Map::Disparity`](super::Map::Disparity), on the pixels that [`crate::options::Method::median`] names and that have a
+                /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
+                /// smallest value at which half of the weight is reached. Weights are [`crate::weights::MedianWeights`] of the left image.
+                Median median;
+            }
+        }
+    };
+}
+
+macro_rules! define {
+    (
+        levels { $( $(#[$of_level:meta])* $level:ident $level_name:ident; )* }
+        finest { $( $(#[$of_finest:meta])* $finest:ident $finest_name:ident; )* }
+        maps { $( $(#[$of_map:meta])* $map:ident $map_name:ident; )* }
+    ) => {
+        /// A stage of the method, with its level where it has one. The documentation of each is its exact definition, which the
+        /// CPU path, the shader and the naive twin in the tests follow independently.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Stage {
+            $( $(#[$of_level])* $level(usize), )*
+            $( $(#[$of_finest])* $finest, )*
+            $( $(#[$of_map])* $map, )*
+        }
+
+        impl Stage {
+            /// Every stage that there is for `plan`, whether its method takes it or not.
+            #[must_use]
+            pub fn all(plan: &Plan) -> Vec<Self> {
+                let of_level = (0..plan.levels.len()).flat_map(|z| [$( Self::$level(z) ),*]);
+                let is_there = |stage: &Self| match stage {
+                    Self::Pyramid(z) | Self::Resolution(z) => *z > 0,
+                    Self::LabelRange(_) => plan.limits_labels(),
+                    _ => true,
+                };
+                of_level.chain([$( Self::$finest, )* $( Self::$map ),*]).filter(is_there).collect()
+            }
+
+            /// Its name: that of its files.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $( Self::$level(_) => stringify!($level_name), )*
+                    $( Self::$finest => stringify!($finest_name), )*
+                    $( Self::$map => stringify!($map_name), )*
+                }
+            }
+
+            /// The level that it runs at; `None` for what there is at the finest one alone.
+            #[must_use]
+            pub fn level(self) -> Option<usize> {
+                match self {
+                    $( Self::$level(z) )|* => Some(z),
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+for_every_stage!(define);

@@ -1,0 +1,167 @@
+//! A pair through a backend: in one piece, or tile by tile.
+
+use crate::backend::{Backend, Map, Stage, Ticket, Traffic};
+use crate::error::Result;
+use crate::front;
+use crate::image::Pair;
+use crate::maps::Maps;
+use crate::options::LeftRightCheck;
+use crate::plan::Plan;
+use crate::solver::{self, Inspector, Run};
+use crate::tiles::Tiles;
+use crate::tiles::mosaic::Mosaic;
+use crate::watch::{Observer, Watch};
+use std::time::{Duration, Instant};
+
+/// What a match leaves behind.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The maps.
+    pub maps: Maps,
+    /// Iterations done, of all phases together; the most of any tile.
+    pub iterations: u32,
+    /// What the host did around the stages, and how long it took.
+    pub host_times: Vec<(&'static str, Duration)>,
+    /// The time of every stage that ran on the maps of all tiles.
+    pub mosaic_times: Vec<(Stage, Duration)>,
+    /// What went through the device.
+    pub traffic: Traffic,
+}
+
+/// Matches `pair` by `plan` on `backend`; `observer` hears of progress.
+///
+/// # Errors
+/// Whatever the backend reports, [`crate::Error::Mismatch`] when the plan is for another size, and
+/// [`crate::Error::Interrupted`] when `observer` breaks.
+pub fn solve(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Solution> {
+    inspect(backend, plan, pair, observer, None)
+}
+
+/// As [`solve`], and `inspector`, if any, looks into the match on its way.
+///
+/// # Errors
+/// Those of [`solve`] and of `inspector`.
+pub fn inspect(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer,
+    inspector: Option<Inspector>,
+) -> Result<Solution> {
+    let mut run = Run { watch: watch(plan, observer), inspector };
+    let iterations = whole(backend, plan, pair, &mut run)?;
+    backend.wait()?;
+    let collect = || backend.request_maps().and_then(|ticket| backend.maps(ticket));
+    let maps = run.watch.host("download", collect)?;
+    let (traffic, host_times) = (backend.traffic(), run.watch.into_times());
+    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic })
+}
+
+/// A match whose stages may still run, or whose maps are on their way.
+pub struct Started {
+    ticket: Ticket,
+    iterations: u32,
+    host_times: Vec<(&'static str, Duration)>,
+    traffic: Traffic,
+}
+
+/// As [`solve`], but does not wait for a device: the next match may be started on it before [`finish`] ends this one.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Started> {
+    let mut run = Run { watch: watch(plan, observer), inspector: None };
+    let iterations = whole(backend, plan, pair, &mut run)?;
+    let ticket = backend.request_maps()?;
+    Ok(Started { ticket, iterations, host_times: run.watch.into_times(), traffic: backend.traffic() })
+}
+
+/// Ends a match that was started on `backend`.
+///
+/// # Errors
+/// Whatever the backend reports.
+pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
+    let Started { ticket, iterations, host_times, traffic } = started;
+    let maps = backend.maps(ticket)?;
+    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic })
+}
+
+/// How often a pair is matched: once more, mirrored, where that is how its right view is found.
+fn matchings(plan: &Plan) -> usize {
+    if plan.method.left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 }
+}
+
+fn watch<'a>(plan: &Plan, observer: Observer<'a>) -> Watch<'a> {
+    Watch::new(observer, matchings(plan) as f64 * solver::work(plan))
+}
+
+/// All stages of a match in one piece; the number of iterations.
+fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<u32> {
+    let mut right_labels = None;
+    if matchings(plan) == 2 {
+        // The right view becomes the left one, its matches to the left again, when both are mirrored.
+        let inspector = run.inspector.take();
+        let mirrored = front::prepare(pair.mirrored(), plan, &mut run.watch)?;
+        solver::estimate(backend, plan, mirrored, run)?;
+        run.inspector = inspector;
+        right_labels = Some(backend.map(Map::Label)?.mirrored());
+    }
+    let prepared = front::prepare(pair.clone(), plan, &mut run.watch)?;
+    let iterations = solver::estimate(backend, plan, prepared, run)?;
+    if let Some(labels) = right_labels {
+        backend.set_right_labels(&labels)?;
+    }
+    for stage in solver::post_processing(&plan.method) {
+        run.stage(backend, plan, stage)?;
+    }
+    Ok(iterations)
+}
+
+/// Matches `pair` tile by tile on `backend`, and finishes the maps of all tiles together on the CPU path; `observer` hears
+/// of progress.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_tiles(
+    backend: &mut dyn Backend,
+    tiles: &Tiles,
+    pair: &Pair,
+    observer: Observer,
+) -> Result<Solution> {
+    let whole = tiles.whole();
+    let all: f64 = tiles.list().iter().map(|tile| solver::work(&tile.plan)).sum();
+    let watch = Watch::new(observer, matchings(whole) as f64 * all);
+    let mut run = Run { watch: watch.in_tiles(matchings(whole) * tiles.count()), inspector: None };
+    let mut mosaic = Mosaic::new(whole, pair)?;
+    let (mut iterations, mut traffic) = (0, Traffic::default());
+    if matchings(whole) == 2 {
+        for tile in tiles.list() {
+            run.watch.next_tile();
+            let mirrored = pair.crop(&tile.crop.mirrored(pair.size().0)).mirrored();
+            let prepared = front::prepare(mirrored, &tile.plan, &mut run.watch)?;
+            solver::estimate(backend, &tile.plan, prepared, &mut run)?;
+            backend.wait()?;
+            run.watch.host("download", || mosaic.place_mirrored(tile, backend))?;
+            traffic += backend.traffic();
+        }
+    }
+    for tile in tiles.list() {
+        run.watch.next_tile();
+        let prepared = front::prepare(pair.crop(&tile.crop), &tile.plan, &mut run.watch)?;
+        let matched = prepared.pair.clone();
+        iterations = iterations.max(solver::estimate(backend, &tile.plan, prepared, &mut run)?);
+        backend.wait()?;
+        run.watch.host("download", || mosaic.place(tile, &matched, backend))?;
+        traffic += backend.traffic();
+    }
+    run.watch.end_tiles();
+    let mut mosaic_times = Vec::new();
+    for stage in solver::post_processing(&whole.method) {
+        run.watch.begin(stage.name(), 0.0)?;
+        let clock = Instant::now();
+        mosaic.run(stage);
+        mosaic_times.push((stage, clock.elapsed()));
+    }
+    let host_times = run.watch.into_times();
+    Ok(Solution { maps: mosaic.into_maps(), iterations, host_times, mosaic_times, traffic })
+}
