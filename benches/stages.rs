@@ -8,12 +8,13 @@
 mod synthetic;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use mrfgs::backend::Stage;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::Gpu;
-use mrfgs::backend::{Backend, Stage};
+use mrfgs::backend::probe::Probe;
 use mrfgs::options::Method;
 use mrfgs::plan::Plan;
-use mrfgs::{graph, solver};
+use mrfgs::{engine, graph};
 use std::ops::ControlFlow;
 use std::time::Duration;
 use synthetic::{LARGE, SMALL, Synthetic};
@@ -44,7 +45,7 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
     ]
 }
 
-fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backend) {
+fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Probe) {
     for (case, presets) in cases() {
         let (pair, range) = (case.pair().expect("one size"), case.range().expect("a range"));
         for preset in presets {
@@ -57,7 +58,7 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                 .warm_up_time(Duration::from_millis(500));
 
             // Whatever a stage needs is there, and the device is warm.
-            solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
+            engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
             for (stage, stages) in groups(&plan) {
                 group.bench_function(format!("{stage}/{name}"), |b| {
                     b.iter(|| {
@@ -70,7 +71,7 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
             }
             group.bench_function(format!("match/{name}"), |b| {
                 b.iter(|| {
-                    solver::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match")
+                    engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match")
                 });
             });
             if name == "cpu" {

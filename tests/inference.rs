@@ -8,12 +8,12 @@ mod common;
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::backend::{Backend, Volume};
+use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::front::Prepared;
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::options::{Method, Potential, Resolution, Schedule};
 use mrfgs::plan::{HARD_CAP, Plan};
-use mrfgs::solver;
 
 /// Neighbours of a dependency factor in these graphs, most slots of which stay empty.
 const NEIGHBOURS: usize = 4;
@@ -143,16 +143,16 @@ impl Model {
         (0..self.variables()).map(|v| self.labels(v)).fold(1, usize::saturating_mul)
     }
 
-    fn backend_with(&self, backend: &mut dyn Backend, evidence: &[Vec<u32>]) {
+    fn backend_with(&self, backend: &mut dyn Probe, evidence: &[Vec<u32>]) {
         let (width, height) = self.plan.size();
-        backend.prepare(&self.plan, &blank(width, height), self.graphs.clone()).unwrap();
+        backend.prepare(&self.plan, Prepared::new(&blank(width, height), self.graphs.clone())).unwrap();
         State::fresh(&self.plan, evidence.to_vec()).write(backend);
     }
 
     /// Beliefs of every variable after the flood of the plan.
-    fn beliefs(&self, backend: &mut dyn Backend, evidence: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    fn beliefs(&self, backend: &mut dyn Probe, evidence: &[Vec<u32>]) -> Vec<Vec<u32>> {
         self.backend_with(backend, evidence);
-        solver::flood(backend, &self.plan).unwrap();
+        common::flood(backend, &self.plan).unwrap();
         let volumes: Vec<Vec<u32>> =
             (0..self.plan.levels.len()).map(|z| backend.read(Volume::Belief(z)).unwrap()).collect();
         (0..self.variables()).map(|v| self.row(&volumes, v).to_vec()).collect()
@@ -541,7 +541,7 @@ fn hard_messages_are_those_of_the_sum_product() {
             model.backend_with(backend, &evidence);
             let mut sums = SumProduct::new(&model, &evidence);
             for iteration in 1..=8 {
-                solver::flood(backend, &model.plan).unwrap();
+                common::flood(backend, &model.plan).unwrap();
                 sums.step();
                 let levels = model.plan.levels.len();
                 let mut read = |f: &dyn Fn(usize) -> Volume, levels: std::ops::Range<usize>| {
@@ -637,7 +637,7 @@ fn control_other_evidence_is_found_by_the_sum_product() {
         (0..60).map(loopy).find(|(m, _)| !infeasible(m) && m.plan.levels.len() == 2).unwrap();
     let (_, mut backend) = backends().swap_remove(0);
     model.backend_with(backend.as_mut(), &evidence);
-    solver::flood(backend.as_mut(), &model.plan).unwrap();
+    common::flood(backend.as_mut(), &model.plan).unwrap();
     let beliefs: Vec<Vec<u32>> = (0..2).map(|z| backend.read(Volume::Belief(z)).unwrap()).collect();
     let differs = |evidence: &[Vec<u32>]| {
         let mut sums = SumProduct::new(&model, evidence);

@@ -9,15 +9,18 @@ use common::compare::compare_maps;
 use common::devices::backends;
 use common::random::{self, Random, texture};
 use common::twin::{self, Finest};
+use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::{Backend, Map, NO_LABEL, Stage};
+use mrfgs::backend::probe::Probe;
+use mrfgs::backend::{Map, NO_LABEL, Stage};
+use mrfgs::engine::{self, Solution};
+use mrfgs::front::Prepared;
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::maps::{Maps, flag};
 use mrfgs::options::{
     Choice, Cost, DisparityRange, Execution, Fill, LeftRightCheck, Median, Method, Potential, Schedule,
 };
 use mrfgs::plan::Plan;
-use mrfgs::solver::{self, Solution};
 use mrfgs::tiles::Tiles;
 use mrfgs::{graph, match_pair};
 use std::ops::ControlFlow;
@@ -44,7 +47,7 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
         twin::fill::fill(maps);
     }
     if plan.method.fill == Fill::Median {
-        twin::median::fill_median(plan, pair, maps);
+        twin::fill_median::fill_median(plan, pair, maps);
     }
     twin::median::median(plan, pair, maps);
 }
@@ -63,7 +66,7 @@ fn solve(pair: &Pair, plan: &Plan) -> Vec<(String, Solution)> {
         .into_iter()
         .map(|(name, mut backend)| {
             let solution =
-                solver::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())).unwrap();
+                engine::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())).unwrap();
             (name, solution)
         })
         .collect()
@@ -89,14 +92,14 @@ fn the_stages_run_in_order() {
             let backend = backend.as_mut();
             let iterations = estimated(backend, &pair, &plan);
             let mut finest = Finest::zero(size);
-            finest.label = backend.read_map(Map::Label).unwrap();
-            finest.best = backend.read_map(Map::Best).unwrap();
-            finest.runner_up = backend.read_map(Map::RunnerUp).unwrap();
+            finest.label = backend.map(Map::Label).unwrap();
+            finest.best = backend.map(Map::Best).unwrap();
+            finest.runner_up = backend.map(Map::RunnerUp).unwrap();
             finest.right_label = match plan.method.left_right_check {
                 LeftRightCheck::SecondMatch => second_match(&pair, &plan),
-                _ => backend.read_map(Map::RightLabel).unwrap(),
+                _ => backend.map(Map::RightLabel).unwrap(),
             };
-            finest.raw = backend.read_map(Map::Raw).unwrap();
+            finest.raw = backend.map(Map::Raw).unwrap();
             let expected = finished(&mut finest, &plan, &pair);
             for (solver, actual) in solve(&pair, &plan) {
                 if let Err(e) = compare_all(&actual.maps, &expected) {
@@ -144,14 +147,14 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
             let mut cpu = Cpu::default();
             if method.left_right_check == LeftRightCheck::SecondMatch {
                 estimated(&mut cpu, &part(&mirrored(&pair)), &tile.plan);
-                let labels = cpu.read_map(Map::Label).unwrap();
+                let labels = cpu.map(Map::Label).unwrap();
                 for (x, y) in places(core) {
                     finest.right_label[(width - 1 - x, y)] = labels[(x - crop.x.start, y - crop.y.start)];
                 }
             }
             iterations = iterations.max(estimated(&mut cpu, &part(&pair), &tile.plan));
             let maps = [Map::Label, Map::Best, Map::RunnerUp, Map::Raw, Map::RightLabel, Map::RightBest]
-                .map(|map| cpu.read_map(map).unwrap());
+                .map(|map| cpu.map(map).unwrap());
             for (x, y) in places(core) {
                 let at = (x - crop.x.start, y - crop.y.start);
                 (finest.label[(x, y)], finest.best[(x, y)]) = (maps[0][at], maps[1][at]);
@@ -170,7 +173,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         let expected = finished(&mut finest, &plan, &pair);
         for (name, mut backend) in backends() {
             let observer = &mut |_| ControlFlow::Continue(());
-            let actual = solver::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();
+            let actual = engine::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();
             if let Err(e) = compare_all(&actual.maps, &expected) {
                 panic!("{name}, seed {seed}: {e}\n{:?}", plan.method);
             }
@@ -194,12 +197,12 @@ fn places(part: &Rect) -> impl Iterator<Item = (usize, usize)> {
 
 fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
     let observer = &mut |_| ControlFlow::Continue(());
-    solver::solve(&mut Cpu::default(), plan, pair, observer).unwrap().maps
+    engine::solve(&mut Cpu::default(), plan, pair, observer).unwrap().maps
 }
 
 /// Runs all stages up to [`Stage::SubPixel`]; the number of iterations.
-fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
-    backend.prepare(plan, pair, graph::build(pair.left(), plan)).unwrap();
+fn estimated(backend: &mut dyn Probe, pair: &Pair, plan: &Plan) -> u32 {
+    backend.prepare(&plan, Prepared::new(pair, graph::build(pair.left(), plan))).unwrap();
     backend.run(Stage::Cost).unwrap();
     for z in 1..plan.levels.len() {
         backend.run(Stage::Pyramid(z)).unwrap();
@@ -207,7 +210,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
     for z in 0..plan.levels.len() {
         backend.run(Stage::Evidence(z)).unwrap();
     }
-    let iterations = solver::flood(backend, plan).unwrap();
+    let iterations = common::flood(backend, plan).unwrap();
     for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
         backend.run(stage).unwrap();
     }
@@ -438,10 +441,10 @@ fn no_label_agrees_with_none() {
     let mut maps = Finest::zero((5, 1));
     maps.right_label = Plane::filled(5, 1, NO_LABEL.into());
     for (name, mut backend) in backends() {
-        backend.prepare(&plan, &pair, graph::build(pair.left(), &plan)).unwrap();
+        backend.prepare(&plan, Prepared::new(&pair, graph::build(pair.left(), &plan))).unwrap();
         maps.write(backend.as_mut());
         backend.run(Stage::LeftRightCheck).unwrap();
-        let validity = backend.read_map(Map::Validity).unwrap();
+        let validity = backend.map(Map::Validity).unwrap();
         assert!(validity.data().iter().all(|&f| f == i32::from(flag::OCCLUDED)), "{name}");
     }
 }
@@ -454,6 +457,6 @@ fn a_plan_of_another_size_is_refused() {
     let plan = Plan::new(8, 9, range, &Method::default()).unwrap();
     for (_, mut backend) in backends() {
         let observer = &mut |_| ControlFlow::Continue(());
-        assert!(solver::solve(backend.as_mut(), &plan, &pair, observer).is_err());
+        assert!(engine::solve(backend.as_mut(), &plan, &pair, observer).is_err());
     }
 }

@@ -6,13 +6,16 @@
 mod common;
 
 use common::devices;
+use mrfgs::backend::Backend;
+use mrfgs::backend::Stage;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::FaultInjection;
-use mrfgs::backend::{Backend, Stage, Volume};
+use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::engine::{Solution, solve};
+use mrfgs::front::Prepared;
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::plan::Plan;
-use mrfgs::solver::{Solution, solve};
 use mrfgs::{Error, graph};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -24,7 +27,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
     (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
 }
 
-fn matched(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {
+fn matched(backend: &mut dyn Probe, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, method).unwrap();
     solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())).unwrap()
@@ -145,10 +148,10 @@ fn poisoned_buffers() {
         method.tolerance = 0.5;
         let (pair, range) = load(Path::new("testdata/thin"));
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
-        let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu::default())];
+        let mut backends: Vec<Box<dyn Probe>> = vec![Box::new(Cpu::default())];
         for max_buffer in [None, Some(2 << 20)] {
             let gpu = devices::open(FaultInjection { max_buffer, ..FaultInjection::default() });
-            backends.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Backend>));
+            backends.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Probe>));
         }
         for backend in &mut backends {
             let name = backend.describe();
@@ -170,10 +173,10 @@ fn poisoned_buffers() {
 }
 
 /// The maps as they stand.
-fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
+fn matched_maps_only(backend: &mut dyn Probe) -> Solution {
     let requested = backend.request_maps().unwrap();
     let (maps, traffic) = (backend.maps(requested).unwrap(), backend.traffic());
-    Solution { maps, iterations: 0, around: Vec::new(), finish: Vec::new(), traffic }
+    Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic }
 }
 
 /// The image goes up once, the maps come down once, and nothing between.
@@ -285,9 +288,9 @@ fn volumes_of_a_real_pair() {
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     let mut cpu = Cpu::default();
     let graphs = graph::build(pair.left(), &plan);
-    let backends: [&mut dyn Backend; 2] = [&mut cpu, &mut gpu];
+    let backends: [&mut dyn Probe; 2] = [&mut cpu, &mut gpu];
     let costs = backends.map(|backend| {
-        backend.prepare(&plan, &pair, graphs.clone()).unwrap();
+        backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
         backend.run(Stage::Cost).unwrap();
         backend.read(Volume::Cost(0)).unwrap()
     });

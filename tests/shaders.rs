@@ -4,13 +4,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::backend::gpu::{Kernel, LevelParams, MAX_LOOP_ITERATIONS, Params, Variant};
+use mrfgs::backend::Stage;
+use mrfgs::backend::gpu::{Job, MAX_LOOP_ITERATIONS, UniformLayout, jobs};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::plan::Plan;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use std::collections::HashSet;
-use std::mem::offset_of;
 
 /// Methods that between them ask for every constant of the shaders.
 fn methods() -> Vec<Method> {
@@ -37,20 +37,12 @@ fn plans() -> Vec<Plan> {
     methods().iter().map(|m| Plan::new(101, 67, range, m).unwrap()).collect()
 }
 
-fn sources() -> Vec<(String, Kernel, String)> {
+/// Every job that a plan has, each kernel once.
+fn all_jobs() -> Vec<Job> {
     let mut seen = HashSet::new();
-    let mut all = Vec::new();
-    for plan in plans() {
-        for level in 0..plan.levels.len() {
-            for kernel in Kernel::ALL {
-                let variant = Variant::new(kernel, &plan, level);
-                if seen.insert((kernel, variant)) {
-                    all.push((format!("{} {variant:?}", kernel.name()), kernel, kernel.source(variant)));
-                }
-            }
-        }
-    }
-    all
+    let plans = plans();
+    let jobs = plans.iter().flat_map(|plan| Stage::all(plan).into_iter().flat_map(|stage| jobs(stage, plan)));
+    jobs.filter(|job| seen.insert(job.kernel.clone())).collect()
 }
 
 fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
@@ -61,44 +53,59 @@ fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
     Ok((module, info))
 }
 
-/// Runs `check` on every shader and reports all failures at once.
-fn for_every_shader(check: impl Fn(Kernel, &Module, &ModuleInfo) -> Result<(), String>) {
-    let sources = sources();
-    assert!(sources.len() > Kernel::ALL.len(), "only {} shaders", sources.len());
-    let failures: Vec<String> = sources
+/// Runs `check` on every kernel and reports all failures at once.
+fn for_every_kernel(check: impl Fn(&Job, &Module, &ModuleInfo) -> Result<(), String>) {
+    let jobs = all_jobs();
+    assert!(jobs.len() > 60, "only {} kernels", jobs.len());
+    let failures: Vec<String> = jobs
         .iter()
-        .filter_map(|(name, kernel, source)| {
-            let result = validated(source).and_then(|(module, info)| check(*kernel, &module, &info));
-            result.err().map(|e| format!("{name}: {e}"))
+        .filter_map(|job| {
+            let result =
+                validated(&job.kernel.source()).and_then(|(module, info)| check(job, &module, &info));
+            result.err().map(|e| format!("{:?}: {e}", job.kernel))
         })
         .collect();
     assert!(
         failures.is_empty(),
-        "{} of {} shaders fail:\n{}",
+        "{} of {} kernels fail:\n{}",
         failures.len(),
-        sources.len(),
+        jobs.len(),
         failures.join("\n")
     );
 }
 
 #[test]
-fn every_file_is_a_kernel_and_every_kernel_has_a_file() {
+fn every_stage_has_a_shader_and_every_shader_a_stage() {
     let files: HashSet<String> = std::fs::read_dir("shaders")
         .unwrap()
         .filter_map(|e| e.unwrap().path().file_name()?.to_str()?.strip_suffix(".wgsl").map(str::to_owned))
         .collect();
-    let kernels: HashSet<String> = Kernel::ALL.iter().map(|k| k.name().to_owned()).collect();
+    let kernels: HashSet<String> = all_jobs().iter().map(|job| job.kernel.stage().to_owned()).collect();
     assert_eq!(files, kernels);
+    let stages: HashSet<&str> =
+        plans().iter().flat_map(Stage::all).map(Stage::name).filter(|name| *name != "flood").collect();
+    assert_eq!(kernels, stages.into_iter().map(str::to_owned).collect(), "the sweep alone has no shader");
+}
+
+/// Every entry point of a file runs somewhere.
+#[test]
+fn every_entry_point_is_a_kernel() {
+    let used: HashSet<(&str, &str)> =
+        all_jobs().iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
+    for_every_kernel(|job, module, _| {
+        let unused = module.entry_points.iter().find(|e| !used.contains(&(job.kernel.stage(), &e.name)));
+        unused.map_or(Ok(()), |e| Err(format!("nothing runs `{}`", e.name)))
+    });
 }
 
 #[test]
 fn every_shader_validates_and_no_capability_is_asked() {
-    for_every_shader(|_, _, _| Ok(()));
+    for_every_kernel(|_, _, _| Ok(()));
 }
 
 #[test]
 fn validation_can_fail() {
-    let source = Kernel::Belief.source(Variant::new(Kernel::Belief, &plans()[0], 0));
+    let source = jobs(Stage::Belief(0), &plans()[0])[0].kernel.source();
     assert!(validated(&source).is_ok());
     assert!(validated(&source.replace("pack_narrow(values)", "values")).is_err());
     // 64-bit integers are a capability that was not asked for.
@@ -108,58 +115,74 @@ fn validation_can_fail() {
     );
 }
 
+/// The struct called `name`: its fields with their offsets, and its bytes.
+fn layout_of(module: &Module, name: &str) -> Result<(Vec<(String, usize)>, usize), String> {
+    let found = module.types.iter().find_map(|(_, t)| match &t.inner {
+        TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
+            let fields = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize));
+            Some((fields.collect(), *span as usize))
+        }
+        _ => None,
+    });
+    found.ok_or(format!("no struct {name}"))
+}
+
 #[test]
 fn uniforms_are_laid_out_as_the_rust_structs() {
-    macro_rules! fields {
-        ($type:ty: $($field:ident),*) => { vec![$( (stringify!($field), offset_of!($type, $field)), )*] };
-    }
-    let level = fields!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch,
-        pixel_pitch, starts_pitch);
-    let params = fields!(Params: level, fine, first_row, rows, row_groups, grid, outside_cost, colour_weight,
-        colour_variance, sad_radius, label_offset, evidence_multiplier, evidence_limit, evidence_up, evidence_down, evidence_cap, tau, sub_pixel,
-        left_right_check, median_all, speckle_size, confidence_floor, halo, span, first_column, columns, source_first_row,
-        source_rows, median_radius, median_step_bits, median_scale, median_doublings, median_row_bits, belief_most);
-    for_every_shader(|_, module, _| {
-        let expected =
-            [("Level", &level, size_of::<LevelParams>()), ("Params", &params, size_of::<Params>())];
-        for (name, fields, bytes) in expected {
-            let (members, span) = module
-                .types
-                .iter()
-                .find_map(|(_, t)| match &t.inner {
-                    TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
-                        Some((members, *span))
-                    }
-                    _ => None,
-                })
-                .ok_or(format!("no struct {name}"))?;
-            let found: Vec<(&str, usize)> =
-                members.iter().map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize)).collect();
-            if found != **fields {
-                return Err(format!("{name} is {found:?} and in Rust {fields:?}"));
+    for_every_kernel(|job, module, _| {
+        let inner = UniformLayout::inner();
+        for (name, layout) in inner.iter().chain([&("Params", job.uniform.clone())]) {
+            let (fields, bytes) = layout_of(module, name)?;
+            let expected: Vec<_> = layout.fields.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
+            if fields != expected {
+                return Err(format!("{name} is {fields:?} and in Rust {expected:?}"));
             }
-            if span as usize != bytes {
-                return Err(format!("{name} takes {span} bytes and in Rust {bytes}"));
+            if bytes.next_multiple_of(16) != layout.bytes.next_multiple_of(16) {
+                return Err(format!("{name} takes {bytes} bytes and in Rust {}", layout.bytes));
             }
         }
         Ok(())
     });
 }
 
+/// Control: a field that moves is noticed.
+#[test]
+fn a_uniform_of_another_layout_is_noticed() {
+    let job = &jobs(Stage::Evidence(0), &plans()[0])[0];
+    let source = job.kernel.source();
+    let fields = |source: &str| layout_of(&validated(source).unwrap().0, "Params").unwrap().0;
+    let expected = |fields: &[(String, usize)]| {
+        fields.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>() == job.uniform.fields
+    };
+    assert!(expected(&fields(&source)));
+    assert!(!expected(&fields(
+        &source.replace("    limit: u32,\n    up: u32,", "    up: u32,\n    limit: u32,")
+    )));
+}
+
+/// The place of the job's entry point.
+fn entry_point(job: &Job, module: &Module) -> usize {
+    module.entry_points.iter().position(|e| e.name == job.kernel.entry()).expect("it compiles")
+}
+
 #[test]
 fn every_shader_stays_within_the_limits_of_all_devices() {
-    for_every_shader(|_, module, _| {
+    for_every_kernel(|job, module, info| {
         let mut layouter = naga::proc::Layouter::default();
         layouter.update(module.to_ctx()).map_err(|e| e.to_string())?;
         let (mut storage, mut workgroup) = (0, 0);
-        for (_, variable) in module.global_variables.iter() {
+        let entry = entry_point(job, module);
+        for (handle, variable) in module.global_variables.iter() {
+            if info.get_entry_point(entry)[handle].is_empty() {
+                continue;
+            }
             match variable.space {
                 AddressSpace::Storage { .. } => storage += 1,
                 AddressSpace::WorkGroup => workgroup += layouter[variable.ty].size,
                 _ => {}
             }
         }
-        let invocations: u32 = module.entry_points[0].workgroup_size.iter().product();
+        let invocations: u32 = module.entry_points[entry].workgroup_size.iter().product();
         if storage > 8 || workgroup > 16_384 || invocations > 256 {
             return Err(format!(
                 "{storage} storage buffers, {workgroup} bytes of workgroup memory, {invocations} invocations"
@@ -172,8 +195,8 @@ fn every_shader_stays_within_the_limits_of_all_devices() {
 #[test]
 fn loops_stay_below_what_drivers_run() {
     let count = |plan: &Plan| {
-        let levels = 0..plan.levels.len();
-        levels.flat_map(|z| Kernel::ALL.map(|k| k.loop_iterations(plan, z))).max().unwrap()
+        let jobs = Stage::all(plan).into_iter().flat_map(|stage| jobs(stage, plan));
+        jobs.map(|job| job.loops).max().unwrap()
     };
     for plan in plans() {
         assert!(count(&plan) <= MAX_LOOP_ITERATIONS, "{} iterations", count(&plan));
@@ -187,8 +210,8 @@ fn loops_stay_below_what_drivers_run() {
 
 #[test]
 fn every_shader_translates_to_spirv_msl_and_hlsl() {
-    for_every_shader(|_, module, info| {
-        let entry = (ShaderStage::Compute, "main".to_owned());
+    for_every_kernel(|job, module, info| {
+        let entry = (ShaderStage::Compute, job.kernel.entry().to_owned());
         let spirv = naga::back::spv::PipelineOptions { shader_stage: entry.0, entry_point: entry.1.clone() };
         let words =
             naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), Some(&spirv))

@@ -3,9 +3,10 @@
 use mrfgs::Result;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::backend::{Backend, Map, Requested, Stage, Traffic, Volume};
-use mrfgs::graph::LevelGraph;
-use mrfgs::image::{Pair, Plane};
+use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, Map, Stage, Ticket, Traffic};
+use mrfgs::front::Prepared;
+use mrfgs::image::Plane;
 use mrfgs::maps::Maps;
 use mrfgs::plan::Plan;
 use std::io::Write;
@@ -39,8 +40,8 @@ pub fn gpu() -> Option<Pooled> {
 /// Name and a fresh instance of every backend.
 ///
 /// The twins are no backend and never in this list: a backend that were compared with itself would always pass.
-pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
-    let mut all: Vec<(String, Box<dyn Backend>)> = vec![("cpu".into(), Box::new(Cpu::default()))];
+pub fn backends() -> Vec<(String, Box<dyn Probe>)> {
+    let mut all: Vec<(String, Box<dyn Probe>)> = vec![("cpu".into(), Box::new(Cpu::default()))];
     if let Some(gpu) = gpu() {
         all.push((gpu.describe(), Box::new(gpu)));
     }
@@ -70,12 +71,8 @@ impl Backend for Pooled {
         self.0.as_ref().expect("there until it is dropped").describe()
     }
 
-    fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()> {
-        self.gpu().prepare(plan, pair, graphs)
-    }
-
-    fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()> {
-        self.gpu().label_range(label_ranges)
+    fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
+        self.gpu().prepare(plan, prepared)
     }
 
     fn run(&mut self, stage: Stage) -> Result<()> {
@@ -90,12 +87,20 @@ impl Backend for Pooled {
         self.gpu().wait()
     }
 
-    fn request_maps(&mut self) -> Result<Requested> {
+    fn map(&mut self, map: Map) -> Result<Plane<i32>> {
+        self.gpu().map(map)
+    }
+
+    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()> {
+        self.gpu().set_right_labels(labels)
+    }
+
+    fn request_maps(&mut self) -> Result<Ticket> {
         self.gpu().request_maps()
     }
 
-    fn maps(&mut self, requested: Requested) -> Result<Maps> {
-        self.gpu().maps(requested)
+    fn maps(&mut self, ticket: Ticket) -> Result<Maps> {
+        self.gpu().maps(ticket)
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {
@@ -110,16 +115,18 @@ impl Backend for Pooled {
         self.0.as_ref().expect("there until it is dropped").traffic()
     }
 
+    fn probe(&mut self) -> &mut dyn Probe {
+        self
+    }
+}
+
+impl Probe for Pooled {
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
         self.gpu().read(volume)
     }
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         self.gpu().write(volume, values)
-    }
-
-    fn read_map(&mut self, map: Map) -> Result<Plane<i32>> {
-        self.gpu().read_map(map)
     }
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {

@@ -9,3 +9,16 @@ pub mod compare;
 pub mod devices;
 pub mod random;
 pub mod twin;
+
+use mrfgs::backend::Backend;
+use mrfgs::plan::Plan;
+use mrfgs::solver::{self, Run};
+use mrfgs::watch::Watch;
+use std::ops::ControlFlow;
+
+/// Runs the flooding of `plan` on the evidence that `backend` holds; the number of iterations.
+pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
+    let mut go_on = |_| ControlFlow::Continue(());
+    let watch = Watch::new(&mut go_on, 1.0);
+    solver::flood(backend, plan, &mut Run { watch, inspector: None })
+}

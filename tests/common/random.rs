@@ -1,7 +1,8 @@
 //! Seeded random input: images, pairs, methods, graphs, and states of the volumes that keep the invariants.
 
 use super::twin::{self, Finest};
-use mrfgs::backend::{Backend, NO_LABEL, Volume};
+use mrfgs::backend::NO_LABEL;
+use mrfgs::backend::probe::{Probe, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::flag;
@@ -227,7 +228,7 @@ impl State {
     }
 
     /// Puts all of it into `backend`.
-    pub fn write(&self, backend: &mut dyn Backend) {
+    pub fn write(&self, backend: &mut dyn Probe) {
         for (volume, values) in self.volumes() {
             backend.write(volume, values).unwrap();
         }

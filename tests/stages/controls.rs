@@ -6,7 +6,8 @@ use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::floods::{twin_flood, whole_flood};
 use crate::{same, twin_start};
-use mrfgs::backend::Volume;
+use mrfgs::backend::probe::Volume;
+use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
 use mrfgs::options::{Cost, Method, Pyramid, Resolution, Schedule};
@@ -28,7 +29,7 @@ fn control_one_wrong_element_is_found() {
     let graphs = random::graphs(&mut random, &plan);
     let state = random::state(&mut random, &plan, &graphs, false);
     for (_, mut backend) in backends() {
-        backend.prepare(&plan, &pair, graphs.clone()).unwrap();
+        backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
         for (volume, values) in state.volumes() {
             for _ in 0..20 {
                 let mut wrong = values.to_vec();

@@ -4,13 +4,14 @@ use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
 use crate::common::random::{self, Random, State};
 use crate::common::twin;
-use crate::{MINIMA, on_all, resolve, same, twin_estimate, twin_start};
-use mrfgs::backend::{Backend, Stage, Volume};
+use crate::{MINIMA, on_all, resolve, same, twin_start};
+use mrfgs::backend::Stage;
+use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
 use mrfgs::options::{Cost, Method, PRESETS, Potential, Resolution, Schedule};
 use mrfgs::plan::Plan;
-use mrfgs::solver;
 use std::collections::HashSet;
 
 /// What was written must carry a flood on, whatever a backend stores beside the labels.
@@ -109,16 +110,23 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
     total
 }
 
+/// What follows the flooding and looks at volumes.
+fn twin_read_out(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {
+    twin::winner_takes_all::winner_takes_all(plan, belief, maps);
+    twin::right_view::right_view(plan, belief, maps);
+    twin::sub_pixel::sub_pixel(plan, cost, maps);
+}
+
 /// From the pair to the estimate, on every backend and on the twins; the number of iterations.
 pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     let graphs = graph::build(pair.left(), plan);
     let (costs, mut state) = twin_start(plan, pair);
     let iterations = twin_flood(plan, &graphs, &mut state);
     let mut maps = twin::Finest::zero(plan.size());
-    twin_estimate(plan, &costs[0], &state.belief[0], &mut maps);
+    twin_read_out(plan, &costs[0], &state.belief[0], &mut maps);
     for (name, mut backend) in backends() {
         let backend = backend.as_mut();
-        backend.prepare(plan, pair, graphs.clone()).unwrap();
+        backend.prepare(&plan, Prepared::new(pair, graphs.clone())).unwrap();
         backend.run(Stage::Cost).unwrap();
         for z in 1..plan.levels.len() {
             backend.run(Stage::Pyramid(z)).unwrap();
@@ -126,8 +134,8 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
         for z in 0..plan.levels.len() {
             backend.run(Stage::Evidence(z)).unwrap();
         }
-        let check = |backend: &mut dyn Backend| -> Result<(), String> {
-            let actual = solver::flood(backend, plan).unwrap();
+        let check = |backend: &mut dyn Probe| -> Result<(), String> {
+            let actual = crate::common::flood(backend, plan).unwrap();
             if actual != iterations {
                 return Err(format!("{actual} iterations but the twin did {iterations}"));
             }

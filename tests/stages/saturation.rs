@@ -6,11 +6,12 @@ use crate::common::twin;
 use crate::common::twin::belief::belief_most;
 use crate::floods::twin_flood;
 use crate::{NEIGHBOURS, cells, resolve, same};
-use mrfgs::backend::{Stage, Volume, volume_shape};
+use mrfgs::backend::Stage;
+use mrfgs::backend::probe::{Volume, volume_shape};
+use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::options::{Method, Resolution};
 use mrfgs::plan::{LevelPlan, Plan, Truncation, TruncationRule, VolumeWidth};
-use mrfgs::solver;
 use std::collections::HashSet;
 
 /// Graphs in which everyone is everyone's neighbour in every window: as many factors a pixel as there can be.
@@ -50,9 +51,9 @@ fn flood_of_the_sure(plan: &Plan) -> u32 {
     let start = state.clone();
     twin_flood(plan, &graphs, &mut state);
     for (name, mut backend) in backends() {
-        backend.prepare(plan, &pair, graphs.clone()).unwrap();
+        backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
         start.write(backend.as_mut());
-        solver::flood(backend.as_mut(), plan).unwrap();
+        crate::common::flood(backend.as_mut(), plan).unwrap();
         for (volume, expected) in state.volumes() {
             if let Err(e) = same(plan, backend.as_mut(), volume, expected) {
                 panic!("{name}: {e}\n{plan:?}");
@@ -128,7 +129,7 @@ fn control_saturated_sums_say_nothing() {
             };
             for (name, mut backend) in backends() {
                 let backend = backend.as_mut();
-                backend.prepare(&plan, &pair, graphs.clone()).unwrap();
+                backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
                 for z in 0..2 {
                     let belief = better(&plan, Volume::Belief(z), belief_most(&plan));
                     backend.write(Volume::Belief(z), &belief).unwrap();
@@ -181,7 +182,7 @@ fn control_padding_stays_behind_beliefs_that_saturate() {
         let silent = vec![0; cells(&plan, 0) * plan.slots()];
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
-            backend.prepare(&plan, &pair, graphs.clone()).unwrap();
+            backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
             backend.write(Volume::Evidence(0), &flat(0)).unwrap();
             backend.write(Volume::Belief(0), &flat(0)).unwrap();
             for _ in 0..2 {

@@ -31,12 +31,8 @@ pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     });
 }
 
-/// The same of filled pixels, the window's places four pixels apart.
-pub fn fill_median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    smooth(plan, pair, maps, (4, 1), plan.method.median_sigma_range / 4.0, filled);
-}
-
-fn filled(validity: i32) -> bool {
+/// Whether a pixel was filled in.
+pub fn filled(validity: i32) -> bool {
     validity & i32::from(flag::FILLED) != 0
 }
 
@@ -44,7 +40,8 @@ fn known(validity: i32) -> bool {
     !invalid(validity) || filled(validity)
 }
 
-fn smooth(
+/// The median at places `step` apart, in every `every`-th row of them.
+pub fn smooth(
     plan: &Plan,
     pair: &Pair,
     maps: &mut Finest,

@@ -1,28 +1,26 @@
-//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/mod.rs` and from nothing
+//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/stage.rs` and from nothing
 //! else: one cell at a time, wide integers, no padding, no table, nothing clever. It shares data types and documented
 //! constants with the library, and no function that computes.
 //!
-//! Volumes are `Vec<u32>` in the layout of [`mrfgs::backend::Volume`]: \[y\]\[x\]\[slot\]\[label\].
+//! Volumes are `Vec<u32>` in the layout of [`mrfgs::backend::probe::Volume`]: \[y\]\[x\]\[slot\]\[label\].
 
-pub mod belief;
 pub mod census;
-pub mod change;
-pub mod confidence;
-pub mod cost;
-pub mod dependency;
-pub mod evidence;
-pub mod fill;
 pub mod graph;
-pub mod label_range;
-pub mod left_right_check;
-pub mod median;
-pub mod pyramid;
-pub mod resolution;
-pub mod speckle_filter;
-pub mod sub_pixel;
-pub mod winner_takes_all;
 
-use mrfgs::backend::{Backend, Map};
+macro_rules! declare {
+    (
+        levels { $( $(#[$_of_level:meta])* $_level:ident $level_name:ident; )* }
+        finest { $( $(#[$_of_finest:meta])* $_finest:ident $finest_name:ident; )* }
+        maps { $( $(#[$_of_map:meta])* $_map:ident $map_name:ident; )* }
+    ) => {
+        $( pub mod $level_name; )* $( pub mod $finest_name; )* $( pub mod $map_name; )*
+    };
+}
+
+mrfgs::for_every_stage!(declare);
+
+use mrfgs::backend::Map;
+use mrfgs::backend::probe::Probe;
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::Plane;
 use mrfgs::plan::{Plan, Truncation, TruncationRule, VolumeWidth};
@@ -74,7 +72,7 @@ impl Finest {
     }
 
     /// Puts all maps into `backend`.
-    pub fn write(&self, backend: &mut dyn Backend) {
+    pub fn write(&self, backend: &mut dyn Probe) {
         for (map, plane) in self.planes() {
             backend.write_map(map, plane).unwrap();
         }

@@ -1,0 +1,9 @@
+use super::Finest;
+use super::median::{filled, smooth};
+use mrfgs::image::Pair;
+use mrfgs::plan::Plan;
+
+/// The median of filled pixels, the window's places four pixels apart.
+pub fn fill_median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
+    smooth(plan, pair, maps, (4, 1), plan.method.median_sigma_range / 4.0, filled);
+}

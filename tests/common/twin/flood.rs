@@ -1,0 +1,18 @@
+use super::belief::belief;
+use super::dependency::dependency;
+use mrfgs::graph::LevelGraph;
+use mrfgs::plan::Plan;
+
+/// New dependency messages of `level` and the beliefs that follow from them, from old ones of both; `others` are the evidence and
+/// the messages from above and from below.
+pub fn flood(
+    plan: &Plan,
+    level: usize,
+    graph: &LevelGraph,
+    (beliefs, messages): (&[u32], &[u32]),
+    [evidence, down, up]: [&[u32]; 3],
+) -> (Vec<u32>, Vec<u32>) {
+    let messages = dependency(plan, level, graph, beliefs, messages);
+    let beliefs = belief(plan, level, graph, evidence, &messages, down, up);
+    (beliefs, messages)
+}

@@ -1,0 +1,26 @@
+use super::Finest;
+use mrfgs::backend::NO_LABEL;
+use mrfgs::image::Plane;
+use mrfgs::plan::Plan;
+
+/// The map of the right view.
+pub fn right_view(plan: &Plan, belief: &[u32], maps: &mut Finest) {
+    let level = &plan.levels[0];
+    let (width, height, count) = (level.width, level.height, level.labels as i64);
+    let at = |x: usize, y: usize, d: i64| belief[(y * width + x) * level.labels + d as usize];
+    let seen = Plane::from_fn(width, height, |x, y| {
+        let mut smallest = None;
+        for d in 0..count {
+            let left = x as i64 + i64::from(level.min) + d;
+            if left >= plan.core.start as i64 && left < plan.core.end as i64 {
+                let b = at(left as usize, y, d);
+                if smallest.is_none_or(|(_, least)| b < least) {
+                    smallest = Some((d as i32, b));
+                }
+            }
+        }
+        smallest
+    });
+    maps.right_label = seen.map(|s| s.map_or(NO_LABEL.into(), |(label, _)| label));
+    maps.right_best = seen.map(|s| s.map_or(65_535, |(_, best)| best as i32));
+}

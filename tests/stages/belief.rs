@@ -1,0 +1,21 @@
+//! The beliefs.
+
+use crate::common::{random, twin};
+use crate::{cells, on_all, same};
+use mrfgs::backend::Stage;
+use mrfgs::backend::probe::Volume;
+
+#[test]
+fn belief() {
+    on_all(|case, backend, random| {
+        let state = random::state(random, &case.plan, &case.graphs, false);
+        state.write(backend);
+        for z in 0..case.plan.levels.len() {
+            let poison = vec![twin::most(&case.plan); cells(&case.plan, z)];
+            backend.write(Volume::Belief(z), &poison).unwrap();
+            backend.run(Stage::Belief(z)).unwrap();
+            same(&case.plan, backend, Volume::Belief(z), &state.belief[z])?;
+        }
+        Ok(())
+    });
+}

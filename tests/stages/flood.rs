@@ -1,0 +1,59 @@
+//! The sweep of a level.
+
+use crate::common::random::{self, Random};
+use crate::common::twin;
+use crate::{on_all, same};
+use mrfgs::backend::cpu::Cpu;
+use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, Stage};
+use mrfgs::front::Prepared;
+use mrfgs::graph;
+use mrfgs::options::Method;
+
+#[test]
+fn flood() {
+    on_all(|case, backend, random| {
+        let state = random::state(random, &case.plan, &case.graphs, true);
+        for (z, graph) in case.graphs.iter().enumerate() {
+            state.write(backend);
+            backend.run(Stage::Flood(z)).unwrap();
+            let others = [&state.evidence[z][..], &state.down[z], &state.up[z]];
+            let old = (&state.belief[z][..], &state.dependency[z][..]);
+            let (beliefs, messages) = twin::flood::flood(&case.plan, z, graph, old, others);
+            same(&case.plan, backend, Volume::Dependency(z), &messages)?;
+            same(&case.plan, backend, Volume::Belief(z), &beliefs)?;
+        }
+        Ok(())
+    });
+}
+
+/// On the CPU path every thread sweeps bands of its own: what is around their borders must not be early or late.
+#[test]
+fn a_sweep_in_bands_is_a_sweep() {
+    let mut random = Random::new(11);
+    for preset in ["default", "paper"] {
+        // Not a whole number of rows a band.
+        let plan = random::plan((9, 133), -2, 21, &Method::preset(preset).unwrap());
+        let pair = random::pair(&mut random, 9, 133);
+        let graphs = graph::build(pair.left(), &plan);
+        let state = random::state(&mut random, &plan, &graphs, true);
+        let run = |threads: usize, stages: &[Stage]| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let mut cpu = Cpu::default();
+                cpu.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
+                state.write(&mut cpu);
+                for &stage in stages {
+                    cpu.run(stage).unwrap();
+                }
+                [Volume::Dependency(0), Volume::Belief(0)].map(|volume| cpu.read(volume).unwrap())
+            })
+        };
+        let expected = run(1, &[Stage::Dependency(0), Stage::Belief(0)]);
+        for threads in [1, 2, 3] {
+            assert!(run(threads, &[Stage::Flood(0)]) == expected, "{preset}, {threads} threads");
+        }
+        // Control: beliefs before the messages are others.
+        assert!(run(2, &[Stage::Belief(0), Stage::Dependency(0)]) != expected, "{preset}");
+    }
+}

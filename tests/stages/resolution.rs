@@ -1,0 +1,23 @@
+//! The messages between levels.
+
+use crate::common::random;
+use crate::{on_all, resolve, same};
+use mrfgs::backend::Stage;
+use mrfgs::backend::probe::Volume;
+
+#[test]
+fn resolution() {
+    on_all(|case, backend, random| {
+        for loose in [false, true] {
+            let mut state = random::state(random, &case.plan, &case.graphs, loose);
+            state.write(backend);
+            for z in 1..case.plan.levels.len() {
+                backend.run(Stage::Resolution(z)).unwrap();
+                resolve(&case.plan, &mut state, z);
+                same(&case.plan, backend, Volume::Down(z - 1), &state.down[z - 1])?;
+                same(&case.plan, backend, Volume::Up(z), &state.up[z])?;
+            }
+        }
+        Ok(())
+    });
+}

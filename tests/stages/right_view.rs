@@ -1,0 +1,38 @@
+//! The map of the right view.
+
+use crate::common::compare::compare_finest;
+use crate::common::twin::belief::belief_most;
+use crate::common::{random, twin};
+use crate::{cells, on_all};
+use mrfgs::backend::Stage;
+use mrfgs::backend::probe::Volume;
+use mrfgs::front::Prepared;
+use std::cell::Cell;
+
+#[test]
+fn right_view() {
+    let narrower = Cell::new(0);
+    on_all(|case, backend, random| {
+        let mut plan = case.plan.clone();
+        let width = plan.levels[0].width;
+        for most in [0, 2, belief_most(&plan)] {
+            let belief: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, most)).collect();
+            backend.write(Volume::Belief(0), &belief).unwrap();
+            let mut maps = random::finest(random, &plan, false);
+            maps.write(backend);
+            backend.run(Stage::RightView).unwrap();
+            twin::right_view::right_view(&plan, &belief, &mut maps);
+            compare_finest(backend, &maps)?;
+            // Control: with all columns it is another right view.
+            let mut all = maps.clone();
+            twin::right_view::right_view(&case.plan, &belief, &mut all);
+            narrower.set(narrower.get() + usize::from(all != maps));
+            // Then a tile with a core of its own, in the same buffers.
+            let start = random.within(0, width as u32 - 1) as usize;
+            plan.core = start..random.within(start as u32 + 1, width as u32) as usize;
+            backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
+        }
+        Ok(())
+    });
+    assert!(narrower.get() > 50, "{}", narrower.get());
+}
