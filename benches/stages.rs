@@ -8,10 +8,9 @@
 mod synthetic;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mrfgs::backend::Stage;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::Gpu;
-use mrfgs::backend::probe::Probe;
+use mrfgs::backend::{Backend, Stage};
 use mrfgs::options::Method;
 use mrfgs::plan::Plan;
 use mrfgs::{engine, graph};
@@ -45,7 +44,7 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
     ]
 }
 
-fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Probe) {
+fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backend) {
     for (case, presets) in cases() {
         let (pair, range) = (case.pair().expect("one size"), case.range().expect("a range"));
         for preset in presets {

@@ -8,7 +8,7 @@
 //! a cache, it can be beaten.
 
 use crate::backend::Stage;
-use crate::backend::probe::{Volume, volume_shape};
+use crate::backend::volume::{Volume, volume_shape};
 use crate::plan::Plan;
 
 /// The stages of the flooding of `plan`, level by level: of [`Stage::Flood`] and the two that it consists of, a backend keeps

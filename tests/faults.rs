@@ -9,7 +9,6 @@ use common::devices::open as device;
 use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::backend::probe::Probe;
 use mrfgs::engine::{Solution, solve};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::maps::Maps;
@@ -36,7 +35,7 @@ fn corner(pair: &Pair) -> Pair {
     Pair::new(cut(pair.left()), cut(pair.right())).unwrap()
 }
 
-fn on(backend: &mut dyn Probe, pair: &Pair, range: DisparityRange) -> Result<Solution> {
+fn on(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange) -> Result<Solution> {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(()))

@@ -8,7 +8,7 @@ mod common;
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
@@ -143,18 +143,18 @@ impl Model {
         (0..self.variables()).map(|v| self.labels(v)).fold(1, usize::saturating_mul)
     }
 
-    fn backend_with(&self, backend: &mut dyn Probe, evidence: &[Vec<u32>]) {
+    fn backend_with(&self, backend: &mut dyn Backend, evidence: &[Vec<u32>]) {
         let (width, height) = self.plan.size();
         backend.prepare(&self.plan, Prepared::new(&blank(width, height), self.graphs.clone())).unwrap();
         State::fresh(&self.plan, evidence.to_vec()).write(backend);
     }
 
     /// Beliefs of every variable after the flood of the plan.
-    fn beliefs(&self, backend: &mut dyn Probe, evidence: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    fn beliefs(&self, backend: &mut dyn Backend, evidence: &[Vec<u32>]) -> Vec<Vec<u32>> {
         self.backend_with(backend, evidence);
         common::flood(backend, &self.plan).unwrap();
         let volumes: Vec<Vec<u32>> =
-            (0..self.plan.levels.len()).map(|z| backend.read(Volume::Belief(z)).unwrap()).collect();
+            (0..self.plan.levels.len()).map(|z| backend.probe().read(Volume::Belief(z)).unwrap()).collect();
         (0..self.variables()).map(|v| self.row(&volumes, v).to_vec()).collect()
     }
 }
@@ -547,7 +547,7 @@ fn hard_messages_are_those_of_the_sum_product() {
                 let mut read = |f: &dyn Fn(usize) -> Volume, levels: std::ops::Range<usize>| {
                     let mut out = vec![Vec::new(); model.plan.levels.len()];
                     for z in levels {
-                        out[z] = backend.read(f(z)).unwrap();
+                        out[z] = backend.probe().read(f(z)).unwrap();
                     }
                     out
                 };
@@ -638,7 +638,7 @@ fn control_other_evidence_is_found_by_the_sum_product() {
     let (_, mut backend) = backends().swap_remove(0);
     model.backend_with(backend.as_mut(), &evidence);
     common::flood(backend.as_mut(), &model.plan).unwrap();
-    let beliefs: Vec<Vec<u32>> = (0..2).map(|z| backend.read(Volume::Belief(z)).unwrap()).collect();
+    let beliefs: Vec<Vec<u32>> = (0..2).map(|z| backend.probe().read(Volume::Belief(z)).unwrap()).collect();
     let differs = |evidence: &[Vec<u32>]| {
         let mut sums = SumProduct::new(&model, evidence);
         sums.step();

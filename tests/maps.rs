@@ -9,10 +9,8 @@ use common::compare::compare_maps;
 use common::devices::backends;
 use common::random::{self, Random, texture};
 use common::twin::{self, Finest};
-use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::probe::Probe;
-use mrfgs::backend::{Map, NO_LABEL, Stage};
+use mrfgs::backend::{Backend, Map, NO_LABEL, Stage};
 use mrfgs::engine::{self, Solution};
 use mrfgs::front::Prepared;
 use mrfgs::image::{Image, Pair, Plane, Rect};
@@ -201,7 +199,7 @@ fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
 }
 
 /// Runs all stages up to [`Stage::SubPixel`]; the number of iterations.
-fn estimated(backend: &mut dyn Probe, pair: &Pair, plan: &Plan) -> u32 {
+fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
     backend.prepare(&plan, Prepared::new(pair, graph::build(pair.left(), plan))).unwrap();
     backend.run(Stage::Cost).unwrap();
     for z in 1..plan.levels.len() {

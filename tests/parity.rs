@@ -6,11 +6,9 @@
 mod common;
 
 use common::devices;
-use mrfgs::backend::Backend;
-use mrfgs::backend::Stage;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::FaultInjection;
-use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::engine::{Solution, solve};
 use mrfgs::front::Prepared;
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
@@ -27,7 +25,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
     (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
 }
 
-fn matched(backend: &mut dyn Probe, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {
+fn matched(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, method).unwrap();
     solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())).unwrap()
@@ -148,16 +146,16 @@ fn poisoned_buffers() {
         method.tolerance = 0.5;
         let (pair, range) = load(Path::new("testdata/thin"));
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
-        let mut backends: Vec<Box<dyn Probe>> = vec![Box::new(Cpu::default())];
+        let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu::default())];
         for max_buffer in [None, Some(2 << 20)] {
             let gpu = devices::open(FaultInjection { max_buffer, ..FaultInjection::default() });
-            backends.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Probe>));
+            backends.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Backend>));
         }
         for backend in &mut backends {
             let name = backend.describe();
             matched(backend.as_mut(), &pair, range, &method);
             for byte in [0xff, 0x5a] {
-                backend.poison(byte).unwrap();
+                backend.probe().poison(byte).unwrap();
                 let actual = matched(backend.as_mut(), &pair, range, &method);
                 assert!(
                     differences(&actual, &expected).is_empty(),
@@ -166,14 +164,14 @@ fn poisoned_buffers() {
                 );
             }
             // Control: poison does arrive where results are.
-            backend.poison(0x5a).unwrap();
+            backend.probe().poison(0x5a).unwrap();
             assert!(differences(&matched_maps_only(backend.as_mut()), &expected).contains(&"disparity"));
         }
     }
 }
 
 /// The maps as they stand.
-fn matched_maps_only(backend: &mut dyn Probe) -> Solution {
+fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
     let (maps, traffic) = (backend.maps(requested).unwrap(), backend.traffic());
     Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic }
@@ -288,11 +286,11 @@ fn volumes_of_a_real_pair() {
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     let mut cpu = Cpu::default();
     let graphs = graph::build(pair.left(), &plan);
-    let backends: [&mut dyn Probe; 2] = [&mut cpu, &mut gpu];
+    let backends: [&mut dyn Backend; 2] = [&mut cpu, &mut gpu];
     let costs = backends.map(|backend| {
         backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
         backend.run(Stage::Cost).unwrap();
-        backend.read(Volume::Cost(0)).unwrap()
+        backend.probe().read(Volume::Cost(0)).unwrap()
     });
     assert!(costs[0] == costs[1]);
 }

@@ -10,8 +10,8 @@ mod common;
 
 use common::devices;
 use common::random::{self, Random};
+use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::probe::Probe;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::{FRACTION, Maps, flag, has_disparity};
 use mrfgs::options::{Choice, DisparityRange, Execution, Illumination, Method};
@@ -118,7 +118,7 @@ fn tiles(case: &Case) -> mrfgs::Result<Tiles> {
 }
 
 /// The maps of a match on a backend.
-fn maps_on(backend: &mut dyn Probe, case: &Case, tiles: &Tiles) -> mrfgs::Result<Maps> {
+fn maps_on(backend: &mut dyn Backend, case: &Case, tiles: &Tiles) -> mrfgs::Result<Maps> {
     let go_on = &mut |_| ControlFlow::Continue(());
     let solution = match tiles.count() {
         1 => engine::solve(backend, tiles.whole(), &case.pair(), go_on)?,

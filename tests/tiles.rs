@@ -6,8 +6,8 @@ mod common;
 
 use common::devices;
 use common::random::Random;
+use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::probe::Probe;
 use mrfgs::engine::{Solution, solve, solve_tiles};
 use mrfgs::image::{Pair, Plane, calib::Calibration, read};
 use mrfgs::maps::{Maps, has_disparity};
@@ -146,7 +146,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
     (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
 }
 
-fn in_tiles(backend: &mut dyn Probe, tiles: &Tiles, pair: &Pair) -> Solution {
+fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {
     solve_tiles(backend, tiles, pair, &mut quiet).unwrap()
 }
 

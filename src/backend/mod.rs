@@ -7,6 +7,7 @@ pub mod cpu;
 pub mod gpu;
 pub mod probe;
 pub mod stage;
+pub mod volume;
 
 use crate::error::Result;
 use crate::front::Prepared;
@@ -16,47 +17,7 @@ use crate::plan::Plan;
 use probe::Probe;
 pub use stage::Stage;
 use std::time::Duration;
-
-/// Stands for "no label", in the right view where no left pixel projects.
-pub const NO_LABEL: u16 = u16::MAX;
-
-/// A map of a match on its way, one value a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Map {
-    /// Index of the label with the smallest belief, the lowest on ties.
-    Label,
-    /// Its belief, in units.
-    Best,
-    /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
-    RunnerUp,
-    /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
-    RightLabel,
-    /// Its belief, in units; [`u16::MAX`] where no left pixel projects.
-    RightBest,
-    /// Disparity before post-processing, in 1/256 px.
-    Raw,
-    /// Disparity as far as post-processing is done, in 1/256 px.
-    Disparity,
-    /// Bits of [`crate::maps::flag`].
-    Validity,
-    /// Confidence, 0 ..= 255.
-    Confidence,
-}
-
-impl Map {
-    /// Every map there is.
-    pub const ALL: [Self; 9] = [
-        Self::Label,
-        Self::Best,
-        Self::RunnerUp,
-        Self::RightLabel,
-        Self::RightBest,
-        Self::Raw,
-        Self::Disparity,
-        Self::Validity,
-        Self::Confidence,
-    ];
-}
+pub use volume::{Map, NO_LABEL, Volume, volume_shape};
 
 /// What a match asked of a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

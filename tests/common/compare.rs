@@ -1,7 +1,7 @@
 //! Comparison of volumes and maps that says where they part.
 
 use super::twin::Finest;
-use mrfgs::backend::probe::{Probe, Volume, volume_shape};
+use mrfgs::backend::{Backend, Volume, volume_shape};
 use mrfgs::image::Plane;
 use mrfgs::plan::Plan;
 use std::fmt::Debug;
@@ -34,7 +34,7 @@ pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) ->
 }
 
 /// The first map of a backend that differs from the twin's.
-pub fn compare_finest(backend: &mut dyn Probe, expected: &Finest) -> Result<(), String> {
+pub fn compare_finest(backend: &mut dyn Backend, expected: &Finest) -> Result<(), String> {
     for (map, plane) in expected.planes() {
         compare_maps(&format!("{map:?}"), &backend.map(map).unwrap(), plane)?;
     }

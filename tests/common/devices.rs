@@ -3,7 +3,7 @@
 use mrfgs::Result;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::probe::Probe;
 use mrfgs::backend::{Backend, Map, Stage, Ticket, Traffic};
 use mrfgs::front::Prepared;
 use mrfgs::image::Plane;
@@ -40,8 +40,8 @@ pub fn gpu() -> Option<Pooled> {
 /// Name and a fresh instance of every backend.
 ///
 /// The twins are no backend and never in this list: a backend that were compared with itself would always pass.
-pub fn backends() -> Vec<(String, Box<dyn Probe>)> {
-    let mut all: Vec<(String, Box<dyn Probe>)> = vec![("cpu".into(), Box::new(Cpu::default()))];
+pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
+    let mut all: Vec<(String, Box<dyn Backend>)> = vec![("cpu".into(), Box::new(Cpu::default()))];
     if let Some(gpu) = gpu() {
         all.push((gpu.describe(), Box::new(gpu)));
     }
@@ -116,24 +116,6 @@ impl Backend for Pooled {
     }
 
     fn probe(&mut self) -> &mut dyn Probe {
-        self
-    }
-}
-
-impl Probe for Pooled {
-    fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
-        self.gpu().read(volume)
-    }
-
-    fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
-        self.gpu().write(volume, values)
-    }
-
-    fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
-        self.gpu().write_map(map, values)
-    }
-
-    fn poison(&mut self, byte: u8) -> Result<()> {
-        self.gpu().poison(byte)
+        self.gpu().probe()
     }
 }

@@ -1,8 +1,7 @@
 //! Seeded random input: images, pairs, methods, graphs, and states of the volumes that keep the invariants.
 
 use super::twin::{self, Finest};
-use mrfgs::backend::NO_LABEL;
-use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, NO_LABEL, Volume};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::flag;
@@ -228,9 +227,9 @@ impl State {
     }
 
     /// Puts all of it into `backend`.
-    pub fn write(&self, backend: &mut dyn Probe) {
+    pub fn write(&self, backend: &mut dyn Backend) {
         for (volume, values) in self.volumes() {
-            backend.write(volume, values).unwrap();
+            backend.probe().write(volume, values).unwrap();
         }
     }
 

@@ -2,8 +2,7 @@
 
 use crate::common::{random, twin};
 use crate::{cells, on_all, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 
 #[test]
 fn belief() {
@@ -12,7 +11,7 @@ fn belief() {
         state.write(backend);
         for z in 0..case.plan.levels.len() {
             let poison = vec![twin::most(&case.plan); cells(&case.plan, z)];
-            backend.write(Volume::Belief(z), &poison).unwrap();
+            backend.probe().write(Volume::Belief(z), &poison).unwrap();
             backend.run(Stage::Belief(z)).unwrap();
             same(&case.plan, backend, Volume::Belief(z), &state.belief[z])?;
         }

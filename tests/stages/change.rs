@@ -3,7 +3,7 @@
 use crate::common::twin;
 use crate::common::twin::belief::belief_most;
 use crate::{cells, on_all};
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::Volume;
 
 #[test]
 fn change() {
@@ -13,7 +13,7 @@ fn change() {
         for _ in 0..4 {
             let most = random.pick(&[0, 2, belief_most(&case.plan)]);
             let belief: Vec<u32> = (0..cells(&case.plan, 0)).map(|_| random.within(0, most)).collect();
-            backend.write(Volume::Belief(0), &belief).unwrap();
+            backend.probe().write(Volume::Belief(0), &belief).unwrap();
             let (actual, expected) =
                 (backend.change().unwrap(), twin::change::change(&belief, labels, &mut map));
             if actual != expected {

@@ -6,7 +6,7 @@ use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::floods::{twin_flood, whole_flood};
 use crate::{same, twin_start};
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::Volume;
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
@@ -35,7 +35,7 @@ fn control_one_wrong_element_is_found() {
                 let mut wrong = values.to_vec();
                 let at = random.within(0, values.len() as u32 - 1) as usize;
                 wrong[at] = if wrong[at] == 0 { 1 } else { wrong[at] - 1 };
-                backend.write(volume, &wrong).unwrap();
+                backend.probe().write(volume, &wrong).unwrap();
                 let error = same(&plan, backend.as_mut(), volume, values).unwrap_err();
                 assert!(error.contains(&format!("1 of {} values differ", values.len())), "{error}");
                 let z = (0..3).find(|z| format!("{volume:?}").contains(&z.to_string())).unwrap();
@@ -51,7 +51,7 @@ fn control_one_wrong_element_is_found() {
                     values[at]
                 );
                 assert!(error.ends_with(&place), "{error} / {place}");
-                backend.write(volume, values).unwrap();
+                backend.probe().write(volume, values).unwrap();
                 same(&plan, backend.as_mut(), volume, values).unwrap();
             }
             let error = compare(&plan, volume, &values[1..], values).unwrap_err();

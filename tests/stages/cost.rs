@@ -4,8 +4,7 @@ use crate::common::devices::backends;
 use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::{cells, on_all, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph;
 use mrfgs::options::Cost;
@@ -18,7 +17,7 @@ fn cost() {
             plan.method.cost = cost;
             backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
             let poison: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, 255)).collect();
-            backend.write(Volume::Cost(0), &poison).unwrap();
+            backend.probe().write(Volume::Cost(0), &poison).unwrap();
             backend.run(Stage::Cost).unwrap();
             same(&plan, backend, Volume::Cost(0), &twin::cost::cost(&plan, &case.pair))?;
         }

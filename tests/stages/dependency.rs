@@ -2,8 +2,7 @@
 
 use crate::common::{random, twin};
 use crate::{on_all, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 
 #[test]
 fn dependency() {

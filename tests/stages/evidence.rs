@@ -2,8 +2,7 @@
 
 use crate::common::twin;
 use crate::{on_all, random_cost, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 
 #[test]
 fn evidence() {
@@ -11,9 +10,9 @@ fn evidence() {
         for z in 0..case.plan.levels.len() {
             let cost = random_cost(random, &case.plan, z);
             let poison = vec![231; cost.len()];
-            backend.write(Volume::Cost(z), &cost).unwrap();
-            backend.write(Volume::Evidence(z), &poison).unwrap();
-            backend.write(Volume::Belief(z), &poison).unwrap();
+            backend.probe().write(Volume::Cost(z), &cost).unwrap();
+            backend.probe().write(Volume::Evidence(z), &poison).unwrap();
+            backend.probe().write(Volume::Belief(z), &poison).unwrap();
             backend.run(Stage::Evidence(z)).unwrap();
             let expected = twin::evidence::evidence(&case.plan, z, &cost);
             same(&case.plan, backend, Volume::Evidence(z), &expected)?;

@@ -4,8 +4,7 @@ use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::{on_all, same};
 use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::probe::{Probe, Volume};
-use mrfgs::backend::{Backend, Stage};
+use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph;
 use mrfgs::options::Method;
@@ -46,7 +45,7 @@ fn a_sweep_in_bands_is_a_sweep() {
                 for &stage in stages {
                     cpu.run(stage).unwrap();
                 }
-                [Volume::Dependency(0), Volume::Belief(0)].map(|volume| cpu.read(volume).unwrap())
+                [Volume::Dependency(0), Volume::Belief(0)].map(|volume| cpu.probe().read(volume).unwrap())
             })
         };
         let expected = run(1, &[Stage::Dependency(0), Stage::Belief(0)]);

@@ -5,8 +5,7 @@ use crate::common::devices::backends;
 use crate::common::random::{self, Random, State};
 use crate::common::twin;
 use crate::{MINIMA, on_all, resolve, same, twin_start};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
@@ -134,7 +133,7 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
         for z in 0..plan.levels.len() {
             backend.run(Stage::Evidence(z)).unwrap();
         }
-        let check = |backend: &mut dyn Probe| -> Result<(), String> {
+        let check = |backend: &mut dyn Backend| -> Result<(), String> {
             let actual = crate::common::flood(backend, plan).unwrap();
             if actual != iterations {
                 return Err(format!("{actual} iterations but the twin did {iterations}"));

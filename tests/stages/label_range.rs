@@ -2,8 +2,7 @@
 
 use crate::common::twin;
 use crate::{on_all, random_cost, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::image::Plane;
 use mrfgs::plan::Plan;
@@ -30,7 +29,7 @@ fn label_range() {
         backend.prepare(&plan, prepared).unwrap();
         for (z, label_range) in label_ranges.iter().enumerate() {
             let cost = random_cost(random, &plan, z);
-            backend.write(Volume::Cost(z), &cost).unwrap();
+            backend.probe().write(Volume::Cost(z), &cost).unwrap();
             backend.run(Stage::LabelRange(z)).unwrap();
             let expected = twin::label_range::label_range(&plan, z, label_range, &cost);
             same(&plan, backend, Volume::Cost(z), &expected)?;

@@ -27,7 +27,7 @@ use common::compare::{compare, compare_maps};
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::backend::probe::{Probe, Volume};
+use mrfgs::backend::{Backend, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
@@ -80,7 +80,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Runs `check` for every case on every backend, prepared, with a generator of the case's own.
-fn on_all(check: impl Fn(&Case, &mut dyn Probe, &mut Random) -> Result<(), String>) {
+fn on_all(check: impl Fn(&Case, &mut dyn Backend, &mut Random) -> Result<(), String>) {
     for case in cases() {
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
@@ -93,8 +93,8 @@ fn on_all(check: impl Fn(&Case, &mut dyn Probe, &mut Random) -> Result<(), Strin
 }
 
 /// Compares what `backend` holds with what the twin says.
-fn same(plan: &Plan, backend: &mut dyn Probe, volume: Volume, expected: &[u32]) -> Result<(), String> {
-    compare(plan, volume, &backend.read(volume).unwrap(), expected)
+fn same(plan: &Plan, backend: &mut dyn Backend, volume: Volume, expected: &[u32]) -> Result<(), String> {
+    compare(plan, volume, &backend.probe().read(volume).unwrap(), expected)
 }
 
 fn cells(plan: &Plan, z: usize) -> usize {

@@ -2,8 +2,7 @@
 
 use crate::common::twin;
 use crate::{on_all, random_cost, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 
 #[test]
 fn pyramid() {
@@ -11,8 +10,8 @@ fn pyramid() {
         for z in 1..case.plan.levels.len() {
             let fine = random_cost(random, &case.plan, z - 1);
             let poison = random_cost(random, &case.plan, z);
-            backend.write(Volume::Cost(z - 1), &fine).unwrap();
-            backend.write(Volume::Cost(z), &poison).unwrap();
+            backend.probe().write(Volume::Cost(z - 1), &fine).unwrap();
+            backend.probe().write(Volume::Cost(z), &poison).unwrap();
             backend.run(Stage::Pyramid(z)).unwrap();
             same(&case.plan, backend, Volume::Cost(z), &twin::pyramid::pyramid(&case.plan, z, &fine))?;
             same(&case.plan, backend, Volume::Cost(z - 1), &fine)?;

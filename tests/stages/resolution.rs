@@ -2,8 +2,7 @@
 
 use crate::common::random;
 use crate::{on_all, resolve, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 
 #[test]
 fn resolution() {

@@ -4,8 +4,7 @@ use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;
 use crate::common::{random, twin};
 use crate::{cells, on_all};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 use mrfgs::front::Prepared;
 use std::cell::Cell;
 
@@ -17,7 +16,7 @@ fn right_view() {
         let width = plan.levels[0].width;
         for most in [0, 2, belief_most(&plan)] {
             let belief: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, most)).collect();
-            backend.write(Volume::Belief(0), &belief).unwrap();
+            backend.probe().write(Volume::Belief(0), &belief).unwrap();
             let mut maps = random::finest(random, &plan, false);
             maps.write(backend);
             backend.run(Stage::RightView).unwrap();

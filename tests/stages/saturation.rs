@@ -6,8 +6,7 @@ use crate::common::twin;
 use crate::common::twin::belief::belief_most;
 use crate::floods::twin_flood;
 use crate::{NEIGHBOURS, cells, resolve, same};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::{Volume, volume_shape};
+use mrfgs::backend::{Stage, Volume, volume_shape};
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::options::{Method, Resolution};
@@ -132,7 +131,7 @@ fn control_saturated_sums_say_nothing() {
                 backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
                 for z in 0..2 {
                     let belief = better(&plan, Volume::Belief(z), belief_most(&plan));
-                    backend.write(Volume::Belief(z), &belief).unwrap();
+                    backend.probe().write(Volume::Belief(z), &belief).unwrap();
                 }
                 backend.run(Stage::Dependency(0)).unwrap();
                 let silent = zero(&plan, Volume::Dependency(0));
@@ -140,19 +139,19 @@ fn control_saturated_sums_say_nothing() {
                     .unwrap_or_else(|e| panic!("{name}: {e}"));
                 backend.run(Stage::Resolution(1)).unwrap();
                 // The coarse pixel at the far corner has a single child, whose belief is no sum.
-                let up = backend.read(Volume::Up(1)).unwrap();
+                let up = backend.probe().read(Volume::Up(1)).unwrap();
                 let silent: Vec<bool> =
                     up.chunks(plan.levels[1].labels).map(|m| m.iter().all(|&m| m == 0)).collect();
                 let (corner, others) = silent.split_last().unwrap();
                 assert!(!corner && others.iter().all(|&silent| silent), "{name}: {silent:?}");
 
                 for volume in [Volume::Dependency(0), Volume::Down(0)] {
-                    backend.write(volume, &better(&plan, volume, tau)).unwrap();
+                    backend.probe().write(volume, &better(&plan, volume, tau)).unwrap();
                 }
-                backend.write(Volume::Evidence(0), &zero(&plan, Volume::Evidence(0))).unwrap();
+                backend.probe().write(Volume::Evidence(0), &zero(&plan, Volume::Evidence(0))).unwrap();
                 backend.run(Stage::Belief(0)).unwrap();
                 // Away from the border every pixel is in 49 factors.
-                let belief = backend.read(Volume::Belief(0)).unwrap();
+                let belief = backend.probe().read(Volume::Belief(0)).unwrap();
                 let labels = plan.levels[0].labels;
                 let inner = &belief[(6 * 15 + 7) * labels..][..labels];
                 assert!(inner.iter().all(|&b| b == belief_most(&plan)), "{name}: {inner:?}");
@@ -183,13 +182,13 @@ fn control_padding_stays_behind_beliefs_that_saturate() {
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
             backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
-            backend.write(Volume::Evidence(0), &flat(0)).unwrap();
-            backend.write(Volume::Belief(0), &flat(0)).unwrap();
+            backend.probe().write(Volume::Evidence(0), &flat(0)).unwrap();
+            backend.probe().write(Volume::Belief(0), &flat(0)).unwrap();
             for _ in 0..2 {
                 backend.run(Stage::Dependency(0)).unwrap();
                 same(&plan, backend, Volume::Dependency(0), &silent)
                     .unwrap_or_else(|e| panic!("{name}: {e}"));
-                backend.write(Volume::Down(0), &flat(belief_most(&plan))).unwrap();
+                backend.probe().write(Volume::Down(0), &flat(belief_most(&plan))).unwrap();
                 backend.run(Stage::Belief(0)).unwrap();
                 same(&plan, backend, Volume::Belief(0), &flat(belief_most(&plan))).unwrap();
             }

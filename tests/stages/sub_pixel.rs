@@ -4,8 +4,7 @@ use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;
 use crate::common::{random, twin};
 use crate::{cells, on_all, random_cost};
-use mrfgs::backend::Stage;
-use mrfgs::backend::probe::Volume;
+use mrfgs::backend::{Stage, Volume};
 
 #[test]
 fn sub_pixel() {
@@ -16,7 +15,7 @@ fn sub_pixel() {
             let mut maps = random::finest(random, &case.plan, false);
             // Labels as a match leaves them.
             twin::winner_takes_all::winner_takes_all(&case.plan, &belief, &mut maps);
-            backend.write(Volume::Cost(0), &cost).unwrap();
+            backend.probe().write(Volume::Cost(0), &cost).unwrap();
             maps.write(backend);
             backend.run(Stage::SubPixel).unwrap();
             twin::sub_pixel::sub_pixel(&case.plan, &cost, &mut maps);

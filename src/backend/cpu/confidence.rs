@@ -1,6 +1,6 @@
 //! How sure each pixel is: see [`crate::backend::Stage::Confidence`].
 
-use super::Finest;
+use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::plan::Plan;

@@ -1,6 +1,6 @@
 //! The farther of two neighbours for what has no disparity of its own: see [`crate::backend::Stage::Fill`].
 
-use super::Finest;
+use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::plan::Plan;

@@ -1,6 +1,6 @@
 //! The stretched median of what was filled: see [`crate::backend::Stage::FillMedian`].
 
-use super::Finest;
+use super::finest::Finest;
 use super::median::smooth;
 use crate::image::Image;
 use crate::maps::flag;

@@ -1,6 +1,6 @@
 //! What the right view says of each pixel: see [`crate::backend::Stage::LeftRightCheck`].
 
-use super::Finest;
+use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::options::LeftRightCheck;

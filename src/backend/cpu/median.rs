@@ -1,6 +1,6 @@
 //! The weighted median of the disparities: see [`crate::backend::Stage::Median`].
 
-use super::Finest;
+use super::finest::Finest;
 use super::units::block;
 use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};

@@ -1,6 +1,6 @@
 //! Regions too small to be trusted: see [`crate::backend::Stage::SpeckleFilter`].
 
-use super::Finest;
+use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::plan::Plan;

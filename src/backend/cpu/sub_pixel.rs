@@ -1,6 +1,6 @@
 //! Disparities between the labels: see [`crate::backend::Stage::SubPixel`].
 
-use super::Finest;
+use super::finest::Finest;
 use super::units::Units;
 use super::volumes::Volumes;
 use crate::maps::FRACTION;

@@ -32,9 +32,9 @@ pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-pub use steps::Job;
+pub use steps::{Job, MAX_LOOP_ITERATIONS};
 use steps::{Pipelines, Recorder, Step};
-use timer::Timer;
+use timer::{PASSES_PER_SUBMIT, Timer};
 pub use uniform::UniformLayout;
 use upload::{image_words, label_range_words, member_words, transposed};
 
@@ -70,10 +70,6 @@ macro_rules! declare {
 
 crate::for_every_stage!(declare);
 
-/// Largest number of iterations of all loops of one invocation together.
-pub const MAX_LOOP_ITERATIONS: usize = 32_768;
-/// Passes recorded before they are submitted.
-const PASSES_PER_SUBMIT: usize = 16;
 /// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop
 /// long jobs, and for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 30;

@@ -2,7 +2,8 @@
 
 use super::Gpu;
 use super::buffers::Rows;
-use crate::backend::probe::{PaddedRows, Probe, Volume, volume_shape};
+use crate::backend::probe::Probe;
+use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::backend::{Backend, Map};
 use crate::error::{Error, Result};
 use crate::image::Plane;

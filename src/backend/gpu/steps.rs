@@ -1,6 +1,5 @@
 //! From a stage to dispatches: in bands of rows where a buffer exceeds what a device lets a shader see.
 
-use super::MAX_LOOP_ITERATIONS;
 use super::buffers::{Binding, Buffers, Copy, LevelBuffers, Rows};
 use super::device::Device;
 use super::shader::{Kernel, WORKGROUP};
@@ -9,6 +8,9 @@ use crate::error::{Error, Result};
 use crate::plan::Plan;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
+
+/// Largest number of iterations of all loops of one invocation together.
+pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 
 /// What a stage has a device do, in order.
 pub(super) enum Step {

@@ -1,10 +1,12 @@
 //! The time of every stage by the device's own clock.
 
-use super::PASSES_PER_SUBMIT;
 use super::device::Device;
 use crate::backend::Stage;
 use crate::error::Result;
 use std::time::Duration;
+
+/// Passes recorded before they are submitted.
+pub(super) const PASSES_PER_SUBMIT: usize = 16;
 
 /// Takes the time of passes and adds up those of one run of a stage.
 pub(super) struct Timer {

@@ -19,8 +19,7 @@ macro_rules! declare {
 
 mrfgs::for_every_stage!(declare);
 
-use mrfgs::backend::Map;
-use mrfgs::backend::probe::Probe;
+use mrfgs::backend::{Backend, Map};
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::Plane;
 use mrfgs::plan::{Plan, Truncation, TruncationRule, VolumeWidth};
@@ -72,9 +71,9 @@ impl Finest {
     }
 
     /// Puts all maps into `backend`.
-    pub fn write(&self, backend: &mut dyn Probe) {
+    pub fn write(&self, backend: &mut dyn Backend) {
         for (map, plane) in self.planes() {
-            backend.write_map(map, plane).unwrap();
+            backend.probe().write_map(map, plane).unwrap();
         }
     }
 }

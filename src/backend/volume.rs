@@ -1,0 +1,125 @@
+//! What a backend holds of a match: volumes and maps.
+
+use crate::plan::Plan;
+
+/// Stands for "no label", in the right view where no left pixel projects.
+pub const NO_LABEL: u16 = u16::MAX;
+
+/// A volume, in the layout \[y\]\[x\]\[slot\]\[label\] (slot only
+/// for dependency messages), unpadded, one value an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Volume {
+    /// Matching cost: in cost units at level 0, in 1/256 cost units at coarser levels.
+    Cost(usize),
+    /// Evidence e.
+    Evidence(usize),
+    /// Messages of the dependency factors to their members.
+    Dependency(usize),
+    /// Messages of the resolution factors above to the pixels of this level.
+    Down(usize),
+    /// Messages of the resolution factors of this level to their own, coarse pixel.
+    Up(usize),
+    /// Beliefs b.
+    Belief(usize),
+}
+
+impl Volume {
+    /// The level it belongs to.
+    #[must_use]
+    pub fn level(self) -> usize {
+        match self {
+            Self::Cost(z)
+            | Self::Evidence(z)
+            | Self::Dependency(z)
+            | Self::Down(z)
+            | Self::Up(z)
+            | Self::Belief(z) => z,
+        }
+    }
+}
+
+/// A map of a match on its way, one value a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Map {
+    /// Index of the label with the smallest belief, the lowest on ties.
+    Label,
+    /// Its belief, in units.
+    Best,
+    /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
+    RunnerUp,
+    /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
+    RightLabel,
+    /// Its belief, in units; [`u16::MAX`] where no left pixel projects.
+    RightBest,
+    /// Disparity before post-processing, in 1/256 px.
+    Raw,
+    /// Disparity as far as post-processing is done, in 1/256 px.
+    Disparity,
+    /// Bits of [`crate::maps::flag`].
+    Validity,
+    /// Confidence, 0 ..= 255.
+    Confidence,
+}
+
+impl Map {
+    /// Every map there is.
+    pub const ALL: [Self; 9] = [
+        Self::Label,
+        Self::Best,
+        Self::RunnerUp,
+        Self::RightLabel,
+        Self::RightBest,
+        Self::Raw,
+        Self::Disparity,
+        Self::Validity,
+        Self::Confidence,
+    ];
+}
+
+/// Number of values in `volume` under `plan`, and labels in a row of them, without and with padding.
+#[must_use]
+pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
+    let rows = if matches!(volume, Volume::Dependency(_)) { plan.slots() } else { 1 };
+    let level = &plan.levels[volume.level()];
+    (level.pixels() * rows, level.labels, level.stride)
+}
+
+/// Values for a volume, as rows of labels to be stored with padding.
+pub(super) struct PaddedRows<'a> {
+    values: &'a [u32],
+    labels: usize,
+    stride: usize,
+    /// The padding is at least this, and a row's largest value.
+    least: u32,
+}
+
+impl<'a> PaddedRows<'a> {
+    pub(super) fn new(plan: &Plan, volume: Volume, values: &'a [u32]) -> Self {
+        let (rows, labels, stride) = volume_shape(plan, volume);
+        assert_eq!(values.len(), rows * labels, "values of {volume:?}");
+        // Padding must never look better than a label, also after a message is taken off a belief.
+        let least = match volume {
+            Volume::Belief(_) => plan.volume_width.most().into(),
+            _ => 0,
+        };
+        Self { values, labels, stride, least }
+    }
+
+    /// Rows of `stride` values each.
+    pub(super) fn iter(&self) -> impl Iterator<Item = Vec<u32>> {
+        self.values.chunks_exact(self.labels).map(|row| {
+            let padding = row.iter().copied().max().unwrap_or(0).max(self.least);
+            let mut row = row.to_vec();
+            row.resize(self.stride, padding);
+            row
+        })
+    }
+
+    pub(super) fn fill<T>(&self, out: &mut [T], convert: impl Fn(u32) -> T) {
+        for (out, row) in out.chunks_exact_mut(self.stride).zip(self.iter()) {
+            for (out, value) in out.iter_mut().zip(row) {
+                *out = convert(value);
+            }
+        }
+    }
+}
