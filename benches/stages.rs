@@ -4,7 +4,7 @@
 //! which takes long and about 20 GB a backend. `cargo bench -- dependency` runs one stage. The GPU rows are missing where there is no
 //! driver, and say so.
 
-#[path = "../cli/src/synthetic.rs"]
+#[path = "../cli/src/commands/bench/synthetic.rs"]
 mod synthetic;
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -6,6 +6,8 @@ use std::{env, io, panic};
 
 use mrfgs::image::read;
 
+use crate::text::single_line;
+
 /// From now on a panic is one line on standard error, and none where an image is decoded, as that becomes an error of the file.
 /// With `RUST_BACKTRACE` it is what it always is.
 pub(crate) fn tell_panics_in_one_line() {
@@ -21,7 +23,7 @@ pub(crate) fn tell_panics_in_one_line() {
         let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic");
         let place =
             panic.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
-        let text = crate::single_line(&format!("this is a defect of mrfgs, please report it: {text}{place}"));
+        let text = single_line(&format!("this is a defect of mrfgs, please report it: {text}{place}"));
         let _ = writeln!(io::stderr(), "mrfgs: {text}");
     }));
 }
@@ -29,7 +31,7 @@ pub(crate) fn tell_panics_in_one_line() {
 /// Keeps the loader of Vulkan from printing to standard error that `XDG_RUNTIME_DIR` is missing, as it does on machines without a
 /// display: starts the program anew with that set, as no other way to set it is safe.
 #[cfg(target_os = "linux")]
-pub(super) fn quiet_loader() {
+pub(crate) fn quiet_loader() {
     use std::os::unix::process::CommandExt;
     if env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| !folder.is_empty()) {
         return;
@@ -45,22 +47,22 @@ pub(super) fn quiet_loader() {
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(super) fn quiet_loader() {}
+pub(crate) fn quiet_loader() {}
 
 /// The time that all processors together have spent on this process.
 #[cfg(unix)]
-pub(super) fn processor_time() -> Option<Duration> {
+pub(crate) fn processor_time() -> Option<Duration> {
     Duration::try_from(rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime)).ok()
 }
 
 /// The time that all processors together have spent on this process.
 #[cfg(not(unix))]
-pub(super) fn processor_time() -> Option<Duration> {
+pub(crate) fn processor_time() -> Option<Duration> {
     None
 }
 
 /// The most memory that this process has held so far, in bytes.
-pub(super) fn peak_memory() -> Option<u64> {
+pub(crate) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use mrfgs::solver::Progress;
 
+use crate::console;
 use crate::stop;
 
 /// What is over sooner than this needs no bar.
@@ -16,7 +17,7 @@ const STEPS: u64 = 1000;
 const SILENCE: Duration = Duration::from_secs(30);
 
 /// A bar on a terminal, from [`PATIENCE`] on.
-pub(super) struct Bar {
+pub(crate) struct Bar {
     start: Instant,
     wanted: bool,
     name: String,
@@ -24,13 +25,13 @@ pub(super) struct Bar {
 }
 
 impl Bar {
-    pub(super) fn new(name: Option<&str>, quiet: bool) -> Self {
+    pub(crate) fn new(name: Option<&str>, quiet: bool) -> Self {
         let wanted = !quiet && std::io::stderr().is_terminal();
         Self { start: Instant::now(), wanted, name: name.unwrap_or("mrfgs").into(), drawn: None }
     }
 
     /// Shows how far it is, and says whether to go on.
-    pub(super) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
+    pub(crate) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
         if self.wanted && self.start.elapsed() > PATIENCE {
             let bar = self.drawn.get_or_insert_with(|| {
                 let style = ProgressStyle::with_template("{prefix} [{bar:40}] {percent:>3} % {msg}");
@@ -48,7 +49,7 @@ impl Bar {
     }
 
     /// Takes the bar away.
-    pub(super) fn finish(self) {
+    pub(crate) fn finish(self) {
         if let Some(bar) = self.drawn {
             bar.finish_and_clear();
         }
@@ -56,14 +57,14 @@ impl Bar {
 }
 
 /// The pairs done of all those of a batch: a bar on a terminal, elsewhere a line now and then.
-pub(super) struct PairBar {
+pub(crate) struct PairBar {
     drawn: Option<ProgressBar>,
     log: Option<Log>,
 }
 
 impl PairBar {
     /// For so many pairs, of which some are done.
-    pub(super) fn new(pairs: usize, done: usize, quiet: bool) -> Self {
+    pub(crate) fn new(pairs: usize, done: usize, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bar = || {
             let style = ProgressStyle::with_template("mrfgs [{bar:40}] {pos} of {len} {msg}");
@@ -79,17 +80,17 @@ impl PairBar {
     }
 
     /// Shows the pair at work.
-    pub(super) fn begin(&mut self, name: &str) {
+    pub(crate) fn begin(&mut self, name: &str) {
         if let Some(bar) = &self.drawn {
             bar.set_message(name.to_owned());
         }
         if let Some(line) = self.log.as_mut().and_then(|log| log.line(name, Instant::now())) {
-            crate::say(&line);
+            console::say(&line);
         }
     }
 
     /// Counts a pair that is done or has failed.
-    pub(super) fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         if let Some(bar) = &self.drawn {
             bar.inc(1);
         }
@@ -99,7 +100,7 @@ impl PairBar {
     }
 
     /// Lets `say` write to standard error past the bar.
-    pub(super) fn past(&self, say: impl FnOnce()) {
+    pub(crate) fn past(&self, say: impl FnOnce()) {
         match &self.drawn {
             Some(bar) => bar.suspend(say),
             None => say(),

@@ -5,13 +5,13 @@ use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The exit status of what was stopped: as shells have it for SIGINT.
-pub(super) const STOPPED: u8 = 130;
+pub(crate) const STOPPED: u8 = 130;
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
 /// From now on the first signal makes [`go_on`] break, so that what was begun can be tidied up, and the second ends the program
 /// as it is.
-pub(super) fn listen() {
+pub(crate) fn listen() {
     // Where that fails a signal ends the program at once.
     let _ = ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::Relaxed) {
@@ -21,6 +21,6 @@ pub(super) fn listen() {
 }
 
 /// Whether there is a reason to go on.
-pub(super) fn go_on() -> ControlFlow<()> {
+pub(crate) fn go_on() -> ControlFlow<()> {
     if STOP.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

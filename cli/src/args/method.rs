@@ -1,0 +1,82 @@
+//! The parameters that determine the result.
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::options::{Method, PRESETS};
+use mrfgs::{Error, Result};
+
+use crate::args::sizes::mebibytes;
+
+/// The parameters that determine the result.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Method")]
+pub(crate) struct MethodArgs {
+    /// A preset, or a TOML file whose keys replace those of the preset; `mrfgs presets` lists presets and keys. Given
+    /// several times, a later file replaces keys of an earlier one [default: default]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) method: Vec<PathBuf>,
+    /// Sets one key, after --method: `--set levels=4 --set cost=sad`
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub(crate) set: Vec<(String, String)>,
+    /// Memory that a match may take, such as 2GiB or 512MiB. A pair that needs more is matched tile by tile, which changes
+    /// some bits of the result [default: 4GiB, the preset's]
+    #[arg(long, value_name = "SIZE", value_parser = mebibytes)]
+    pub(crate) memory: Option<u32>,
+}
+
+fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().into(), value.trim().into())),
+        _ => Err("give a key and its value, like levels=4".into()),
+    }
+}
+
+/// The preset that `--method` names, if it names one.
+fn preset(word: &Path) -> Option<&'static str> {
+    PRESETS.iter().map(|(name, _)| *name).find(|name| word == Path::new(name))
+}
+
+impl MethodArgs {
+    /// The method: the preset, then each file, then each `--set`, then the memory.
+    pub(crate) fn method(&self) -> Result<Method> {
+        self.on("default")
+    }
+
+    /// The same; without a preset in `--method` the files change the preset `base`.
+    pub(crate) fn on(&self, base: &str) -> Result<Method> {
+        let mut method = Method::preset(base)?;
+        for (i, word) in self.method.iter().enumerate() {
+            if let Some(name) = preset(word) {
+                if i > 0 {
+                    let reason = format!("the preset {name} would replace all keys before it; give it first");
+                    return Err(Error::option("--method", reason));
+                }
+                method = Method::preset(name)?;
+            } else if word.extension().is_some_and(|extension| extension == "toml") || word.exists() {
+                method.load(word)?;
+            } else {
+                let names: Vec<_> = PRESETS.iter().map(|(name, _)| *name).collect();
+                let reason = format!(
+                    "there is no preset `{}`, and no such file; give one of {}, or a TOML file",
+                    word.display(),
+                    names.join(", ")
+                );
+                return Err(Error::option("--method", reason));
+            }
+        }
+        method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
+        method.memory = self.memory.unwrap_or(method.memory);
+        method.validated()
+    }
+
+    /// The files that `--method` names.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.method.iter().map(PathBuf::as_path).filter(|word| preset(word).is_none())
+    }
+
+    /// What the method is called: the words of `--method`.
+    pub(crate) fn name(&self) -> Option<String> {
+        let words: Vec<_> = self.method.iter().map(|word| word.display().to_string()).collect();
+        (!words.is_empty()).then(|| words.join(" + "))
+    }
+}

@@ -1,0 +1,27 @@
+//! How images, masks and maps are read.
+
+use mrfgs::image::read::{MAX_PIXELS, Reader};
+
+/// How images, masks and maps are read.
+#[derive(clap::Args)]
+pub(crate) struct ReadingArgs {
+    /// Pixels that have this value in every channel, as the file stores it, hold no data and are ignored [default: the
+    /// value that a TIFF file names itself]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    pub(crate) no_data: Option<f64>,
+    /// Most pixels that an image may have; a file that claims more is refused before it takes memory
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        default_value_t = MAX_PIXELS,
+        value_parser = clap::value_parser!(u64).range(1..)
+    )]
+    pub(crate) max_pixels: u64,
+}
+
+impl ReadingArgs {
+    pub(crate) fn reader(&self) -> Reader {
+        Reader { max_pixels: self.max_pixels, no_data: self.no_data }
+    }
+}

@@ -1,0 +1,128 @@
+//! The disparities to search: as the user says, by a calibration, or by sparse matches.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use mrfgs::front::check;
+use mrfgs::image::Pair;
+use mrfgs::image::calib::Calibration;
+use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+use mrfgs::{Error, Result};
+use serde::Serialize;
+
+use crate::args::sign::Sign;
+use crate::failure;
+
+/// The largest disparity to search, as users give it: a number of pixels, or `auto`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Largest {
+    /// The range is that of sparse matches.
+    Auto,
+    /// So many pixels, within [`MAX_DISPARITY`] of 0.
+    #[serde(untagged)]
+    Pixels(i32),
+}
+
+impl FromStr for Largest {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if text == "auto" { Ok(Self::Auto) } else { pixels(text).map(Self::Pixels) }
+    }
+}
+
+/// A disparity, in pixels, as users give it.
+///
+/// # Errors
+/// What to give instead, for anything but a whole number within [`MAX_DISPARITY`] of 0.
+pub fn pixels(text: &str) -> std::result::Result<i32, String> {
+    let reach = -MAX_DISPARITY..=MAX_DISPARITY;
+    let number = text.parse().ok().filter(|number| reach.contains(number));
+    number.ok_or_else(|| format!("give a whole number of pixels within {MAX_DISPARITY} of 0"))
+}
+
+/// What the user says of the range.
+#[derive(clap::Args, Clone, Copy, Serialize)]
+pub(crate) struct Search {
+    /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
+    /// - 1 of the calibration file, or auto without one]
+    #[arg(long, value_name = "N|auto", allow_negative_numbers = true, value_parser = str::parse::<Largest>)]
+    pub(crate) max_disparity: Option<Largest>,
+    /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
+    pub(crate) min_disparity: Option<i32>,
+}
+
+/// A range, and how it was found.
+pub(crate) struct Found {
+    pub(crate) range: DisparityRange,
+    /// Whether sparse matches gave it.
+    pub(crate) by_matches: bool,
+}
+
+impl Search {
+    /// The range to search in `pair`, where the user counts by `sign`; a `calibration` comes with its path.
+    pub(crate) fn range(
+        &self,
+        pair: &Pair,
+        calibration: Option<(&Path, &Calibration)>,
+        sign: Sign,
+    ) -> Result<Found> {
+        let (max, auto) = match self.max_disparity {
+            Some(Largest::Pixels(max)) => (Some(max), false),
+            other => (None, other.is_some()),
+        };
+        // What is far is at 0 unless told otherwise, whichever end of the range that is.
+        let (near, far) = match sign {
+            Sign::LeftMinusRight => (max, self.min_disparity),
+            Sign::RightMinusLeft => (self.min_disparity, max),
+        };
+        let between = |near: i32, far: i32| {
+            let range = match sign {
+                Sign::LeftMinusRight => DisparityRange::new(far, near),
+                Sign::RightMinusLeft => DisparityRange::new(near, far),
+            };
+            range.map(|range| sign.range(range))
+        };
+        let given = match near {
+            Some(near) if !auto => Some(between(near, far.unwrap_or(0))?),
+            None if !auto => calibration
+                .map_or(Ok(None), |(path, c)| calibrated_range(path, c, sign.disparity(far.unwrap_or(0))))?,
+            _ => None,
+        };
+        let range = if let Some(range) = given {
+            range
+        } else {
+            let found = by_matches(pair)?;
+            let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
+            between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
+        };
+        let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
+        if i64::from(range.min) >= width || i64::from(range.max) <= -width {
+            let DisparityRange { min, max } = sign.range(range);
+            let reason = format!(
+                "no disparity from {min} to {max} is inside images {width} pixels wide; give those of the pair"
+            );
+            return Err(Error::option("--max-disparity", reason));
+        }
+        Ok(Found { range, by_matches: given.is_none() })
+    }
+}
+
+fn by_matches(pair: &Pair) -> Result<DisparityRange> {
+    let lacking = "the views have too few matches to find the range of disparities; give --max-disparity";
+    check::range(pair)?.ok_or_else(|| Error::Mismatch(lacking.into()))
+}
+
+/// The range from `min` on that `calibration`, read from the file `path`, gives; `None` where it gives none.
+pub(crate) fn calibrated_range(
+    path: &Path,
+    calibration: &Calibration,
+    min: i32,
+) -> Result<Option<DisparityRange>> {
+    let Some(ndisp) = calibration.ndisp else { return Ok(None) };
+    let max = i32::try_from(ndisp).unwrap_or(i32::MAX) - 1;
+    let range = DisparityRange::new(min, max);
+    range.map(Some).map_err(|e| failure::in_file(e, path, &format!("ndisp={ndisp}: ")))
+}

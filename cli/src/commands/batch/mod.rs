@@ -1,0 +1,411 @@
+//! `mrfgs batch`.
+
+mod listed;
+mod request;
+mod shard;
+
+use std::collections::{HashSet, VecDeque};
+use std::fmt::Write as _;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use mrfgs::front::check;
+use mrfgs::image::read::Reader;
+use mrfgs::image::{Pair, write};
+use mrfgs::options::Method;
+use mrfgs::{Error, Matched, Matcher, Result};
+
+use crate::args::execution::ExecutionArgs;
+use crate::args::method::MethodArgs;
+use crate::args::reading::ReadingArgs;
+use crate::args::sign::Sign;
+use crate::failure::{self, Failure};
+use crate::outputs::also::{self, Also, AlsoArgs, Outcome};
+use crate::outputs::claim::Claim;
+use crate::outputs::files;
+use crate::outputs::record::MatchRecord;
+use crate::progress::PairBar;
+use crate::{console, stop};
+
+use listed::{Input, List, Listed};
+use request::{Request, State};
+use shard::{Shard, shard};
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs batch pairs.csv maps
+  mrfgs batch pairs.csv maps              # again: resumes what was stopped
+  mrfgs batch MiddEval3/trainingQ maps --format png --also validity
+  mrfgs batch pairs.csv maps --status
+  mrfgs batch pairs.csv maps --shard 3/8  # the third of eight machines
+
+A list:
+  name,left,right,max_disparity
+  # a comment
+  street-01,left/01.png,right/01.png,127
+  street-02,left/02.png,right/02.png,";
+
+/// Match many pairs, and resume where an earlier run was stopped
+///
+/// LIST is a CSV file whose header names its columns: name, left, right, and optionally `max_disparity`, `min_disparity`
+/// and mask, which mean what the flags of `mrfgs match` mean. An empty field counts as a flag that is not given; without
+/// a range, that of a calib.txt beside the left image is searched, or else that of sparse matches. Relative paths start at
+/// the folder of LIST; lines that begin with # are comments. LIST may also be a folder: each folder in it that is not hidden
+/// is a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the truth.
+///
+/// Names are names of files: up to 200 bytes, in letters of any script, with spaces, but without / \ : * ? " < > | and
+/// control characters, no . or - first, no . or space last. Names must differ by more than upper and lower case.
+///
+/// For each pair the map goes to OUTDIR/NAME.pfm (see --format), and then its record to OUTDIR/NAME.json: the fields of
+/// `match --json`, `status` ("done" or "failed", with a `reason`), `warnings`, the `request` (inputs with sizes in bytes and
+/// times in ms since 1970, range and outputs), and the `bytes` of each output. A pair is complete when its record says done,
+/// has the same request, method and version, and its outputs are there with as many bytes. A further run skips complete pairs
+/// and matches all others. A pair that fails is named, and the others go on.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    /// CSV file with a row for each pair, or folder with a folder for each
+    list: PathBuf,
+    /// Folder for maps and records; created where there is none
+    #[arg(value_name = "OUTDIR")]
+    folder: PathBuf,
+
+    #[command(flatten)]
+    maps: MapArgs,
+    /// Matches one of N parts of the list, the K-th from 1 on, such as 2/8
+    ///
+    /// The part of a pair depends on its name and N alone (64-bit FNV-1a, upper and lower half joined by exclusive or,
+    /// modulo N), so it stays the same when pairs are added or removed. Runs at the same time into the same OUTDIR, of parts or
+    /// of the whole, match each pair once: a run locks the pair that it matches (OUTDIR/.NAME.tmp), where the file system has
+    /// locks.
+    #[arg(long, value_name = "K/N", value_parser = shard)]
+    shard: Option<Shard>,
+    /// Prints the state of each pair (complete, failed or missing) for the same arguments, and runs nothing
+    #[arg(long)]
+    status: bool,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    /// Prints nothing but failures
+    #[arg(long)]
+    quiet: bool,
+
+    #[command(flatten)]
+    method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+}
+
+/// The maps to write of each pair.
+#[derive(clap::Args)]
+struct MapArgs {
+    /// Format of the disparity maps, as the extensions of `mrfgs match`
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    format: Format,
+    #[command(flatten)]
+    also: AlsoArgs,
+}
+
+impl MapArgs {
+    /// The name of the disparity map of a pair.
+    fn map(&self, name: &str) -> String {
+        format!("{name}.{}", self.format.extension())
+    }
+
+    /// The wanted outputs beside it, with their names.
+    fn also(&self, name: &str) -> impl Iterator<Item = (&'static Also, String)> {
+        let map = self.map(name);
+        self.also.wanted().map(move |word| (word, shown(&word.beside(Path::new(&map)))))
+    }
+}
+
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum Format {
+    /// Float, +infinity for invalid pixels
+    #[default]
+    Pfm,
+    /// Float, NaN for invalid pixels
+    Tif,
+    /// 16 bits, disparity times 256, 0 for invalid pixels
+    Png,
+}
+
+impl Format {
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Pfm => "pfm",
+            Self::Tif => "tif",
+            Self::Png => "png",
+        }
+    }
+}
+
+/// How long to wait for pairs that other runs match.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// What all pairs have in common.
+struct Batch<'a> {
+    args: &'a Args,
+    method: Method,
+    reader: Reader,
+    base: PathBuf,
+}
+
+pub(crate) fn run(args: &Args) -> std::result::Result<(), Failure> {
+    args.maps.also.check()?;
+    let method = args.method.method()?;
+    let execution = args.execution.execution();
+    let List { base, mut pairs } = List::read(&args.list)?;
+    check_folder(args, &base, &pairs)?;
+    if let Some(shard) = args.shard {
+        pairs.retain(|listed| shard.holds(&listed.name));
+    }
+    let batch = Batch { args, method, reader: args.reading.reader(), base };
+    if args.status {
+        return Ok(batch.print_status(&pairs)?);
+    }
+    stop::listen();
+    let matcher = Matcher::new(&execution)?;
+    match fs::create_dir(&args.folder) {
+        Err(e) if e.kind() != ErrorKind::AlreadyExists => Err(Error::write(&args.folder, e).into()),
+        _ => batch.run(&pairs, matcher),
+    }
+}
+
+/// Refuses an output folder that could not be one, and outputs that would overwrite an input.
+fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
+    let folder = &args.folder;
+    let place = files::folder_place(folder)?;
+    if args.list.is_dir() {
+        if args.list.canonicalize().is_ok_and(|list| place.starts_with(list)) {
+            let reason = format!("lies in {}, the folder of the pairs; give another", args.list.display());
+            return Err(Error::write(folder, reason));
+        }
+        return Ok(());
+    }
+    let cameras = args.maps.also.take_cameras().is_some();
+    // What lies elsewhere cannot be overwritten.
+    let inputs = pairs.iter().flat_map(|listed| listed.inputs(base, cameras)).map(|path| base.join(path));
+    let inputs = inputs.chain([args.list.clone()]).chain(args.method.files().map(Path::to_owned));
+    let inside = inputs.filter_map(|path| {
+        let path = path.canonicalize().ok()?;
+        let name = path.file_name().filter(|_| path.parent() == Some(&place))?;
+        Some(name.to_string_lossy().to_lowercase())
+    });
+    let inside: HashSet<_> = inside.collect();
+    if inside.is_empty() {
+        return Ok(());
+    }
+    let owned = pairs.iter().flat_map(|listed| owned(&listed.name));
+    match owned.into_iter().find(|name| inside.contains(&name.to_lowercase())) {
+        Some(name) => {
+            let reason = "is an input, and an output would take its place; give another folder";
+            Err(Error::write(folder.join(name), reason))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The names of all files that a batch may write for a pair.
+fn owned(name: &str) -> Vec<String> {
+    let maps = Format::value_variants().iter().map(|format| format!("{name}.{}", format.extension()));
+    let beside = maps
+        .clone()
+        .flat_map(|map| also::all_beside(Path::new(&map)).map(|path| shown(&path)).collect::<Vec<_>>());
+    maps.chain(beside).chain([format!("{name}.json")]).collect()
+}
+
+impl Batch<'_> {
+    fn request(&self, listed: &Listed) -> Request {
+        let (maps, name) = (&self.args.maps, &listed.name);
+        let outputs = std::iter::once(maps.map(name)).chain(maps.also(name).map(|(_, file)| file));
+        Request::new(listed, &self.base, maps.also.take_cameras().is_some(), outputs.collect())
+    }
+
+    fn record(&self, listed: &Listed) -> PathBuf {
+        self.args.folder.join(format!("{}.json", listed.name))
+    }
+
+    fn state(&self, listed: &Listed) -> State {
+        self.request(listed).state(&self.record(listed), &self.method)
+    }
+
+    /// Prints a line for each pair, and how many there are of each state.
+    fn print_status(&self, pairs: &[Listed]) -> Result<()> {
+        let mut text = String::new();
+        let [mut complete, mut failed, mut missing] = [0; 3];
+        for listed in pairs {
+            let name = &listed.name;
+            let _ = match self.state(listed) {
+                State::Complete => {
+                    complete += 1;
+                    writeln!(text, "complete  {name}")
+                }
+                State::Failed(reason) => {
+                    failed += 1;
+                    writeln!(text, "failed    {name}: {reason}")
+                }
+                State::Missing => {
+                    missing += 1;
+                    writeln!(text, "missing   {name}")
+                }
+            };
+        }
+        let _ = writeln!(text, "{complete} complete, {failed} failed, {missing} missing");
+        console::print(&text)
+    }
+
+    /// Matches every pair that is not complete.
+    fn run(&self, pairs: &[Listed], mut matcher: Matcher) -> std::result::Result<(), Failure> {
+        for listed in pairs {
+            Claim::remove_remains(&self.args.folder, &listed.name)?;
+        }
+        let mut left: VecDeque<_> =
+            pairs.iter().filter(|listed| self.state(listed) != State::Complete).collect();
+        let all = pairs.len();
+        let (mut done, mut skipped, mut failed) = (0, all - left.len(), Vec::new());
+        let mut bar = PairBar::new(all, skipped, self.args.quiet);
+        let mut told = None;
+        // How many pairs in a row other runs had claimed.
+        let mut taken = 0;
+        while let Some(listed) = left.pop_front() {
+            let name = listed.name.as_str();
+            bar.begin(name);
+            let interrupted = || {
+                let finished = skipped + done + failed.len();
+                Failure::Stopped(format!("stopped after {finished} of {all}; run it again to resume"))
+            };
+            if stop::go_on().is_break() {
+                return Err(interrupted());
+            }
+            let Some(claim) = Claim::new(&self.args.folder, name)? else {
+                left.push_back(listed);
+                taken += 1;
+                if taken >= left.len() {
+                    std::thread::sleep(PATIENCE);
+                    taken = 0;
+                }
+                continue;
+            };
+            taken = 0;
+            if self.state(listed) == State::Complete {
+                // Another run has matched it since this one began.
+                skipped += 1;
+                bar.end();
+                continue;
+            }
+            match self.pair(listed, &claim, &mut matcher) {
+                Ok(Ok(note)) => {
+                    done += 1;
+                    // Why there is no device is the same for all that follow.
+                    if note.is_some() && note != told && !self.args.quiet {
+                        bar.past(|| note.iter().for_each(|note| console::say(&failure::in_flags(note))));
+                        told = note;
+                    }
+                }
+                Ok(Err(error)) => {
+                    failed.push(name);
+                    bar.past(|| console::say(&format!("{name}: {}", failure::message(&error))));
+                }
+                Err(Error::Interrupted) => return Err(interrupted()),
+                Err(error) => return Err(error.into()),
+            }
+            bar.end();
+        }
+        drop(bar);
+        let summary = format!("{done} done, {skipped} skipped, {} failed", failed.len());
+        if !failed.is_empty() {
+            let text = format!("{summary}: {}; run it again to try these once more", failed.join(", "));
+            return Err(Failure::Incomplete(text));
+        }
+        if !self.args.quiet {
+            console::say(&summary);
+        }
+        Ok(())
+    }
+
+    /// Matches one pair and writes its outputs, or why it failed. Returns the note of the match.
+    ///
+    /// # Errors
+    /// An error that concerns all pairs; inside, one that concerns this pair.
+    fn pair(&self, listed: &Listed, claim: &Claim, matcher: &mut Matcher) -> Result<Result<Option<String>>> {
+        let (request, record) = (self.request(listed), self.record(listed));
+        let (input, matched, time, warnings) = match self.compute(listed, matcher, claim) {
+            Ok(computed) => computed,
+            Err(error @ (Error::Interrupted | Error::Device(_))) => return Err(error),
+            Err(error) => {
+                let text = request.failed(&record, &self.method, &error)?;
+                self.publish(claim, &[], &record, &text)?;
+                return Ok(Err(error));
+            }
+        };
+        let Input { pair, range, rig, mut files, .. } = input;
+        let wanted = &self.args.maps;
+        let pair = Some(pair).filter(|_| wanted.also.show_left());
+        let (maps, sign) = (&matched.maps, Sign::default());
+        let outcome = Outcome { maps, range, sign, left: pair.as_ref().map(Pair::left), rig };
+        let staged = |file: &str| claim.folder().join(file);
+        // The user knows the file by its place in the output folder.
+        let at =
+            |file: &str, result: Result<()>| result.map_err(|e| failure::at(e, &self.args.folder.join(file)));
+        let map = wanted.map(&listed.name);
+        at(&map, write::disparity(&staged(&map), &maps.final_map()))?;
+        for (word, file) in wanted.also(&listed.name) {
+            at(&file, wanted.also.write(word, &staged(&file), &outcome).map(drop))?;
+        }
+        files.output = Some(map);
+        let found = MatchRecord::new(&files, &matched, time, sign);
+        let text = request.done(&record, claim.folder(), found, &warnings)?;
+        self.publish(claim, request.outputs(), &record, &text)?;
+        Ok(Ok(matched.note))
+    }
+
+    fn compute(
+        &self,
+        listed: &Listed,
+        matcher: &mut Matcher,
+        claim: &Claim,
+    ) -> Result<(Input, Matched, Duration, Vec<String>)> {
+        let wanted = &self.args.maps;
+        let input = listed.read(&self.base, self.reader, wanted.also.take_cameras())?;
+        let (pair, range) = (&input.pair, input.range);
+        // The folder is there, so what can be wrong is the range.
+        let check =
+            |file: &str, result: Result<()>| result.map_err(|e| failure::at(e, &self.args.folder.join(file)));
+        let map = wanted.map(&listed.name);
+        check(&map, write::check_disparity_path(&claim.folder().join(&map), range.min, range.max))?;
+        for (word, file) in wanted.also(&listed.name) {
+            check(&file, word.check(&claim.folder().join(&file), range))?;
+        }
+        let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
+        let start = Instant::now();
+        let matched = matcher.run(pair, range, &self.method, &mut |_| stop::go_on())?;
+        let time = start.elapsed();
+        warnings.extend(check::clipped(&matched.maps, range));
+        Ok((input, matched, time, warnings.iter().map(ToString::to_string).collect()))
+    }
+
+    /// Puts `outputs` in their place, and then the record. Without a record the pair is not complete, so the old record is removed
+    /// first, and with it the outputs that it names.
+    fn publish(&self, claim: &Claim, outputs: &[String], record: &Path, text: &str) -> Result<()> {
+        let name = record.file_name().unwrap_or(record.as_os_str());
+        let staged_record = claim.folder().join(name);
+        write::save(&staged_record, text.as_bytes()).map_err(|e| failure::at(e, record))?;
+        let old = Request::recorded_outputs(record);
+        write::remove(record)?;
+        let stem = record.file_stem().unwrap_or_default().to_string_lossy();
+        for map in owned(&stem).into_iter().filter(|map| old.contains(map)) {
+            write::remove(&self.args.folder.join(map))?;
+        }
+        for map in outputs {
+            write::publish(&claim.folder().join(map), &self.args.folder.join(map))?;
+        }
+        write::publish(&staged_record, record)
+    }
+}

@@ -1,0 +1,144 @@
+//! The record of a pair of a batch, the last of its files: what was asked for, and what was found.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+use mrfgs::options::Method;
+use mrfgs::{Error, Result};
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::args::search::Search;
+use crate::failure;
+use crate::outputs::files;
+use crate::outputs::record::MatchRecord;
+
+use super::listed::Listed;
+
+/// What a batch is asked to make of a pair. The record of a complete pair holds the same request.
+#[derive(Serialize)]
+pub(super) struct Request {
+    inputs: Vec<InputFile>,
+    #[serde(flatten)]
+    search: Search,
+    /// The names of the maps, in the output folder.
+    outputs: Vec<String>,
+}
+
+/// A file as it was when it was read.
+#[derive(Serialize)]
+struct InputFile {
+    path: String,
+    bytes: Option<u64>,
+    /// When it was last changed, in ms since 1970.
+    modified: Option<u64>,
+}
+
+/// How far a pair is.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// Its record says that it is done, for the same request.
+    Complete,
+    /// Its record says why it failed.
+    Failed(String),
+    /// There is no record, or one of another request.
+    Missing,
+}
+
+#[derive(Serialize)]
+struct Done<'a> {
+    status: &'static str,
+    request: &'a Request,
+    /// The size of each output.
+    bytes: BTreeMap<&'a str, u64>,
+    warnings: &'a [String],
+    #[serde(flatten)]
+    found: MatchRecord<'a>,
+}
+
+#[derive(Serialize)]
+struct Failed<'a> {
+    status: &'static str,
+    reason: &'a str,
+    request: &'a Request,
+    version: &'static str,
+    method: &'a Method,
+}
+
+impl Request {
+    pub(super) fn new(listed: &Listed, base: &Path, cameras: bool, outputs: Vec<String>) -> Self {
+        let inputs = listed.inputs(base, cameras).into_iter().map(|path| {
+            let about = fs::metadata(base.join(&path)).ok();
+            let modified =
+                about.as_ref().and_then(|about| about.modified().ok()?.duration_since(UNIX_EPOCH).ok());
+            InputFile {
+                path,
+                bytes: about.map(|about| about.len()),
+                modified: modified.and_then(|time| u64::try_from(time.as_millis()).ok()),
+            }
+        });
+        Self { inputs: inputs.collect(), search: listed.search(), outputs }
+    }
+
+    pub(super) fn outputs(&self) -> &[String] {
+        &self.outputs
+    }
+
+    /// The outputs that the record `path` names; none where there is no record.
+    pub(super) fn recorded_outputs(path: &Path) -> Vec<String> {
+        let record = read(path).unwrap_or_default();
+        serde_json::from_value(record["request"]["outputs"].clone()).unwrap_or_default()
+    }
+
+    /// The state of the pair whose record is `path`, beside its outputs, if `method` is to match it.
+    pub(super) fn state(&self, path: &Path, method: &Method) -> State {
+        let Some(record) = read(path) else { return State::Missing };
+        if record["status"] == "failed" {
+            return State::Failed(record["reason"].as_str().unwrap_or("for no known reason").to_owned());
+        }
+        let complete = record["status"] == "done"
+            && record["version"] == env!("CARGO_PKG_VERSION")
+            && same(&record["request"], self)
+            && same(&record["method"], method)
+            && self.outputs.iter().all(|name| {
+                let size = fs::metadata(path.with_file_name(name)).ok().filter(fs::Metadata::is_file);
+                size.is_some_and(|size| record["bytes"][name] == size.len())
+            });
+        if complete { State::Complete } else { State::Missing }
+    }
+
+    /// The text of the record `path` of a pair that is done, and whose outputs are in the folder `staged`.
+    pub(super) fn done(
+        &self,
+        path: &Path,
+        staged: &Path,
+        found: MatchRecord,
+        warnings: &[String],
+    ) -> Result<String> {
+        let size = |name: &String| fs::metadata(staged.join(name)).map(|about| about.len());
+        let sizes = self.outputs.iter().map(|name| Ok((name.as_str(), size(name)?)));
+        let bytes = sizes.collect::<std::io::Result<_>>().map_err(|e| Error::write(path, e))?;
+        files::json_text(path, &Done { status: "done", request: self, bytes, warnings, found })
+    }
+
+    /// The text of the record `path` of a pair that failed.
+    pub(super) fn failed(&self, path: &Path, method: &Method, reason: &Error) -> Result<String> {
+        let reason = &failure::message(reason);
+        let version = env!("CARGO_PKG_VERSION");
+        files::json_text(path, &Failed { status: "failed", reason, request: self, version, method })
+    }
+}
+
+fn read(path: &Path) -> Option<Value> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+/// Whether `recorded` is what `value` becomes when it is written and read: that rounds both alike.
+fn same(recorded: &Value, value: &impl Serialize) -> bool {
+    let text = serde_json::to_string(value);
+    text.ok()
+        .and_then(|text| serde_json::from_str::<Value>(&text).ok())
+        .is_some_and(|value| value == *recorded)
+}

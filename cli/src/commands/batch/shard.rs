@@ -1,0 +1,61 @@
+//! Parts of a list for machines or jobs of their own.
+
+/// One of `count` parts; `index` is below it.
+#[derive(Clone, Copy)]
+pub(super) struct Shard {
+    index: u64,
+    count: u64,
+}
+
+/// # Errors
+/// What to give instead, for anything but K/N.
+pub(super) fn shard(text: &str) -> Result<Shard, String> {
+    let numbers = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse::<u32>().ok()?)));
+    match numbers {
+        Some((k, n)) if (1..=n).contains(&k) => Ok(Shard { index: u64::from(k - 1), count: u64::from(n) }),
+        _ => Err("give K/N with K from 1 to N, like 2/8".into()),
+    }
+}
+
+impl Shard {
+    /// Whether the pair `name` is in this part.
+    pub(super) fn holds(self, name: &str) -> bool {
+        let hash = name
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3));
+        (hash >> 32 ^ hash & 0xffff_ffff) % self.count == self.index
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_in_one_shard_and_stays_there() {
+        for count in [1, 2, 3, 8, 64] {
+            let mut sizes = vec![0; count as usize];
+            for pair in 0..1000 {
+                let name = format!("pair-{pair:04}");
+                let held: Vec<_> = (0..count).filter(|&index| Shard { index, count }.holds(&name)).collect();
+                assert_eq!(held.len(), 1, "{name}");
+                sizes[held[0] as usize] += 1;
+            }
+            let even = 1000 / count;
+            assert!(sizes.iter().all(|size| (even / 3..=even * 3).contains(size)), "{sizes:?}");
+        }
+        // The published values of FNV-1a for "a" and "foobar", folded, so that no release moves a pair.
+        for (name, hash) in [("a", 0xaf63_dc4c_8601_ec8c_u64), ("foobar", 0x8594_4171_f739_67e8)] {
+            let (index, count) = ((hash >> 32 ^ hash & 0xffff_ffff) % 1009, 1009);
+            assert!(Shard { index, count }.holds(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_shard_is_one_of_some() {
+        for text in ["0/3", "4/3", "1/0", "-1/3", "1", "1/", "/3", "a/b", "1/2/3", "1/99999999999"] {
+            assert!(shard(text).is_err(), "{text}");
+        }
+        assert!(shard("3/3").is_ok_and(|shard| (shard.index, shard.count) == (2, 3)));
+    }
+}

@@ -1,0 +1,88 @@
+//! `mrfgs bench`.
+
+mod args;
+mod case;
+mod findings;
+mod synthetic;
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::Result;
+use mrfgs::backend::gpu::{self, Gpu};
+use mrfgs::image::write;
+
+use crate::args::execution::Device;
+use crate::outputs::files;
+use crate::pairs::folder::{self, Folder};
+
+pub(crate) use args::Args;
+use case::Case;
+use findings::Findings;
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    check_output(args)?;
+    // What is missing in the last folder is said before the first is matched.
+    args.dirs.iter().try_for_each(|dir| Folder::to_match(dir).map(drop))?;
+    let bases: &[&'static str] =
+        if args.method.name().is_some() { &["default"] } else { &["default", "paper"] };
+    let name = |base: &str| args.method.name().unwrap_or_else(|| base.into());
+    let methods = bases.iter().map(|base| Ok((name(base), args.method.on(base)?))).collect::<Result<_>>()?;
+    let devices = devices(args)?;
+    let dirs: Vec<Option<&Path>> = match args.dirs.as_slice() {
+        [] => vec![None],
+        dirs => dirs.iter().map(|dir| Some(dir.as_path())).collect(),
+    };
+    let alone = dirs.len() * bases.len() * devices.len() == 1;
+    let mut pairs = Vec::new();
+    for dir in dirs {
+        for base in bases {
+            let mut rows = Vec::new();
+            for device in &devices {
+                let case = Case { args, dir, base, device };
+                rows.push(if alone { case.measure()? } else { case.apart()? });
+            }
+            pairs.extend(rows.into_iter().reduce(|mut all, row| {
+                all.devices.extend(row.devices);
+                all
+            }));
+        }
+    }
+    let findings = Findings {
+        version: env!("CARGO_PKG_VERSION").into(),
+        threads: args.pool()?.current_num_threads(),
+        repeats: args.repeats,
+        methods,
+        pairs,
+    };
+    files::deliver(args.json.as_deref(), &findings, &findings.text(), |_| Ok(()))
+}
+
+/// Finds out before any computing whether the output can be written.
+fn check_output(args: &Args) -> Result<()> {
+    let Some(path) = files::json_file(args.json.as_deref()) else { return Ok(()) };
+    write::check_path(path)?;
+    let inputs: Vec<PathBuf> = args.dirs.iter().flat_map(|dir| folder::inputs(dir)).collect();
+    let inputs = inputs.iter().map(PathBuf::as_path).chain(args.method.files());
+    files::distinct(&inputs.map(|path| ("an input", path)).collect::<Vec<_>>(), &[("--json", path)])
+}
+
+/// The devices to measure, each once; a device that is missing is an error before the others are measured.
+fn devices(args: &Args) -> Result<Vec<Device>> {
+    let mut devices: Vec<Device> = Vec::new();
+    for device in &args.device {
+        let device = match device {
+            Device::Auto if gpu::has_automatic() => Device::Gpu,
+            Device::Auto => Device::Cpu,
+            device => device.clone(),
+        };
+        if !devices.contains(&device) {
+            devices.push(device);
+        }
+    }
+    if devices.len() > 1 {
+        for device in devices.iter().filter(|device| **device != Device::Cpu) {
+            Gpu::new(device.name()).map(drop)?;
+        }
+    }
+    Ok(devices)
+}

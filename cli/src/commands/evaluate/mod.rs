@@ -1,0 +1,78 @@
+//! `mrfgs evaluate`.
+
+mod ablations;
+mod breakdown;
+mod findings;
+mod map;
+mod metrics;
+mod pairs;
+mod paper;
+mod report;
+mod scenes;
+mod submission;
+
+use clap::Subcommand;
+use mrfgs::Result;
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs evaluate Teddy Cones
+  mrfgs evaluate Teddy --method paper --json figures.json
+  mrfgs evaluate Teddy Cones --report report  # then open report/index.html
+  mrfgs evaluate Teddy Cones --breakdown
+  mrfgs evaluate HalfSize/Art --truth-scale 2
+  mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png
+  mrfgs evaluate paper Teddy Cones Dolls Rocks1 Motorcycle";
+
+/// Match pairs with known truth and print their errors
+///
+/// A DIR has the layout of one of the Middlebury sets, recognised by its files: im0.png, im1.png, disp0GT.pfm and calib.txt
+/// with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and disp2.png (2003). The truth
+/// of the older sets has 8 bits (see --truth-scale); without a calib.txt their range is from 0 to the largest known disparity,
+/// rounded up. A mask0nocc.png, if there is one, says which pixels both views see (255). Write ./map for a folder that is
+/// called like a command.
+///
+/// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB),
+/// pixels wrong by more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with known truth and
+/// over those that both views see (nonocc).
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(disable_help_subcommand = true)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    mode: Option<Mode>,
+    #[command(flatten)]
+    pairs: pairs::Args,
+}
+
+#[derive(Subcommand)]
+enum Mode {
+    Map(map::Args),
+    Paper(paper::Args),
+    Ablations(ablations::Args),
+    Submission(submission::Args),
+}
+
+impl Args {
+    /// Whether it asks the drivers which devices there are.
+    pub(crate) fn asks_drivers(&self) -> bool {
+        let execution = match &self.mode {
+            None => &self.pairs.execution,
+            Some(Mode::Map(_)) => return false,
+            Some(Mode::Paper(args)) => &args.execution,
+            Some(Mode::Ablations(args)) => &args.execution,
+            Some(Mode::Submission(args)) => &args.execution,
+        };
+        execution.device.asks_drivers()
+    }
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    match &args.mode {
+        None => pairs::run(&args.pairs),
+        Some(Mode::Map(args)) => map::run(args),
+        Some(Mode::Paper(args)) => paper::run(args),
+        Some(Mode::Ablations(args)) => ablations::run(args),
+        Some(Mode::Submission(args)) => submission::run(args),
+    }
+}

@@ -1,0 +1,119 @@
+//! `mrfgs evaluate submission`: maps in the format of the Middlebury stereo evaluation (version 3).
+//!
+//! Its upload format has a folder for each pair with `disp0METHOD.pfm`, or `disp0METHOD_s.pfm` where the method leaves pixels
+//! without a disparity, and `timeMETHOD.txt`, which holds nothing but the seconds.
+
+use std::ffi::{OsStr, OsString};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use mrfgs::image::{Plane, write};
+use mrfgs::options::Fill;
+use mrfgs::{Error, Matcher, Result};
+
+use crate::args::execution::ExecutionArgs;
+use crate::args::method::MethodArgs;
+use crate::outputs::files;
+use crate::outputs::staged::StagedFolder;
+use crate::pairs::folder;
+use crate::stop;
+
+use super::metrics;
+use super::scenes::{self, SceneArgs};
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs evaluate submission trainingQ MRFGS MiddEval3/trainingQ/*";
+
+/// Match pairs and write their maps as the Middlebury evaluation (version 3) takes them
+///
+/// For each pair it writes DIR/PAIR/disp0METHOD.pfm, with +infinity where there is no disparity, and
+/// DIR/PAIR/timeMETHOD.txt, the time of the match in seconds; PAIR is the name of the pair's folder. Without a fill (--set
+/// fill=none) a map counts as sparse, and its METHOD is followed by _s. It also prints the errors, as `evaluate` does.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    /// Folder to write, new or empty; the evaluation wants it called trainingF, trainingH or trainingQ by the size of
+    /// the pairs
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Name of the method: letters, digits, - and _
+    #[arg(value_name = "METHOD")]
+    called: OsString,
+    /// Folders with the pairs, as `evaluate` takes them
+    #[arg(value_name = "PAIR", required = true)]
+    dirs: Vec<PathBuf>,
+    #[command(flatten)]
+    scenes: SceneArgs,
+
+    #[command(flatten)]
+    method: MethodArgs,
+    #[command(flatten)]
+    pub(super) execution: ExecutionArgs,
+}
+
+pub(super) fn run(args: &Args) -> Result<()> {
+    stop::listen();
+    let method = args.method.method()?;
+    let names = args.dirs.iter().map(|dir| folder::name(dir)).collect::<Vec<_>>();
+    let submission = Submission::new(&args.folder, &args.called, &names, method.fill)?;
+    if let Some(path) = files::json_file(args.scenes.json()) {
+        files::outside(("DIR", submission.folder.place()), ("--json", path))?;
+    }
+    args.scenes.check_json(&args.dirs, Some(&args.method))?;
+    let folders = args.scenes.folders(&args.dirs)?;
+    let mut matcher = Matcher::new(&args.execution.execution())?;
+    let findings =
+        scenes::match_all(&args.scenes, &folders, &mut matcher, method, None, |scene, maps, time| {
+            submission.add(&scene.name, &maps.final_map(), time)
+        })?;
+    files::deliver(args.scenes.json(), &findings, &metrics::text(&findings), |written| {
+        let place = submission.folder.place().to_owned();
+        written.note(&place, submission.folder.publish())
+    })
+}
+
+/// A folder of maps in the making.
+struct Submission {
+    folder: StagedFolder,
+    method: String,
+    /// Behind the method in the names of maps.
+    ending: &'static str,
+}
+
+impl Submission {
+    /// Begins the folder `dir`, a new or an empty one, for the pairs called `names`.
+    fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self> {
+        let error = |name: &str, reason: String| Err(Error::option(name, reason));
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let Some(method) = method.to_str().filter(|m| !m.is_empty() && m.chars().all(plain)) else {
+            return error(
+                "METHOD",
+                format!("{} is no name for files: give letters, digits, - and _", method.display()),
+            );
+        };
+        if method.ends_with("_s") {
+            return error(
+                "METHOD",
+                format!("{method} ends in _s, the mark of sparse maps; give another name"),
+            );
+        }
+        if let Some(twice) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+            return error("PAIR", format!("two pairs are called {}; rename the folder of one", twice.1));
+        }
+        let ending = if fill == Fill::None { "_s" } else { "" };
+        Ok(Self { folder: StagedFolder::new_or_empty(dir)?, method: method.into(), ending })
+    }
+
+    /// Adds the map of a pair and the time that it took.
+    fn add(&self, name: &str, map: &Plane<f32>, time: Duration) -> Result<()> {
+        let Self { folder, method, ending } = self;
+        let dir = folder.path().join(name);
+        fs::create_dir(&dir).map_err(|e| Error::write(folder.place().join(name), e))?;
+        let time = format!("{:.3}\n", time.as_secs_f64());
+        write::disparity(&dir.join(format!("disp0{method}{ending}.pfm")), map)
+            .and_then(|()| write::save(&dir.join(format!("time{method}.txt")), time.as_bytes()))
+            .map_err(|e| folder.named(e))
+    }
+}

@@ -1,0 +1,129 @@
+//! `mrfgs inspect`: what happens inside a match, for developers.
+
+mod steps;
+
+use std::path::PathBuf;
+
+use mrfgs::plan::Plan;
+use mrfgs::solver::{Glimpse, Inspector};
+use mrfgs::{Matched, Matcher, Result};
+
+use std::time::Duration;
+
+use crate::args::execution::ExecutionArgs;
+use crate::args::method::MethodArgs;
+use crate::args::sign::Sign;
+use crate::outputs::files;
+use crate::outputs::record::{MatchRecord, stage_and_level};
+use crate::outputs::staged::StagedFolder;
+use crate::pairs::input::{Input, PairArgs};
+use crate::table::Table;
+use crate::text::bytes;
+use crate::{matching, stop};
+
+use steps::Steps;
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs inspect left.png right.png --max-disparity 63
+  mrfgs inspect im0.png im1.png steps --method paper";
+
+/// Match a pair and print the time of every stage; with DIR, show every step as a picture
+///
+/// The times are by the device's own clock where it has one. What is neither a stage nor done around the stages is in
+/// `rest`: with DIR, that is mostly the pictures.
+///
+/// DIR gets pictures and small tables: corrected images, zones, matches, label ranges, costs, graphs, a map of each level,
+/// and the change of each iteration. With them a match takes a multiple of the time, and it must fit into --memory in one
+/// piece.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    pair: PairArgs,
+    /// Folder for the steps, new or empty
+    #[arg(value_name = "DIR")]
+    folder: Option<PathBuf>,
+
+    /// Writes what ran as JSON; `-` prints it instead of the table
+    ///
+    /// The fields are those of `match --json`, and `stages` (ms by stage and level).
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+
+    #[command(flatten)]
+    method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    stop::listen();
+    let method = args.method.method()?;
+    let mut execution = args.execution.execution();
+    execution.timings = true;
+    let input = args.pair.read(Sign::default(), false)?;
+    input.say_range(Sign::default());
+    check_outputs(args, &input)?;
+    input.warn();
+    let plan = Plan::new(input.pair.size().0, input.pair.size().1, input.range, &method)?;
+    let mut matcher = Matcher::new(&execution)?;
+    let mut steps = args.folder.as_deref().map(|folder| Steps::new(folder, plan)).transpose()?;
+    let mut look = steps.as_mut().map(|steps| |glimpse: &mut Glimpse| steps.look(glimpse));
+    let look: Option<Inspector> = match &mut look {
+        Some(look) => Some(look),
+        None => None,
+    };
+    let (matched, time) = matching::run(&mut matcher, &input.pair, input.range, &method, None, false, look)?;
+    let files = args.pair.files(&input, None);
+    let record = MatchRecord::new(&files, &matched, time, Sign::default());
+    files::deliver(args.json.as_deref(), &record, &times(&matched, time), |written| {
+        match (steps, &args.folder) {
+            (Some(steps), Some(folder)) => written.note(folder, steps.finish()),
+            _ => Ok(()),
+        }
+    })
+}
+
+/// Finds out before any computing whether the outputs can be written.
+fn check_outputs(args: &Args, input: &Input) -> Result<()> {
+    let steps = args.folder.as_deref().map(StagedFolder::new_or_empty).transpose()?;
+    let json = files::json_file(args.json.as_deref()).map(|path| ("--json", path));
+    if let Some((flag, path)) = json {
+        mrfgs::image::write::check_path(path)?;
+        if let Some(steps) = &steps {
+            files::outside(("DIR", steps.place()), (flag, path))?;
+        }
+    }
+    let mut inputs = args.pair.inputs(input);
+    inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
+    let outputs: Vec<_> =
+        args.folder.as_deref().map(|folder| ("DIR", folder)).into_iter().chain(json).collect();
+    files::distinct(&inputs, &outputs)
+}
+
+/// The time of every stage; `whole` is that of the match.
+fn times(matched: &Matched, whole: Duration) -> String {
+    let Matched { timings, traffic, .. } = matched;
+    let mut table = Table::new("lrrr");
+    table.row(["stage", "  runs", "        ms", "    share"]);
+    let mut row = |name: &str, runs: &str, time: Duration| {
+        let (time, whole) = (time.as_secs_f64(), whole.as_secs_f64());
+        table.row([name, runs, &format!("{:.2}", 1000.0 * time), &format!("{:.1} %", 100.0 * time / whole)]);
+    };
+    for timing in timings {
+        row(&stage_and_level(timing), &timing.runs.to_string(), timing.time);
+    }
+    row("rest", "", whole.saturating_sub(timings.iter().map(|t| t.time).sum()));
+    row("all", "", whole);
+    if traffic.dispatches > 0 {
+        table.text(format!(
+            "{} dispatches in {} submissions, {} up, {} down",
+            traffic.dispatches,
+            traffic.submissions,
+            bytes(traffic.bytes_up),
+            bytes(traffic.bytes_down)
+        ));
+    }
+    table.to_string()
+}

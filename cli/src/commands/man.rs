@@ -1,0 +1,47 @@
+//! `mrfgs man`.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+
+use clap::Command;
+use clap_mangen::Man;
+use mrfgs::image::write;
+use mrfgs::{Error, Result};
+
+use crate::outputs::files::Written;
+
+/// Write the man pages: mrfgs.1 and one for each subcommand
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder to write to, such as ~/.local/share/man/man1; created where there is none
+    folder: PathBuf,
+}
+
+/// Writes the man pages of `program`.
+pub(crate) fn run(args: &Args, mut program: Command) -> Result<()> {
+    match fs::create_dir(&args.folder) {
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            return Err(Error::write(&args.folder, "there is no folder to make it in; create that first"));
+        }
+        Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(&args.folder, e)),
+        _ => {}
+    }
+    program.build();
+    let mut written = Written::default();
+    for (name, command) in pages(&program, "mrfgs") {
+        let path = args.folder.join(format!("{name}.1"));
+        let mut page = Vec::new();
+        Man::new(command).title(name.as_str()).render(&mut page).map_err(|e| Error::write(&path, e))?;
+        written.note(&path, write::save(&path, &page))?;
+    }
+    written.keep();
+    Ok(())
+}
+
+/// The pages of a command called `name` and of all its subcommands, each with its name.
+fn pages(command: &Command, name: &str) -> Vec<(String, Command)> {
+    let subcommands = command.get_subcommands().filter(|command| command.get_name() != "help");
+    let below = subcommands.flat_map(|command| pages(command, &format!("{name}-{}", command.get_name())));
+    std::iter::once((name.to_owned(), command.clone().display_name(name.to_owned()))).chain(below).collect()
+}

@@ -1,0 +1,184 @@
+//! `mrfgs match`.
+
+mod plan;
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::front::check;
+use mrfgs::image::{Pair, pfm, write};
+use mrfgs::plan::Plan;
+use mrfgs::tiles::Tiles;
+use mrfgs::{Error, Matcher, Result};
+
+use crate::args::execution::ExecutionArgs;
+use crate::args::method::MethodArgs;
+use crate::args::sign::Sign;
+use crate::outputs::also::{Also, AlsoArgs, Outcome};
+use crate::outputs::files::{self, Written};
+use crate::outputs::record::MatchRecord;
+use crate::pairs::cameras;
+use crate::pairs::input::{self, Input, PairArgs};
+use crate::{console, matching, stop};
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs match left.png right.png disparity.pfm --max-disparity 63
+  mrfgs match l.tif r.tif d.tif --min-disparity -40 --max-disparity 25
+  mrfgs match l.png r.png d.png --max-disparity 90 --also confidence
+  mrfgs match l.png r.png - --max-disparity 63 | other-program
+  # Holes where the views do not agree:
+  mrfgs match l.png r.png d.pfm --max-disparity 90 --set fill=none
+  # The plan, with its memory, without running:
+  mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run
+  # Range and cameras from the calib.txt beside im0.png:
+  mrfgs match im0.png im1.png d.pfm --also depth,points";
+
+/// Match a rectified pair and write its disparity map
+///
+/// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF or PFM, recognised by their
+/// content. Pixels that are transparent, not finite, or without data are ignored.
+///
+/// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels,
+/// .tif or .tiff as float with NaN, .png as in KITTI: 16 bits with disparity times 256 and 0 for invalid pixels (ranges
+/// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output. If OUTPUT is a symbolic link,
+/// the file it leads to is written.
+///
+/// Depth and points take the cameras from a calibration file in Middlebury's format: cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels),
+/// doffs (cx1 - cx0, pixels) and baseline. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the unit of the
+/// baseline (Middlebury: millimetres). Where d + doffs is 0 or less there is no depth.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    pair: PairArgs,
+    /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
+    output: PathBuf,
+
+    /// Which way disparities count in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes right-minus-left
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    sign: Sign,
+    /// Checks everything and prints the plan (levels, schedule, memory), but runs and writes nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Prints nothing but failures
+    #[arg(long)]
+    quiet: bool,
+
+    #[command(flatten)]
+    method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+
+    #[command(flatten)]
+    also: AlsoArgs,
+    /// Writes what ran and what it found as JSON; `-` prints it
+    ///
+    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `width`, `height`, `sign`,
+    /// `range` (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why another device
+    /// was taken), `tiles`, `iterations` and `seconds` (of the match). In percent of all pixels: `density` (with a
+    /// disparity), which is the sum of `measured` and `filled`. `mean_confidence` is that of the measured pixels.
+    #[arg(long, value_name = "FILE", help_heading = "More outputs")]
+    json: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    stop::listen();
+    let method = args.method.method()?;
+    let execution = args.execution.execution();
+    let cameras = args.also.take_cameras();
+    let input = args.pair.read(args.sign, cameras.is_some())?;
+    let range = input.range;
+    if !args.quiet {
+        input.say_range(args.sign);
+    }
+    let remedy = "give one with --calib";
+    let rig = cameras
+        .map(|word| cameras::rig(word, input.calibration(), &args.pair.left, input.pair.size(), remedy))
+        .transpose()?;
+    let also = check_outputs(args, &input)?;
+    if !args.quiet {
+        input.warn();
+    }
+    let plan = Plan::new(input.pair.size().0, input.pair.size().1, range, &method)?;
+    if args.dry_run {
+        return console::print(&plan::describe(&Tiles::new(&plan)?));
+    }
+    let mut matcher = Matcher::new(&execution)?;
+    let (matched, time) = matching::run(&mut matcher, &input.pair, range, &method, None, args.quiet, None)?;
+    if !args.quiet {
+        input::warn(
+            check::clipped(&matched.maps, range).into_iter().map(|warning| args.sign.warning(warning)),
+        );
+    }
+    // Outputs take memory too.
+    drop(matcher);
+    let files = args.pair.files(&input, Some(&args.output));
+    let unit = input.calibration().map(|(file, _)| file.display().to_string());
+    let pair = Some(input.pair).filter(|_| args.also.show_left());
+    let left = pair.as_ref().map(Pair::left);
+    let outcome = Outcome { maps: &matched.maps, range, sign: args.sign, left, rig };
+    let said = write_outputs(args, &also, &outcome, &MatchRecord::new(&files, &matched, time, args.sign))?;
+    if let Some(file) = unit.filter(|_| !args.quiet && !said.is_empty()) {
+        console::say(&format!("{}; unit: that of the baseline in {file}", said.join("; ")));
+    }
+    Ok(())
+}
+
+/// Finds out before any computing whether all outputs can be written. Returns the files of `--also`.
+fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathBuf)>> {
+    let (output, range) = (args.output.as_path(), args.sign.range(input.range));
+    args.also.check()?;
+    if files::is_printed(output) {
+        if let Some(word) = args.also.wanted().next() {
+            let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
+            return Err(Error::option(word.flag(), reason));
+        }
+        console::check_takes_data()?;
+    } else {
+        write::check_disparity_path(output, range.min, range.max)?;
+    }
+    let also: Vec<_> = args.also.wanted().map(|word| (word, word.beside(output))).collect();
+    also.iter().try_for_each(|(word, path)| word.check(path, range))?;
+    files::json_file(args.json.as_deref()).map_or(Ok(()), write::check_path)?;
+    let mut inputs = args.pair.inputs(input);
+    inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
+    let flags: Vec<_> = also.iter().map(|(word, path)| (word.flag(), path.as_path())).collect();
+    let outputs = std::iter::once(("OUTPUT", output))
+        .chain(flags.iter().map(|(flag, path)| (flag.as_str(), *path)))
+        .chain(args.json.as_deref().map(|path| ("--json", path)));
+    files::distinct(&inputs, &outputs.collect::<Vec<_>>())?;
+    Ok(also)
+}
+
+/// Writes all outputs, or leaves none of them. Returns what there is to say of depths and points.
+fn write_outputs(
+    args: &Args,
+    also: &[(&Also, PathBuf)],
+    outcome: &Outcome,
+    record: &MatchRecord,
+) -> Result<Vec<String>> {
+    let output = args.output.as_path();
+    let map = || outcome.sign.map(outcome.maps.final_map());
+    let mut written = Written::default();
+    let mut said = Vec::new();
+    if !files::is_printed(output) {
+        written.note(output, write::disparity(output, &map()))?;
+    }
+    for (word, path) in also {
+        said.extend(written.note(path, args.also.write(word, path, outcome))?);
+    }
+    let json = args.json.as_deref().map(|path: &Path| Ok((path, files::json_text(path, record)?)));
+    let json = json.transpose()?;
+    if let Some((path, text)) = json.as_ref().filter(|(path, _)| !files::is_printed(path)) {
+        written.note(path, write::save(path, text.as_bytes()))?;
+    }
+    // What is printed cannot be taken back, so it comes last.
+    if files::is_printed(output) {
+        console::print_data(&pfm::encode(&map()))?;
+    }
+    written.keep();
+    if let Some((_, text)) = json.filter(|(path, _)| files::is_printed(path)) {
+        console::print(&text)?;
+    }
+    Ok(said)
+}

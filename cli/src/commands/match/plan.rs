@@ -1,0 +1,76 @@
+//! The plan of a match, as `--dry-run` prints it.
+
+use std::fmt::Write;
+
+use mrfgs::options::Schedule;
+use mrfgs::plan::Plan;
+use mrfgs::tiles::Tiles;
+
+use crate::table::Table;
+use crate::text::{bytes, plural};
+
+/// The plan in words and tables.
+pub(super) fn describe(tiles: &Tiles) -> String {
+    let mut out = String::new();
+    let plan = tiles.largest();
+    let ((width, height), range) = (tiles.whole().size(), plan.range);
+    let labels = range.labels();
+    let _ = writeln!(
+        out,
+        "{width} x {height} pixels, disparities {} to {} ({labels} label{})",
+        range.min,
+        range.max,
+        plural(labels)
+    );
+    if tiles.count() > 1 {
+        let (width, height) = plan.size();
+        let _ =
+            writeln!(out, "in {} tiles of up to {width} x {height} pixels, one after another", tiles.count());
+    }
+    let _ = write!(out, "\n{}\n{}", memory(tiles, plan), schedule(plan));
+    out
+}
+
+/// The levels and their memory.
+fn memory(tiles: &Tiles, plan: &Plan) -> Table {
+    let mut table = Table::new("l|r|l|r");
+    table.row(["level", "width x height", "labels", "memory"]);
+    table.rule();
+    for (z, level) in plan.levels.iter().enumerate() {
+        let size = format!("{} x {}", level.width, level.height);
+        let labels = format!("{} to {} ({})", level.min, level.max(), level.labels);
+        table.row([z.to_string(), size, labels, bytes(plan.level_bytes(z))]);
+    }
+    table.row(["maps", "", "", &bytes(plan.map_bytes())]);
+    if tiles.count() > 1 {
+        table.row(["whole image", "", "", &bytes(tiles.bytes() - plan.bytes())]);
+    }
+    table.row(["all", "", "", &bytes(tiles.bytes())]);
+    table
+}
+
+/// The messages and when they are exchanged.
+fn schedule(plan: &Plan) -> Table {
+    let mut table = Table::new("l|l");
+    let width = 8 * plan.volume_width.bytes();
+    table.row(["messages", &format!("{width} bits, factors of {} pixels and their centre", plan.neighbours)]);
+    let last = plan.levels.len() - 1;
+    for (i, phase) in plan.phases.iter().enumerate() {
+        let levels = match phase.finest {
+            z if z == last => format!("level {last}"),
+            0 if plan.method.schedule == Schedule::CoarseFirst => "level 0, the others in between".into(),
+            z => format!("levels {z} to {last}"),
+        };
+        let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
+        table.row([head, &format!("{n} iteration{} of {levels}", plural(n as usize))]);
+    }
+    if plan.method.tolerance > 0.0 {
+        let sooner = match plan.method.schedule {
+            Schedule::Together => "or fewer",
+            Schedule::CoarseFirst => "or fewer of the last",
+        };
+        let tolerance = plan.method.tolerance;
+        table.row(["", &format!("{sooner}, once the map changes by at most {tolerance} px (RMS)")]);
+    }
+    table
+}

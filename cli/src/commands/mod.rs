@@ -1,0 +1,11 @@
+//! The commands of `mrfgs`, each in a file or folder of its own.
+
+pub(crate) mod batch;
+pub(crate) mod bench;
+pub(crate) mod completions;
+pub(crate) mod devices;
+pub(crate) mod evaluate;
+pub(crate) mod inspect;
+pub(crate) mod man;
+pub(crate) mod r#match;
+pub(crate) mod presets;

@@ -1,0 +1,51 @@
+//! Running a match with a progress bar and a line about it.
+
+use std::time::{Duration, Instant};
+
+use mrfgs::image::Pair;
+use mrfgs::options::{DisparityRange, Method};
+use mrfgs::solver::Inspector;
+use mrfgs::{Matched, Matcher, Result};
+
+use crate::console;
+use crate::failure;
+use crate::progress::Bar;
+use crate::text::plural;
+
+/// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and says on standard error what ran where and how
+/// long. `name` tells pairs apart where there are several.
+pub(crate) fn run(
+    matcher: &mut Matcher,
+    pair: &Pair,
+    range: DisparityRange,
+    method: &Method,
+    name: Option<&str>,
+    quiet: bool,
+    inspector: Option<Inspector>,
+) -> Result<(Matched, Duration)> {
+    let start = Instant::now();
+    let mut bar = Bar::new(name, quiet);
+    let matched = matcher.inspect(pair, range, method, &mut |progress| bar.update(progress), inspector);
+    bar.finish();
+    let (matched, time) = (matched?, start.elapsed());
+    if !quiet {
+        if let Some(note) = &matched.note {
+            console::say(&failure::in_flags(note));
+        }
+        let (width, height) = matched.plan.size();
+        let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
+        let (labels, iterations) = (range.labels(), matched.iterations);
+        let tiles = match matched.tiles.count() {
+            1 => String::new(),
+            count => format!(", {count} tiles"),
+        };
+        console::say(&format!(
+            "{name}{width} x {height}, {labels} label{}{tiles}, {iterations} iteration{} in {:.2} s on {}",
+            plural(labels),
+            plural(iterations as usize),
+            time.as_secs_f64(),
+            matched.ran_on
+        ));
+    }
+    Ok((matched, time))
+}

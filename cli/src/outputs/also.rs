@@ -1,0 +1,251 @@
+//! What `--also` writes beside a disparity map: one table, from which every command follows.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mrfgs::depth::Rig;
+use mrfgs::image::colour::{self, ColourMap};
+use mrfgs::image::{Image, Plane, ply, write};
+use mrfgs::maps::Maps;
+use mrfgs::options::DisparityRange;
+use mrfgs::{Error, Result};
+
+use crate::args::sign::Sign;
+use crate::text::plural;
+
+/// An output beside the disparity map.
+#[derive(Debug)]
+pub(crate) struct Also {
+    /// The word of `--also`, which is also in the name of the file.
+    pub(crate) word: &'static str,
+    help: &'static str,
+    kind: Kind,
+}
+
+/// What an output shows, and thereby the format of its file.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// A map of disparities, in the format of the disparity map.
+    Disparity(fn(&Maps) -> Plane<f32>),
+    /// A map of bytes, as 8-bit PNG.
+    Bytes(fn(&Maps) -> &Plane<u8>),
+    /// The depth of every disparity, as float PFM, or TIFF where the disparity map is one.
+    Depth,
+    /// A cloud of points, as PLY.
+    Points,
+    /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
+    Picture { beside: bool },
+}
+
+/// All outputs, in the order in which they are written. One more is one more row.
+static ALL: [Also; 7] = [
+    Also {
+        word: "raw",
+        help: "The disparity map before post-processing, in the format of the disparity map",
+        kind: Kind::Disparity(Maps::raw_map),
+    },
+    Also {
+        word: "depth",
+        help: "The depth of every pixel, as float: .pfm (+infinity where there is none), or .tif (NaN) if the disparity \
+               map is TIFF",
+        kind: Kind::Depth,
+    },
+    Also {
+        word: "points",
+        help: "Points with the colours of LEFT and their confidence (`quality`): binary .ply, x to the right, y down, z \
+               forward of the left camera. Invalid, filled and low-confidence pixels are left out",
+        kind: Kind::Points,
+    },
+    Also {
+        word: "confidence",
+        help: "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
+        kind: Kind::Bytes(|maps| &maps.confidence),
+    },
+    Also {
+        word: "validity",
+        help: "Why a pixel is what it is: 8-bit .png, the sum of 1 match outside the right image, 2 occluded, 4 in a \
+               small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted",
+        kind: Kind::Bytes(|maps| &maps.validity),
+    },
+    Also {
+        word: "preview",
+        help: "The disparity map in colours, with a scale: .png",
+        kind: Kind::Picture { beside: false },
+    },
+    Also {
+        word: "side-by-side",
+        help: "LEFT and beside it the preview: .png",
+        kind: Kind::Picture { beside: true },
+    },
+];
+
+/// The outputs beside the disparity map.
+#[derive(clap::Args)]
+#[command(next_help_heading = "More outputs")]
+pub(crate) struct AlsoArgs {
+    /// Writes more files beside the disparity map, as STEM.WORD.EXTENSION: `--also raw,validity` with d.pfm writes d.raw.pfm
+    /// and d.validity.png
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parser())]
+    also: Vec<&'static Also>,
+    /// Colours of the previews, from far to near [default: turbo]
+    #[arg(long, value_name = "NAME")]
+    colours: Option<Colours>,
+}
+
+fn parser() -> impl TypedValueParser<Value = &'static Also> {
+    let words = ALL.iter().map(|also| PossibleValue::new(also.word).help(also.help));
+    PossibleValuesParser::new(words)
+        .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
+}
+
+/// The colours of a preview.
+#[derive(Clone, Copy, ValueEnum)]
+enum Colours {
+    /// Cold to warm
+    Turbo,
+    /// Violet to yellow, with even steps of lightness
+    Viridis,
+    /// Dark to bright
+    Grey,
+}
+
+impl From<Colours> for ColourMap {
+    fn from(colours: Colours) -> Self {
+        match colours {
+            Colours::Turbo => Self::Turbo,
+            Colours::Viridis => Self::Viridis,
+            Colours::Grey => Self::Grey,
+        }
+    }
+}
+
+/// What a match has found, for its outputs.
+pub(crate) struct Outcome<'a> {
+    pub(crate) maps: &'a Maps,
+    pub(crate) range: DisparityRange,
+    pub(crate) sign: Sign,
+    /// The left image, where an output [shows it](AlsoArgs::show_left).
+    pub(crate) left: Option<&'a Image>,
+    /// The cameras, where an output [takes them](AlsoArgs::take_cameras).
+    pub(crate) rig: Option<Rig>,
+}
+
+impl AlsoArgs {
+    /// The wanted outputs, each once, in the order of the table.
+    pub(crate) fn wanted(&self) -> impl Iterator<Item = &'static Also> {
+        ALL.iter().filter(|also| self.also.iter().any(|wanted| wanted.word == also.word))
+    }
+
+    /// Refuses colours without a picture.
+    pub(crate) fn check(&self) -> Result<()> {
+        let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
+        if self.colours.is_some() && !self.wanted().any(is_picture) {
+            let reason = "are those of a preview; add --also preview, or leave --colours out";
+            return Err(Error::option("--colours", reason));
+        }
+        Ok(())
+    }
+
+    /// The first wanted output that takes the cameras.
+    pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
+        self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points))
+    }
+
+    /// Whether a wanted output shows the left image.
+    pub(crate) fn show_left(&self) -> bool {
+        self.wanted().any(|also| matches!(also.kind, Kind::Points | Kind::Picture { beside: true }))
+    }
+
+    /// Writes `also` to `path`. Returns what there is to say of it.
+    pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
+        let &Outcome { maps, range, sign, left, ref rig } = outcome;
+        match also.kind {
+            Kind::Disparity(map) => write::disparity(path, &sign.map(map(maps)))?,
+            Kind::Bytes(map) => write::grey8(path, map(maps))?,
+            Kind::Depth => {
+                let Some(rig) = rig else { return Ok(None) };
+                let depths = rig.depths(&maps.final_map());
+                write::depth(path, &depths)?;
+                let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
+                return Ok(Some(match known().reduce(f32::min).zip(known().reduce(f32::max)) {
+                    Some((least, most)) => format!("depths {least:.3} to {most:.3}"),
+                    None => "no pixel has a depth".into(),
+                }));
+            }
+            Kind::Points => {
+                let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
+                let points = rig.points(maps, left);
+                ply::write(path, &points)?;
+                return Ok(Some(format!("{} point{}", points.len(), plural(points.len()))));
+            }
+            Kind::Picture { beside } => {
+                let colours = self.colours.map(ColourMap::from).unwrap_or_default();
+                let mut picture =
+                    colour::preview(&maps.final_map(), range.min as f32, range.max as f32, colours);
+                if let Some(left) = left.filter(|_| beside) {
+                    picture = colour::side_by_side(&left.to_rgb8(), &picture);
+                }
+                write::rgb8(path, &picture)?;
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Also {
+    /// The flag that asks for it.
+    pub(crate) fn flag(&self) -> String {
+        format!("--also {}", self.word)
+    }
+
+    /// Its file beside the disparity map `output`.
+    pub(crate) fn beside(&self, output: &Path) -> PathBuf {
+        let own = output.extension().unwrap_or_default().to_string_lossy();
+        let is_tiff = ["tif", "tiff"].iter().any(|tiff| own.eq_ignore_ascii_case(tiff));
+        let extension = match self.kind {
+            Kind::Disparity(_) => &*own,
+            Kind::Depth if is_tiff => &*own,
+            Kind::Depth => "pfm",
+            Kind::Points => "ply",
+            Kind::Bytes(_) | Kind::Picture { .. } => "png",
+        };
+        output.with_extension(format!("{}.{extension}", self.word))
+    }
+
+    /// Says before any computing whether it can be written to `path`, with disparities in `range`.
+    pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> Result<()> {
+        match self.kind {
+            Kind::Disparity(_) => write::check_disparity_path(path, range.min, range.max),
+            Kind::Depth => write::check_depth_path(path),
+            Kind::Points => write::check_ply_path(path),
+            Kind::Bytes(_) | Kind::Picture { .. } => write::check_png_path(path),
+        }
+    }
+}
+
+/// What stands between stem and extension in the names of all such files: ".raw" and the like.
+pub(crate) fn endings() -> impl Iterator<Item = String> {
+    ALL.iter().map(|also| format!(".{}", also.word))
+}
+
+/// The files of all outputs beside the disparity map `output`, wanted or not.
+pub(crate) fn all_beside(output: &Path) -> impl Iterator<Item = PathBuf> {
+    ALL.iter().map(|also| also.beside(output))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_named_after_the_map() {
+        let names = |output: &str| -> Vec<String> {
+            all_beside(Path::new(output)).map(|path| path.to_str().unwrap().to_owned()).collect()
+        };
+        let of_pfm = ["raw.pfm", "depth.pfm", "points.ply", "confidence.png", "validity.png", "preview.png"];
+        assert_eq!(names("a/b.c.pfm")[..6], of_pfm.map(|end| format!("a/b.c.{end}")));
+        assert_eq!(names("d.png")[..2], ["d.raw.png", "d.depth.pfm"]);
+        assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.depth.TIFF", "d.points.ply"]);
+    }
+}

@@ -1,0 +1,156 @@
+//! Locks, so that one run at a time makes a pair of a batch or a folder of outputs.
+
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use mrfgs::{Error, Result};
+use same_file::Handle;
+
+/// The file that is locked.
+const LOCK: &str = "lock";
+/// The folders that may be made: a new one, and the old one while the new one takes its place.
+pub(crate) const FOLDERS: [&str; 2] = ["new", "old"];
+
+/// The claim of this run to a pair or a folder, and the staging folder in which its files are made. As long as the claim lives,
+/// the staging folder is locked; then it is removed. However the process ends, its lock goes with it, and an unlocked folder may
+/// be left.
+pub(crate) struct Claim {
+    folder: PathBuf,
+    /// Held for its lock.
+    _lock: File,
+}
+
+impl Claim {
+    /// Claims `name` in the output folder `parent`, and removes what a killed run has left of it; `None` while another run holds
+    /// it.
+    pub(crate) fn new(parent: &Path, name: impl AsRef<OsStr>) -> Result<Option<Self>> {
+        let folder = staging(parent, name.as_ref());
+        let failed =
+            |e: io::Error| Error::write(parent, format!("nothing can be created in it: {}", e.kind()));
+        loop {
+            if let Err(e) = fs::create_dir(&folder)
+                && e.kind() != ErrorKind::AlreadyExists
+            {
+                return Err(failed(e));
+            }
+            let path = folder.join(LOCK);
+            let lock = match File::options().write(true).create(true).truncate(false).open(&path) {
+                // Whose folder that was has just removed it.
+                Err(e) if e.kind() == ErrorKind::NotFound => continue,
+                lock => lock.map_err(failed)?,
+            };
+            match lock.try_lock() {
+                Err(TryLockError::WouldBlock) => return Ok(None),
+                // Some file systems of networks have no locks; there it is up to the user.
+                Err(TryLockError::Error(_)) | Ok(()) => {}
+            }
+            let locked = Handle::from_file(lock.try_clone().map_err(failed)?).map_err(failed)?;
+            if Handle::from_path(&path).is_ok_and(|there| there == locked) {
+                let claim = Self { folder, _lock: lock };
+                claim.clear().map_err(failed)?;
+                return Ok(Some(claim));
+            }
+            // It was removed between opening and locking, so it keeps nobody out.
+        }
+    }
+
+    /// Removes what a killed run has left of `name`, unless another run holds it.
+    pub(crate) fn remove_remains(parent: &Path, name: &str) -> Result<()> {
+        if staging(parent, name.as_ref()).exists() {
+            Self::new(parent, name)?;
+        }
+        Ok(())
+    }
+
+    /// Where the files are made.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Removes everything but the lock.
+    fn clear(&self) -> io::Result<()> {
+        for entry in fs::read_dir(&self.folder)? {
+            let entry = entry?;
+            // Folders of any other name are not ours, and nothing is claimed then.
+            if FOLDERS.iter().any(|name| entry.file_name() == *name) {
+                fs::remove_dir_all(entry.path())?;
+            } else if entry.file_name() != LOCK {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // The lock last: once it is gone, the folder may be another run's.
+        if self.clear().is_ok() && fs::remove_file(self.folder.join(LOCK)).is_ok() {
+            let _ = fs::remove_dir(&self.folder);
+        }
+    }
+}
+
+/// The staging folder for `name`. Its name is known, so that the next run finds what a killed run has left.
+fn staging(parent: &Path, name: &OsStr) -> PathBuf {
+    let mut folder = OsString::from(".");
+    folder.push(name);
+    folder.push(".tmp");
+    parent.join(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_pair_is_claimed_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let claimed = || Claim::new(folder.path(), "a").unwrap();
+        let first = claimed().unwrap();
+        fs::write(first.folder().join("a.pfm"), "half").unwrap();
+        assert!(claimed().is_none() && Claim::new(folder.path(), "b").unwrap().is_some());
+        Claim::remove_remains(folder.path(), "a").unwrap();
+        assert!(first.folder().join("a.pfm").exists(), "it is not for others to remove");
+        drop(first);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(claimed().is_some());
+
+        // What a killed run leaves: no lock, but the file that was locked.
+        let remains = staging(folder.path(), "a".as_ref());
+        fs::create_dir_all(remains.join("new/below")).unwrap();
+        for file in ["lock", "a.pfm", "new/b.pfm"] {
+            fs::write(remains.join(file), "half").unwrap();
+        }
+        let claim = claimed().unwrap();
+        assert!(!claim.folder().join("a.pfm").exists() && !claim.folder().join("new").exists());
+        drop(claim);
+        assert!(!remains.exists());
+    }
+
+    #[test]
+    fn claims_shut_each_other_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = AtomicUsize::new(0);
+        let held = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..500 {
+                        let Some(claim) = Claim::new(folder.path(), "a").unwrap() else { continue };
+                        assert_eq!(inside.fetch_add(1, Ordering::SeqCst), 0);
+                        fs::write(claim.folder().join("a.pfm"), "map").unwrap();
+                        held.fetch_add(1, Ordering::SeqCst);
+                        inside.fetch_sub(1, Ordering::SeqCst);
+                    }
+                });
+            }
+        });
+        assert!(held.into_inner() > 100);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

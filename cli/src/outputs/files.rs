@@ -1,0 +1,130 @@
+//! Where outputs go, and the files written so far.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mrfgs::image::write;
+use mrfgs::{Error, Result};
+use serde::Serialize;
+
+use crate::console;
+
+/// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
+pub(crate) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
+    let mut taken: Vec<(&str, PathBuf)> =
+        inputs.iter().filter_map(|(name, path)| Some((*name, place(path)?))).collect();
+    for (name, path) in outputs {
+        let Some(place) = place(path) else { continue };
+        if let Some((other, _)) = taken.iter().find(|(_, p)| *p == place) {
+            let reason = format!("{} is {other} already; give another name", path.display());
+            return Err(Error::option(*name, reason));
+        }
+        taken.push((name, place));
+    }
+    Ok(())
+}
+
+/// Where a file is, or would be, however its path is spelt; `None` for a device or a pipe, which any number may share.
+fn place(path: &Path) -> Option<PathBuf> {
+    if let Ok(place) = fs::canonicalize(path) {
+        return place.is_file().then_some(place);
+    }
+    Some(fs::canonicalize(parent(path)).ok()?.join(path.file_name()?))
+}
+
+/// Where a path leads without its last part.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."))
+}
+
+/// Refuses a file or folder in a folder that is replaced as a whole; each comes with the name of its flag.
+pub(crate) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
+    if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
+        let reason = format!("{} lies in the folder of {folder_name}; give another name", path.display());
+        return Err(Error::option(name, reason));
+    }
+    Ok(())
+}
+
+/// The files and folders written so far: gone again when dropped, unless kept.
+#[derive(Default)]
+pub(crate) struct Written(Vec<PathBuf>);
+
+impl Written {
+    /// Notes that `path` has been written, if that went well.
+    pub(crate) fn note<T>(&mut self, path: &Path, result: Result<T>) -> Result<T> {
+        if result.is_ok() {
+            self.0
+                .extend(place(path).or_else(|| fs::canonicalize(path).ok().filter(|folder| folder.is_dir())));
+        }
+        result
+    }
+
+    /// Keeps them: all went well.
+    pub(crate) fn keep(mut self) {
+        self.0.clear();
+    }
+}
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        for path in &self.0 {
+            let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        }
+    }
+}
+
+/// Whether an output goes to standard output.
+pub(crate) fn is_printed(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// The file that the JSON goes to, unless it is printed.
+pub(crate) fn json_file(json: Option<&Path>) -> Option<&Path> {
+    json.filter(|path| !is_printed(path))
+}
+
+/// The text of a JSON file at `path`.
+pub(crate) fn json_text(path: &Path, findings: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
+    Ok(text + "\n")
+}
+
+/// Delivers findings: as JSON where it is asked for, with whatever `more` writes, and as text unless the JSON is printed.
+pub(crate) fn deliver(
+    json: Option<&Path>,
+    findings: &impl Serialize,
+    text: &str,
+    more: impl FnOnce(&mut Written) -> Result<()>,
+) -> Result<()> {
+    let mut written = Written::default();
+    let mut printed = text.to_owned();
+    if let Some(path) = json {
+        let json = json_text(path, findings)?;
+        match json_file(Some(path)) {
+            Some(file) => written.note(file, write::save(file, json.as_bytes()))?,
+            None => printed = json,
+        }
+    }
+    more(&mut written)?;
+    written.keep();
+    console::print(&printed)
+}
+
+/// Where a folder for outputs is, or would be.
+pub(crate) fn folder_place(name: &Path) -> Result<PathBuf> {
+    match fs::canonicalize(name) {
+        Ok(place) if place.is_dir() => Ok(place),
+        Ok(_) => Err(Error::write(name, "is a file; give the name of a folder")),
+        Err(_) => {
+            let parent = parent(name);
+            match (fs::canonicalize(parent), name.file_name()) {
+                (Ok(parent), Some(last)) if parent.is_dir() => Ok(parent.join(last)),
+                _ => {
+                    let reason = format!("there is no folder {}; create it first", parent.display());
+                    Err(Error::write(name, reason))
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! What ran and what it found, in JSON: `mrfgs match --json` and the records of a batch.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use mrfgs::maps::{flag, has_disparity};
+use mrfgs::options::{DisparityRange, Method};
+use mrfgs::{Matched, Timing};
+use serde::Serialize;
+
+use crate::args::sign::Sign;
+use crate::failure;
+
+/// The inputs of a match and its map, as the user wrote them.
+#[derive(Serialize)]
+pub(crate) struct Files {
+    pub(crate) left: String,
+    pub(crate) right: String,
+    pub(crate) mask: Option<String>,
+    pub(crate) calibration: Option<String>,
+    /// None where no map is written.
+    pub(crate) output: Option<String>,
+}
+
+/// A match in JSON. The help of `mrfgs match --json` explains the fields.
+#[derive(Serialize)]
+pub(crate) struct MatchRecord<'a> {
+    version: &'static str,
+    files: &'a Files,
+    width: usize,
+    height: usize,
+    sign: Sign,
+    range: DisparityRange,
+    labels: usize,
+    method: &'a Method,
+    ran_on: &'a str,
+    driver: Option<&'a str>,
+    note: Option<String>,
+    tiles: usize,
+    iterations: u32,
+    seconds: f64,
+    /// Milliseconds by stage and level, where they were measured.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    stages: BTreeMap<String, f64>,
+    density: f64,
+    measured: f64,
+    filled: f64,
+    mean_confidence: Option<f64>,
+}
+
+impl<'a> MatchRecord<'a> {
+    pub(crate) fn new(files: &'a Files, matched: &'a Matched, time: Duration, sign: Sign) -> Self {
+        let Matched { maps, plan, .. } = matched;
+        let (width, height) = plan.size();
+        let percent = |count: usize| 100.0 * count as f64 / (width * height) as f64;
+        let filled = maps.validity.data().iter().filter(|&v| v & flag::FILLED != 0).count();
+        let measured = |validity: u8| has_disparity(validity) && validity & flag::FILLED == 0;
+        let pixels = maps.validity.data().iter().zip(maps.confidence.data());
+        let (count, sum) = pixels
+            .filter(|(validity, _)| measured(**validity))
+            .fold((0, 0), |(count, sum), (_, confidence)| (count + 1, sum + u64::from(*confidence)));
+        let ms = |time: Duration| 1000.0 * time.as_secs_f64();
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            files,
+            width,
+            height,
+            sign,
+            range: sign.range(plan.range),
+            labels: plan.range.labels(),
+            method: &plan.method,
+            ran_on: &matched.ran_on,
+            driver: matched.driver.as_deref(),
+            note: matched.note.as_deref().map(failure::in_flags),
+            tiles: matched.tiles.count(),
+            iterations: matched.iterations,
+            seconds: time.as_secs_f64(),
+            stages: matched.timings.iter().map(|t| (stage_and_level(t), ms(t.time))).collect(),
+            density: percent(count + filled),
+            measured: percent(count),
+            filled: percent(filled),
+            mean_confidence: (count > 0).then(|| sum as f64 / count as f64),
+        }
+    }
+}
+
+/// The name of what was timed: "dependency, level 0".
+pub(crate) fn stage_and_level(timing: &Timing) -> String {
+    let level = timing.level.map_or(String::new(), |z| format!(", level {z}"));
+    format!("{}{level}", timing.stage)
+}

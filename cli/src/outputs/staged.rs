@@ -1,0 +1,86 @@
+//! Folders that appear as a whole.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mrfgs::{Error, Result};
+
+use crate::failure;
+use crate::outputs::claim::{Claim, FOLDERS};
+use crate::outputs::files::folder_place;
+
+/// A folder in the making, beside the place that it takes once it is whole. If it is dropped before, it is removed with all it
+/// holds; if the program is killed, the next run that makes the folder removes it.
+pub(crate) struct StagedFolder {
+    /// As the user wrote it.
+    name: PathBuf,
+    place: PathBuf,
+    staging: Claim,
+}
+
+impl StagedFolder {
+    /// Begins the folder `name`, which may be there already.
+    pub(crate) fn new(name: &Path) -> Result<Self> {
+        let place = folder_place(name)?;
+        let (Some(beside), Some(last)) = (place.parent(), place.file_name()) else {
+            return Err(Error::write(name, "has no name; give the name of a folder"));
+        };
+        let staging = Claim::new(beside, last).map_err(|e| match e {
+            Error::Write { reason, .. } => {
+                Error::write(name, reason.replacen("in it", &format!("in {}", beside.display()), 1))
+            }
+            other => other,
+        })?;
+        let staging = staging.ok_or_else(|| {
+            Error::write(name, "another run is writing it; wait for that, or give another name")
+        })?;
+        let staged = Self { name: name.to_owned(), place, staging };
+        fs::create_dir(staged.path()).map_err(|e| Error::write(name, e))?;
+        Ok(staged)
+    }
+
+    /// Begins the folder `name`, which must be new or empty.
+    pub(crate) fn new_or_empty(name: &Path) -> Result<Self> {
+        let staged = Self::new(name)?;
+        match fs::read_dir(&staged.place).map(|mut entries| entries.next().is_none()) {
+            Ok(false) => Err(Error::write(name, "the folder is not empty; name a new one")),
+            _ => Ok(staged),
+        }
+    }
+
+    /// Where it will be.
+    pub(crate) fn place(&self) -> &Path {
+        &self.place
+    }
+
+    /// Where it is made.
+    pub(crate) fn path(&self) -> PathBuf {
+        self.staging.folder().join(FOLDERS[0])
+    }
+
+    /// An error that names a file in the making as one that names the folder.
+    pub(crate) fn named(&self, error: Error) -> Error {
+        match &error {
+            Error::Write { path, .. } if path.starts_with(self.staging.folder()) => {
+                failure::at(error, &self.name)
+            }
+            _ => error,
+        }
+    }
+
+    /// Puts it in its place; what was there goes, and comes back when that fails.
+    pub(crate) fn publish(self) -> Result<()> {
+        let error = |e: std::io::Error| Error::write(&self.name, e);
+        let old = self.staging.folder().join(FOLDERS[1]);
+        let replaces = self.place.exists();
+        if replaces {
+            fs::rename(&self.place, &old).map_err(error)?;
+        }
+        fs::rename(self.path(), &self.place).map_err(|e| {
+            if replaces {
+                let _ = fs::rename(&old, &self.place);
+            }
+            error(e)
+        })
+    }
+}

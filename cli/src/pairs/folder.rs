@@ -1,0 +1,187 @@
+//! Folders with a pair and its ground truth, in the layouts of the Middlebury sets.
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::evaluation::GroundTruth;
+use mrfgs::image::{Pair, Plane, calib::Calibration, read::Reader};
+use mrfgs::options::DisparityRange;
+use mrfgs::{Error, Result};
+
+use crate::args::search::calibrated_range;
+
+/// What a folder holds.
+struct Layout {
+    /// Left view, right view and truth of the left one.
+    files: [&'static str; 3],
+    /// How many levels of an 8-bit truth are one pixel, unless the user gives a scale; `None` where the truth is in pixels
+    /// and a calib.txt gives the range.
+    scale: Option<f32>,
+}
+
+/// The layout of a folder is the first of these of which it holds most.
+const LAYOUTS: [Layout; 3] = [
+    Layout { files: ["im0.png", "im1.png", "disp0GT.pfm"], scale: None },
+    // 2005 and 2006, third size.
+    Layout { files: ["view1.png", "view5.png", "disp1.png"], scale: Some(3.0) },
+    // 2003, quarter size.
+    Layout { files: ["im2.png", "im6.png", "disp2.png"], scale: Some(4.0) },
+];
+
+pub(crate) const CALIBRATION: &str = "calib.txt";
+
+/// The mask's name in any of them, which may lack it.
+const MASK: &str = "mask0nocc.png";
+
+impl Layout {
+    /// The files that must be there, with the truth or without.
+    fn required(&self, truth: bool) -> impl Iterator<Item = &'static str> {
+        let [left, right, known] = self.files;
+        let known = truth.then_some(known);
+        [left, right].into_iter().chain(known).chain(self.scale.is_none().then_some(CALIBRATION))
+    }
+}
+
+/// A folder to match, with all that it must hold.
+pub(crate) struct Folder<'a> {
+    dir: &'a Path,
+    layout: &'static Layout,
+}
+
+impl<'a> Folder<'a> {
+    /// Finds the layout of `dir`, which is to be evaluated; the error names what is missing.
+    pub(crate) fn of(dir: &'a Path) -> Result<Self> {
+        Self::holding(dir, "to evaluate", |_| true)
+    }
+
+    /// As [`Folder::of`], for a folder that is only matched: it needs no truth if a calib.txt gives the range.
+    pub(crate) fn to_match(dir: &'a Path) -> Result<Self> {
+        let calibrated = dir.join(CALIBRATION).is_file();
+        Self::holding(dir, "to match", |layout| layout.scale.is_some() && !calibrated)
+    }
+
+    fn holding(dir: &'a Path, purpose: &str, truth: impl Fn(&Layout) -> bool) -> Result<Self> {
+        let held = |layout: &Layout| layout.files.into_iter().filter(|file| dir.join(file).is_file()).count();
+        let layout = LAYOUTS.iter().fold(&LAYOUTS[0], |a, b| if held(b) > held(a) { b } else { a });
+        let described = |layout: &Layout| layout.required(truth(layout)).collect::<Vec<_>>().join(", ");
+        if let Some(missing) = layout.required(truth(layout)).find(|file| !dir.join(file).is_file()) {
+            let expected = match held(layout) {
+                0 => LAYOUTS.iter().map(described).collect::<Vec<_>>().join("; or "),
+                _ => described(layout),
+            };
+            let reason = format!("there is no such file; a folder {purpose} holds {expected}");
+            return Err(Error::read(dir.join(missing), reason));
+        }
+        Ok(Self { dir, layout })
+    }
+
+    /// Whether its truth has 8 bits and a scale.
+    pub(crate) fn is_scaled(&self) -> bool {
+        self.layout.scale.is_some()
+    }
+
+    /// Reads it all by `reader`; `scale` replaces that of the layout.
+    pub(crate) fn read(&self, reader: Reader, scale: Option<f32>) -> Result<Scene> {
+        let calibrated = self.calibrated()?;
+        let pair = self.views(reader)?;
+        let ground = self.ground(reader, scale, pair.size())?;
+        let range = calibrated.map_or_else(|| range_of(&ground), Ok)?;
+        Ok(Scene { name: name(self.dir), pair, range, ground })
+    }
+
+    /// Reads the pair and the range, and of the truth no more than the range takes.
+    pub(crate) fn read_pair(&self, reader: Reader) -> Result<(Pair, DisparityRange)> {
+        let calibrated = self.calibrated()?;
+        let pair = self.views(reader)?;
+        let known = || range_of(&self.ground(reader, None, pair.size())?);
+        let range = calibrated.map_or_else(known, Ok)?;
+        Ok((pair, range))
+    }
+
+    /// The range that a calib.txt gives, where there is one.
+    fn calibrated(&self) -> Result<Option<DisparityRange>> {
+        let calib = self.dir.join(CALIBRATION);
+        if !calib.is_file() {
+            return Ok(None);
+        }
+        let range = calibrated_range(&calib, &Calibration::read(&calib)?, 0)?;
+        let silent = || Error::read(&calib, "does not say ndisp, the number of disparities; add ndisp=N");
+        range.ok_or_else(silent).map(Some)
+    }
+
+    /// The file names of the two views.
+    pub(crate) fn view_names(&self) -> [&'static str; 2] {
+        let [left, right, _] = self.layout.files;
+        [left, right]
+    }
+
+    fn views(&self, reader: Reader) -> Result<Pair> {
+        let [left, right] = self.view_names().map(|file| self.dir.join(file));
+        reader.pair(&left, &right, None)
+    }
+
+    fn ground(&self, reader: Reader, scale: Option<f32>, size: (usize, usize)) -> Result<GroundTruth> {
+        let [left, _, truth] = self.layout.files.map(|file| self.dir.join(file));
+        let mask = Some(self.dir.join(MASK)).filter(|m| m.exists());
+        let scale = self.layout.scale.map(|usual| scale.unwrap_or(usual));
+        ground_truth(reader, &truth, scale, mask.as_deref(), &left, size)
+    }
+}
+
+/// The name of the folder `dir`, however its path is spelt.
+pub(crate) fn name(dir: &Path) -> String {
+    let full = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    full.file_name().unwrap_or(dir.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Every file that may be read of `dir`.
+pub(crate) fn inputs(dir: &Path) -> impl Iterator<Item = PathBuf> {
+    LAYOUTS.iter().flat_map(|layout| layout.files).chain([CALIBRATION, MASK]).map(|file| dir.join(file))
+}
+
+/// One folder, read.
+pub(crate) struct Scene {
+    pub(crate) name: String,
+    pub(crate) pair: Pair,
+    pub(crate) range: DisparityRange,
+    pub(crate) ground: GroundTruth,
+}
+
+/// From 0 to the largest known disparity, rounded up.
+fn range_of(ground: &GroundTruth) -> Result<DisparityRange> {
+    let known = ground.truth().data().iter().copied().filter(|d| d.is_finite());
+    DisparityRange::new(0, known.fold(0.0, f32::max).ceil() as i32)
+}
+
+/// The truth, of 8 bits where it has a `scale`, and the mask for `what`, which is of the given size.
+pub(crate) fn ground_truth(
+    reader: Reader,
+    truth: &Path,
+    scale: Option<f32>,
+    mask: Option<&Path>,
+    what: &Path,
+    size: (usize, usize),
+) -> Result<GroundTruth> {
+    fn fits<T>(plane: Plane<T>, path: &Path, what: &Path, size: (usize, usize)) -> Result<Plane<T>> {
+        if plane.size() == size {
+            return Ok(plane);
+        }
+        let (w, h) = plane.size();
+        Err(Error::Mismatch(format!(
+            "{} is {w} x {h} and {} is {} x {}: give files of the same pair at the same size",
+            path.display(),
+            what.display(),
+            size.0,
+            size.1
+        )))
+    }
+    let plane = match scale {
+        Some(scale) => reader.scaled_disparity(truth, scale)?,
+        None => reader.disparity(truth)?,
+    };
+    let plane = fits(plane, truth, what, size)?;
+    if !plane.data().iter().any(|d| d.is_finite()) {
+        return Err(Error::read(truth, "holds no known disparity; nothing can be compared with it"));
+    }
+    let mask = mask.map(|path| fits(reader.grey8(path)?, path, what, size)).transpose()?;
+    GroundTruth::new(plane, mask)
+}

@@ -1,0 +1,112 @@
+//! The pair that `mrfgs match` and `mrfgs inspect` take.
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::Result;
+use mrfgs::front::check::{self, Warning};
+use mrfgs::image::Pair;
+use mrfgs::image::calib::Calibration;
+use mrfgs::options::DisparityRange;
+
+use crate::args::reading::ReadingArgs;
+use crate::args::search::{Found, Search};
+use crate::args::sign::Sign;
+use crate::console;
+use crate::outputs::record::Files;
+use crate::pairs::folder::CALIBRATION;
+
+/// The files of a pair, and how they are read.
+#[derive(clap::Args)]
+pub(crate) struct PairArgs {
+    /// Left image, the reference view
+    pub(crate) left: PathBuf,
+    /// Right image, of the same size and rectified, so that matches are on the same row
+    pub(crate) right: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) search: Search,
+    /// Calibration file: the range (ndisp), and the cameras for depth and points [default: a calib.txt beside LEFT]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) calib: Option<PathBuf>,
+    /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
+    #[arg(long, value_name = "FILE")]
+    pub(crate) mask: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+}
+
+/// A pair, read.
+pub(crate) struct Input {
+    pub(crate) pair: Pair,
+    pub(crate) range: DisparityRange,
+    /// Whether sparse matches gave the range.
+    by_matches: bool,
+    /// The calibration file and what it holds.
+    calibration: Option<(PathBuf, Calibration)>,
+}
+
+impl PairArgs {
+    /// Reads the images and what the range takes, and the cameras where `cameras` asks for them. The user counts disparities
+    /// by `sign`.
+    pub(crate) fn read(&self, sign: Sign, cameras: bool) -> Result<Input> {
+        let pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
+        let calibration = match &self.calib {
+            Some(path) => Some((path.clone(), Calibration::read(path)?)),
+            None if self.search.max_disparity.is_some() && !cameras => None,
+            None => Calibration::beside(&self.left)?.map(|c| (self.left.with_file_name(CALIBRATION), c)),
+        };
+        let known = calibration.as_ref().map(|(path, calibration)| (path.as_path(), calibration));
+        let Found { range, by_matches } = self.search.range(&pair, known, sign)?;
+        Ok(Input { pair, range, by_matches, calibration })
+    }
+
+    /// The paths for a record.
+    pub(crate) fn files(&self, input: &Input, output: Option<&Path>) -> Files {
+        let path = |path: &Path| path.display().to_string();
+        Files {
+            left: path(&self.left),
+            right: path(&self.right),
+            mask: self.mask.as_deref().map(path),
+            calibration: input.calibration().map(|(file, _)| path(file)),
+            output: output.map(path),
+        }
+    }
+
+    /// The files that no output may overwrite, each with its name.
+    pub(crate) fn inputs<'a>(&'a self, input: &'a Input) -> Vec<(&'static str, &'a Path)> {
+        let mut inputs = vec![("LEFT", self.left.as_path()), ("RIGHT", self.right.as_path())];
+        inputs.extend(self.mask.as_deref().map(|path| ("the mask", path)));
+        inputs.extend(input.calibration().map(|(path, _)| ("the calibration file", path)));
+        inputs
+    }
+}
+
+impl Input {
+    /// The calibration file and what it holds.
+    pub(crate) fn calibration(&self) -> Option<(&Path, &Calibration)> {
+        self.calibration.as_ref().map(|(path, calibration)| (path.as_path(), calibration))
+    }
+
+    /// Says which range was found, if the user gave none.
+    pub(crate) fn say_range(&self, sign: Sign) {
+        if self.by_matches {
+            let DisparityRange { min, max } = sign.range(self.range);
+            let text =
+                format!("disparities {min} to {max}, by sparse matches; set them with --max-disparity");
+            console::say(&text);
+        }
+    }
+
+    /// Says what is probably wrong with the pair.
+    pub(crate) fn warn(&self) {
+        // A range that was found does not show what the user knows.
+        warn(check::warnings(&self.pair, (!self.by_matches).then_some(self.range)));
+    }
+}
+
+/// Says on standard error what is probably wrong.
+pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
+    for warning in warnings {
+        console::say(&format!("warning: {warning}"));
+    }
+}

@@ -1,0 +1,162 @@
+//! Lists of pairs: CSV files in UTF-8 whose header names their columns.
+//!
+//! The columns are name, left and right, and optionally `max_disparity`, `min_disparity` and mask. An empty field counts as
+//! missing. Empty lines and lines that begin with # are skipped.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+use mrfgs::options::DisparityRange;
+use mrfgs::text::{self, quoted};
+use mrfgs::{Error, Result};
+
+pub use crate::args::search::{Largest, pixels};
+use crate::failure::in_columns;
+use crate::outputs::also;
+
+/// The columns of a list; the first three are required.
+const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
+const REQUIRED: usize = 3;
+
+/// The longest name of a pair, in bytes: file systems allow more, which leaves room for the endings of its files.
+const MAX_NAME: usize = 200;
+/// A list of a million pairs is smaller.
+const MAX_BYTES: u64 = 1 << 28;
+
+/// One pair of a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// The name of its outputs; see [`Names`].
+    pub name: String,
+    /// Path of the left image. Paths are as the list has them.
+    pub left: String,
+    /// Path of the right image.
+    pub right: String,
+    /// Path of the mask, if there is one.
+    pub mask: Option<String>,
+    /// Largest disparity to search, where the list says it.
+    pub max_disparity: Option<Largest>,
+    /// Smallest disparity to search, in pixels, where the list says it; at most the largest.
+    pub min_disparity: Option<i32>,
+}
+
+/// Reads a list; it may have no rows.
+///
+/// # Errors
+/// [`Error::Read`] with the line, where there is one, for what cannot be read or makes no sense.
+pub fn read(path: &Path) -> Result<Vec<Row>> {
+    let text = String::from_utf8(text::read(path, MAX_BYTES, "list of pairs")?)
+        .map_err(|_| Error::read(path, "is no text in UTF-8; give a CSV file"))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let lines = text.lines().zip(1..).map(|(line, number)| (number, line));
+    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
+    let Some((number, header)) = lines.next() else { return Ok(Vec::new()) };
+    let wrong = |number: usize, reason: String| Error::read(path, format!("line {number}: {reason}"));
+    let columns = columns(&fields(header)).map_err(|reason| wrong(number, reason))?;
+    let mut names = Names::default();
+    let mut rows = Vec::new();
+    for (number, line) in lines {
+        let row = row(&columns, &fields(line)).map_err(|reason| wrong(number, reason))?;
+        names.add(&row.name, number).map_err(|reason| wrong(number, reason))?;
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// The fields of a line of CSV.
+fn fields(line: &str) -> StringRecord {
+    let mut reader =
+        ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(line.as_bytes());
+    // A line of UTF-8 in memory always is a record.
+    reader.records().next().and_then(std::result::Result::ok).unwrap_or_default()
+}
+
+/// Which column each field of the rows belongs to.
+fn columns(header: &StringRecord) -> std::result::Result<Vec<&'static str>, String> {
+    let known = COLUMNS.join(", ");
+    let mut columns = Vec::new();
+    for field in header {
+        let column = COLUMNS.into_iter().find(|column| *column == field);
+        let column = column.ok_or_else(|| {
+            format!("{} is no column; the header names the columns, of {known}", quoted(field))
+        })?;
+        if columns.contains(&column) {
+            return Err(format!("there are two columns {column}; remove one"));
+        }
+        columns.push(column);
+    }
+    match COLUMNS[..REQUIRED].iter().find(|column| !columns.contains(column)) {
+        Some(missing) => {
+            Err(format!("there is no column {missing}; the header names the columns, of {known}"))
+        }
+        None => Ok(columns),
+    }
+}
+
+fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, String> {
+    if fields.len() != columns.len() {
+        let (found, wanted) = (fields.len(), columns.len());
+        return Err(format!(
+            "there are {found} fields and {wanted} columns; give one each, in double quotes where it has a comma"
+        ));
+    }
+    let field = |name: &str| {
+        let place = columns.iter().position(|column| *column == name)?;
+        fields.get(place).filter(|field| !field.is_empty())
+    };
+    let required =
+        |name: &str| field(name).map(str::to_owned).ok_or_else(|| format!("the {name} is missing"));
+    let within = |column: &str, reason: String| format!("{column}: {reason}");
+    let max = field("max_disparity").map(str::parse).transpose();
+    let min = field("min_disparity").map(pixels).transpose();
+    let row = Row {
+        name: required("name")?,
+        left: required("left")?,
+        right: required("right")?,
+        mask: field("mask").map(str::to_owned),
+        max_disparity: max.map_err(|reason| within("max_disparity", reason))?,
+        min_disparity: min.map_err(|reason| within("min_disparity", reason))?,
+    };
+    if let Some(Largest::Pixels(max)) = row.max_disparity {
+        let range = DisparityRange::new(row.min_disparity.unwrap_or(0), max);
+        range.map_err(|error| in_columns(error).to_string())?;
+    }
+    Ok(row)
+}
+
+/// The names of pairs so far, each fit for files on every file system: without / \ : * ? " < > | and control characters, no . or -
+/// first, no . or space last, and no ending that `mrfgs batch` gives to further outputs of a pair (.confidence and the
+/// like). They differ by more than upper and lower case: on some file systems `A` and `a` are one file.
+#[derive(Debug, Default)]
+pub struct Names(HashMap<String, usize>);
+
+impl Names {
+    /// Adds a name from line `line` (from 1; 0 where there are no lines).
+    ///
+    /// # Errors
+    /// What is wrong and the remedy, for a name that is taken or unfit for a file.
+    pub fn add(&mut self, name: &str, line: usize) -> std::result::Result<(), String> {
+        let forbidden = |c: char| c.is_control() || r#"/\:*?"<>|"#.contains(c);
+        let ends_badly = name.starts_with(['.', '-', ' ']) || name.ends_with(['.', ' ']);
+        if name.len() > MAX_NAME || ends_badly || name.contains(forbidden) {
+            return Err(format!(
+                r#"{} is no name for files; rename it: at most {MAX_NAME} bytes, none of / \ : * ? " < > |, no . or - first, no . or space last"#,
+                quoted(name)
+            ));
+        }
+        let lower = name.to_lowercase();
+        if let Some(ending) = also::endings().find(|ending| lower.ends_with(ending)) {
+            return Err(format!("`{name}` ends in {ending}, as outputs of other pairs do; rename it"));
+        }
+        if let Some(other) = self.0.insert(lower, line) {
+            let mut reason = format!("the name {name} is taken");
+            if other > 0 {
+                let _ = write!(reason, " by line {other}");
+            }
+            return Err(reason + "; rename one of them, by more than upper and lower case");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,6 @@
+//! Where pairs come from.
+
+pub(crate) mod cameras;
+pub(crate) mod folder;
+pub(crate) mod input;
+pub mod list;

@@ -1,0 +1,148 @@
+//! Tables for a terminal.
+
+use std::fmt;
+
+/// A table whose columns are as wide as their widest cell, in groups with a `|` between them.
+pub(crate) struct Table {
+    /// The alignment of each column, by group.
+    groups: Vec<Vec<Align>>,
+    lines: Vec<Line>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Align {
+    Left,
+    Right,
+}
+
+enum Line {
+    /// A cell for each column; those that are missing at the end are empty.
+    Row(Vec<String>),
+    /// A title for each group, centred over its columns.
+    Titles(Vec<String>),
+    /// A rule across the table.
+    Rule,
+    /// A line of its own.
+    Text(String),
+}
+
+impl Table {
+    /// An empty table. `columns` has an `l` or an `r` for each column, aligned left or right, and a `|` between groups.
+    pub(crate) fn new(columns: &str) -> Self {
+        let align = |c| if c == 'l' { Align::Left } else { Align::Right };
+        Self {
+            groups: columns.split('|').map(|group| group.chars().map(align).collect()).collect(),
+            lines: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = impl Into<String>>) {
+        self.lines.push(Line::Row(cells.into_iter().map(Into::into).collect()));
+    }
+
+    /// Adds a row with a title for each group of columns.
+    pub(crate) fn titles(&mut self, titles: impl IntoIterator<Item = impl Into<String>>) {
+        self.lines.push(Line::Titles(titles.into_iter().map(Into::into).collect()));
+    }
+
+    /// Adds a rule.
+    pub(crate) fn rule(&mut self) {
+        self.lines.push(Line::Rule);
+    }
+
+    /// Adds lines of text that are in no column.
+    pub(crate) fn text(&mut self, text: impl Into<String>) {
+        self.lines.push(Line::Text(text.into()));
+    }
+
+    /// The width of each column, by group.
+    fn widths(&self) -> Vec<Vec<usize>> {
+        let mut widths: Vec<Vec<usize>> = self.groups.iter().map(|group| vec![0; group.len()]).collect();
+        for line in &self.lines {
+            if let Line::Row(cells) = line {
+                for (width, cell) in widths.iter_mut().flatten().zip(cells) {
+                    *width = (*width).max(length(cell));
+                }
+            }
+        }
+        for line in &self.lines {
+            if let Line::Titles(titles) = line {
+                for (group, title) in widths.iter_mut().zip(titles) {
+                    let missing = length(title).saturating_sub(whole(group));
+                    if let Some(first) = group.first_mut() {
+                        *first += missing;
+                    }
+                }
+            }
+        }
+        widths
+    }
+}
+
+/// The width of a group of columns, which are a space apart.
+fn whole(group: &[usize]) -> usize {
+    group.iter().sum::<usize>() + group.len().saturating_sub(1)
+}
+
+fn length(text: &str) -> usize {
+    text.chars().count()
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let widths = self.widths();
+        for line in &self.lines {
+            let text = match line {
+                Line::Row(cells) => {
+                    let mut cells = cells.iter().map(String::as_str).chain(std::iter::repeat(""));
+                    let groups = widths.iter().zip(&self.groups).map(|(widths, aligns)| {
+                        let cells = widths.iter().zip(aligns).zip(&mut cells);
+                        let padded = cells.map(|((&width, align), cell)| match align {
+                            Align::Left => format!("{cell:width$}"),
+                            Align::Right => format!("{cell:>width$}"),
+                        });
+                        padded.collect::<Vec<_>>().join(" ")
+                    });
+                    groups.collect::<Vec<_>>().join(" | ")
+                }
+                Line::Titles(titles) => {
+                    let titles = titles.iter().map(String::as_str).chain(std::iter::repeat(""));
+                    let groups =
+                        widths.iter().zip(titles).map(|(group, title)| format!("{title:^0$}", whole(group)));
+                    groups.collect::<Vec<_>>().join(" | ")
+                }
+                Line::Rule => {
+                    let groups = widths.iter().map(|group| "-".repeat(whole(group)));
+                    groups.collect::<Vec<_>>().join("-+-")
+                }
+                Line::Text(text) => text.clone(),
+            };
+            writeln!(f, "{}", text.trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_fit_their_cells() {
+        let mut table = Table::new("l|rr|l");
+        table.titles(["", "title", "a longer one"]);
+        table.row(["name", "a", "bcd"]);
+        table.rule();
+        table.row(["ä", "12", "3", "é"]);
+        table.text("  text");
+        let expected = "
+     | title  | a longer one
+name |  a bcd |
+-----+--------+-------------
+ä    | 12   3 | é
+  text
+";
+        assert_eq!(table.to_string(), expected[1..]);
+    }
+}
