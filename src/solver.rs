@@ -2,7 +2,7 @@
 
 use crate::backend::cpu::Mosaic;
 use crate::backend::{Backend, Map, Requested, Stage, Traffic};
-use crate::error::{Error, Result};
+use crate::error::{Error, Purpose, Result};
 use crate::front::illumination::homomorphic;
 use crate::front::label_range;
 use crate::front::matches::{self, Match};
@@ -125,7 +125,7 @@ pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
 /// All stages of a match in one piece; the number of iterations.
 fn run(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work) -> Result<u32> {
     check_size(plan, pair)?;
-    memory::check(plan.front_bytes(), memory::SMALLER_MATCH)?;
+    memory::check(plan.front_bytes(), Purpose::Match)?;
     let right_labels = if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = work.inspector.take();
@@ -160,7 +160,7 @@ pub fn solve_tiles(
 ) -> Result<Solution> {
     let whole = tiles.whole();
     check_size(whole, pair)?;
-    memory::check(tiles.largest().front_bytes(), memory::SMALLER_MATCH)?;
+    memory::check(tiles.largest().front_bytes(), Purpose::Match)?;
     let all: f64 = tiles.list().iter().map(|tile| total_work(&tile.plan)).sum();
     let mut work = Work::new(observer, None, matchings(whole) as f64 * all);
     work.tile = Some((0, matchings(whole) * tiles.count()));

@@ -20,6 +20,7 @@ use crate::batch_record::{Request, State};
 use crate::claim::Claim;
 use crate::outputs;
 use crate::progress::PairBar;
+use crate::remedy;
 use crate::sidecar::Sidecar;
 use crate::sign::Sign;
 use crate::stop;
@@ -322,6 +323,7 @@ impl Batch<'_> {
                 }
                 Ok(Err(error)) => {
                     failed.push(name);
+                    let error = remedy::error(&error, &remedy::COLUMNS);
                     bar.past(|| crate::say(&crate::single_line(&format!("{name}: {error}"))));
                 }
                 Err(Error::Interrupted) => return Err(interrupted()),
@@ -333,7 +335,7 @@ impl Batch<'_> {
         let summary = format!("{done} done, {skipped} skipped, {} failed", failed.len());
         if !failed.is_empty() {
             let text = format!("{summary}: {}; run it again to try these once more", failed.join(", "));
-            return Err(Failure::Incomplete(text));
+            return Err(Failure::Failed(text));
         }
         if !self.args.quiet {
             crate::say(&summary);
@@ -410,7 +412,8 @@ impl Batch<'_> {
         let matched = matcher.run(pair, range, &self.method, &mut |_| stop::go_on())?;
         let time = start.elapsed();
         warnings.extend(check::clipped(&matched.maps, range));
-        Ok((input, matched, time, warnings.iter().map(ToString::to_string).collect()))
+        let warnings = warnings.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)).collect();
+        Ok((input, matched, time, warnings))
     }
 
     /// Puts `outputs` in their place, and then the record. Until that is there the pair is not complete, so the old one goes

@@ -132,8 +132,7 @@ impl Listed {
                 };
                 let calibration_path = left_path.with_file_name("calib.txt");
                 let known = calibration.as_ref().map(|known| (calibration_path.as_path(), known));
-                let found = search.range(&pair, known, Sign::default()).map_err(list::in_columns)?;
-                let Found { range, by_matches } = found;
+                let Found { range, by_matches } = search.range(&pair, known, Sign::default())?;
                 let calibration = calibration.map(|_| calibration_beside(left));
                 let files = Files {
                     left: left.clone(),

@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use crate::batch_list::Listed;
 use crate::outputs;
+use crate::remedy;
 use crate::search::Search;
 use crate::sidecar::Sidecar;
 
@@ -123,7 +124,7 @@ impl Request {
 
     /// The text of the record `path` of a pair that failed.
     pub(super) fn failed(&self, path: &Path, method: &Method, reason: &Error) -> Result<String> {
-        let reason = &crate::single_line(&reason.to_string());
+        let reason = &crate::single_line(&remedy::error(reason, &remedy::COLUMNS));
         let version = env!("CARGO_PKG_VERSION");
         outputs::json_text(path, &Failed { status: "failed", reason, request: self, version, method })
     }

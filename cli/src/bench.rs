@@ -13,6 +13,7 @@ use clap::ValueEnum;
 use mrfgs::backend::Stage;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{self, Gpu};
+use mrfgs::error::ExecutionError;
 use mrfgs::image::{Pair, write};
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
 use mrfgs::plan::Plan;
@@ -23,7 +24,7 @@ use crate::folder::{self, Folder};
 use crate::process::{peak_memory, processor_time};
 use crate::synthetic::{LARGE, SMALL, Synthetic};
 use crate::tables::figure;
-use crate::{MethodArgs, ReadArgs, ResourceArgs, outputs};
+use crate::{Failure, MethodArgs, ReadArgs, ResourceArgs, outputs, remedy};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -146,7 +147,7 @@ struct Figures {
     device_bytes: Option<u64>,
 }
 
-pub(super) fn run(args: &Args) -> Result<()> {
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
     check_output(args)?;
     // What is missing in the last folder is said before the first is matched.
     args.dirs.iter().try_for_each(|dir| Folder::to_match(dir).map(drop))?;
@@ -180,11 +181,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
         methods,
         pairs,
     };
-    outputs::deliver(args.json.as_deref(), &findings, &findings.text(), |_| Ok(()))
+    Ok(outputs::deliver(args.json.as_deref(), &findings, &findings.text(), |_| Ok(()))?)
 }
 
 /// Finds out before any computing whether the output can be written.
-fn check_output(args: &Args) -> Result<()> {
+fn check_output(args: &Args) -> Result<(), Failure> {
     let Some(path) = outputs::json_file(args.json.as_deref()) else { return Ok(()) };
     write::check_path(path)?;
     let inputs: Vec<PathBuf> = args.dirs.iter().flat_map(|dir| folder::inputs(dir)).collect();
@@ -209,7 +210,7 @@ fn made_up(args: &Args) -> Synthetic {
 fn backends(args: &Args) -> Result<Vec<&'static str>> {
     let device = args.resources.device.as_deref();
     if args.backend == Some(Which::Cpu) && device.is_some() {
-        return Err(crate::no_device());
+        return Err(ExecutionError::NeedlessDevice.into());
     }
     let (cpu, gpu) = match args.backend {
         Some(which) => (which != Which::Gpu, which != Which::Cpu),
@@ -225,13 +226,13 @@ fn backends(args: &Args) -> Result<Vec<&'static str>> {
 fn pool(args: &Args) -> Result<rayon::ThreadPool> {
     let threads = args.resources.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|e| Error::option("--threads", e.to_string()))
+    pool.map_err(|e| ExecutionError::Threads(e.to_string()).into())
 }
 
 impl Case<'_> {
     /// Measures in a process of its own, whose memory no case before has touched.
-    fn apart(&self, args: &Args) -> Result<Row> {
-        let failed = |reason: String| Error::Device(reason);
+    fn apart(&self, args: &Args) -> Result<Row, Failure> {
+        let failed = Failure::Failed;
         let program = std::env::current_exe().map_err(|e| Error::read("this program", e))?;
         let run = Command::new(program).args(self.arguments(args)).output();
         let run = run.map_err(|e| failed(format!("a process for a measurement cannot be started: {e}")))?;
@@ -298,8 +299,8 @@ impl Case<'_> {
         let (name, preset) = (self.name(args), self.preset);
         let what = format!("{name}, preset {preset}, {}", self.backend);
         let figures = match self.figures(args, &pair, range) {
-            Err(Error::Memory(reason)) => {
-                crate::say(&format!("{what}: left out: {reason}"));
+            Err(error @ Error::Memory(_)) => {
+                crate::say(&format!("{what}: left out: {}", remedy::error(&error, &remedy::FLAGS)));
                 None
             }
             figures => Some(figures?),

@@ -8,7 +8,7 @@ use mrfgs::evaluation::{Breakdown, Detection, Report, Row, Sparsification, mean,
 use mrfgs::image::write;
 use mrfgs::maps::Maps;
 use mrfgs::options::Method;
-use mrfgs::{Error, Matcher, Result};
+use mrfgs::{Matcher, Result};
 use serde::Serialize;
 
 use crate::ablations::{self, Ablations};
@@ -19,7 +19,7 @@ use crate::report::{self, Destination, Picture};
 use crate::stop;
 use crate::submission::Submission;
 use crate::tables::{self, Comparison};
-use crate::{ExecutionArgs, MethodArgs, ReadArgs};
+use crate::{ExecutionArgs, Failure, MethodArgs, ReadArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -202,7 +202,7 @@ fn over<T>(pairs: &[Figures], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) ->
     mean(&pairs.iter().map(of).collect::<Option<Vec<_>>>()?)
 }
 
-pub(super) fn run(args: &Args) -> Result<()> {
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if args.disparity.is_none() {
         stop::listen();
     }
@@ -239,7 +239,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.breakdown {
         text.push_str(&breakdown::text(&findings));
     }
-    outputs::deliver(args.json.as_deref(), &findings, &text, |written| {
+    Ok(outputs::deliver(args.json.as_deref(), &findings, &text, |written| {
         if let Some(submission) = submission {
             let place = submission.place().to_owned();
             written.note(&place, submission.publish())?;
@@ -248,11 +248,11 @@ pub(super) fn run(args: &Args) -> Result<()> {
             Some(destination) => report::write(&destination, &findings, &pictures),
             None => Ok(()),
         }
-    })
+    })?)
 }
 
 /// Finds out before any computing whether the outputs can be written, and begins the folders among them.
-fn check_outputs(args: &Args) -> Result<(Option<Destination<'_>>, Option<Submission>)> {
+fn check_outputs(args: &Args) -> Result<(Option<Destination<'_>>, Option<Submission>), Failure> {
     let destination = args.report.as_deref().map(Destination::check).transpose()?;
     let submission = match args.submission.as_deref() {
         Some([dir, method]) => {
@@ -312,11 +312,11 @@ fn finished_map(
 }
 
 /// The folders, all complete: what is missing in the last is said before the first is matched.
-fn folders(args: &Args) -> Result<Vec<Folder<'_>>> {
+fn folders(args: &Args) -> Result<Vec<Folder<'_>>, Failure> {
     let folders = args.dirs.iter().map(|dir| Folder::of(dir)).collect::<Result<Vec<_>>>()?;
     if args.truth_scale.is_some() && !folders.iter().any(Folder::is_scaled) {
-        let reason = "no folder holds a truth of 8 bits, and disp0GT.pfm is in pixels; leave it out";
-        return Err(Error::option("--truth-scale", reason));
+        let reason = "no folder holds a truth of 8 bits, and disp0GT.pfm is in pixels; omit it";
+        return Err(Failure::Usage(format!("--truth-scale: {reason}")));
     }
     Ok(folders)
 }
@@ -355,7 +355,7 @@ fn match_all(
 }
 
 /// Prints the paper's tables beside ours.
-fn compare(args: &Args) -> Result<()> {
+fn compare(args: &Args) -> Result<(), Failure> {
     let folders = folders(args)?;
     let mut matcher = Matcher::new(&args.execution.execution()?)?;
     let mut found = Vec::new();
@@ -365,11 +365,11 @@ fn compare(args: &Args) -> Result<()> {
             .push((preset, match_all(args, &folders, &mut matcher, method, Some(preset), |_, _, _| Ok(()))?));
     }
     let comparison = Comparison::new(&found);
-    outputs::deliver(args.json.as_deref(), &comparison, &comparison.text(), |_| Ok(()))
+    Ok(outputs::deliver(args.json.as_deref(), &comparison, &comparison.text(), |_| Ok(()))?)
 }
 
 /// Prints what the default is without each of its parts.
-fn ablate(args: &Args) -> Result<()> {
+fn ablate(args: &Args) -> Result<(), Failure> {
     let folders = folders(args)?;
     let mut matcher = Matcher::new(&args.execution.execution()?)?;
     let mut run = |row: &ablations::Row, called: &str| {
@@ -382,5 +382,5 @@ fn ablate(args: &Args) -> Result<()> {
         found.push((*row, run(row, row.0)?));
     }
     let ablations = Ablations::new(&found);
-    outputs::deliver(args.json.as_deref(), &ablations, &ablations.text(), |_| Ok(()))
+    Ok(outputs::deliver(args.json.as_deref(), &ablations, &ablations.text(), |_| Ok(()))?)
 }

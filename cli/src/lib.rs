@@ -18,6 +18,7 @@ mod outputs;
 mod presets;
 mod process;
 mod progress;
+mod remedy;
 mod report;
 mod search;
 mod shell;
@@ -38,6 +39,7 @@ use std::time::{Duration, Instant};
 use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand, ValueEnum};
 use mrfgs::backend::gpu;
+use mrfgs::error::{ExecutionError, RangeError};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::{MAX_PIXELS, Reader};
@@ -104,8 +106,8 @@ impl Command {
 pub(crate) enum Failure {
     /// The command line makes no sense.
     Usage(String),
-    /// Some pairs of a batch failed.
-    Incomplete(String),
+    /// Something failed that the library has no error for, such as some pairs of a batch.
+    Failed(String),
     /// The user stopped it.
     Stopped(String),
     /// Anything else.
@@ -115,9 +117,17 @@ pub(crate) enum Failure {
 impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Usage(_) | Self::Error(Error::Option { .. }) => ExitCode::from(2),
+            Self::Error(Error::Range(RangeError::NotFound)) => ExitCode::FAILURE,
+            Self::Usage(_)
+            | Self::Error(
+                Error::Option { .. }
+                | Error::Preset { .. }
+                | Error::Range(_)
+                | Error::Execution(_)
+                | Error::Budget(_),
+            ) => ExitCode::from(2),
             Self::Stopped(_) => ExitCode::from(stop::STOPPED),
-            Self::Incomplete(_) | Self::Error(_) => ExitCode::FAILURE,
+            Self::Failed(_) | Self::Error(_) => ExitCode::FAILURE,
         }
     }
 }
@@ -126,8 +136,8 @@ impl fmt::Display for Failure {
     /// One line, whatever names of files hold.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let text = match self {
-            Self::Usage(text) | Self::Incomplete(text) | Self::Stopped(text) => text.clone(),
-            Self::Error(error) => error.to_string(),
+            Self::Usage(text) | Self::Failed(text) | Self::Stopped(text) => text.clone(),
+            Self::Error(error) => remedy::error(error, &remedy::FLAGS),
         };
         f.write_str(&single_line(&text))
     }
@@ -356,7 +366,7 @@ impl ExecutionArgs {
     fn execution(&self) -> Result<Execution> {
         let ResourceArgs { device, threads } = &self.resources;
         if self.backend == Backend::Cpu && device.is_some() {
-            return Err(no_device());
+            return Err(ExecutionError::NeedlessDevice.into());
         }
         if let Some(threads) = threads {
             // What is done around a match (reading, the look at what may be wrong) is bound by it too. A second call changes
@@ -376,17 +386,12 @@ impl ExecutionArgs {
     }
 }
 
-/// `--device` beside `--backend cpu`.
-fn no_device() -> Error {
-    Error::option("--device", "`--backend cpu` runs on no device; leave one of the two away")
-}
-
 /// The range that `path`, a calib.txt, has read as `calibration`, gives from `min` on; `None` where it gives none.
 fn calibrated_range(path: &Path, calibration: &Calibration, min: i32) -> Result<Option<DisparityRange>> {
     let Some(ndisp) = calibration.ndisp else { return Ok(None) };
     let max = i32::try_from(ndisp).unwrap_or(i32::MAX) - 1;
     match DisparityRange::new(min, max) {
-        Err(Error::Option { reason, .. }) => Err(Error::read(path, format!("ndisp={ndisp}: {reason}"))),
+        Err(Error::Range(cause)) => Err(Error::read(path, format!("ndisp={ndisp}: {cause}"))),
         range => range.map(Some),
     }
 }

@@ -15,6 +15,8 @@ use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use mrfgs::text::{self, quoted};
 use mrfgs::{Error, Result};
 
+use crate::remedy;
+
 /// What the header of a list may name; the first three it must.
 const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
 const REQUIRED: usize = 3;
@@ -93,19 +95,6 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// An error of the range, told by the list's columns rather than by flags.
-#[must_use]
-pub fn in_columns(error: Error) -> Error {
-    match error {
-        Error::Option { name, reason } => Error::Option {
-            name: name.trim_start_matches("--").replace('-', "_"),
-            reason: reason.replace("--min-disparity", "min_disparity"),
-        },
-        Error::Mismatch(reason) => Error::Mismatch(reason.replace("--max-disparity", "max_disparity")),
-        error => error,
-    }
-}
-
 /// The fields of a line of CSV.
 fn fields(line: &str) -> StringRecord {
     let mut reader =
@@ -124,7 +113,7 @@ fn columns(header: &StringRecord) -> std::result::Result<Vec<&'static str>, Stri
             format!("{} is no column; the header names the columns, of {known}", quoted(field))
         })?;
         if columns.contains(&column) {
-            return Err(format!("there are two columns {column}; leave one away"));
+            return Err(format!("there are two columns {column}; remove one"));
         }
         columns.push(column);
     }
@@ -162,7 +151,7 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     };
     if let Some(Largest::Pixels(max)) = row.max_disparity {
         let range = DisparityRange::new(row.min_disparity.unwrap_or(0), max);
-        range.map_err(|error| in_columns(error).to_string())?;
+        range.map_err(|error| remedy::error(&error, &remedy::COLUMNS))?;
     }
     Ok(row)
 }

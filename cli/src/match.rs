@@ -15,11 +15,12 @@ use mrfgs::{Error, Matcher, Result};
 
 use crate::intermediates::Intermediates;
 use crate::match_outputs::{MoreOutputs, Outcome};
+use crate::remedy;
 use crate::search::{Found, Search};
 use crate::sidecar::{Files, Sidecar};
 use crate::sign::Sign;
 use crate::stop;
-use crate::{ExecutionArgs, MethodArgs, ReadArgs, bytes, plural};
+use crate::{ExecutionArgs, Failure, MethodArgs, ReadArgs, bytes, plural};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -88,7 +89,7 @@ pub(super) struct Args {
     more: MoreOutputs,
 }
 
-pub(super) fn run(args: &Args) -> Result<()> {
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
     stop::listen();
     let mut method = args.method.method()?;
     if args.no_fill {
@@ -101,7 +102,9 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let Found { range, by_matches } = args.search.range(&pair, known, args.sign)?;
     if by_matches && !args.quiet {
         let DisparityRange { min, max } = args.sign.range(range);
-        crate::say(&format!("disparities {min} to {max}, by sparse matches; --max-disparity says otherwise"));
+        crate::say(&format!(
+            "disparities {min} to {max}, found by sparse matches; --max-disparity sets another range"
+        ));
     }
     let rig = rig(args, &pair, calibration.as_ref())?;
     let inputs = [
@@ -119,7 +122,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let plan = Plan::new(pair.size().0, pair.size().1, range, &method)?;
     if args.dry_run {
-        return crate::print(&describe(&Tiles::new(&plan)?));
+        return Ok(crate::print(&describe(&Tiles::new(&plan)?))?);
     }
     let mut matcher = Matcher::new(&execution)?;
     let steps = args.more.intermediates.as_deref().map(|folder| Intermediates::new(folder, plan));
@@ -175,13 +178,13 @@ fn calibration(args: &Args) -> Result<Option<Calibrated>> {
 }
 
 /// The cameras, where depth or points are asked for.
-fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Option<Rig>> {
+fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Option<Rig>, Failure> {
     let Some(flag) = args.more.take_cameras() else { return Ok(None) };
     let Some((path, calibration)) = calibration else {
         let left = args.left.display();
-        let reason =
-            format!("takes the cameras, and there is no calib.txt beside {left}; give one with --calib");
-        return Err(Error::option(flag, reason));
+        return Err(Failure::Usage(format!(
+            "{flag} takes the cameras, and there is no calib.txt beside {left}; give one with --calib"
+        )));
     };
     let (width, height) = pair.size();
     let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
@@ -192,18 +195,19 @@ fn rig(args: &Args, pair: &Pair, calibration: Option<&Calibrated>) -> Result<Opt
             size.0,
             size.1,
             args.left.display()
-        )));
+        ))
+        .into());
     }
     match Rig::new(calibration) {
-        Err(Error::Option { reason, .. }) => Err(Error::read(path, reason)),
-        rig => rig.map(Some),
+        Err(Error::Calibration(reason)) => Err(Error::read(path, reason).into()),
+        rig => Ok(Some(rig?)),
     }
 }
 
 /// Says on standard error what is probably wrong.
 fn warn(warnings: impl IntoIterator<Item = Warning>) {
     for warning in warnings {
-        crate::say(&format!("warning: {warning}"));
+        crate::say(&format!("warning: {}", remedy::warning(&warning, &remedy::FLAGS)));
     }
 }
 

@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use mrfgs::Result;
 use mrfgs::depth::Rig;
 use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Image, pfm, ply, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
+use mrfgs::{Error, Result};
 
 use crate::intermediates::Intermediates;
 use crate::outputs::{self, StagedFolder, Written};
-use crate::plural;
 use crate::sidecar::Sidecar;
 use crate::sign::Sign;
+use crate::{Failure, plural};
 
 /// The outputs besides the map.
 #[derive(clap::Args)]
@@ -107,7 +107,12 @@ impl MoreOutputs {
     }
 
     /// Finds out before any computing whether all outputs can be written; `inputs` come with their names.
-    pub(super) fn check(&self, output: &Path, inputs: &[(&str, &Path)], range: DisparityRange) -> Result<()> {
+    pub(super) fn check(
+        &self,
+        output: &Path,
+        inputs: &[(&str, &Path)],
+        range: DisparityRange,
+    ) -> Result<(), Failure> {
         let steps = self.intermediates.as_deref().map(StagedFolder::new_or_empty).transpose()?;
         if outputs::is_printed(output) {
             outputs::check_standard_output()?;
@@ -186,7 +191,8 @@ impl MoreOutputs {
             }
             written.note(path, write::rgb8(path, &picture))?;
         }
-        let json = self.json.as_deref().map(|path| Ok((path, outputs::json_text(path, sidecar)?)));
+        let json =
+            self.json.as_deref().map(|path| Ok::<_, Error>((path, outputs::json_text(path, sidecar)?)));
         let json = json.transpose()?;
         if let Some((path, text)) = json.as_ref().filter(|(path, _)| !outputs::is_printed(path)) {
             written.note(path, write::save(path, text.as_bytes()))?;

@@ -8,17 +8,18 @@ use mrfgs::image::write;
 use mrfgs::{Error, Result};
 use serde::Serialize;
 
+use crate::Failure;
 use crate::claim::{Claim, FOLDERS};
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
-pub(super) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
+pub(super) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<(), Failure> {
     let mut taken: Vec<(&str, PathBuf)> =
         inputs.iter().filter_map(|(name, path)| Some((*name, place(path)?))).collect();
     for (name, path) in outputs {
         let Some(place) = place(path) else { continue };
         if let Some((other, _)) = taken.iter().find(|(_, p)| *p == place) {
-            let reason = format!("{} is {other} already; give another name", path.display());
-            return Err(Error::option(*name, reason));
+            let path = path.display();
+            return Err(Failure::Usage(format!("{name}: {path} is {other} already; give another name")));
         }
         taken.push((name, place));
     }
@@ -39,10 +40,15 @@ fn parent(path: &Path) -> &Path {
 }
 
 /// Refuses a file or folder in a folder that is replaced as a whole; each comes with the name of its flag.
-pub(super) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
+pub(super) fn outside(
+    (folder_name, folder): (&str, &Path),
+    (name, path): (&str, &Path),
+) -> Result<(), Failure> {
     if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
-        let reason = format!("{} lies in the folder of {folder_name}; give another name", path.display());
-        return Err(Error::option(name, reason));
+        let path = path.display();
+        return Err(Failure::Usage(format!(
+            "{name}: {path} lies in the folder of {folder_name}; give another name"
+        )));
     }
     Ok(())
 }

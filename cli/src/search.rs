@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use crate::list::{self, Largest};
+use mrfgs::Result;
+use mrfgs::error::RangeError;
 use mrfgs::front::check;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::DisparityRange;
-use mrfgs::{Error, Result};
 use serde::Serialize;
 
 use crate::sign::Sign;
@@ -69,19 +70,11 @@ impl Search {
             let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
             between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };
-        let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
-        if i64::from(range.min) >= width || i64::from(range.max) <= -width {
-            let DisparityRange { min, max } = sign.range(range);
-            let reason = format!(
-                "no disparity from {min} to {max} is inside images {width} pixels wide; give those of the pair"
-            );
-            return Err(Error::option("--max-disparity", reason));
-        }
+        sign.range(range).within(pair.size().0)?;
         Ok(Found { range, by_matches: given.is_none() })
     }
 }
 
 fn by_matches(pair: &Pair) -> Result<DisparityRange> {
-    let lacking = "the views have too few matches to find the range of disparities; give --max-disparity";
-    check::range(pair)?.ok_or_else(|| Error::Mismatch(lacking.into()))
+    check::range(pair)?.ok_or_else(|| RangeError::NotFound.into())
 }

@@ -12,6 +12,7 @@ use mrfgs::image::{Plane, write};
 use mrfgs::options::Fill;
 use mrfgs::{Error, Result};
 
+use crate::Failure;
 use crate::outputs::StagedFolder;
 
 /// A folder of maps in the making.
@@ -24,8 +25,8 @@ pub(super) struct Submission {
 
 impl Submission {
     /// Begins the folder `dir`, a new or an empty one, for the pairs called `names`.
-    pub(super) fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self> {
-        let error = |reason: String| Err(Error::option("--submission", reason));
+    pub(super) fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self, Failure> {
+        let error = |reason: String| Err(Failure::Usage(format!("--submission: {reason}")));
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let Some(method) = method.to_str().filter(|m| !m.is_empty() && m.chars().all(plain)) else {
             return error(format!("{} is no METHOD: give letters, digits, - and _", method.display()));

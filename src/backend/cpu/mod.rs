@@ -20,7 +20,7 @@ mod units;
 mod winner_takes_all;
 
 use super::{Backend, Map, PaddedRows, Requested, Stage, Traffic, Volume, volume_shape};
-use crate::error::Result;
+use crate::error::{Purpose, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane, Rect};
 use crate::maps::Maps;
@@ -398,7 +398,7 @@ impl Backend for Cpu {
             _ => {
                 // What the last match holds goes before the next one asks for more.
                 self.state = None;
-                memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
+                memory::check(plan.bytes(), Purpose::Match)?;
                 self.state = Some(match plan.volume_width {
                     VolumeWidth::Narrow => State::Narrow(Volumes::new(plan, pair, graphs)?),
                     VolumeWidth::Wide => State::Wide(Volumes::new(plan, pair, graphs)?),

@@ -2,7 +2,7 @@
 
 use super::Finest;
 use crate::backend::{Backend, Map, NO_LABEL, Stage};
-use crate::error::Result;
+use crate::error::{Purpose, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
@@ -25,7 +25,7 @@ impl Mosaic {
     /// # Errors
     /// [`crate::Error::Memory`] when the machine cannot hold them.
     pub fn new(plan: &Plan, pair: &Pair) -> Result<Self> {
-        memory::check(plan.mosaic_bytes(), memory::SMALLER_MATCH)?;
+        memory::check(plan.mosaic_bytes(), Purpose::Match)?;
         let (width, height) = plan.size();
         let maps = Finest {
             right: Plane::filled(width, height, NO_LABEL),

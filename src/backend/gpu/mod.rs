@@ -16,12 +16,12 @@ mod upload;
 mod values;
 
 use super::{Backend, Map, Requested, Stage, Traffic, Volume};
-use crate::error::{Error, Result};
+use crate::error::{DeviceError, Error, Purpose, Result};
 use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
-use crate::plan::Plan;
+use crate::plan::{LevelPlan, Plan};
 use crate::weights::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
@@ -130,15 +130,9 @@ impl Gpu {
     fn pipeline(&mut self, kernel: Kernel, plan: &Plan, level: usize) -> Result<wgpu::ComputePipeline> {
         let loops = kernel.loop_iterations(plan, level);
         if loops > MAX_LOOP_ITERATIONS {
-            return Err(Error::Device(format!(
-                "{} x {} pixels and {} labels with {} neighbours are too many for one invocation of the shader `{}`: use \
-                 --backend cpu",
-                plan.levels[0].width,
-                plan.levels[0].height,
-                plan.levels[0].labels,
-                plan.neighbours,
-                kernel.name()
-            )));
+            let LevelPlan { width, height, labels, .. } = plan.levels[0];
+            let (neighbours, shader) = (plan.neighbours, kernel.name());
+            return Err(DeviceError::TooLargeForShader { width, height, labels, neighbours, shader }.into());
         }
         let variant = Variant::new(kernel, plan, level);
         if let Some(pipeline) = self.pipelines.get(&(kernel, variant)) {
@@ -338,7 +332,7 @@ impl Backend for Gpu {
                 // What the last match holds goes before the next one asks for more.
                 drop(other);
                 if self.device.software {
-                    memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
+                    memory::check(plan.bytes(), Purpose::Match)?;
                 }
                 let buffers = Buffers::new(&self.device, plan)?;
                 let steps = self.steps(plan, &buffers)?;

@@ -5,7 +5,7 @@ use super::buffers::{Binding, Buffers, Copy, Rows, with_halo};
 use super::kernels::{JOINED_COLUMNS, Kernel, Params, SEGMENT};
 use super::{Gpu, WORKGROUP};
 use crate::backend::Stage;
-use crate::error::{Error, Result};
+use crate::error::{Error, MemoryError, Result};
 use crate::options::{Cost, LeftRightCheck, Median};
 use crate::plan::Plan;
 use crate::weights::MedianWeights;
@@ -447,13 +447,13 @@ impl Gpu {
                     break;
                 }
                 if rows == 1 {
-                    return Err(Error::Memory(format!(
-                        "what a row of the image depends on takes {} KiB and {} lets a shader see {} KiB at once: use \
-                         --backend cpu, or a smaller image or range",
-                        most >> 10,
-                        self.device.name,
-                        self.device.max_binding >> 10
-                    )));
+                    return Err(MemoryError::Buffer {
+                        name: self.device.name.clone(),
+                        what: "one row of the image and what it depends on".into(),
+                        needed: most,
+                        allowed: self.device.max_binding,
+                    }
+                    .into());
                 }
                 rows -= rows.div_ceil(8).min(rows - 1);
             }
