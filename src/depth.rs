@@ -21,10 +21,10 @@ impl Rig {
     /// The rig that a calibration file describes.
     ///
     /// # Errors
-    /// [`Error::Option`] that names what the file lacks of `cam0`, `doffs` and `baseline`, or a baseline that is not
+    /// [`Error::Calibration`] that names what the file lacks of `cam0`, `doffs` and `baseline`, or a baseline that is not
     /// above 0.
     pub fn new(calibration: &Calibration) -> Result<Self> {
-        let error = |reason: String| Err(Error::option("calibration", reason));
+        let error = |reason: String| Err(Error::Calibration(reason));
         let &Calibration { camera, doffs, baseline, .. } = calibration;
         let (Some(camera), Some(doffs), Some(baseline)) = (camera, doffs, baseline) else {
             let known =

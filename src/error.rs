@@ -1,56 +1,369 @@
-//! The one error type. Every message names the thing that failed and the way out.
+//! What can go wrong, in types.
+//!
+//! Each error says in plain words what is wrong, with its names and numbers. The remedy is often a flag or an argument
+//! of the front end that was used, which this library does not know: a front end matches on the cause, and adds its
+//! own words.
 
 use std::path::{Path, PathBuf};
 
-/// What can go wrong, in words that a user can act on.
-#[derive(Debug, thiserror::Error)]
+/// What can go wrong.
+///
+/// The request was wrong: [`Error::Option`], [`Error::Preset`], [`Error::Range`], [`Error::Execution`] and
+/// [`Error::Budget`]. The machine cannot serve it: [`Error::Device`] and [`Error::Memory`]. The others are about data.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be read, or is not what its name says.
-    #[error("cannot read {}: {reason}", path.display())]
+    #[error("cannot read {}: {cause}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and the remedy where there is one.
-        reason: String,
+        /// What is wrong with it.
+        cause: ReadError,
     },
     /// A file could not be written; nothing of it is left behind.
     #[error("cannot write {}: {reason}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// What went wrong, and the remedy where there is one.
+        /// What went wrong.
         reason: String,
     },
-    /// An option, a flag or an argument has a value that makes no sense.
-    #[error("{name}: {reason}")]
+    /// A key of a [`Method`](crate::options::Method) has a value that makes no sense, or does not exist.
+    #[error("{key}: {cause}")]
     Option {
-        /// The option's key or the flag, as the user wrote it.
-        name: String,
-        /// What is wrong with the value, and what would be right.
-        reason: String,
+        /// The key, such as `levels`.
+        key: String,
+        /// What is wrong with it.
+        cause: OptionError,
     },
+    /// There is no preset of this name.
+    #[error("there is no preset `{name}`; there are {}", known.join(", "))]
+    Preset {
+        /// The name that was asked for.
+        name: String,
+        /// The names of the presets.
+        known: Vec<&'static str>,
+    },
+    /// The range of disparities makes no sense, or none can be found.
+    #[error("disparity range: {0}")]
+    Range(RangeError),
+    /// What should run the match makes no sense, or is not there.
+    #[error("{0}")]
+    Execution(ExecutionError),
+    /// The memory that the method grants to a match is too little for what is asked.
+    #[error("{0}")]
+    Budget(BudgetError),
+    /// A calibration lacks what depth needs, or makes no sense.
+    #[error("the calibration {0}")]
+    Calibration(String),
     /// Images, masks or maps that belong together do not fit each other.
     #[error("{0}")]
     Mismatch(String),
-    /// No device, or one that cannot do the job, or one that failed.
+    /// There is no device, or the one that there is failed.
     #[error("{0}")]
-    Device(String),
-    /// The job needs more memory than it was given.
+    Device(DeviceError),
+    /// The machine or the device has not enough memory.
     #[error("{0}")]
-    Memory(String),
-    /// The caller's progress callback asked to stop.
+    Memory(MemoryError),
+    /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
 }
 
+/// Why a file cannot be read.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// Its header claims more pixels than the reader's limit.
+    #[error("claims {width} x {height} pixels and at most {limit} are read")]
+    TooManyPixels {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// Most pixels that are read.
+        limit: u64,
+    },
+    /// It is larger than any image within the reader's limit.
+    #[error("has more bytes than {limit} pixels can take")]
+    TooManyBytes {
+        /// Most pixels that are read.
+        limit: u64,
+    },
+    /// An 8-bit PNG was read as a disparity map, and nothing tells the scale of its values.
+    #[error(
+        "is an 8-bit PNG, which does not tell the scale of its disparities; disparity maps are .pfm, float .tif, or \
+         16-bit .png with disparity times 256"
+    )]
+    UnknownScale,
+    /// A scale was given for a disparity map that is no grey 8-bit PNG.
+    #[error("is no grey 8-bit PNG, and only such a disparity map needs a scale")]
+    NeedlessScale,
+    /// The file says which value stands for no data, but not as a number.
+    #[error("has the no-data value {value}, which is no number")]
+    NoData {
+        /// What it says.
+        value: String,
+    },
+    /// There is not enough memory to read it.
+    #[error("{0}")]
+    Memory(MemoryError),
+    /// It is a file of options, one of which makes no sense.
+    #[error("{}{key}: {cause}", line.map_or(String::new(), |line| format!("line {line}: ")))]
+    Option {
+        /// The line, from 1, where it is known.
+        line: Option<usize>,
+        /// The key.
+        key: String,
+        /// What is wrong with it.
+        cause: OptionError,
+    },
+    /// Anything else, in words that say what to do where there is something to do.
+    #[error("{0}")]
+    Other(String),
+}
+
+/// What is wrong with a key of a [`Method`](crate::options::Method).
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OptionError {
+    /// There is no such key.
+    #[error("there is no such key")]
+    Unknown,
+    /// The value is of the wrong kind.
+    #[error("expected {expected}, not {found}")]
+    WrongKind {
+        /// The values that the key takes: `levels, 1 to 16`.
+        expected: String,
+        /// The value that was given.
+        found: String,
+    },
+    /// The value is outside its range.
+    #[error("{value} is outside {low} to {high}")]
+    OutOfRange {
+        /// The value that was given.
+        value: f64,
+        /// The smallest value.
+        low: f64,
+        /// The largest value.
+        high: f64,
+    },
+    /// The value must be odd.
+    #[error("{value} is not odd; take {} or {}", value.saturating_sub(1), value + 1)]
+    NotOdd {
+        /// The value that was given.
+        value: u32,
+    },
+}
+
+/// What is wrong with a range of disparities; all numbers are in pixels.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RangeError {
+    /// The largest disparity is below the smallest.
+    #[error("{max} is below the minimum disparity {min}")]
+    Empty {
+        /// The smallest disparity.
+        min: i32,
+        /// The largest disparity.
+        max: i32,
+    },
+    /// A disparity is too far from 0.
+    #[error("{disparity} is out of reach: disparities are within {limit} px of 0")]
+    TooFar {
+        /// The disparity.
+        disparity: i32,
+        /// The largest absolute disparity.
+        limit: i32,
+    },
+    /// The range has too many labels.
+    #[error("{min} to {max} are {} labels and at most {limit} fit", i64::from(*max) - i64::from(*min) + 1)]
+    TooManyLabels {
+        /// The smallest disparity.
+        min: i32,
+        /// The largest disparity.
+        max: i32,
+        /// Most labels of a range.
+        limit: usize,
+    },
+    /// Every disparity of the range leads outside the images.
+    #[error("no disparity from {min} to {max} is inside images {width} pixels wide")]
+    OutsideImages {
+        /// The smallest disparity.
+        min: i32,
+        /// The largest disparity.
+        max: i32,
+        /// The width of the images.
+        width: usize,
+    },
+    /// No range was given, and the sparse matches are too few to find it.
+    #[error("the views have too few matches to find the range of disparities")]
+    NotFound,
+}
+
+/// What is wrong with an [`Execution`](crate::options::Execution).
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExecutionError {
+    /// A device is named for the CPU path.
+    #[error("a device is named, and the CPU path runs on none")]
+    NeedlessDevice,
+    /// No device has this name or index.
+    #[error("no device is called `{wanted}`; there are {}", present.join(", "))]
+    NoSuchDevice {
+        /// The name or index that was asked for.
+        wanted: String,
+        /// The devices, each as `index: name`.
+        present: Vec<String>,
+    },
+    /// The number of threads is 0.
+    #[error("0 threads do nothing; at least 1 is needed")]
+    NoThreads,
+    /// The system does not start the threads.
+    #[error("the threads cannot be started: {0}")]
+    Threads(String),
+}
+
+/// For what the memory that a method grants to a match is too little; all sizes are in MiB.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BudgetError {
+    /// Even the smallest tiles need more.
+    #[error(
+        "{memory} MiB of memory are too few for {width} x {height} pixels and {labels} labels, which need {needed} MiB \
+         even in the smallest tiles"
+    )]
+    NoTileFits {
+        /// The memory that is granted.
+        memory: u32,
+        /// Columns of the image.
+        width: usize,
+        /// Rows of the image.
+        height: usize,
+        /// Labels of the range.
+        labels: usize,
+        /// The least that would do.
+        needed: u64,
+    },
+    /// The steps of a match are inspected, and the image is cut into tiles.
+    #[error(
+        "the steps of a match can only be shown for an image in one piece: this one is cut into {tiles} tiles, and needs \
+         {needed} MiB of memory in one piece"
+    )]
+    StepsOfTiles {
+        /// The number of tiles.
+        tiles: usize,
+        /// What one piece would take.
+        needed: u64,
+    },
+}
+
+/// Why a device does not do the job.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// The machine has no driver for any device.
+    #[error("no Vulkan or Metal driver found")]
+    NoDriver,
+    /// The device gets a small test pair wrong.
+    #[error("{name} computes other maps than the CPU path on a test pair")]
+    WrongMaps {
+        /// The device.
+        name: String,
+    },
+    /// The job takes more iterations of a loop than a driver can be trusted with.
+    #[error(
+        "{width} x {height} pixels and {labels} labels with {neighbours} neighbours are too many for one invocation of \
+         the shader `{shader}`"
+    )]
+    TooLargeForShader {
+        /// Columns of the image.
+        width: usize,
+        /// Rows of the image.
+        height: usize,
+        /// Labels of the range.
+        labels: usize,
+        /// Neighbours in each dependency factor.
+        neighbours: usize,
+        /// The shader.
+        shader: &'static str,
+    },
+    /// The device or its driver failed, or was lost.
+    #[error("{name}: {reason}")]
+    Failed {
+        /// The device.
+        name: String,
+        /// What its driver says, in one line.
+        reason: String,
+    },
+}
+
+/// What there is not enough memory for; all sizes are in bytes.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MemoryError {
+    /// The machine has too little, or does not let this process have it.
+    #[error(
+        "{} of memory are needed and {}",
+        size(*needed),
+        available.map_or("cannot be had".into(), |free| format!("{} are free", size(free)))
+    )]
+    Machine {
+        /// What is needed.
+        needed: u64,
+        /// What is free, where the system says so.
+        available: Option<u64>,
+        /// What needs it.
+        purpose: Purpose,
+    },
+    /// The device has too little for the match.
+    #[error("the match needs {} of memory and {name} has {}", size(*needed), size(*available))]
+    Device {
+        /// The device.
+        name: String,
+        /// What is needed.
+        needed: u64,
+        /// What the device has.
+        available: u64,
+    },
+    /// The device does not allow one buffer, or one view of it, to be so large.
+    #[error("a buffer for {what} takes {} and {name} allows {}", size(*needed), size(*allowed))]
+    Buffer {
+        /// The device.
+        name: String,
+        /// What the buffer holds.
+        what: String,
+        /// What is needed.
+        needed: u64,
+        /// Most that the device allows.
+        allowed: u64,
+    },
+    /// The device ran out of memory on the way.
+    #[error("{name} is out of memory")]
+    Exhausted {
+        /// The device.
+        name: String,
+    },
+}
+
+/// What memory is needed for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Purpose {
+    /// Matching: its size follows from the image, the range and the method.
+    Match,
+    /// Reading or preparing an image: its size follows from the image alone.
+    Image,
+}
+
 /// Shorthand for results of this crate.
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
     /// An [`Error::Read`] for `path`.
-    pub fn read(path: impl AsRef<Path>, reason: impl ToString) -> Self {
-        Self::Read { path: path.as_ref().to_owned(), reason: reason.to_string() }
+    pub fn read(path: impl AsRef<Path>, cause: impl Into<ReadError>) -> Self {
+        Self::Read { path: path.as_ref().to_owned(), cause: cause.into() }
     }
 
     /// An [`Error::Write`] for `path`.
@@ -58,8 +371,191 @@ impl Error {
         Self::Write { path: path.as_ref().to_owned(), reason: reason.to_string() }
     }
 
-    /// An [`Error::Option`] for the option or flag `name`.
-    pub fn option(name: impl Into<String>, reason: impl Into<String>) -> Self {
-        Self::Option { name: name.into(), reason: reason.into() }
+    /// An [`Error::Option`] for `key`.
+    pub fn option(key: impl Into<String>, cause: OptionError) -> Self {
+        Self::Option { key: key.into(), cause }
+    }
+}
+
+impl From<RangeError> for Error {
+    fn from(cause: RangeError) -> Self {
+        Self::Range(cause)
+    }
+}
+
+impl From<ExecutionError> for Error {
+    fn from(cause: ExecutionError) -> Self {
+        Self::Execution(cause)
+    }
+}
+
+impl From<BudgetError> for Error {
+    fn from(cause: BudgetError) -> Self {
+        Self::Budget(cause)
+    }
+}
+
+impl From<DeviceError> for Error {
+    fn from(cause: DeviceError) -> Self {
+        Self::Device(cause)
+    }
+}
+
+impl From<MemoryError> for Error {
+    fn from(cause: MemoryError) -> Self {
+        Self::Memory(cause)
+    }
+}
+
+impl From<MemoryError> for ReadError {
+    fn from(cause: MemoryError) -> Self {
+        Self::Memory(cause)
+    }
+}
+
+impl From<String> for ReadError {
+    fn from(reason: String) -> Self {
+        Self::Other(reason)
+    }
+}
+
+impl From<&str> for ReadError {
+    fn from(reason: &str) -> Self {
+        Self::Other(reason.into())
+    }
+}
+
+impl From<std::io::Error> for ReadError {
+    fn from(error: std::io::Error) -> Self {
+        Self::Other(error.to_string())
+    }
+}
+
+/// A number of bytes for people.
+fn size(bytes: u64) -> String {
+    let [kib, mib] = [10, 20].map(|bits| bytes as f64 / f64::from(1 << bits));
+    match mib {
+        _ if mib < 1.0 => format!("{:.0} KiB", kib.ceil()),
+        _ if mib < 1024.0 => format!("{:.0} MiB", mib.ceil()),
+        _ => format!("{:.1} GiB", mib / 1024.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::front::check::Warning;
+    use std::fs;
+
+    /// An error of every cause.
+    fn every() -> Vec<Error> {
+        let name = || "device".to_owned();
+        let read = |cause: ReadError| Error::read("a.png", cause);
+        let option = |cause| Error::option("levels", cause);
+        let wrong_kind = OptionError::WrongKind { expected: "levels, 1 to 16".into(), found: "2.5".into() };
+        let machine = |available, purpose| MemoryError::Machine { needed: 3 << 30, available, purpose };
+        vec![
+            read(ReadError::TooManyPixels { width: 9, height: 9, limit: 80 }),
+            read(ReadError::TooManyBytes { limit: 80 }),
+            read(ReadError::UnknownScale),
+            read(ReadError::NeedlessScale),
+            read(ReadError::NoData { value: "`none`".into() }),
+            read(machine(None, Purpose::Image).into()),
+            read(ReadError::Option { line: Some(3), key: "levels".into(), cause: OptionError::Unknown }),
+            read(ReadError::Other("is empty".into())),
+            Error::write("a.png", "disk full"),
+            option(OptionError::Unknown),
+            option(wrong_kind),
+            option(OptionError::OutOfRange { value: 99.0, low: 1.0, high: 16.0 }),
+            option(OptionError::NotOdd { value: 4 }),
+            Error::Preset { name: "best".into(), known: vec!["default", "paper"] },
+            RangeError::Empty { min: 5, max: 4 }.into(),
+            RangeError::TooFar { disparity: 1 << 21, limit: 1 << 20 }.into(),
+            RangeError::TooManyLabels { min: i32::MIN, max: i32::MAX, limit: 16_384 }.into(),
+            RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
+            RangeError::NotFound.into(),
+            ExecutionError::NeedlessDevice.into(),
+            ExecutionError::NoSuchDevice { wanted: name(), present: vec!["0: other".into()] }.into(),
+            ExecutionError::NoThreads.into(),
+            ExecutionError::Threads("limit reached".into()).into(),
+            BudgetError::NoTileFits { memory: 1, width: 60, height: 40, labels: 9, needed: 7 }.into(),
+            BudgetError::StepsOfTiles { tiles: 4, needed: 70 }.into(),
+            Error::Calibration("does not say baseline".into()),
+            Error::Mismatch("the sizes differ".into()),
+            DeviceError::NoDriver.into(),
+            DeviceError::WrongMaps { name: name() }.into(),
+            DeviceError::TooLargeForShader {
+                width: 9,
+                height: 5,
+                labels: 9000,
+                neighbours: 3,
+                shader: "flood",
+            }
+            .into(),
+            DeviceError::Failed { name: name(), reason: "it is lost".into() }.into(),
+            machine(None, Purpose::Match).into(),
+            machine(Some(1 << 20), Purpose::Match).into(),
+            MemoryError::Device { name: name(), needed: 2 << 20, available: 1 << 20 }.into(),
+            MemoryError::Buffer { name: name(), what: "the costs".into(), needed: 2 << 10, allowed: 9 }
+                .into(),
+            MemoryError::Exhausted { name: name() }.into(),
+            Error::Interrupted,
+        ]
+    }
+
+    /// A library user knows no flags, and no program.
+    #[test]
+    fn no_message_names_a_flag_or_the_program() {
+        let warnings = [
+            Warning::Identical,
+            Warning::Plain { view: "left" },
+            Warning::Contrast { percent: 12 },
+            Warning::Saturated { percent: [1, 37] },
+            Warning::Turned { how: "upside down" },
+            Warning::NotRectified { offset: 512 },
+            Warning::Swapped { percent: 97 },
+            Warning::Clipped { end: 63, upper: true, percent: 9 },
+            Warning::Clipped { end: 0, upper: false, percent: 9 },
+        ];
+        let errors = every().into_iter().map(|error| error.to_string());
+        for said in errors.chain(warnings.map(|warning| warning.to_string())) {
+            assert!(!said.contains("--") && !said.contains("mrfgs") && !said.contains('\n'), "{said}");
+        }
+    }
+
+    /// Nor do the texts that are passed on as they are.
+    #[test]
+    fn no_text_in_the_source_names_a_flag_or_the_program() {
+        let mut folders = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
+        let mut files = 0;
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                    continue;
+                }
+                files += 1;
+                let source = fs::read_to_string(&path).unwrap();
+                let source = source.split("#[cfg(test)]").next().unwrap();
+                for line in source.lines().filter(|line| !line.trim_start().starts_with("//")) {
+                    let flag = line
+                        .match_indices("--")
+                        .any(|(at, _)| line[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()));
+                    let tests = path.ends_with("tests.rs");
+                    assert!(tests || !(flag || line.contains("`mrfgs ")), "{}: {line}", path.display());
+                }
+            }
+        }
+        assert!(files > 20, "{files}");
+    }
+
+    #[test]
+    fn sizes_are_rounded_up_to_what_is_enough() {
+        for (bytes, text) in
+            [(1, "1 KiB"), (1 << 20, "1 MiB"), ((1 << 20) + 1, "2 MiB"), (3 << 30, "3.0 GiB")]
+        {
+            assert_eq!(size(bytes), text);
+        }
     }
 }

@@ -4,7 +4,7 @@ use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, Gpu};
 use crate::backend::{Backend, Stage, Traffic};
 use crate::engine::{self, Solution, Started};
-use crate::error::{Error, Result};
+use crate::error::{BudgetError, DeviceError, Error, ExecutionError, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::options::{Choice, DisparityRange, Execution, Method};
@@ -70,15 +70,12 @@ impl Matcher {
     /// Opens what `execution` names.
     ///
     /// # Errors
-    /// [`Error::Option`] for what makes no sense, [`Error::Device`] where the wanted device is missing or cannot be
-    /// opened.
+    /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
+    /// driver or the device cannot be opened.
     pub fn new(execution: &Execution) -> Result<Self> {
         let device = execution.device.as_deref();
         match execution.backend {
-            Choice::Cpu if device.is_some() => Err(Error::option(
-                "--device",
-                "names a device, and --backend cpu uses none: leave one of them out",
-            )),
+            Choice::Cpu if device.is_some() => Err(ExecutionError::NeedlessDevice.into()),
             Choice::Cpu => Self::build(None, false, execution),
             // Who names a device means it.
             Choice::Gpu => Self::build(Some(Gpu::new(device)), false, execution),
@@ -90,7 +87,7 @@ impl Matcher {
     /// On `gpu`; where that fails or cannot serve, on the CPU path if it `falls_back`.
     ///
     /// # Errors
-    /// [`Error::Option`] for a number of threads that cannot be had, and that of `gpu` unless it falls back.
+    /// [`Error::Execution`] for a number of threads that cannot be had, and the error of `gpu` unless it falls back.
     pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
         Self::build(Some(gpu), falls_back, execution)
     }
@@ -99,11 +96,11 @@ impl Matcher {
         let mut pool = rayon::ThreadPoolBuilder::new();
         if let Some(threads) = execution.threads {
             if threads == 0 {
-                return Err(Error::option("--threads", "give a whole number from 1 on"));
+                return Err(ExecutionError::NoThreads.into());
             }
             pool = pool.num_threads(threads);
         }
-        let pool = pool.build().map_err(|e| Error::option("--threads", e.to_string()))?;
+        let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
         let (gpu, given_up) = match gpu.transpose() {
             Ok(gpu) => (gpu, None),
             Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e.to_string())),
@@ -128,9 +125,9 @@ impl Matcher {
     /// Matches `pair` over `range` by `method`; `observer` hears of progress and can stop it.
     ///
     /// # Errors
-    /// [`Error::Option`] for options out of range, and where no tile is small enough for the method's memory; [`Error::Device`]
-    /// where the wanted device fails, [`Error::Memory`] when
-    /// the machine or the device cannot hold it, [`Error::Interrupted`] when `observer` breaks.
+    /// [`Error::Option`] for options out of range, [`Error::Budget`] where no tile is small enough for the method's memory,
+    /// [`Error::Device`] where the wanted device fails, [`Error::Memory`] when the machine or the device cannot hold it,
+    /// [`Error::Interrupted`] when `observer` breaks.
     pub fn run(
         &mut self,
         pair: &Pair,
@@ -157,11 +154,8 @@ impl Matcher {
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
         if inspector.is_some() && tiles.count() > 1 {
-            let (count, needed) = (tiles.count(), plan.bytes().div_ceil(1 << 20));
-            let reason = format!(
-                "shows the steps of a match in one piece, and this one has {count} tiles: give --memory {needed}MiB"
-            );
-            return Err(Error::option("--intermediates", reason));
+            let (tiles, needed) = (tiles.count(), plan.bytes().div_ceil(1 << 20));
+            return Err(BudgetError::StepsOfTiles { tiles, needed }.into());
         }
         let Self { pool, gpu, checked, timings, .. } = self;
         let mut note = None;
@@ -375,10 +369,7 @@ fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>) -> Result
     let expected = engine::solve(&mut Cpu::default(), &plan, &pair, quiet)?;
     let found = engine::solve(gpu, &plan, &pair, quiet)?;
     if found.maps != expected.maps {
-        return Err(Error::Device(format!(
-            "{} computes other maps than the CPU path on a test pair: update its driver, or use --backend cpu",
-            gpu.describe()
-        )));
+        return Err(DeviceError::WrongMaps { name: gpu.describe() }.into());
     }
     *checked = Some(method.clone());
     Ok(())

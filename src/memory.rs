@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::error::{Error, Result};
+use crate::error::{MemoryError, Purpose, Result};
 
 /// Bytes that can be had without swapping, where the system says so.
 fn available() -> Option<u64> {
@@ -11,25 +11,18 @@ fn available() -> Option<u64> {
     line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
 }
 
-/// What to do where a match needs more memory than there is.
-pub(crate) const SMALLER_MATCH: &str = "let it take less (--memory), or use a smaller image, a smaller range (--min-disparity, \
-                                        --max-disparity) or fewer neighbours (--set percentile)";
-/// The same where an image does.
-pub(crate) const SMALLER_IMAGE: &str = "use a smaller image, or a part of it";
-
-/// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end it without a
-/// word. `remedy` says what to do.
+/// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end the process
+/// without a word.
 ///
 /// # Errors
-/// [`Error::Memory`] with both figures, where both are known.
-pub(crate) fn check(bytes: u64, remedy: &str) -> Result<()> {
+/// [`MemoryError::Machine`] with both figures, where both are known.
+pub(crate) fn check(bytes: u64, purpose: Purpose) -> Result<(), MemoryError> {
     if let Some(free) = available().filter(|free| bytes > *free) {
-        let (bytes, free) = (size(bytes), size(free));
-        return Err(Error::Memory(format!("{bytes} of memory are needed and {free} are free: {remedy}")));
+        return Err(MemoryError::Machine { needed: bytes, available: Some(free), purpose });
     }
     // Limits of the process (`ulimit -v`) and of a system that does not overcommit: what is never touched costs nothing.
     let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
-    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| lacking(bytes as u64, remedy))
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| lacking(bytes as u64, purpose))
 }
 
 /// Bytes that have been claimed.
@@ -43,11 +36,11 @@ impl Claim {
     ///
     /// # Errors
     /// Those of [`check`], of all claims together.
-    pub(crate) fn new(bytes: u64) -> Result<Self> {
+    pub(crate) fn new(bytes: u64) -> Result<Self, MemoryError> {
         let claim = Self(bytes);
         let others = CLAIMED.fetch_add(bytes, Ordering::Relaxed);
         // Where it fails the claim is dropped.
-        check(others.saturating_add(bytes), SMALLER_IMAGE).map(|()| claim)
+        check(others.saturating_add(bytes), Purpose::Image).map(|()| claim)
     }
 }
 
@@ -57,32 +50,26 @@ impl Drop for Claim {
     }
 }
 
-fn lacking(bytes: u64, remedy: &str) -> Error {
-    Error::Memory(format!("{} of memory are needed and cannot be had: {remedy}", size(bytes)))
-}
-
-/// A size for people.
-fn size(bytes: u64) -> String {
-    let mib = bytes as f64 / f64::from(1 << 20);
-    if mib < 1024.0 { format!("{:.0} MiB", mib.ceil()) } else { format!("{:.1} GiB", mib / 1024.0) }
+fn lacking(bytes: u64, purpose: Purpose) -> MemoryError {
+    MemoryError::Machine { needed: bytes, available: None, purpose }
 }
 
 /// An empty vector with room for `count` values.
 ///
 /// # Errors
-/// [`Error::Memory`] when the system has not as much.
-pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>> {
+/// [`MemoryError::Machine`] when the system has not as much.
+pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>, MemoryError> {
     let mut out = Vec::new();
     let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
-    out.try_reserve_exact(count).map_err(|_| lacking(bytes, SMALLER_IMAGE))?;
+    out.try_reserve_exact(count).map_err(|_| lacking(bytes, Purpose::Image))?;
     Ok(out)
 }
 
 /// A vector of `count` times `value`.
 ///
 /// # Errors
-/// [`Error::Memory`] when the system has not as much.
-pub(crate) fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>> {
+/// [`MemoryError::Machine`] when the system has not as much.
+pub(crate) fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, MemoryError> {
     let mut out = reserved(count)?;
     out.resize(count, value);
     Ok(out)
@@ -95,12 +82,12 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_declined() {
         for bytes in [1 << 55, u64::MAX] {
-            let said = check(bytes, SMALLER_IMAGE).unwrap_err().to_string();
-            assert!(said.contains("GiB") && said.contains("smaller image") && !said.contains('\n'), "{said}");
+            let said = check(bytes, Purpose::Image).unwrap_err().to_string();
+            assert!(said.contains("GiB of memory are needed") && !said.contains('\n'), "{said}");
         }
         assert!(filled(usize::MAX / 8, 0_u64).is_err());
         assert_eq!(filled(3, 7).unwrap(), [7; 3]);
-        check(1 << 20, SMALLER_MATCH).unwrap();
+        check(1 << 20, Purpose::Match).unwrap();
     }
 
     #[test]

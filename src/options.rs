@@ -6,7 +6,7 @@
 //! Correspondence Algorithm*; where a meaning says "open", the paper leaves the matter open and the choice is
 //! this project's.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, OptionError, RangeError, ReadError, Result};
 use crate::text;
 use crate::text::one_line;
 use serde::{Deserialize, Serialize};
@@ -34,30 +34,33 @@ impl DisparityRange {
     /// The range `min ..= max`.
     ///
     /// # Errors
-    /// [`Error::Option`] when it is empty, or beyond [`MAX_LABELS`] or [`MAX_DISPARITY`].
+    /// [`Error::Range`] when it is empty, or beyond [`MAX_LABELS`] or [`MAX_DISPARITY`].
     pub fn new(min: i32, max: i32) -> Result<Self> {
         if min > max {
-            return Err(Error::option(
-                "--max-disparity",
-                format!("{max} is below the minimum disparity {min}: raise it or lower --min-disparity"),
-            ));
+            return Err(RangeError::Empty { min, max }.into());
         }
         if min < -MAX_DISPARITY || max > MAX_DISPARITY {
-            let (name, value) =
-                if max > MAX_DISPARITY { ("--max-disparity", max) } else { ("--min-disparity", min) };
-            return Err(Error::option(
-                name,
-                format!("{value} is out of reach: disparities are within {MAX_DISPARITY} px of 0"),
-            ));
+            let disparity = if max > MAX_DISPARITY { max } else { min };
+            return Err(RangeError::TooFar { disparity, limit: MAX_DISPARITY }.into());
         }
-        let labels = i64::from(max) - i64::from(min) + 1;
-        if labels > MAX_LABELS as i64 {
-            return Err(Error::option(
-                "--max-disparity",
-                format!("{min} to {max} are {labels} labels and at most {MAX_LABELS} fit: narrow the range"),
-            ));
+        if i64::from(max) - i64::from(min) >= MAX_LABELS as i64 {
+            return Err(RangeError::TooManyLabels { min, max, limit: MAX_LABELS }.into());
         }
         Ok(Self { min, max })
+    }
+
+    /// The range, if any disparity of it leads from some pixel to another within images of `width` columns.
+    ///
+    /// # Errors
+    /// [`Error::Range`] when none does.
+    pub fn within(self, width: usize) -> Result<Self> {
+        let Self { min, max } = self;
+        let reach = i32::try_from(width).unwrap_or(i32::MAX);
+        if min >= reach || max <= -reach {
+            Err(RangeError::OutsideImages { min, max, width }.into())
+        } else {
+            Ok(self)
+        }
     }
 
     /// Number of labels.
@@ -298,7 +301,7 @@ impl Method {
     /// The preset called `name`, one of [`PRESETS`].
     ///
     /// # Errors
-    /// [`Error::Option`] when there is no such preset.
+    /// [`Error::Preset`] when there is no such preset.
     pub fn preset(name: &str) -> Result<Self> {
         match name {
             "default" => Ok(Self::default()),
@@ -328,11 +331,8 @@ impl Method {
                 ..Self::preset("paper")?
             }),
             _ => {
-                let names: Vec<_> = PRESETS.iter().map(|p| p.0).collect();
-                Err(Error::option(
-                    "--preset",
-                    format!("there is no preset `{name}`; there are {}", names.join(", ")),
-                ))
+                let known = PRESETS.iter().map(|p| p.0).collect();
+                Err(Error::Preset { name: one_line(name), known })
             }
         }
     }
@@ -360,9 +360,7 @@ impl Method {
             .into_iter()
             .map(|(key, text)| (key.to_owned(), value(text).unwrap_or_else(|| text.into())))
             .collect();
-        *self = self
-            .merged(changes)
-            .map_err(|(key, reason)| Error::option(format!("--set {}", one_line(&key)), reason))?;
+        *self = self.merged(changes).map_err(|(key, cause)| Error::option(one_line(&key), cause))?;
         Ok(())
     }
 
@@ -379,25 +377,25 @@ impl Method {
             let place = e.span().map(|s| format!("line {}: ", line(s.start.min(text.len()))));
             Error::read(path, format!("{}{}", place.unwrap_or_default(), one_line(e.message())))
         })?;
-        *self = self.merged(table).map_err(|(key, reason)| {
+        *self = self.merged(table).map_err(|(key, cause)| {
             let place = text.lines().position(|l| {
                 l.trim_start()
                     .strip_prefix(&key)
                     .is_some_and(|rest| rest.trim_start().starts_with(['=', '.']))
             });
-            let place = place.map(|n| format!("line {}: ", n + 1));
-            Error::read(path, format!("{}{}: {reason}", place.unwrap_or_default(), one_line(&key)))
+            let line = place.map(|n| n + 1);
+            Error::read(path, ReadError::Option { line, key: one_line(&key), cause })
         })?;
         Ok(())
     }
 
     /// This method with the keys of `changes` replaced; else the key that does not fit, and why.
-    fn merged(&self, changes: toml::Table) -> std::result::Result<Self, (String, String)> {
+    fn merged(&self, changes: toml::Table) -> Result<Self, (String, OptionError)> {
         let mut table = self.table();
         let mut method = self.clone();
         for (key, value) in changes {
             let Some(old) = table.get(&key) else {
-                return Err((key, "there is no such key; `mrfgs presets` lists them".into()));
+                return Err((key, OptionError::Unknown));
             };
             // A whole number is a fine value for a real parameter.
             let value = match (old, value) {
@@ -406,14 +404,12 @@ impl Method {
             };
             table.insert(key.clone(), value.clone());
             method = table.clone().try_into().map_err(|_| {
-                let unit = keys().into_iter().find(|k| k.0 == key).map_or("", |k| k.1);
-                (key, format!("expected {unit}, not {}", one_line(&value.to_string())))
+                let expected = keys().into_iter().find(|k| k.0 == key).map_or("", |k| k.1).into();
+                (key, OptionError::WrongKind { expected, found: one_line(&value.to_string()) })
             })?;
         }
-        method.validated().map_err(|e| match e {
-            Error::Option { name, reason } => (name, reason),
-            other => (String::new(), other.to_string()),
-        })
+        method.check()?;
+        Ok(method)
     }
 
     /// All keys with their values.
@@ -430,6 +426,12 @@ impl Method {
     /// # Errors
     /// [`Error::Option`] naming the first key that is out of its range, and the range.
     pub fn validated(self) -> Result<Self> {
+        self.check().map_err(|(key, cause)| Error::option(key, cause))?;
+        Ok(self)
+    }
+
+    /// Names the first key that is out of its range.
+    fn check(&self) -> Result<(), (String, OptionError)> {
         let table = self.table();
         let within = |name: &str, low: f64, high: f64| {
             let value = match &table[name] {
@@ -440,18 +442,11 @@ impl Method {
             if value >= low && value <= high {
                 Ok(())
             } else {
-                Err(Error::option(name, format!("{value} is outside {low} to {high}")))
+                Err((name.to_owned(), OptionError::OutOfRange { value, low, high }))
             }
         };
         let odd = |name: &str, value: u32| {
-            if value % 2 == 1 {
-                Ok(())
-            } else {
-                Err(Error::option(
-                    name,
-                    format!("{value} is not odd; take {} or {}", value.saturating_sub(1), value + 1),
-                ))
-            }
+            if value % 2 == 1 { Ok(()) } else { Err((name.to_owned(), OptionError::NotOdd { value })) }
         };
         within("zones", 1.0, 64.0)?;
         within("zone-sigmas", 0.0, 100.0)?;
@@ -476,8 +471,7 @@ impl Method {
         within("median-sigma-space", 0.1, 100.0)?;
         within("median-sigma-range", 1e-3, 10.0)?;
         within("confidence-floor", 0.0, 255.0)?;
-        within("memory", 1.0, f64::from(MAX_MEMORY))?;
-        Ok(self)
+        within("memory", 1.0, f64::from(MAX_MEMORY))
     }
 }
 
@@ -537,23 +531,23 @@ mod tests {
             assert_eq!((method.cost, method.outside_cost), (Cost::AdCensus, 0.5));
         }
         let error = Method::preset("paper").unwrap().set("cost", "ad-census").unwrap_err().to_string();
-        assert_eq!(error, "--set outside-cost: 20 is outside 0 to 1.625");
+        assert_eq!(error, "outside-cost: 20 is outside 0 to 1.625");
     }
 
     #[test]
     fn errors_name_the_key_and_what_it_takes() {
         for (key, value, words) in [
-            ("colour", "red", "--set colour: there is no such key; `mrfgs presets` lists them"),
-            ("cost", "ncc", "--set cost: expected sad | census | ad-census, not \"ncc\""),
-            ("levels", "2.5", "--set levels: expected levels, 1 to 16, not 2.5"),
-            ("levels", "-1", "--set levels: expected levels, 1 to 16, not -1"),
-            ("levels", "", "--set levels: expected levels, 1 to 16, not \"\""),
-            ("levels", "17", "--set levels: 17 is outside 1 to 16"),
-            ("levels", "3\ncost = \"sad\"", "--set levels: expected"),
-            ("temperature", "nan", "--set temperature: NaN is outside 0.001 to 1000000"),
-            ("median-window", "4", "--set median-window: 4 is not odd; take 3 or 5"),
-            ("two\nlines\u{1b}[2J", "4", "--set two lines [2J: there is no such key"),
-            (&"keys".repeat(99), "4", &format!("--set {}...: there is no such key", "keys".repeat(40))),
+            ("colour", "red", "colour: there is no such key"),
+            ("cost", "ncc", "cost: expected sad | census | ad-census, not \"ncc\""),
+            ("levels", "2.5", "levels: expected levels, 1 to 16, not 2.5"),
+            ("levels", "-1", "levels: expected levels, 1 to 16, not -1"),
+            ("levels", "", "levels: expected levels, 1 to 16, not \"\""),
+            ("levels", "17", "levels: 17 is outside 1 to 16"),
+            ("levels", "3\ncost = \"sad\"", "levels: expected"),
+            ("temperature", "nan", "temperature: NaN is outside 0.001 to 1000000"),
+            ("median-window", "4", "median-window: 4 is not odd; take 3 or 5"),
+            ("two\nlines\u{1b}[2J", "4", "two lines [2J: there is no such key"),
+            (&"keys".repeat(99), "4", &format!("{}...: there is no such key", "keys".repeat(40))),
         ] {
             let mut method = Method::default();
             let error = method.set(key, value).unwrap_err().to_string();
@@ -599,14 +593,14 @@ mod tests {
     }
 
     #[test]
-    fn ranges_name_the_flag_to_change() {
+    fn ranges_that_make_no_sense_are_refused() {
         assert_eq!(DisparityRange::new(-3, -3).unwrap().labels(), 1);
         for (min, max, words) in [
-            (5, 4, ["--max-disparity", "below the minimum"]),
-            (0, 2_000_000, ["--max-disparity", "out of reach"]),
-            (-2_000_000, 0, ["--min-disparity", "out of reach"]),
+            (5, 4, ["4 is", "below the minimum disparity 5"]),
+            (0, 2_000_000, ["2000000", "out of reach"]),
+            (-2_000_000, 0, ["-2000000", "out of reach"]),
             (i32::MIN, i32::MAX, ["disparity", "out of reach"]),
-            (0, 16_384, ["--max-disparity", "narrow the range"]),
+            (0, 16_384, ["16385 labels", "at most 16384 fit"]),
         ] {
             let error = DisparityRange::new(min, max).unwrap_err().to_string();
             assert!(words.iter().all(|w| error.contains(w)), "{error}");

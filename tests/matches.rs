@@ -452,12 +452,12 @@ fn identical_images_are_told() {
 }
 
 #[test]
-fn warnings_are_one_line_with_the_remedy() {
+fn warnings_are_one_line_with_the_cause() {
     for (warning, words) in [
         (Warning::Identical, ["the same", "right view"]),
         (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
         (Warning::Turned { how: "upside down" }, ["upside down", "turn it back"]),
-        (Warning::Swapped { percent: 97 }, ["97 %", "exchange"]),
+        (Warning::Swapped { percent: 97 }, ["97 %", "seem to be swapped"]),
     ] {
         let line = warning.to_string();
         assert!(!line.contains('\n') && words.iter().all(|w| line.contains(w)), "{line}");

@@ -9,6 +9,7 @@ use common::random::Random;
 use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::engine::{Solution, solve, solve_tiles};
+use mrfgs::error::BudgetError;
 use mrfgs::image::{Pair, Plane, calib::Calibration, read};
 use mrfgs::maps::{Maps, has_disparity};
 use mrfgs::options::{Choice, DisparityRange, Execution, LeftRightCheck, Method, PRESETS};
@@ -98,11 +99,10 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
             }
             Err(error) => {
                 refused += 1;
-                let error = error.to_string();
                 // What it asks for is enough, and the least that is.
-                let needed: u32 =
-                    error.split("at least ").nth(1).unwrap().split("MiB").next().unwrap().parse().unwrap();
-                assert!(error.starts_with("--memory: ") && needed > method.memory, "{error}");
+                let Error::Budget(BudgetError::NoTileFits { needed, .. }) = error else { panic!("{error}") };
+                let needed = u32::try_from(needed).unwrap();
+                assert!(needed > method.memory, "{error}");
                 for (memory, enough) in [(needed, true), (needed - 1, false)] {
                     let plan = self::plan(size, range, &method, memory);
                     assert_eq!(Tiles::with_overlap(&plan, overlap).is_ok(), enough, "{memory} MiB: {error}");

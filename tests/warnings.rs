@@ -154,17 +154,17 @@ fn a_range_that_cuts_off_the_scene_is_told() {
 }
 
 #[test]
-fn warnings_are_one_line_with_the_remedy() {
+fn warnings_are_one_line_with_the_cause() {
     for (warning, words) in [
-        (Warning::Plain { view: "left" }, ["the left view is all one colour", "right file"]),
+        (Warning::Plain { view: "left" }, ["the left view is all one colour", "right image"]),
         (Warning::Contrast { percent: 12 }, ["12 % of the other's contrast", "expose both alike"]),
         (
             Warning::Saturated { percent: [1, 37] },
-            ["1 % of the left view and 37 % of the right", "expose both"],
+            ["1 % of the left view and 37 % of the right", "nothing can be matched"],
         ),
         (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["9 %", "at disparity 63"]),
-        (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["cuts off", "raise --max-disparity"]),
-        (Warning::Clipped { end: -5, upper: false, percent: 9 }, ["-5", "lower --min-disparity"]),
+        (Warning::Clipped { end: 63, upper: true, percent: 9 }, ["cuts off", "an end of the range"]),
+        (Warning::Clipped { end: -5, upper: false, percent: 9 }, ["-5", "cuts off"]),
     ] {
         let line = warning.to_string();
         assert!(!line.contains('\n') && words.iter().all(|w| line.contains(w)), "{line}");

@@ -11,6 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use mrfgs::error::RangeError;
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::{Pair, Plane, raster};
 use mrfgs::options::{Choice, DisparityRange, Execution, Method};
@@ -30,7 +31,7 @@ pyo3::create_exception!(
 
 /// The exception that says what went wrong, in the words of Python.
 fn exception(error: Error) -> PyErr {
-    let text = words::in_python(&error.to_string());
+    let text = words::error(&error);
     match error {
         Error::Memory(_) => PyMemoryError::new_err(text),
         Error::Device(_) => PyRuntimeError::new_err(text),
@@ -42,7 +43,7 @@ fn exception(error: Error) -> PyErr {
 /// Says what is probably wrong, at the line of Python that called.
 fn warn(py: Python, warnings: impl IntoIterator<Item = Warning>) -> PyResult<()> {
     for warning in warnings {
-        let text = CString::new(words::in_python(&warning.to_string()))?;
+        let text = CString::new(words::warning(&warning))?;
         PyErr::warn(py, &py.get_type::<MatchWarning>(), &text, 1)?;
     }
     Ok(())
@@ -325,8 +326,7 @@ fn interruptible(run: impl FnOnce(Observer) -> mrfgs::Result<Matched> + Send) ->
 /// The range that sparse matches find, from `min` on where that is given.
 fn found_range(pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
     let Some(found) = check::range(pair).map_err(exception)? else {
-        let reason = "max_disparity: give the largest disparity to search, in pixels: there are too few matches to find it";
-        return Err(PyValueError::new_err(reason));
+        return Err(exception(RangeError::NotFound.into()));
     };
     DisparityRange::new(min.unwrap_or(found.min), found.max).map_err(exception)
 }

@@ -74,7 +74,8 @@ pub fn range(pair: &Pair) -> Result<Option<DisparityRange>> {
     Ok(DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION)).ok())
 }
 
-/// What is probably wrong with a pair. Each displays as one line with the cause and the remedy.
+/// What is probably wrong with a pair. Each displays as one line with the cause, and with the remedy where that is no argument of
+/// the front end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Warning {
@@ -127,12 +128,12 @@ impl fmt::Display for Warning {
             Self::Identical => {
                 write!(
                     f,
-                    "the two images are the same, so there is no depth in them: give the right view as the second"
+                    "the two images are the same, so they show no depth: give the right view as the second"
                 )
             }
             Self::Plain { view } => write!(
                 f,
-                "the {view} view is all one colour, so nothing in it can be matched: check that it is the right file and \
+                "the {view} view is all one colour, so nothing in it can be matched: check that it is the right image and \
                  well exposed"
             ),
             Self::Contrast { percent } => write!(
@@ -143,12 +144,12 @@ impl fmt::Display for Warning {
             Self::Saturated { percent: [left, right] } => write!(
                 f,
                 "the exposures are far apart: {left} % of the left view and {right} % of the right one are black or white, \
-                 where nothing can be matched: expose both alike, or --mask what is no image"
+                 where nothing can be matched"
             ),
             Self::Turned { how } => write!(
                 f,
-                "one of the views is {how}, as the other one matches it only then: turn it back, for disparities are of views \
-                 that stand alike"
+                "one of the views is {how}, because the other one matches it only that way: turn it back, so that both views \
+                 have the same orientation"
             ),
             Self::NotRectified { offset } => write!(
                 f,
@@ -158,14 +159,12 @@ impl fmt::Display for Warning {
             ),
             Self::Swapped { percent } => write!(
                 f,
-                "the views seem to be swapped: {percent} % of the matches have negative disparities: exchange the \
-                 two images, or give a negative --min-disparity if the cameras converge"
+                "the views seem to be swapped: {percent} % of the matches have negative disparities"
             ),
-            Self::Clipped { end, upper, percent } => write!(
+            Self::Clipped { end, percent, .. } => write!(
                 f,
                 "{percent} % of the measured pixels are at disparity {end}, an end of the range, which probably cuts off \
-                 part of the scene: {}",
-                if *upper { "raise --max-disparity" } else { "lower --min-disparity" }
+                 part of the scene"
             ),
         }
     }

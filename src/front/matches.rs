@@ -8,7 +8,7 @@
 //! Sums are integers and the rest is + - * / and square roots in a fixed order, so every machine finds the same
 //! matches, whatever the number of threads.
 
-use crate::error::Result;
+use crate::error::{Purpose, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::FRACTION;
 use crate::memory;
@@ -93,7 +93,7 @@ const BYTES: u64 = 2 * (2 + 4 + 8) + 8 + 2 * 9;
 /// [`Error::Memory`](crate::Error::Memory).
 pub(super) fn check_memory(pair: &Pair) -> Result<()> {
     let (width, height) = pair.size();
-    memory::check(BYTES * (width * height) as u64, memory::SMALLER_IMAGE)
+    Ok(memory::check(BYTES * (width * height) as u64, Purpose::Image)?)
 }
 
 /// [`find`] with one corner in `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below its own.

@@ -6,7 +6,7 @@ pub mod label_range;
 pub mod matches;
 pub mod zones;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Purpose, Result};
 use crate::graph::{self, LevelGraph};
 use crate::image::{Pair, Plane};
 use crate::memory;
@@ -54,7 +54,7 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
         let (plan, pair) = (plan.size(), pair.size());
         return Err(Error::Mismatch(format!("a plan for {plan:?} and a pair of {pair:?}")));
     }
-    memory::check(plan.front_bytes(), memory::SMALLER_MATCH)?;
+    memory::check(plan.front_bytes(), Purpose::Match)?;
     let method = &plan.method;
     let pair = match method.illumination {
         Illumination::None => pair,

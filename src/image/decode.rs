@@ -10,7 +10,7 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Li
 use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, most_bytes, unsupported};
 use super::raster::{Raster, Samples};
 use super::{jpeg, pfm, tiff};
-use crate::error::{Error, Result};
+use crate::error::{Error, ReadError, Result};
 use crate::memory::Claim;
 use crate::text::one_line;
 
@@ -59,7 +59,7 @@ fn unknown(bytes: &[u8]) -> String {
 }
 
 pub(super) fn decode_file(path: &Path, max_pixels: u64, no_data: Option<f64>) -> Result<Raster<'static>> {
-    decode(&load(path, max_pixels)?, max_pixels, no_data).map_err(|reason| Error::read(path, reason))
+    decode(&load(path, max_pixels)?, max_pixels, no_data).map_err(|cause| Error::read(path, cause))
 }
 
 /// Decodes a whole file; the error says in one line what is wrong with it. Memory for pixels is taken once the header
@@ -69,9 +69,9 @@ pub(super) fn decode(
     bytes: &[u8],
     max_pixels: u64,
     no_data: Option<f64>,
-) -> std::result::Result<Raster<'static>, String> {
+) -> Result<Raster<'static>, ReadError> {
     let marked = |raster: Raster<'static>| match no_data {
-        Some(value) => raster.without(value).map_err(|e| e.to_string()),
+        Some(value) => Ok(raster.marked(value)?),
         None => Ok(raster),
     };
     guarded(|| match Kind::of(bytes) {
@@ -79,7 +79,7 @@ pub(super) fn decode(
         Some(Kind::Tiff) => tiff::decode(bytes, max_pixels, no_data),
         Some(Kind::Coded(ImageFormat::Jpeg)) => jpeg::decode(bytes, max_pixels).and_then(marked),
         Some(Kind::Coded(format)) => decode_coded(bytes, format, max_pixels).and_then(marked),
-        None => Err(unknown(bytes)),
+        None => Err(unknown(bytes).into()),
     })
 }
 
@@ -94,7 +94,7 @@ pub fn is_guarded() -> bool {
 }
 
 /// Does what foreign decoders do, whose panics are errors of the file.
-fn guarded<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::result::Result<T, String> {
+fn guarded<T>(decode: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
     let before = GUARDED.replace(true);
     let decoded = catch_unwind(AssertUnwindSafe(decode));
     GUARDED.set(before);
@@ -107,7 +107,7 @@ fn guarded<T>(decode: impl FnOnce() -> std::result::Result<T, String>) -> std::r
     })
 }
 
-fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'static>, String> {
+fn decode_pfm(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     let (width, height, channels, samples) = match pfm::decode(bytes, max_pixels)? {
         pfm::Pfm::Grey(p) => (p.width(), p.height(), 1, p.into_data()),
         pfm::Pfm::Colour(p) => (p.width(), p.height(), 3, p.into_data().into_flattened()),
@@ -116,7 +116,7 @@ fn decode_pfm(bytes: &[u8], max_pixels: u64) -> std::result::Result<Raster<'stat
 }
 
 /// The error of the general decoder.
-fn coded_reason(e: ImageError) -> String {
+fn coded_reason(e: ImageError) -> ReadError {
     let text = plain(&e.to_string());
     if matches!(e, ImageError::Unsupported(_)) { unsupported(text) } else { damaged(text) }
 }
@@ -134,11 +134,7 @@ fn plain(text: &str) -> String {
     out
 }
 
-fn decode_coded(
-    bytes: &[u8],
-    format: ImageFormat,
-    max_pixels: u64,
-) -> std::result::Result<Raster<'static>, String> {
+fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     // What else is in a PNG file, compressed as well, is unpacked before the decoder tells the size.
     let claimed = if format == ImageFormat::Png {
         let (width, height) = png_size(bytes)?;
@@ -157,7 +153,7 @@ fn decode_coded(
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
     check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
     // The decoder holds rows and their filtered copies beside its pixels.
-    let _claim = Claim::new(2 * decoder.total_bytes()).map_err(|e| e.to_string())?;
+    let _claim = Claim::new(2 * decoder.total_bytes())?;
     let image = DynamicImage::from_decoder(decoder).map_err(coded_reason)?;
     let (channels, samples) = match image {
         DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw().into())),
@@ -171,14 +167,16 @@ fn decode_coded(
         DynamicImage::ImageRgb32F(i) => (3, Samples::Float(i.into_raw().into())),
         DynamicImage::ImageRgba32F(i) => (4, Samples::Float(i.into_raw().into())),
         other => {
-            return Err(format!("pixels of the kind {:?} are not read; convert it to PNG", other.color()));
+            return Err(
+                format!("pixels of the kind {:?} are not read; convert it to PNG", other.color()).into()
+            );
         }
     };
     Ok(Raster { width: width as usize, height: height as usize, channels, samples, no_data: None })
 }
 
 /// (width, height) that a PNG file claims, by the header that must come first.
-fn png_size(bytes: &[u8]) -> std::result::Result<(u64, u64), String> {
+fn png_size(bytes: &[u8]) -> Result<(u64, u64), ReadError> {
     match bytes.get(8..24) {
         Some([0, 0, 0, 13, b'I', b'H', b'D', b'R', a, b, c, d, e, f, g, h]) => {
             Ok((u32::from_be_bytes([*a, *b, *c, *d]).into(), u32::from_be_bytes([*e, *f, *g, *h]).into()))
@@ -198,7 +196,7 @@ mod tests {
             assert!(is_guarded());
             Ok(nothing[0])
         });
-        let said = said.unwrap_err();
+        let said = said.unwrap_err().to_string();
         assert!(
             said.contains("the decoder gave up: index out of bounds") && said.contains("convert it"),
             "{said}"

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Purpose, ReadError, Result};
 use crate::memory;
 use crate::text::one_line;
 
@@ -44,12 +44,9 @@ pub(super) fn load(
         return error("is a folder; give the image file");
     }
     if metadata.len() > max_bytes {
-        return Err(Error::read(
-            path,
-            format!("has more bytes than {max_pixels} pixels can take; raise --max-pixels or crop it"),
-        ));
+        return Err(Error::read(path, ReadError::TooManyBytes { limit: max_pixels }));
     }
-    memory::check(metadata.len(), memory::SMALLER_IMAGE).map_err(|e| Error::read(path, e))?;
+    memory::check(metadata.len(), Purpose::Image).map_err(|e| Error::read(path, e))?;
     let mut file = File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
     file.by_ref().take(64).read_to_end(&mut bytes).map_err(io)?;
@@ -64,15 +61,12 @@ pub(super) fn load(
 }
 
 /// Errors when an image of this size will not be read: it has no pixel, or more than `max_pixels`.
-pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> std::result::Result<(), String> {
+pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> Result<(), ReadError> {
     if width == 0 || height == 0 {
-        return Err(format!("is {width} x {height} and holds no pixel"));
+        return Err(format!("is {width} x {height} and holds no pixel").into());
     }
     if width.checked_mul(height).is_none_or(|n| n > max_pixels) {
-        return Err(format!(
-            "claims {width} x {height} pixels and at most {max_pixels} are read; if that is true, raise --max-pixels \
-             or crop it"
-        ));
+        return Err(ReadError::TooManyPixels { width, height, limit: max_pixels });
     }
     Ok(())
 }
@@ -83,22 +77,24 @@ pub(super) fn check_claim(
     max_pixels: u64,
     per_byte: u64,
     bytes: usize,
-) -> std::result::Result<(), String> {
+) -> Result<(), ReadError> {
     check_size(width, height, max_pixels)?;
     if width * height > per_byte * bytes as u64 {
         return Err(format!(
             "claims {width} x {height} pixels in {bytes} bytes: truncated or damaged; get the file again"
-        ));
+        )
+        .into());
     }
     Ok(())
 }
 
 /// What is wrong with a file that does not decode, and what to do about it.
-pub(super) fn damaged(e: impl std::fmt::Display) -> String {
-    format!("{}; truncated or damaged? get the file again, or convert it to PNG", one_line(&e.to_string()))
+pub(super) fn damaged(e: impl std::fmt::Display) -> ReadError {
+    let reason = one_line(&e.to_string());
+    format!("{reason}; truncated or damaged? get the file again, or convert it to PNG").into()
 }
 
 /// What a decoder does not know, and what to do about it.
-pub(super) fn unsupported(e: impl std::fmt::Display) -> String {
-    format!("{}; convert it to PNG", one_line(&e.to_string()))
+pub(super) fn unsupported(e: impl std::fmt::Display) -> ReadError {
+    format!("{}; convert it to PNG", one_line(&e.to_string())).into()
 }

@@ -8,6 +8,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged};
 use super::raster::{Raster, Samples};
+use crate::error::ReadError;
 use crate::memory::{self, Claim};
 
 /// Bytes that the decoder takes for a pixel beside its samples, at most: the coefficients of a progressive image, and rows in
@@ -18,7 +19,7 @@ const BYTES_BESIDE: u64 = 10;
 ///
 /// # Errors
 /// What is wrong with the file, in one line.
-pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, String> {
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     // The decoder takes the end of the file for the end of the pixels.
     if !is_whole(bytes) {
         return Err(damaged("the JPEG data has no end"));
@@ -35,16 +36,15 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, S
     };
     decoder.set_options(options.jpeg_set_out_colorspace(colours));
     let count = size.0 * size.1 * channels;
-    let _claim =
-        Claim::new(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64).map_err(|e| e.to_string())?;
-    let mut samples = memory::filled(count, 0).map_err(|e| e.to_string())?;
+    let _claim = Claim::new(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64)?;
+    let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
     let samples = Samples::Byte(samples.into());
     Ok(Raster { width: size.0, height: size.1, channels, samples, no_data: None })
 }
 
 /// The error of the decoder, which prints some texts as Rust has them.
-fn reason(e: impl std::fmt::Display) -> String {
+fn reason(e: impl std::fmt::Display) -> ReadError {
     damaged(e.to_string().trim_matches('"').trim_start_matches("[strict-mode]: "))
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::file::{self, MAX_PIXELS};
 use super::{Plane, write};
-use crate::error::{Error, Result};
+use crate::error::{Error, ReadError, Result};
 
 /// What a PFM file holds, the top row first (the file has the bottom row first).
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ pub enum Pfm {
 /// [`Error::Read`] when there is no such file, it is no complete PFM file, or has more than [`MAX_PIXELS`].
 pub fn read(path: &Path) -> Result<Pfm> {
     let not_pfm = |bytes: &[u8]| (!is_pfm(bytes)).then(|| NOT_PFM.into());
-    decode(&file::load(path, MAX_PIXELS, not_pfm)?, MAX_PIXELS).map_err(|reason| Error::read(path, reason))
+    decode(&file::load(path, MAX_PIXELS, not_pfm)?, MAX_PIXELS).map_err(|cause| Error::read(path, cause))
 }
 
 /// Writes a plane as single-channel PFM, little endian with scale -1.0, whole or not at all.
@@ -53,7 +53,7 @@ pub(super) fn is_pfm(bytes: &[u8]) -> bool {
 }
 
 /// Parses a whole file of at most `max_pixels` pixels; the error says what is wrong with it.
-pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Pfm, String> {
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Pfm, ReadError> {
     if !is_pfm(bytes) {
         return Err(NOT_PFM.into());
     }
@@ -65,7 +65,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Pfm, 
     let word = token(bytes, &mut at).ok_or("the PFM header ends before the scale")?;
     let scale = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
     let Some(scale) = scale else {
-        return Err(format!("the PFM header has the scale {word:?}, which is no number other than 0"));
+        return Err(format!("the PFM header has the scale {word:?}, which is no number other than 0").into());
     };
 
     let channels = if colour { 3 } else { 1 };
@@ -78,7 +78,8 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> std::result::Result<Pfm, 
         return Err(format!(
             "truncated: {width} x {height} pixels need {need} bytes of data and {} are there; get the file again",
             data.len()
-        ));
+        )
+        .into());
     }
 
     let from = if scale < 0.0 { f32::from_le_bytes } else { f32::from_be_bytes };
@@ -109,7 +110,7 @@ fn token<'a>(bytes: &'a [u8], at: &mut usize) -> Option<&'a str> {
     std::str::from_utf8(&rest[..length]).ok()
 }
 
-fn dimension(bytes: &[u8], at: &mut usize, name: &str) -> std::result::Result<usize, String> {
+fn dimension(bytes: &[u8], at: &mut usize, name: &str) -> Result<usize, String> {
     let word = token(bytes, at).ok_or_else(|| format!("the PFM header ends before the {name}"))?;
     match word.parse::<u32>() {
         Ok(n) => Ok(n as usize),
@@ -122,7 +123,7 @@ mod tests {
     use super::*;
 
     fn decode(bytes: &[u8]) -> std::result::Result<Pfm, String> {
-        super::decode(bytes, MAX_PIXELS)
+        super::decode(bytes, MAX_PIXELS).map_err(|cause| cause.to_string())
     }
 
     fn plane() -> Plane<f32> {
@@ -189,9 +190,9 @@ mod tests {
         refused(b"Pf\n1 1\n-1", "scale");
         refused(b"Pf\n1 1\n-1\n\0\0\0", "truncated");
         refused(b"Pf\n16384 16384\n-1\n\0\0\0", "truncated");
-        refused(b"Pf\n16385 16384\n-1\n\0\0\0", "--max-pixels");
+        refused(b"Pf\n16385 16384\n-1\n\0\0\0", "at most 268435456");
         // No limit of the caller's makes the arithmetic overflow.
-        let reason = super::decode(b"PF\n4294967295 4294967295\n-1\n\0", u64::MAX).unwrap_err();
+        let reason = super::decode(b"PF\n4294967295 4294967295\n-1\n\0", u64::MAX).unwrap_err().to_string();
         assert!(reason.contains("truncated"), "{reason}");
         refused(&[b"Pf\n".as_slice(), &[b'7'; 5000]].concat(), "width");
         refused(b"Pf\n\xff\xfe 1\n-1\n", "width");

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::{Image, Pair, Pixel, Plane, grey};
-use crate::error::{Error, Result};
+use crate::error::{Error, MemoryError, Purpose, Result};
 use crate::memory;
 
 /// Float values and the wider integers end here: 255 in 1/256 of an 8-bit level.
@@ -66,6 +66,10 @@ impl<'a> Raster<'a> {
     /// # Errors
     /// [`Error::Memory`] when the system has not enough.
     pub fn without(self, value: f64) -> Result<Self> {
+        Ok(self.marked(value)?)
+    }
+
+    pub(super) fn marked(self, value: f64) -> Result<Self, MemoryError> {
         let colours = if self.channels < 3 { 1 } else { 3 };
         let no_data = Some(holding(&self.samples, self.channels, colours, value)?);
         Ok(Self { no_data, ..self })
@@ -154,8 +158,18 @@ impl<'a> Raster<'a> {
 
 /// Where the first `colours` of the `n` samples of a pixel are all `value`, rounded as they are. NaN is equal to NaN.
 #[allow(clippy::float_cmp, reason = "it is that very value that stands for no data")]
-pub(super) fn holding(samples: &Samples, n: usize, colours: usize, value: f64) -> Result<Vec<bool>> {
-    fn all<S: Copy>(samples: &[S], n: usize, colours: usize, is: impl Fn(S) -> bool) -> Result<Vec<bool>> {
+pub(super) fn holding(
+    samples: &Samples,
+    n: usize,
+    colours: usize,
+    value: f64,
+) -> Result<Vec<bool>, MemoryError> {
+    fn all<S: Copy>(
+        samples: &[S],
+        n: usize,
+        colours: usize,
+        is: impl Fn(S) -> bool,
+    ) -> Result<Vec<bool>, MemoryError> {
         let mut out = memory::reserved(samples.len() / n)?;
         out.extend(samples.chunks_exact(n).map(|pixel| pixel[..colours].iter().all(|&v| is(v))));
         Ok(out)
@@ -186,7 +200,7 @@ pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Resul
     let images = [&left, &right];
     // Of either view the pixels and their mask.
     let pixels = left.width as u64 * left.height as u64;
-    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, memory::SMALLER_IMAGE)?;
+    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
     if left.samples.is_float() != right.samples.is_float() {
         return Err(Error::Mismatch(
             "one image holds float values and the other whole ones: give both in one format".into(),

@@ -9,7 +9,7 @@ use image::ImageFormat;
 use super::decode::{Kind, decode, decode_file, load};
 use super::raster::{self, Raster, Samples};
 use super::{Pair, Plane, grey};
-use crate::error::{Error, Result};
+use crate::error::{Error, ReadError, Result};
 
 pub use super::decode::is_guarded;
 pub use super::file::MAX_PIXELS;
@@ -154,7 +154,7 @@ impl Reader {
         let bytes = load(path, self.max_pixels)?;
         let kind = Kind::of(&bytes);
         let raster =
-            decode(&bytes, self.max_pixels, self.no_data).map_err(|reason| Error::read(path, reason))?;
+            decode(&bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(path, cause))?;
         drop(bytes);
         let wrong = |what: &str| Err(Error::read(path, format!("{what}; {REMEDY}")));
         if raster.channels != 1 {
@@ -168,9 +168,7 @@ impl Reader {
                 v.iter().copied().map(|v| if v == 0 { f32::INFINITY } else { v as f32 / 256.0 }).collect()
             }
             (Some(Kind::Coded(ImageFormat::Png)), _) => {
-                return wrong(
-                    "an 8-bit PNG does not tell the scale of its disparities (of a truth, --truth-scale does)",
-                );
+                return Err(Error::read(path, ReadError::UnknownScale));
             }
             _ => return wrong("holds no disparities"),
         };
@@ -192,16 +190,13 @@ impl Reader {
         let bytes = load(path, self.max_pixels)?;
         let kind = Kind::of(&bytes);
         let raster =
-            decode(&bytes, self.max_pixels, self.no_data).map_err(|reason| Error::read(path, reason))?;
+            decode(&bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(path, cause))?;
         match (kind, raster.channels, raster.samples) {
             (Some(Kind::Coded(ImageFormat::Png)), 1, Samples::Byte(v)) => {
                 let disparity = |v| if v == 0 { f32::INFINITY } else { f32::from(v) / scale };
                 Ok(Plane::new(raster.width, raster.height, v.iter().copied().map(disparity).collect()))
             }
-            _ => Err(Error::read(
-                path,
-                "is no grey 8-bit PNG, and only such a truth has a scale; leave --truth-scale out",
-            )),
+            _ => Err(Error::read(path, ReadError::NeedlessScale)),
         }
     }
 }

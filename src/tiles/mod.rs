@@ -14,7 +14,7 @@
 
 pub mod mosaic;
 
-use crate::error::{Error, Result};
+use crate::error::{BudgetError, Result};
 use crate::image::Rect;
 use crate::plan::Plan;
 use std::ops::Range;
@@ -52,7 +52,7 @@ impl Tiles {
     /// else those that do and crop the fewest pixels in all.
     ///
     /// # Errors
-    /// [`Error::Option`] when no tile is small enough.
+    /// [`Error::Budget`](crate::Error::Budget) when no tile is small enough.
     pub fn new(whole: &Plan) -> Result<Self> {
         Self::with_overlap(whole, OVERLAP)
     }
@@ -85,18 +85,14 @@ impl Tiles {
         });
         let Some((_, (width, height))) = candidates.min_by_key(|&(pixels, _)| pixels) else {
             let least = bytes((across.crop(across.most()), down.crop(down.most()))).min(whole.bytes());
-            return Err(Error::option(
-                "--memory",
-                format!(
-                    "{} MiB are too few for {} x {} pixels and {} labels, also in tiles: give at least {}MiB, or a \
-                     smaller image or range",
-                    whole.method.memory,
-                    all.x.len(),
-                    all.y.len(),
-                    range.labels(),
-                    least.div_ceil(1 << 20)
-                ),
-            ));
+            return Err(BudgetError::NoTileFits {
+                memory: whole.method.memory,
+                width: all.x.len(),
+                height: all.y.len(),
+                labels: range.labels(),
+                needed: least.div_ceil(1 << 20),
+            }
+            .into());
         };
         let rows = down.spans(height);
         let mut tiles = Vec::new();

@@ -3,7 +3,7 @@
 use super::Tile;
 use crate::backend::cpu::Finest;
 use crate::backend::{Backend, Map, NO_LABEL, Stage};
-use crate::error::{Error, Result};
+use crate::error::{Error, Purpose, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
@@ -29,7 +29,7 @@ impl Mosaic {
             let (plan, pair) = (plan.size(), pair.size());
             return Err(Error::Mismatch(format!("a plan for {plan:?} and a pair of {pair:?}")));
         }
-        memory::check(plan.mosaic_bytes(), memory::SMALLER_MATCH)?;
+        memory::check(plan.mosaic_bytes(), Purpose::Match)?;
         let (width, height) = plan.size();
         let maps = Finest {
             right: Plane::filled(width, height, NO_LABEL),

@@ -8,7 +8,7 @@ mod volumes;
 
 use super::probe::Probe;
 use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
-use crate::error::Result;
+use crate::error::{Purpose, Result};
 use crate::front::Prepared;
 use crate::image::{Image, Plane};
 use crate::maps::Maps;
@@ -92,7 +92,7 @@ impl Backend for Cpu {
             _ => {
                 // What the last match holds goes before the next one asks for more.
                 self.state = None;
-                memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
+                memory::check(plan.bytes(), Purpose::Match)?;
                 self.state = Some(match plan.volume_width {
                     VolumeWidth::Narrow => State::Narrow(Volumes::new(plan, prepared)?),
                     VolumeWidth::Wide => State::Wide(Volumes::new(plan, prepared)?),

@@ -1,6 +1,6 @@
 //! Memory for volumes.
 
-use crate::error::{Error, Result};
+use crate::error::{MemoryError, Purpose, Result};
 use bytemuck::Pod;
 use memmap2::MmapMut;
 use std::marker::PhantomData;
@@ -18,14 +18,17 @@ impl<T: Pod> Pages<T> {
     /// `len` values.
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not as much.
-    pub(super) fn new(len: usize) -> Result<Self> {
+    /// [`MemoryError::Machine`] when the system has not as much.
+    pub(super) fn new(len: usize) -> Result<Self, MemoryError> {
         let size = len * size_of::<T>();
         if size == 0 {
             return Ok(Self { bytes: None, values: PhantomData });
         }
-        let bytes = MmapMut::map_anon(size)
-            .map_err(|e| Error::Memory(format!("{} MiB for a volume cannot be had: {e}", size >> 20)))?;
+        let bytes = MmapMut::map_anon(size).map_err(|_| MemoryError::Machine {
+            needed: size as u64,
+            available: None,
+            purpose: Purpose::Match,
+        })?;
         // A wish: a system without large pages gives small ones.
         #[cfg(target_os = "linux")]
         let _ = bytes.advise(memmap2::Advice::HugePage);

@@ -7,7 +7,7 @@
 use super::device::Device;
 use super::uniform::{ALIGN_WORDS, LevelParams};
 use super::upload::Incoming;
-use crate::error::{Error, Result};
+use crate::error::{MemoryError, Result};
 use crate::plan::{GRAPH_WINDOW, Plan};
 use std::num::NonZero;
 use std::ops::Range;
@@ -233,11 +233,8 @@ impl Allocator<'_> {
         let size = (4 * words).max(4 * ALIGN_WORDS as u64);
         let (name, largest) = (&self.device.name, self.device.max_buffer);
         if size > largest {
-            return Err(Error::Memory(format!(
-                "the {label} buffer needs {} MiB and {name} allows {}: use --backend cpu, or a smaller image",
-                size >> 20,
-                largest >> 20
-            )));
+            let (name, what) = (name.clone(), format!("the {label}"));
+            return Err(MemoryError::Buffer { name, what, needed: size, allowed: largest }.into());
         }
         let buffer = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -273,14 +270,14 @@ fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec
     }
     let own = fitting.saturating_sub(2 * u64::from(HALO)) as u32 & !1;
     if own == 0 {
-        return Err(Error::Memory(format!(
-            "{} rows of {} labels need {} KiB and {} allows {} in a buffer: use --backend cpu, or a smaller image or range",
-            2 + 2 * HALO,
-            plan.levels[0].labels,
-            (u64::from(2 + 2 * HALO) * 4 * u64::from(widest)) >> 10,
-            device.name,
-            device.max_buffer >> 10
-        )));
+        let rows = 2 + 2 * HALO;
+        return Err(MemoryError::Buffer {
+            name: device.name.clone(),
+            what: format!("{rows} rows of {} labels", plan.levels[0].labels),
+            needed: 4 * u64::from(rows) * u64::from(widest),
+            allowed: device.max_buffer,
+        }
+        .into());
     }
     Ok((0..params.height).step_by(own as usize).chain([params.height]).collect())
 }
@@ -291,13 +288,9 @@ impl Buffers {
     /// # Errors
     /// [`Error::Memory`] when it does not fit, [`Error::Device`] when the device fails.
     pub(super) fn new(device: &Device, plan: &Plan) -> Result<Self> {
-        if let Some(memory) = device.memory.filter(|&m| m < plan.bytes()) {
-            return Err(Error::Memory(format!(
-                "the match needs {} MiB and {} has {}: use --backend cpu, or a smaller --memory, image or range",
-                plan.bytes() >> 20,
-                device.name,
-                memory >> 20
-            )));
+        if let Some(available) = device.memory.filter(|&m| m < plan.bytes()) {
+            let (name, needed) = (device.name.clone(), plan.bytes());
+            return Err(MemoryError::Device { name, needed, available }.into());
         }
         let mut allocator = Allocator { device, all: Vec::new() };
         let a = &mut allocator;

@@ -1,7 +1,7 @@
 //! Adapters: which there are, which one to take, and a device on it that reports its failures.
 
 use crate::backend::Traffic;
-use crate::error::{Error, Result};
+use crate::error::{DeviceError, Error, ExecutionError, MemoryError, Result};
 use std::collections::VecDeque;
 use std::sync::mpsc;
 use std::sync::{Arc, Mutex};
@@ -123,11 +123,7 @@ pub fn devices() -> Vec<DeviceInfo> {
 fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     let mut adapters = adapters();
     if adapters.is_empty() {
-        return Err(Error::Device(
-            "no Vulkan or Metal driver found: install the driver of the GPU, or a software one (Mesa's lavapipe), or \
-             use --backend cpu"
-                .into(),
-        ));
+        return Err(DeviceError::NoDriver.into());
     }
     let place = match wanted {
         None => preferred(&adapters),
@@ -143,16 +139,8 @@ fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     if let Some(place) = place {
         return Ok(adapters.swap_remove(place));
     }
-    let names: Vec<_> =
-        adapters.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect();
-    Err(Error::option(
-        "--device",
-        format!(
-            "no device is called `{}`; `mrfgs devices` lists {}",
-            wanted.unwrap_or_default(),
-            names.join(", ")
-        ),
-    ))
+    let present = adapters.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect();
+    Err(ExecutionError::NoSuchDevice { wanted: wanted.unwrap_or_default().into(), present }.into())
 }
 
 /// Whether there may be a GPU. On Linux every driver of one has a node in `/dev`; elsewhere only the driver knows.
@@ -232,7 +220,7 @@ impl Device {
     pub(super) fn open(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         let adapter = if faults.noop {
             let noop = adapters_of(wgpu::Backends::NOOP).pop();
-            noop.ok_or_else(|| Error::Device("this build has no device that computes nothing".into()))?
+            noop.ok_or(DeviceError::NoDriver)?
         } else {
             select(wanted)?
         };
@@ -258,12 +246,8 @@ impl Device {
             required_limits: limits.clone(),
             ..Default::default()
         });
-        let (device, queue) = pollster::block_on(request).map_err(|e| {
-            Error::Device(format!(
-                "{} cannot be opened: {e}; use another --device or --backend cpu",
-                info.name
-            ))
-        })?;
+        let (device, queue) = pollster::block_on(request)
+            .map_err(|e| failed(&info.name, &format!("the device cannot be opened: {e}")))?;
         let failure = Arc::new(Mutex::new(None));
         let note = |failure: &Arc<Mutex<Option<Error>>>| {
             let failure = Arc::clone(failure);
@@ -277,9 +261,9 @@ impl Device {
         let (uncaptured, device_name) = (note(&failure), name.clone());
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
             uncaptured(match e {
-                wgpu::Error::OutOfMemory { .. } => Error::Memory(format!(
-                    "{device_name} is out of memory: use --backend cpu, another --device, or a smaller image or range"
-                )),
+                wgpu::Error::OutOfMemory { .. } => {
+                    MemoryError::Exhausted { name: device_name.clone() }.into()
+                }
                 e => failed(&device_name, &e),
             });
         }));
@@ -324,7 +308,7 @@ impl Device {
         match &*failure {
             None => Ok(()),
             Some(Error::Memory(_)) => failure.take().map_or(Ok(()), Err),
-            Some(e) => Err(Error::Device(e.to_string())),
+            Some(e) => Err(e.clone()),
         }
     }
 
@@ -433,5 +417,5 @@ pub(super) struct Requested {
 /// The failure of the device called `name`, in one line.
 pub(super) fn failed(name: &str, reason: &dyn std::fmt::Display) -> Error {
     let reason = reason.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    Error::Device(format!("{name}: {reason}; use another --device or --backend cpu"))
+    DeviceError::Failed { name: name.into(), reason }.into()
 }

@@ -18,7 +18,7 @@ mod upload;
 
 use super::probe::Probe;
 use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
-use crate::error::Result;
+use crate::error::{Purpose, Result};
 use crate::front::Prepared;
 use crate::image::Plane;
 use crate::maps::Maps;
@@ -310,7 +310,7 @@ impl Backend for Gpu {
                 // What the last match holds goes before the next one asks for more.
                 drop(other);
                 if self.device.software {
-                    memory::check(plan.bytes(), memory::SMALLER_MATCH)?;
+                    memory::check(plan.bytes(), Purpose::Match)?;
                 }
                 let buffers = Buffers::new(&self.device, plan)?;
                 let mut steps = HashMap::new();

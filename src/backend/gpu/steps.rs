@@ -4,8 +4,8 @@ use super::buffers::{Binding, Buffers, Copy, LevelBuffers, Rows};
 use super::device::Device;
 use super::shader::{Kernel, WORKGROUP};
 use super::uniform::{self, Band, Header, Layout, LevelParams, UniformLayout};
-use crate::error::{Error, Result};
-use crate::plan::Plan;
+use crate::error::{DeviceError, MemoryError, Result};
+use crate::plan::{LevelPlan, Plan};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
@@ -149,13 +149,13 @@ impl<'a> Recorder<'a> {
                     break;
                 }
                 if rows == 1 {
-                    return Err(Error::Memory(format!(
-                        "what a row of the image depends on takes {} KiB and {} lets a shader see {} KiB at once: use \
-                         --backend cpu, or a smaller image or range",
-                        most >> 10,
-                        self.device.name,
-                        self.device.max_binding >> 10
-                    )));
+                    return Err(MemoryError::Buffer {
+                        name: self.device.name.clone(),
+                        what: "one row of the image and what it depends on".into(),
+                        needed: most,
+                        allowed: self.device.max_binding,
+                    }
+                    .into());
                 }
                 rows -= rows.div_ceil(8).min(rows - 1);
             }
@@ -212,16 +212,9 @@ impl<'a> Recorder<'a> {
     fn pipeline(&mut self, job: &Job) -> Result<wgpu::ComputePipeline> {
         let Job { kernel, loops, .. } = job;
         if *loops > MAX_LOOP_ITERATIONS {
-            let plan = self.plan;
-            return Err(Error::Device(format!(
-                "{} x {} pixels and {} labels with {} neighbours are too many for one invocation of the shader `{}`: use \
-                 --backend cpu",
-                plan.levels[0].width,
-                plan.levels[0].height,
-                plan.levels[0].labels,
-                plan.neighbours,
-                kernel.stage()
-            )));
+            let LevelPlan { width, height, labels, .. } = self.plan.levels[0];
+            let (neighbours, shader) = (self.plan.neighbours, kernel.stage());
+            return Err(DeviceError::TooLargeForShader { width, height, labels, neighbours, shader }.into());
         }
         if let Some(pipeline) = self.pipelines.get(kernel) {
             return Ok(pipeline.clone());

@@ -11,6 +11,7 @@ use tiff::TiffError;
 use tiff::decoder::{Decoder, Limits};
 
 use super::directory::Order;
+use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 use crate::memory;
 
@@ -42,10 +43,10 @@ impl Packing<'_> {
     ///
     /// # Errors
     /// What is wrong with it, in one line.
-    pub(super) fn rows<'a>(&self, data: &'a [u8], rows: usize) -> Result<Cow<'a, [u8]>, String> {
+    pub(super) fn rows<'a>(&self, data: &'a [u8], rows: usize) -> Result<Cow<'a, [u8]>, ReadError> {
         let bytes = self.row_bytes * rows;
         let data = if self.reversed && self.compression != JPEG {
-            let mut copy = memory::filled(data.len(), 0_u8).map_err(|e| e.to_string())?;
+            let mut copy = memory::filled(data.len(), 0_u8)?;
             copy.iter_mut().zip(data).for_each(|(to, from)| *to = from.reverse_bits());
             Cow::Owned(copy)
         } else {
@@ -69,7 +70,7 @@ impl Packing<'_> {
     }
 
     /// What the `tiff` crate makes of compressed data: a file with nothing else in it, grey, in one strip.
-    fn unpacked(&self, data: &[u8], rows: usize) -> Result<Vec<u8>, String> {
+    fn unpacked(&self, data: &[u8], rows: usize) -> Result<Vec<u8>, ReadError> {
         if self.compression == JPEG {
             let frame =
                 jpeg_frame(data).ok_or_else(|| damaged("a JPEG strip or tile does not say its size"))?;
@@ -111,7 +112,7 @@ impl Packing<'_> {
         file.try_reserve_exact(data.len())
             .map_err(|_| unsupported("a TIFF strip or tile is too large for the memory"))?;
         file.extend(data);
-        let mut out = memory::filled(self.row_bytes * rows, 0).map_err(|e| e.to_string())?;
+        let mut out = memory::filled(self.row_bytes * rows, 0)?;
         let reason = |e: TiffError| match e {
             TiffError::UnsupportedError(_) => unsupported(e),
             _ => damaged(e),

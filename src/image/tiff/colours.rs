@@ -2,6 +2,7 @@
 
 use super::directory::Directory;
 use super::{equal, tag};
+use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 use crate::image::raster::Samples;
 use crate::memory;
@@ -48,7 +49,7 @@ impl Colours {
     ///
     /// # Errors
     /// What of it is not understood.
-    pub(super) fn of(directory: &Directory) -> Result<Self, String> {
+    pub(super) fn of(directory: &Directory) -> Result<Self, ReadError> {
         let samples = directory.first(tag::SAMPLES, 1)? as usize;
         let bits = equal(directory, tag::BITS, 1, "depths")?;
         if samples == 0 || samples > usize::from(u16::MAX) || !(1..=64).contains(&bits) {
@@ -91,7 +92,7 @@ impl Colours {
         let known = colours + usize::from(alpha != Alpha::None);
         if samples < colours || colours == 1 && samples != known {
             let plural = if samples == 1 { "" } else { "s" };
-            return Err(format!("has {samples} band{plural}; extract one, or red, green and blue"));
+            return Err(format!("has {samples} band{plural}; extract one, or red, green and blue").into());
         }
         let subsampling = match model {
             Model::YCbCr { .. } => {
@@ -123,7 +124,7 @@ impl Colours {
 
     /// Grey or red, green and blue, with alpha where there is one, and how many they are. Unsigned samples of fewer than 8 bits span
     /// all levels of 8; those of 9 to 15 stay as they are.
-    pub(super) fn levels(&self, samples: Samples<'static>) -> Result<(usize, Samples<'static>), String> {
+    pub(super) fn levels(&self, samples: Samples<'static>) -> Result<(usize, Samples<'static>), ReadError> {
         let n = self.read();
         // White.
         let most = if self.bits < 64 { (1_u64 << self.bits) - 1 } else { u64::MAX };
@@ -181,10 +182,10 @@ impl Colours {
         samples: &[S],
         rgb: impl Fn(&[S]) -> Option<[T; 3]>,
         alpha: impl Fn(S) -> T,
-    ) -> Result<Vec<T>, String> {
+    ) -> Result<Vec<T>, ReadError> {
         let (n, has_alpha) = (self.read(), self.alpha != Alpha::None);
         let count = samples.len() / n * (3 + usize::from(has_alpha));
-        let mut out = memory::reserved(count).map_err(|e| e.to_string())?;
+        let mut out = memory::reserved(count)?;
         for pixel in samples.chunks_exact(n) {
             out.extend(rgb(pixel).ok_or_else(|| damaged("an index is beyond the end of the palette"))?);
             out.extend(has_alpha.then(|| alpha(pixel[n - 1])));
@@ -203,7 +204,7 @@ impl Model {
         }
     }
 
-    fn ycbcr(directory: &Directory) -> Result<Self, String> {
+    fn ycbcr(directory: &Directory) -> Result<Self, ReadError> {
         let coefficients = directory.reals(tag::YCBCR_COEFFICIENTS)?;
         let coefficients = coefficients.as_deref().and_then(|values| values.first_chunk().copied());
         let black_white = directory.reals(tag::REFERENCE_BLACK_WHITE)?;
@@ -221,7 +222,7 @@ impl Model {
 }
 
 /// Red, green and blue of every index of `bits` bits, in 8 bits.
-fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, String> {
+fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, ReadError> {
     if bits > 16 {
         return Err(unsupported(format!("holds indices of {bits} bits into a palette")));
     }
@@ -285,10 +286,10 @@ pub(super) fn spread(
     width: usize,
     rows: usize,
     (across, down): (usize, usize),
-) -> Result<Vec<u8>, String> {
+) -> Result<Vec<u8>, ReadError> {
     let unit = across * down + 2;
     let units = width.div_ceil(across);
-    let mut out = memory::reserved(3 * width * rows).map_err(|e| e.to_string())?;
+    let mut out = memory::reserved(3 * width * rows)?;
     for y in 0..rows {
         let line = &stored[y / down * units * unit..][..units * unit];
         for x in 0..width {

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::tag;
+use crate::error::ReadError;
 use crate::image::file::damaged;
 
 /// Directories that are looked at, at most: a file with more has no end.
@@ -50,7 +51,7 @@ impl<'a> Directory<'a> {
     ///
     /// # Errors
     /// What is wrong with the file, in one line.
-    pub(super) fn of(file: &'a [u8]) -> Result<Self, String> {
+    pub(super) fn of(file: &'a [u8]) -> Result<Self, ReadError> {
         let (order, big) = match file {
             [b'I', b'I', kind, 0, ..] => (Order::Little, *kind == 43),
             [b'M', b'M', 0, kind, ..] => (Order::Big, *kind == 43),
@@ -79,7 +80,7 @@ impl<'a> Directory<'a> {
         Ok(first)
     }
 
-    fn read(file: &'a [u8], order: Order, big: bool, place: u64) -> Result<Self, String> {
+    fn read(file: &'a [u8], order: Order, big: bool, place: u64) -> Result<Self, ReadError> {
         // Sizes of the number of entries, of an entry, and of counts and places.
         let (head, size, wide) = if big { (8, 20, 8) } else { (2, 12, 4) };
         let ends = || damaged("the TIFF file ends within its directory");
@@ -104,7 +105,7 @@ impl<'a> Directory<'a> {
     }
 
     /// Whether it is of an image in full size.
-    fn is_image(&self) -> Result<bool, String> {
+    fn is_image(&self) -> Result<bool, ReadError> {
         // Bit 0 tells a reduced copy, bit 2 a mask. The older tag has 2 for a reduced copy.
         Ok(self.first(tag::NEW_SUBFILE_TYPE, 0)? & 5 == 0 && self.first(tag::SUBFILE_TYPE, 1)? != 2)
     }
@@ -115,7 +116,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The values of a tag as they stand, with their kind.
-    fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, String> {
+    fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, ReadError> {
         let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };
         let bytes = entry.count.checked_mul(size_of_kind(entry.kind) as u64);
         let range = bytes.and_then(|bytes| Some(entry.place..entry.place.checked_add(bytes)?));
@@ -133,7 +134,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The values of a tag that holds whole numbers; `None` where there is none.
-    pub(super) fn unsigned(&self, tag: u16) -> Result<Option<Vec<u64>>, String> {
+    pub(super) fn unsigned(&self, tag: u16) -> Result<Option<Vec<u64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
             return Err(damaged(format!("the TIFF tag {tag} holds no whole numbers")));
@@ -142,23 +143,23 @@ impl<'a> Directory<'a> {
     }
 
     /// The first value of a tag, or `default`.
-    pub(super) fn first(&self, tag: u16, default: u64) -> Result<u64, String> {
+    pub(super) fn first(&self, tag: u16, default: u64) -> Result<u64, ReadError> {
         Ok(self.unsigned(tag)?.and_then(|values| values.first().copied()).unwrap_or(default))
     }
 
     /// The first value of a tag that must be there.
-    pub(super) fn required(&self, tag: u16, what: &str) -> Result<u64, String> {
+    pub(super) fn required(&self, tag: u16, what: &str) -> Result<u64, ReadError> {
         let value = self.unsigned(tag)?.and_then(|values| values.first().copied());
         value.ok_or_else(|| damaged(format!("the TIFF directory does not say the {what}")))
     }
 
     /// The bytes of a tag, whatever they are.
-    pub(super) fn bytes(&self, tag: u16) -> Result<Option<&'a [u8]>, String> {
+    pub(super) fn bytes(&self, tag: u16) -> Result<Option<&'a [u8]>, ReadError> {
         Ok(self.values(tag)?.map(|(_, values)| values))
     }
 
     /// The values of a tag that holds fractions of unsigned numbers, or floats.
-    pub(super) fn reals(&self, tag: u16) -> Result<Option<Vec<f64>>, String> {
+    pub(super) fn reals(&self, tag: u16) -> Result<Option<Vec<f64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         let real = |value: &[u8]| match kind {
             5 => self.order.number(&value[..4]) as f64 / self.order.number(&value[4..]) as f64,
@@ -170,7 +171,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The text of a tag, up to where it ends.
-    pub(super) fn text(&self, tag: u16) -> Result<Option<String>, String> {
+    pub(super) fn text(&self, tag: u16) -> Result<Option<String>, ReadError> {
         let text = self.bytes(tag)?.and_then(|bytes| bytes.split(|byte| *byte == 0).next());
         Ok(text.map(|bytes| String::from_utf8_lossy(bytes).trim().to_owned()))
     }

@@ -17,6 +17,7 @@ use self::colours::Colours;
 use self::directory::{Directory, Order};
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
 use super::raster::{Raster, Samples, holding};
+use crate::error::ReadError;
 use crate::memory;
 use crate::text::quoted;
 
@@ -84,29 +85,29 @@ struct Layout<'a> {
 ///
 /// # Errors
 /// What is wrong with the file, in one line.
-pub(super) fn decode(file: &[u8], max_pixels: u64, no_data: Option<f64>) -> Result<Raster<'static>, String> {
+pub(super) fn decode(
+    file: &[u8],
+    max_pixels: u64,
+    no_data: Option<f64>,
+) -> Result<Raster<'static>, ReadError> {
     let directory = Directory::of(file)?;
     let colours = Colours::of(&directory)?;
     let layout = Layout::of(&directory, &colours, file.len(), max_pixels)?;
     let no_data = no_data.map_or_else(|| no_data_of(&directory), |value| Ok(Some(value)))?;
     let samples = layout.samples(file, no_data.unwrap_or(0.0))?;
-    let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose();
-    let no_data = no_data.map_err(|e| e.to_string())?;
+    let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
     let (channels, samples) = colours.levels(samples)?;
     Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data })
 }
 
 /// The value that GDAL says stands for no data.
-fn no_data_of(directory: &Directory) -> Result<Option<f64>, String> {
+fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
     let Some(text) = directory.text(tag::NO_DATA)? else { return Ok(None) };
     match text.parse() {
         Ok(value) => Ok(Some(value)),
         // Written so by some.
         Err(_) if text.is_empty() => Ok(None),
-        Err(_) => Err(format!(
-            "has the no-data value {}, which is no number; give one with --no-data",
-            quoted(&text)
-        )),
+        Err(_) => Err(ReadError::NoData { value: quoted(&text) }),
     }
 }
 
@@ -116,7 +117,7 @@ impl<'a> Layout<'a> {
         colours: &Colours,
         file_bytes: usize,
         max_pixels: u64,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ReadError> {
         let size = (directory.required(tag::WIDTH, "width")?, directory.required(tag::HEIGHT, "height")?);
         check_claim(size, max_pixels, MAX_PIXELS_PER_BYTE, file_bytes)?;
         let (width, height) = (size.0 as usize, size.1 as usize);
@@ -189,7 +190,7 @@ impl<'a> Layout<'a> {
 
         let tiled = directory.has(tag::TILE_WIDTH);
         let (chunk, offsets, byte_counts) = if tiled {
-            let side = |tag, what| Ok::<_, String>(directory.required(tag, what)?.max(1));
+            let side = |tag, what| Ok::<_, ReadError>(directory.required(tag, what)?.max(1));
             let chunk = (
                 side(tag::TILE_WIDTH, "width of its tiles")?,
                 side(tag::TILE_HEIGHT, "height of its tiles")?,
@@ -251,7 +252,7 @@ impl<'a> Layout<'a> {
     }
 
     /// The samples that are read of all pixels; `missing` where the file leaves a strip or tile out.
-    fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, String> {
+    fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, ReadError> {
         let (order, bits) = (self.packing.order, self.packing.bits);
         let size = bits as usize / 8;
         let number = |row: &[u8], i: usize| order.number(&row[i * size..(i + 1) * size]);
@@ -306,9 +307,8 @@ impl<'a> Layout<'a> {
         file: &[u8],
         missing: S,
         read: impl Fn(&[u8], usize) -> S,
-    ) -> Result<Vec<S>, String> {
-        let mut out =
-            memory::filled(self.width * self.height * self.read, missing).map_err(|e| e.to_string())?;
+    ) -> Result<Vec<S>, ReadError> {
+        let mut out = memory::filled(self.width * self.height * self.read, missing)?;
         let (across, down) = (self.width.div_ceil(self.chunk.0), self.height.div_ceil(self.chunk.1));
         let (in_row, samples) = if self.planar { (1, 1) } else { (self.read, self.packing.samples) };
         for (i, &offset) in self.offsets.iter().enumerate() {
@@ -354,7 +354,7 @@ impl<'a> Layout<'a> {
 }
 
 /// The value of a tag that has one for every sample, all alike.
-fn equal(directory: &Directory, tag: u16, default: u64, what: &str) -> Result<u64, String> {
+fn equal(directory: &Directory, tag: u16, default: u64, what: &str) -> Result<u64, ReadError> {
     let values = directory.unsigned(tag)?.unwrap_or_default();
     let first = values.first().copied().unwrap_or(default);
     if values.iter().any(|value| *value != first) {
