@@ -6,7 +6,7 @@ use crate::backend::{Backend, Stage, Traffic};
 use crate::error::{Error, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
-use crate::options::{Choice, DisparityRange, Execution, Method};
+use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::{self, Inspector, Observer, Solution, Started};
 use crate::tiles::Tiles;
@@ -71,17 +71,11 @@ impl Matcher {
     /// [`Error::Option`] for what makes no sense, [`Error::Device`] where the wanted device is missing or cannot be
     /// opened.
     pub fn new(execution: &Execution) -> Result<Self> {
-        let device = execution.device.as_deref();
-        match execution.backend {
-            Choice::Cpu if device.is_some() => Err(Error::option(
-                "--device",
-                "names a device, and --backend cpu uses none: leave one of them out",
-            )),
-            Choice::Cpu => Self::build(None, false, execution),
-            // Who names a device means it.
-            Choice::Gpu => Self::build(Some(Gpu::new(device)), false, execution),
-            Choice::Auto if device.is_some() => Self::build(Some(Gpu::new(device)), false, execution),
-            Choice::Auto => Self::build(gpu::has_automatic().then(|| Gpu::new(None)), true, execution),
+        match &execution.device {
+            DeviceChoice::Cpu => Self::build(None, false, execution),
+            DeviceChoice::Gpu => Self::build(Some(Gpu::new(None)), false, execution),
+            DeviceChoice::Named(name) => Self::build(Some(Gpu::new(Some(name))), false, execution),
+            DeviceChoice::Auto => Self::build(gpu::has_automatic().then(|| Gpu::new(None)), true, execution),
         }
     }
 

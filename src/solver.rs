@@ -11,7 +11,7 @@ use crate::graph::{self, LevelGraph};
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
-use crate::options::{Fill, Illumination, LeftRightCheck, Median, Method, Schedule};
+use crate::options::{Fill, Illumination, LeftRightCheck, Median, Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::tiles::Tiles;
 use std::iter;
@@ -208,12 +208,12 @@ fn check_size(plan: &Plan, pair: &Pair) -> Result<()> {
 
 /// How often a pair is matched: once more, mirrored, where that is how its right view is found.
 fn matchings(plan: &Plan) -> usize {
-    if plan.method.left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 }
+    if plan.method.refinement.left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 }
 }
 
 /// The pair with its illumination corrected, where that is asked for.
 fn corrected(plan: &Plan, pair: Pair, work: &mut Work) -> Result<Pair> {
-    match plan.method.illumination {
+    match plan.method.front.illumination {
         Illumination::None => Ok(pair),
         Illumination::Homomorphic => {
             let both = || Pair::new(homomorphic(pair.left()), homomorphic(pair.right()));
@@ -231,7 +231,7 @@ fn estimate(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, work: &mut Work
     work.look(&mut Glimpse::Graphs(&graphs))?;
     work.host("upload", || backend.prepare(plan, pair, graphs))?;
     if plan.limits_labels() {
-        let options = zones::Options { zones: method.zones as usize, ..zones::Options::default() };
+        let options = zones::Options { zones: method.front.zones as usize, ..zones::Options::default() };
         let zones = work.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
         let split = Some((&zones.map, zones.count));
         let matches = work.host("matches", || Ok(matches::find(pair, split, Some(plan.range))))?;
@@ -263,7 +263,7 @@ pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> Result<u32> {
 
 fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<u32> {
     let coarsest = plan.levels.len() - 1;
-    let tolerance = plan.method.tolerance;
+    let tolerance = plan.method.schedule.tolerance;
     let mut iterations = 0;
     for phase in &plan.phases {
         if phase.finest < coarsest && plan.phases.len() > 1 {
@@ -300,13 +300,13 @@ fn propagate(backend: &mut dyn Backend, plan: &Plan, work: &mut Work) -> Result<
 fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> + use<> {
     let (finest, coarsest) = (phase.finest, plan.levels.len() - 1);
     // The coarsest levels that are resolved and that are flooded.
-    let (resolved, flooded) = match plan.method.schedule {
-        Schedule::Together => (coarsest, coarsest),
+    let (resolved, flooded) = match plan.method.schedule.order {
+        Order::Together => (coarsest, coarsest),
         // What joining has just resolved would give the same messages again.
-        Schedule::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
+        Order::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
         // The coarser levels have settled: they and level 0 speak in turns. A level that is farther away than messages
         // between levels still go has no say any more.
-        Schedule::CoarseFirst => {
+        Order::CoarseFirst => {
             let reach = coarsest.min((phase.iterations / 2 - i / 2) as usize);
             if i.is_multiple_of(2) { (0, reach) } else { (reach, 0) }
         }
@@ -316,23 +316,23 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
 
 /// What follows the estimate and looks at volumes still.
 fn read_out(method: &Method) -> Vec<Stage> {
-    let right = (method.left_right_check == LeftRightCheck::RightView).then_some(Stage::RightView);
+    let right = (method.refinement.left_right_check == LeftRightCheck::RightView).then_some(Stage::RightView);
     right.into_iter().chain([Stage::SubPixel]).collect()
 }
 
 /// What follows that, and looks at maps alone.
 fn post_processing(method: &Method) -> Vec<Stage> {
     let mut stages = vec![Stage::LeftRightCheck];
-    if method.speckle_size > 1 {
+    if method.refinement.speckle_size > 1 {
         stages.push(Stage::SpeckleFilter);
     }
     stages.push(Stage::Confidence);
-    match method.fill {
+    match method.refinement.fill {
         Fill::None => {}
         Fill::Row => stages.push(Stage::Fill),
         Fill::Median => stages.extend([Stage::Fill, Stage::FillMedian]),
     }
-    if method.median != Median::Off {
+    if method.refinement.median != Median::Off {
         stages.push(Stage::Median);
     }
     stages

@@ -61,7 +61,7 @@ impl Tiles {
     /// As [`Tiles::new`].
     pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
         let (width, height) = whole.size();
-        let memory = u64::from(whole.method.memory) << 20;
+        let memory = u64::from(whole.method.tiles.memory) << 20;
         let all = Rect::whole((width, height));
         if whole.bytes() <= memory {
             let tile = Tile { core: all.clone(), crop: all, plan: whole.clone() };
@@ -88,7 +88,7 @@ impl Tiles {
                 format!(
                     "{} MiB are too few for {} x {} pixels and {} labels, also in tiles: give at least {}MiB, or a \
                      smaller image or range",
-                    whole.method.memory,
+                    whole.method.tiles.memory,
                     all.x.len(),
                     all.y.len(),
                     range.labels(),

@@ -14,7 +14,7 @@ use mrfgs::backend::Stage;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::gpu::{self, Gpu};
 use mrfgs::image::{Pair, write};
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
 use mrfgs::plan::Plan;
 use mrfgs::{Error, Matched, Matcher, Result, Timing, roofline};
 use serde::{Deserialize, Serialize};
@@ -316,8 +316,11 @@ impl Case<'_> {
         let method = args.method.on(self.preset)?;
         let device = args.resources.device.clone();
         let mut matcher = Matcher::new(&Execution {
-            backend: if self.backend == "gpu" { Choice::Gpu } else { Choice::Cpu },
-            device: device.clone(),
+            device: match (self.backend, device.clone()) {
+                ("gpu", Some(name)) => DeviceChoice::Named(name),
+                ("gpu", None) => DeviceChoice::Gpu,
+                _ => DeviceChoice::Cpu,
+            },
             threads: args.resources.threads.map(usize::from),
             timings: false,
         })?;

@@ -257,7 +257,7 @@ fn check_outputs(args: &Args) -> Result<(Option<Destination<'_>>, Option<Submiss
     let submission = match args.submission.as_deref() {
         Some([dir, method]) => {
             let names = args.dirs.iter().map(|dir| folder::name(dir)).collect::<Vec<_>>();
-            let fill = args.method.method()?.fill;
+            let fill = args.method.method()?.refinement.fill;
             Some(Submission::new(Path::new(dir), method, &names, fill)?)
         }
         _ => None,

@@ -41,7 +41,7 @@ use mrfgs::backend::gpu;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::{MAX_PIXELS, Reader};
-use mrfgs::options::{Choice, DisparityRange, Execution, MAX_MEMORY, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, MAX_MEMORY, Method};
 use mrfgs::solver::Inspector;
 use mrfgs::{Error, Matched, Matcher, Result, Timing};
 use progress::Bar;
@@ -240,7 +240,7 @@ struct MethodArgs {
     /// TOML file of keys that replace the preset's, such as `mrfgs presets NAME` prints
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Sets one key, after preset and config file: `--set levels=4 --set cost=sad`
+    /// Sets one key, after preset and config file: `--set levels=4 --set matching=sad`
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     set: Vec<(String, String)>,
     /// Memory that a match may take, such as 2GiB or 512MiB; a pair that needs more is matched tile by tile, which changes
@@ -303,7 +303,7 @@ impl MethodArgs {
             method.load(path)?;
         }
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
-        method.memory = self.memory.unwrap_or(method.memory);
+        method.tiles.memory = self.memory.unwrap_or(method.tiles.memory);
         method.validated()
     }
 }
@@ -364,12 +364,12 @@ impl ExecutionArgs {
             let _ = rayon::ThreadPoolBuilder::new().num_threads((*threads).into()).build_global();
         }
         Ok(Execution {
-            backend: match self.backend {
-                Backend::Auto => Choice::Auto,
-                Backend::Gpu => Choice::Gpu,
-                Backend::Cpu => Choice::Cpu,
+            device: match (device, self.backend) {
+                (Some(name), _) => DeviceChoice::Named(name.clone()),
+                (None, Backend::Auto) => DeviceChoice::Auto,
+                (None, Backend::Gpu) => DeviceChoice::Gpu,
+                (None, Backend::Cpu) => DeviceChoice::Cpu,
             },
-            device: device.clone(),
             threads: threads.map(usize::from),
             timings: self.timings,
         })

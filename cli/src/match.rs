@@ -7,7 +7,7 @@ use mrfgs::depth::Rig;
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
-use mrfgs::options::{DisparityRange, Fill, Schedule};
+use mrfgs::options::{DisparityRange, Fill, Order};
 use mrfgs::plan::Plan;
 use mrfgs::solver::{Glimpse, Inspector};
 use mrfgs::tiles::Tiles;
@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     stop::listen();
     let mut method = args.method.method()?;
     if args.no_fill {
-        method.fill = Fill::None;
+        method.refinement.fill = Fill::None;
     }
     let execution = args.execution.execution()?;
     let pair = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
@@ -244,18 +244,18 @@ fn describe(tiles: &Tiles) -> String {
     for (i, phase) in plan.phases.iter().enumerate() {
         let levels = match phase.finest {
             z if z == last => format!("level {last}"),
-            0 if plan.method.schedule == Schedule::CoarseFirst => "level 0, the others in between".into(),
+            0 if plan.method.schedule.order == Order::CoarseFirst => "level 0, the others in between".into(),
             z => format!("levels {z} to {last}"),
         };
         let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
         let _ = writeln!(out, "{head:10} {n:>4} iteration{} of {levels}", plural(n as usize));
     }
-    if plan.method.tolerance > 0.0 {
-        let sooner = match plan.method.schedule {
-            Schedule::Together => "or fewer",
-            Schedule::CoarseFirst => "or fewer of the last",
+    if plan.method.schedule.tolerance > 0.0 {
+        let sooner = match plan.method.schedule.order {
+            Order::Together => "or fewer",
+            Order::CoarseFirst => "or fewer of the last",
         };
-        let tolerance = plan.method.tolerance;
+        let tolerance = plan.method.schedule.tolerance;
         let _ = writeln!(out, "{:10} {sooner}, once the map changes by at most {tolerance} px (RMS)", "");
     }
     out

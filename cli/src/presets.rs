@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use mrfgs::Result;
-use mrfgs::options::{Method, PRESETS, keys};
+use mrfgs::options::{GROUPS, Key, Method, PRESETS, Takes};
 
 /// Columns of the output.
 const WIDTH: usize = 100;
@@ -14,7 +14,7 @@ Examples:
   mrfgs presets default > mine.toml      edit it, and give it to --config
   mrfgs match left.png right.png out.pfm --max-disparity 63 --config mine.toml";
 
-/// List the keys of the method with unit and meaning, and what each preset sets them to
+/// List the options of the method by group, with range, meaning and source, and their value in each preset
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -35,9 +35,12 @@ fn file(name: &str) -> Result<String> {
     let mut out = String::new();
     let about = PRESETS.iter().find(|p| p.0 == name).map_or("", |p| p.1);
     let _ = writeln!(out, "# The preset `{name}` of mrfgs {}: {about}.", env!("CARGO_PKG_VERSION"));
-    for (key, unit, meaning) in keys() {
-        let _ = writeln!(out, "\n{}", wrapped(&format!("{meaning} [{unit}]"), "# "));
-        let _ = writeln!(out, "{key} = {}", table[&key]);
+    for group in GROUPS {
+        let _ = writeln!(out, "\n\n{}\n[{}]", wrapped(group.meaning, "# "), group.name);
+        for key in group.keys {
+            let _ = writeln!(out, "\n{}", wrapped(&format!("{} [{key}]", meaning(key)), "# "));
+            let _ = writeln!(out, "{} = {}", key.name(), table[group.name][key.name()]);
+        }
     }
     Ok(out)
 }
@@ -50,17 +53,33 @@ fn listing() -> Result<String> {
     }
     let tables =
         PRESETS.iter().map(|(name, _)| Ok(Method::preset(name)?.table())).collect::<Result<Vec<_>>>()?;
-    let line = |key: &str, values: &mut dyn Iterator<Item = String>, unit: &str| {
+    let line = |key: &str, values: &mut dyn Iterator<Item = String>, takes: &str| {
         let values = values.map(|v| format!("{v:14}")).collect::<Vec<_>>().concat();
-        format!("\n{key:20}{values}[{unit}]")
+        format!("{key:22}{values}[{takes}]")
     };
     let names = &mut PRESETS.iter().map(|p| p.0.to_owned());
-    let _ = writeln!(out, "{}", line("key", names, "unit and range"));
-    for (key, unit, meaning) in keys() {
-        let values = &mut tables.iter().map(|t| t[&key].to_string().replace('"', ""));
-        let _ = writeln!(out, "{}\n{}", line(&key, values, unit), wrapped(meaning, "    "));
+    let _ = writeln!(out, "\n{}", line("key", names, "unit and range"));
+    for group in GROUPS {
+        let _ = writeln!(out, "\n[{}] {}", group.name, group.meaning);
+        for key in group.keys {
+            let name = key.name();
+            let values = &mut tables.iter().map(|t| t[group.name][&name].to_string().replace('"', ""));
+            let _ = writeln!(out, "\n{}", line(&name, values, &key.to_string()));
+            let _ = writeln!(out, "{}", wrapped(&meaning(key), "    "));
+            if let Takes::Words(words) = key.takes {
+                for word in words {
+                    let _ =
+                        writeln!(out, "{}", wrapped(&format!("{}: {}", word.word, word.meaning), "      "));
+                }
+            }
+        }
     }
     Ok(out)
+}
+
+/// What a key does, and where it comes from.
+fn meaning(key: &Key) -> String {
+    format!("{} ({}).", key.meaning.trim_end_matches('.'), key.source)
 }
 
 /// A text in lines of at most [`WIDTH`] columns, each behind `lead`.

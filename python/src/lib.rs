@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::{Pair, Plane, raster};
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
 use mrfgs::solver::Observer;
 use mrfgs::{Error, Matched, Matcher};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -64,9 +64,9 @@ fn method(preset: &str, options: Option<&Bound<PyDict>>) -> PyResult<Method> {
 
 fn execution(backend: &str, device: Option<String>, threads: Option<usize>) -> PyResult<Execution> {
     let backend = match backend {
-        "auto" => Choice::Auto,
-        "cpu" => Choice::Cpu,
-        "gpu" => Choice::Gpu,
+        "auto" => DeviceChoice::Auto,
+        "cpu" => DeviceChoice::Cpu,
+        "gpu" => DeviceChoice::Gpu,
         _ => return Err(PyValueError::new_err(format!("backend: {backend} is none of auto, cpu and gpu"))),
     };
     Ok(Execution { backend, device, threads, ..Execution::default() })

@@ -151,7 +151,7 @@ pub enum Stage {
     /// [`Map::RightLabel`] and [`Map::RightBest`]: at (x, y) the label with the smallest belief of left pixel (x + d, y) among
     /// those in the columns [`Plan::core`], the lowest on ties, and that belief.
     RightView,
-    /// [`Map::Raw`], and [`Map::Disparity`] equal to it: the label and, where [`crate::options::Method::sub_pixel`] asks
+    /// [`Map::Raw`], and [`Map::Disparity`] equal to it: the label and, where [`crate::options::RefinementOptions::sub_pixel`] asks
     /// for it, its offset.
     ///
     /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
@@ -161,7 +161,7 @@ pub enum Stage {
     /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
     SubPixel,
     /// [`Map::Validity`]: [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
-    /// [`crate::options::Method::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
+    /// [`crate::options::RefinementOptions::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
     /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
     ///
     /// [`flag::MASKED`]: crate::maps::flag::MASKED
@@ -169,13 +169,13 @@ pub enum Stage {
     /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
     LeftRightCheck,
     /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE) on every pixel of each region of fewer than
-    /// [`crate::options::Method::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
+    /// [`crate::options::RefinementOptions::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
     /// flag, 4-connected; labels that differ by at most one connect.
     SpeckleFilter,
     /// [`Map::Confidence`]: how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
     /// 255 where there is no runner-up, 0 for invalid pixels. Sets
     /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
-    /// [`crate::options::Method::confidence_floor`].
+    /// [`crate::options::RefinementOptions::confidence_floor`].
     Confidence,
     /// Fills [`Map::Disparity`] on every invalid pixel that is not masked with the smaller of the nearest valid
     /// disparities to the left and to the right on its row, or the one there is: what is occluded belongs to the
@@ -185,7 +185,7 @@ pub enum Stage {
     /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
     /// apart, distance counts in places, and the range parameter is a quarter.
     FillMedian,
-    /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::Method::median`] names and that have a
+    /// Weighted median of [`Map::Disparity`], on the pixels that [`crate::options::RefinementOptions::median`] names and that have a
     /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
     /// smallest value at which half of the weight is reached. Weights are [`crate::weights::MedianWeights`] of the left image.
     Median,
@@ -287,7 +287,7 @@ pub trait Backend {
     fn prepare(&mut self, plan: &Plan, pair: &Pair, graphs: Vec<LevelGraph>) -> Result<()>;
 
     /// Takes the label range of every pixel for [`Stage::LabelRange`], once the pair is prepared: at each level the first and the
-    /// last label index that it may have. Only for plans whose method has a [`crate::options::Method::zone_sigmas`].
+    /// last label index that it may have. Only for plans whose method has a [`crate::options::FrontOptions::zone_sigmas`].
     fn label_range(&mut self, label_ranges: &[Plane<[u16; 2]>]) -> Result<()>;
 
     /// Runs a stage. Devices may still be at it when this returns.

@@ -20,7 +20,7 @@ use mrfgs::backend::cpu::Cpu;
 use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::{Pair, Plane};
-use mrfgs::options::{Cost, Method};
+use mrfgs::options::{MatchingCost, Method};
 use mrfgs::plan::{COST_MAX, Plan};
 use std::cell::Cell;
 use std::collections::HashSet;
@@ -103,9 +103,12 @@ fn random_cost(random: &mut Random, plan: &Plan, z: usize) -> Vec<u32> {
 fn the_cases_cover_what_they_should() {
     let cases = cases();
     let seen = |f: &dyn Fn(&Plan) -> String| cases.iter().map(|c| f(&c.plan)).collect::<HashSet<_>>();
-    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.potential, p.method.resolution)).len(), 6);
+    assert_eq!(
+        seen(&|p| format!("{:?} {:?}", p.method.messages.potential, p.method.messages.agreement)).len(),
+        6
+    );
     assert_eq!(seen(&|p| format!("{:?} {:?}", p.volume_width, p.dependency.rule)).len(), 4);
-    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost, p.method.pyramid)).len(), 6);
+    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost.matching, p.method.cost.pyramid)).len(), 6);
     assert_eq!(seen(&|p| p.neighbours.to_string()).len(), NEIGHBOURS.len());
     assert_eq!(seen(&|p| p.levels.len().to_string()).len(), 5);
     assert_eq!(
@@ -157,9 +160,9 @@ fn downsample() {
 #[test]
 fn cost() {
     on_all(|case, backend, random| {
-        for cost in [Cost::Sad, Cost::Census, Cost::AdCensus] {
+        for cost in [MatchingCost::Sad, MatchingCost::Census, MatchingCost::AdCensus] {
             let mut plan = case.plan.clone();
-            plan.method.cost = cost;
+            plan.method.cost.matching = cost;
             backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();
             let poison: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, 255)).collect();
             backend.write(Volume::Cost(0), &poison).unwrap();
@@ -174,7 +177,7 @@ fn cost() {
 fn cost_with_the_largest_window() {
     let mut random = Random::new(31);
     let mut method = random::method(&mut random, 0);
-    (method.cost, method.sad_window, method.outside_cost) = (Cost::Sad, 31, 20.0);
+    (method.cost.matching, method.cost.sad_window, method.cost.outside_cost) = (MatchingCost::Sad, 31, 20.0);
     let plan = random::plan((37, 33), -3, 9, &method);
     let pair = random::pair(&mut random, 37, 33);
     for (name, mut backend) in backends() {
@@ -206,7 +209,7 @@ fn pyramid() {
 fn label_range() {
     on_all(|case, backend, random| {
         let mut method = case.plan.method.clone();
-        method.zone_sigmas = 1.0;
+        method.front.zone_sigmas = 1.0;
         let (width, height) = case.plan.size();
         let plan = Plan::new(width, height, case.plan.range, &method).unwrap();
         backend.prepare(&plan, &case.pair, case.graphs.clone()).unwrap();

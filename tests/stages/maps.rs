@@ -20,7 +20,7 @@ type Twin = fn(&Plan, &Pair, &mut Finest);
 /// A plan with one level and no neighbours for a method drawn anew.
 fn small_plan(random: &mut Random, size: (usize, usize), change: impl Fn(&mut Method)) -> Plan {
     let mut method = random::method(random, 0);
-    method.levels = 1;
+    method.graph.levels = 1;
     change(&mut method);
     let labels = random.pick(&[1, 2, 3, 9, 40]);
     random::plan(size, random.pick(&[-20, -1, 0, 5]), labels, &method)
@@ -67,7 +67,8 @@ fn left_right_check() {
 #[test]
 fn speckle_filter() {
     let sizes = [0, 1, 2, 3, 5, 20, 10_000];
-    let change = |random: &mut Random, method: &mut Method| method.speckle_size = random.pick(&sizes);
+    let change =
+        |random: &mut Random, method: &mut Method| method.refinement.speckle_size = random.pick(&sizes);
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, false);
         // As the left-right check leaves it.
@@ -103,7 +104,7 @@ fn regions_that_wind() {
     for (shape, inside) in shapes {
         let area = (0..width * height).filter(|i| inside(i % width, i / width)).count() as u32;
         for speckle_size in [2, 3, area / 2, area, area + 1] {
-            let plan = small_plan(&mut random, (width, height), |m| m.speckle_size = speckle_size);
+            let plan = small_plan(&mut random, (width, height), |m| m.refinement.speckle_size = speckle_size);
             let labels = plan.levels[0].labels as i32;
             let mut maps = Finest::zero((width, height));
             maps.validity = Plane::from_fn(width, height, |x, y| i32::from(!inside(x, y)) * 2);
@@ -146,7 +147,8 @@ fn fill() {
 #[test]
 fn confidence() {
     let floors = [0, 1, 16, 17, 255];
-    let change = |random: &mut Random, method: &mut Method| method.confidence_floor = random.pick(&floors);
+    let change =
+        |random: &mut Random, method: &mut Method| method.refinement.confidence_floor = random.pick(&floors);
     let input = |random: &mut Random, plan: &Plan| random::finest(random, plan, false);
     on_all(Stage::Confidence, 40, change, input, |plan, _, maps| twin::confidence::confidence(plan, maps));
 }
@@ -154,10 +156,10 @@ fn confidence() {
 #[test]
 fn median() {
     let change = |random: &mut Random, method: &mut Method| {
-        method.median = random.pick(&[Median::Off, Median::Filled, Median::All, Median::All]);
-        method.median_sigma_space = random.log_within(0.1, 100.0);
-        method.median_sigma_range = random.log_within(0.001, 10.0);
-        method.median_window = random.pick(&[3, 5, 15, 31]);
+        method.refinement.median = random.pick(&[Median::Off, Median::Filled, Median::All, Median::All]);
+        method.refinement.median_sigma_space = random.log_within(0.1, 100.0);
+        method.refinement.median_sigma_range = random.log_within(0.001, 10.0);
+        method.refinement.median_window = random.pick(&[3, 5, 15, 31]);
     };
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, true);
@@ -212,7 +214,9 @@ fn median_weights() {
 fn nothing_valid() {
     for &size in SIZES {
         let mut random = Random::new(1);
-        let plan = small_plan(&mut random, size, |m| (m.median, m.speckle_size) = (Median::All, 100));
+        let plan = small_plan(&mut random, size, |m| {
+            (m.refinement.median, m.refinement.speckle_size) = (Median::All, 100);
+        });
         let pair = random::pair(&mut random, size.0, size.1);
         for all in [flag::MASKED, flag::OCCLUDED, flag::OUTSIDE | flag::LOW_CONFIDENCE, flag::SPECKLE] {
             let mut maps = random::finest(&mut random, &plan, false);
@@ -243,7 +247,7 @@ type Control = (Stage, bool, Twin, fn(&mut Plan));
 fn control_changes_are_found() {
     let mut random = Random::new(21);
     let mut method = Method::default();
-    (method.levels, method.percentile, method.median_window) = (1, 100.0, 5);
+    (method.graph.levels, method.graph.percentile, method.refinement.median_window) = (1, 100.0, 5);
     let plan = random::plan((24, 31), 0, 9, &method);
     // Faint enough for neighbours to have weight in the median.
     let faint = Plane::from_fn(24, 31, |_, _| [0; 3].map(|_: i32| random.within(100, 130) as u8));
@@ -268,18 +272,20 @@ fn control_changes_are_found() {
     };
     let changes: &[Control] = &[
         (Stage::LeftRightCheck, false, twin::left_right_check::left_right_check, |p| p.range.min += 1),
-        (Stage::SpeckleFilter, true, region, |p| p.method.speckle_size += 1),
+        (Stage::SpeckleFilter, true, region, |p| p.method.refinement.speckle_size += 1),
         (Stage::Fill, false, larger, |_| ()),
-        (Stage::Confidence, false, confidence, |p| p.method.confidence_floor += 4),
-        (Stage::FillMedian, false, twin::median::fill_median, |p| p.method.median_window = 7),
-        (Stage::FillMedian, false, twin::median::fill_median, |p| p.method.median_sigma_range = 0.02),
-        (Stage::FillMedian, false, twin::median::median, |p| p.method.median = Median::Filled),
-        (Stage::Median, false, twin::median::median, |p| p.method.median_window = 7),
-        (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_space = 1.0),
-        (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_range = 0.02),
+        (Stage::Confidence, false, confidence, |p| p.method.refinement.confidence_floor += 4),
+        (Stage::FillMedian, false, twin::median::fill_median, |p| p.method.refinement.median_window = 7),
+        (Stage::FillMedian, false, twin::median::fill_median, |p| {
+            p.method.refinement.median_sigma_range = 0.02;
+        }),
+        (Stage::FillMedian, false, twin::median::median, |p| p.method.refinement.median = Median::Filled),
+        (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_window = 7),
+        (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_space = 1.0),
+        (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_range = 0.02),
     ];
     let mut plan = plan;
-    plan.method.speckle_size = 3;
+    plan.method.refinement.speckle_size = 3;
     for (name, mut backend) in backends() {
         for (stage, bare, twin, change) in changes {
             let input = if *bare { &unflagged } else { &maps };

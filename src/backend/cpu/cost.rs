@@ -2,7 +2,7 @@
 
 use super::units::{Blocks, block, block_mut};
 use crate::image::{Image, Pair, Pixel};
-use crate::options::Cost;
+use crate::options::MatchingCost;
 use crate::plan::{CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, COLOUR_MOST, COST_MAX, Plan};
 use rayon::prelude::*;
 use std::array::from_fn;
@@ -11,9 +11,9 @@ const CENSUS_X: usize = 4;
 const CENSUS_Y: isize = 3;
 
 pub(super) fn run(plan: &Plan, pair: &Pair, out: &mut [u8]) {
-    match plan.method.cost {
-        Cost::Census | Cost::AdCensus => census(plan, pair, out),
-        Cost::Sad => sad(plan, pair, out),
+    match plan.method.cost.matching {
+        MatchingCost::Census | MatchingCost::AdCensus => census(plan, pair, out),
+        MatchingCost::Sad => sad(plan, pair, out),
     }
 }
 
@@ -277,7 +277,7 @@ fn colour_weights_on<'a, S: pulp::Simd>(
 fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
     let (width, height) = (level.width, level.height);
-    let radius = plan.method.sad_window as usize / 2;
+    let radius = plan.method.cost.sad_window as usize / 2;
     let (left, right) = (pair.left(), pair.right());
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
         || vec![(0u64, 0u32); width + 1],

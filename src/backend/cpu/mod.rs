@@ -170,8 +170,8 @@ impl Finest {
     fn run(&mut self, plan: &Plan, left: &Image, stage: Stage) {
         match stage {
             Stage::LeftRightCheck => left_right_check::run(plan, left, self),
-            Stage::SpeckleFilter => speckle_filter::run(plan.method.speckle_size as usize, self),
-            Stage::Confidence => confidence::run(plan.method.confidence_floor, self),
+            Stage::SpeckleFilter => speckle_filter::run(plan.method.refinement.speckle_size as usize, self),
+            Stage::Confidence => confidence::run(plan.method.refinement.confidence_floor, self),
             Stage::Fill => fill::run(self),
             Stage::FillMedian => median::fill(plan, left, self),
             Stage::Median => median::run(plan, left, self),

@@ -193,7 +193,7 @@ impl Kernel {
             Self::Census | Self::Contrast => 7 * 10,
             Self::AdCensus => 4,
             Self::Sad => {
-                let window = plan.method.sad_window as usize;
+                let window = plan.method.cost.sad_window as usize;
                 (window + 7) * (1 + 5 * window + 8) + 8 * 5
             }
             Self::Pyramid => 7 * 31,
@@ -222,7 +222,7 @@ impl Kernel {
             | Self::Confidence => 0,
             Self::Median => {
                 // One pass, and one for every three bits of what the disparities of a window may span.
-                let window = plan.method.median_window as usize;
+                let window = plan.method.refinement.median_window as usize;
                 (1 + 8) * (window + 1) * window + 8
             }
         }

@@ -6,7 +6,7 @@ use super::kernels::{JOINED_COLUMNS, Kernel, Params, SEGMENT};
 use super::{Gpu, WORKGROUP};
 use crate::backend::Stage;
 use crate::error::{Error, Result};
-use crate::options::{Cost, LeftRightCheck, Median};
+use crate::options::{LeftRightCheck, MatchingCost, Median};
 use crate::plan::Plan;
 use crate::weights::MedianWeights;
 use std::collections::{BTreeSet, HashMap};
@@ -48,7 +48,7 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         outside_cost: plan.outside_cost.into(),
         colour_weight: plan.colour_weight(),
         colour_variance: plan.colour_variance(),
-        sad_radius: (method.sad_window / 2) as i32,
+        sad_radius: (method.cost.sad_window / 2) as i32,
         label_offset: if level == 0 { 0 } else { plan.label_offset(level) },
         evidence_multiplier: scale.multiplier.into(),
         evidence_limit: scale.limit.into(),
@@ -56,10 +56,10 @@ fn params(plan: &Plan, buffers: &Buffers, level: usize) -> Params {
         evidence_down: scale.down,
         evidence_cap: scale.cap.into(),
         belief_most: plan.belief_most().into(),
-        sub_pixel: method.sub_pixel.into(),
-        left_right_check: (method.left_right_check != LeftRightCheck::Off).into(),
-        speckle_size: method.speckle_size,
-        confidence_floor: method.confidence_floor,
+        sub_pixel: method.refinement.sub_pixel.into(),
+        left_right_check: (method.refinement.left_right_check != LeftRightCheck::Off).into(),
+        speckle_size: method.refinement.speckle_size,
+        confidence_floor: method.refinement.confidence_floor,
         ..Params::default()
     }
 }
@@ -133,8 +133,8 @@ impl Gpu {
         add(Stage::Fill, self.fill(plan, buffers)?);
         let stretched = MedianWeights::stretched(method);
         add(Stage::FillMedian, self.median(plan, buffers, &stretched, &buffers.stretched_weights, false)?);
-        let (weights, all) = (MedianWeights::of(method), method.median == Median::All);
-        let median = match method.median {
+        let (weights, all) = (MedianWeights::of(method), method.refinement.median == Median::All);
+        let median = match method.refinement.median {
             Median::Off => Vec::new(),
             _ => self.median(plan, buffers, &weights, &buffers.median_weights, all)?,
         };
@@ -147,9 +147,9 @@ impl Gpu {
         let l = base.level;
         let job = |kernel| Job { kernel, plan, level: 0, params: base, cuts };
         let cost = &buffers.levels[0].cost;
-        let mut steps = if plan.method.cost == Cost::Sad {
+        let mut steps = if plan.method.cost.matching == MatchingCost::Sad {
             self.stage(&job(Kernel::Sad), Some(l.width.div_ceil(8) * l.quads), |rows| {
-                let seen = with_halo(rows, plan.method.sad_window / 2, l.height);
+                let seen = with_halo(rows, plan.method.cost.sad_window / 2, l.height);
                 vec![buffers.left.bind(&seen), buffers.right.bind(&seen), cost.bind(rows)]
             })?
         } else {
@@ -293,7 +293,7 @@ impl Gpu {
     /// Regions are found anew in every band, among its rows and so many around it that a region which leaves them is
     /// large enough.
     fn speckle_filter(&mut self, plan: &Plan, buffers: &Buffers) -> Result<Vec<Step>> {
-        let halo = plan.method.speckle_size;
+        let halo = plan.method.refinement.speckle_size;
         let base = Params { halo, ..params(plan, buffers, 0) };
         let l = base.level;
         let Buffers { optima, flags, speckle_parents: parents, speckle_sizes: sizes, .. } = buffers;
