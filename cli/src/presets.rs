@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use mrfgs::Result;
-use mrfgs::options::{GROUPS, Key, Method, PRESETS, Takes};
+use mrfgs::options::{GROUPS, Key, Method, PRESETS, Takes, Word};
 
 /// Columns of the output.
 const WIDTH: usize = 100;
@@ -36,9 +36,12 @@ fn file(name: &str) -> Result<String> {
     let about = PRESETS.iter().find(|p| p.0 == name).map_or("", |p| p.1);
     let _ = writeln!(out, "# The preset `{name}` of mrfgs {}: {about}.", env!("CARGO_PKG_VERSION"));
     for group in GROUPS {
-        let _ = writeln!(out, "\n\n{}\n[{}]", wrapped(group.meaning, "# "), group.name);
+        let _ = writeln!(out, "\n{}\n[{}]", wrapped(group.meaning, "# "), group.name);
         for key in group.keys {
-            let _ = writeln!(out, "\n{}", wrapped(&format!("{} [{key}]", meaning(key)), "# "));
+            let _ = match key.takes {
+                Takes::Words(_) => writeln!(out, "\n{}{}", wrapped(&meaning(key), "# "), words(key, "#   ")),
+                _ => writeln!(out, "\n{}", wrapped(&format!("{} [{key}]", meaning(key)), "# ")),
+            };
             let _ = writeln!(out, "{} = {}", key.name(), table[group.name][key.name()]);
         }
     }
@@ -65,13 +68,7 @@ fn listing() -> Result<String> {
             let name = key.name();
             let values = &mut tables.iter().map(|t| t[group.name][&name].to_string().replace('"', ""));
             let _ = writeln!(out, "\n{}", line(&name, values, &key.to_string()));
-            let _ = writeln!(out, "{}", wrapped(&meaning(key), "    "));
-            if let Takes::Words(words) = key.takes {
-                for word in words {
-                    let _ =
-                        writeln!(out, "{}", wrapped(&format!("{}: {}", word.word, word.meaning), "      "));
-                }
-            }
+            let _ = writeln!(out, "{}{}", wrapped(&meaning(key), "    "), words(key, "      "));
         }
     }
     Ok(out)
@@ -80,6 +77,13 @@ fn listing() -> Result<String> {
 /// What a key does, and where it comes from.
 fn meaning(key: &Key) -> String {
     format!("{} ({}).", key.meaning.trim_end_matches('.'), key.source)
+}
+
+/// The words that a key takes, each with its meaning on lines of its own behind `lead`.
+fn words(key: &Key, lead: &str) -> String {
+    let Takes::Words(words) = key.takes else { return String::new() };
+    let line = |word: &Word| format!("\n{}", wrapped(&format!("{}: {}", word.word, word.meaning), lead));
+    words.iter().map(line).collect()
 }
 
 /// A text in lines of at most [`WIDTH`] columns, each behind `lead`.

@@ -11,7 +11,9 @@ pub(crate) fn in_python(text: &str) -> String {
             // Behind it stands the key.
             "set" => {
                 let rest = rest.trim_start();
-                let end = rest.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(rest.len());
+                let end = rest
+                    .find(|c: char| !c.is_ascii_lowercase() && c != '-' && c != '.')
+                    .unwrap_or(rest.len());
                 let (key, rest) = rest.split_at(end);
                 out += &format!("options[\"{key}\"]{rest}");
             }
@@ -22,5 +24,5 @@ pub(crate) fn in_python(text: &str) -> String {
             }
         }
     }
-    out.replace("backend cpu", "backend=\"cpu\"")
+    out.replace("backend cpu", "device=\"cpu\"")
 }

@@ -1,6 +1,6 @@
 //! Options of the matching cost.
 
-use super::row::{Takes, odd, options, real, words};
+use super::row::{odd, one_of, options, real, words};
 use crate::error::{Error, Result};
 
 words! {
@@ -41,7 +41,7 @@ options! {
     /// The cost of matching a pixel at a label, and its pyramid.
     "cost" CostOptions {
         /// Matching cost.
-        matching: MatchingCost = MatchingCost::AdCensus, takes Takes::Words(MatchingCost::WORDS),
+        matching: MatchingCost = MatchingCost::AdCensus, takes one_of(MatchingCost::WORDS),
             source "section 2.4: sad";
         /// Side of the window of sad.
         sad_window: u32 = 7, takes odd(1..=31), unit "pixels", source "section 3.1: 7";
@@ -52,7 +52,7 @@ options! {
         /// that none is preferred. It may not be larger than the largest matching cost.
         outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.most()), unit "as the matching cost", source "open";
         /// How a level's cost volume comes from the next finer one.
-        pyramid: Pyramid = Pyramid::Minimum, takes Takes::Words(Pyramid::WORDS), source "section 2.4: low-pass";
+        pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass";
     }
 }
 

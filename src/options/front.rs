@@ -1,6 +1,6 @@
 //! Options of the front end.
 
-use super::row::{Takes, options, real, whole, words};
+use super::row::{one_of, options, real, whole, words};
 
 words! {
     /// Correction of the illumination.
@@ -16,7 +16,7 @@ options! {
     /// What is done before any cost is computed: illumination, texture zones, label ranges.
     "front" FrontOptions {
         /// Correction of the illumination of both images.
-        illumination: Illumination = Illumination::None, takes Takes::Words(Illumination::WORDS),
+        illumination: Illumination = Illumination::None, takes one_of(Illumination::WORDS),
             source "sections 2.4 and 3.1: homomorphic";
         /// Number of texture zones of the reference image, found by K-means of Gabor responses. Used where zone-sigmas is
         /// above 0.

@@ -1,6 +1,6 @@
 //! Options of the evidence and the messages of belief propagation.
 
-use super::row::{Takes, options, real, words};
+use super::row::{one_of, options, real, words};
 
 words! {
     /// Potential of a factor whose members disagree, against 1 where they agree.
@@ -37,11 +37,11 @@ options! {
         /// pixels.
         evidence_gain: f64 = 4.0, takes real(1.0..=4.0), unit "factor per level", source "open";
         /// Potential of factors whose members disagree.
-        potential: Potential = Potential::Soft, takes Takes::Words(Potential::WORDS), source "section 2.2: hard";
+        potential: Potential = Potential::Soft, takes one_of(Potential::WORDS), source "section 2.2: hard";
         /// Cost of disagreement in a dependency factor; hard potentials do not use it.
         dependency_truncation: f64 = 2.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";
         /// Which labels of two levels agree.
-        agreement: Agreement = Agreement::Interpolating, takes Takes::Words(Agreement::WORDS),
+        agreement: Agreement = Agreement::Interpolating, takes one_of(Agreement::WORDS),
             source "section 2.2: strict";
         /// Cost of disagreement in a resolution factor; hard potentials do not use it.
         resolution_truncation: f64 = 3.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";

@@ -1,6 +1,6 @@
 //! Options of the refinement of the disparity map.
 
-use super::row::{Takes, odd, options, real, whole, words};
+use super::row::{Takes, odd, one_of, options, real, whole, words};
 
 words! {
     /// Where the right view's map for the left-right check comes from.
@@ -43,16 +43,16 @@ options! {
     /// What is done with the disparity map after belief propagation.
     "refinement" RefinementOptions {
         /// Compare with the disparities of the right view: a pixel that differs by more than one pixel is occluded.
-        left_right_check: LeftRightCheck = LeftRightCheck::RightView, takes Takes::Words(LeftRightCheck::WORDS),
+        left_right_check: LeftRightCheck = LeftRightCheck::RightView, takes one_of(LeftRightCheck::WORDS),
             source "section 2.5: off";
         /// Regions with fewer pixels than this become invalid; 0 keeps all regions.
         speckle_size: u32 = 200, takes whole(0..=u32::MAX), unit "pixels", source "open";
         /// Place the disparity between the labels, by the matching cost around the optimum.
         sub_pixel: bool = true, takes Takes::Switch, source "open";
         /// What happens to invalid pixels.
-        fill: Fill = Fill::Median, takes Takes::Words(Fill::WORDS), source "row in the paper";
+        fill: Fill = Fill::Median, takes one_of(Fill::WORDS), source "row in the paper";
         /// Which pixels the weighted median changes.
-        median: Median = Median::All, takes Takes::Words(Median::WORDS), source "section 2.5: all";
+        median: Median = Median::All, takes one_of(Median::WORDS), source "section 2.5: all";
         /// Side of the median's window; it uses every second row of the window.
         median_window: u32 = 15, takes odd(3..=31), unit "pixels", source "open";
         /// Spatial parameter of the median's weights.

@@ -133,6 +133,11 @@ pub(super) const fn real(range: RangeInclusive<f64>) -> Takes {
     Takes::Real { low: *range.start(), high: *range.end() }
 }
 
+/// One of some words.
+pub(super) const fn one_of(words: &'static [Word]) -> Takes {
+    Takes::Words(words)
+}
+
 /// A word that an option takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Word {

@@ -1,14 +1,14 @@
 //! Options of the message schedule.
 
-use super::row::{Takes, options, real, whole, words};
+use super::row::{one_of, options, real, whole, words};
 
 words! {
     /// The order in which levels exchange messages.
     Order {
         /// All levels in every iteration.
         Together = "together",
-        /// The coarsest level first; then each finer one joins all levels before it. In the end level 0 and the coarser
-        /// levels alternate, as far as that still changes the result.
+        /// The coarsest level starts, and the finer ones join one after the other. Once all have joined, level 0 and the
+        /// coarser levels take turns, as far as that still changes the result.
         CoarseFirst = "coarse-first",
     }
 }
@@ -17,7 +17,7 @@ options! {
     /// The order and number of iterations.
     "schedule" ScheduleOptions {
         /// The order in which levels exchange messages.
-        order: Order = Order::CoarseFirst, takes Takes::Words(Order::WORDS), source "algorithm 1: together";
+        order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together";
         /// Iterations of all levels together; with coarse-first, iterations after each level that joins but the finest.
         iterations: u32 = 3, takes whole(1..=1000), unit "iterations", source "section 3: 20 to 30";
         /// Iterations after the finest level joins: every second one with the messages between levels, the others with
