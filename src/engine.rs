@@ -88,7 +88,7 @@ pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
 
 /// How often a pair is matched: once more, mirrored, where that is how its right view is found.
 fn matchings(plan: &Plan) -> usize {
-    if plan.method.left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 }
+    if plan.method.refinement.left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 }
 }
 
 fn watch<'a>(plan: &Plan, observer: Observer<'a>) -> Watch<'a> {

@@ -131,6 +131,24 @@ pub enum OptionError {
     /// There is no such key.
     #[error("there is no such key")]
     Unknown,
+    /// The group has no such key, but another one has.
+    #[error("there is no such key; it is `{key}`")]
+    InGroup {
+        /// The key with its own group: `cost.sad-window`.
+        key: String,
+    },
+    /// It is a group of keys.
+    #[error("is a group and takes no value; set one of its keys: {}", keys.join(", "))]
+    IsGroup {
+        /// The keys of the group.
+        keys: Vec<String>,
+    },
+    /// A file sets the key twice.
+    #[error("is set in line {line} already; keep one of the two")]
+    Repeated {
+        /// The line that sets it first.
+        line: usize,
+    },
     /// The value is of the wrong kind.
     #[error("expected {expected}, not {found}")]
     WrongKind {

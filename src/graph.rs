@@ -210,7 +210,7 @@ impl LevelGraph {
 /// The graphs of all levels of `plan`, from the reference image.
 #[must_use]
 pub fn build(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
-    let weight = spatial_weight(plan.method.sigma_space, plan.method.sigma_range);
+    let weight = spatial_weight(plan.method.graph.sigma_space, plan.method.graph.sigma_range);
     let mut coarser: Vec<Image> = Vec::new();
     for _ in 1..plan.levels.len() {
         coarser.push(downsample(coarser.last().unwrap_or(image)));

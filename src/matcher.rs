@@ -7,7 +7,7 @@ use crate::engine::{self, Solution, Started};
 use crate::error::{BudgetError, DeviceError, Error, ExecutionError, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::Maps;
-use crate::options::{Choice, DisparityRange, Execution, Method};
+use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::solver::Inspector;
 use crate::tiles::Tiles;
@@ -73,14 +73,11 @@ impl Matcher {
     /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
     /// driver or the device cannot be opened.
     pub fn new(execution: &Execution) -> Result<Self> {
-        let device = execution.device.as_deref();
-        match execution.backend {
-            Choice::Cpu if device.is_some() => Err(ExecutionError::NeedlessDevice.into()),
-            Choice::Cpu => Self::build(None, false, execution),
-            // Who names a device means it.
-            Choice::Gpu => Self::build(Some(Gpu::new(device)), false, execution),
-            Choice::Auto if device.is_some() => Self::build(Some(Gpu::new(device)), false, execution),
-            Choice::Auto => Self::build(gpu::has_automatic().then(|| Gpu::new(None)), true, execution),
+        match &execution.device {
+            DeviceChoice::Cpu => Self::build(None, false, execution),
+            DeviceChoice::Gpu => Self::build(Some(Gpu::new(None)), false, execution),
+            DeviceChoice::Named(name) => Self::build(Some(Gpu::new(Some(name))), false, execution),
+            DeviceChoice::Auto => Self::build(gpu::has_automatic().then(|| Gpu::new(None)), true, execution),
         }
     }
 

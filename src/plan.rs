@@ -9,7 +9,9 @@
 //! or 16 where the method needs them ([`VolumeWidth`]), and saturate: what is that dear is no candidate, whatever it costs.
 
 use crate::error::Result;
-use crate::options::{Cost, DisparityRange, Illumination, Method, Potential, Pyramid, Resolution, Schedule};
+use crate::options::{
+    Agreement, DisparityRange, Illumination, MatchingCost, Method, Order, Potential, Pyramid,
+};
 use std::ops::Range;
 
 /// Units of cost in one nat.
@@ -99,8 +101,8 @@ pub struct EvidenceScale {
 
 impl EvidenceScale {
     fn new(gain: f64, cost_units: f64, method: &Method) -> Self {
-        let per_cost = gain * UNITS_PER_NAT / (method.temperature * cost_units * 256.0);
-        let cap = (method.evidence_cap * UNITS_PER_NAT + 0.5).floor();
+        let per_cost = gain * UNITS_PER_NAT / (method.messages.temperature * cost_units * 256.0);
+        let cap = (method.messages.evidence_cap * UNITS_PER_NAT + 0.5).floor();
         let limit = (cap / per_cost).ceil().clamp(1.0, u16::MAX.into()) as u16;
         let up = limit.leading_zeros();
         let unshifted = per_cost * 65536.0 / f64::from(1u32 << up);
@@ -225,14 +227,14 @@ impl Plan {
     /// [`crate::Error::Option`] when the method is out of its ranges.
     pub fn new(width: usize, height: usize, range: DisparityRange, method: &Method) -> Result<Self> {
         let method = method.clone().validated()?;
-        let cost_units = match method.cost {
-            Cost::Sad => 1.0,
-            Cost::Census | Cost::AdCensus => CENSUS_UNITS,
+        let cost_units = match method.cost.matching {
+            MatchingCost::Sad => 1.0,
+            MatchingCost::Census | MatchingCost::AdCensus => CENSUS_UNITS,
         };
         let mut levels = Vec::new();
         let mut gain = 1.0;
         let (mut size, mut min, mut max) = ((width, height), range.min, range.max);
-        for _ in 0..method.levels {
+        for _ in 0..method.graph.levels {
             let labels = (max - min + 1) as usize;
             levels.push(LevelPlan {
                 width: size.0,
@@ -247,19 +249,21 @@ impl Plan {
             }
             size = (size.0.div_ceil(2), size.1.div_ceil(2));
             (min, max) = (min.div_euclid(2), -((-max).div_euclid(2)));
-            gain *= method.evidence_gain;
+            gain *= method.messages.evidence_gain;
         }
 
         let window = GRAPH_WINDOW * GRAPH_WINDOW;
         // The tolerance keeps 48 (1 - 75 / 100) = 12 at 12 whatever the last bit of the product.
-        let neighbours =
-            (((window - 1) as f64 * (100.0 - method.percentile) / 100.0) - 1e-9).ceil().max(0.0) as usize;
-        let cut = |nats: f64| match method.potential {
+        let neighbours = (((window - 1) as f64 * (100.0 - method.graph.percentile) / 100.0) - 1e-9)
+            .ceil()
+            .max(0.0) as usize;
+        let cut = |nats: f64| match method.messages.potential {
             Potential::Hard => Truncation { tau: HARD_CAP, rule: TruncationRule::Relative },
             Potential::Soft => Truncation { tau: units(nats), rule: TruncationRule::Relative },
             Potential::Exact => Truncation { tau: units(nats), rule: TruncationRule::Absolute },
         };
-        let (dependency, resolution) = (cut(method.dependency_truncation), cut(method.resolution_truncation));
+        let (dependency, resolution) =
+            (cut(method.messages.dependency_truncation), cut(method.messages.resolution_truncation));
         // Where a pixel is in as many factors as a factor has members, as pixels are on average, nothing saturates.
         let usual = u32::from(levels[0].evidence.cap)
             + (neighbours + 1) as u32 * u32::from(dependency.tau)
@@ -268,18 +272,22 @@ impl Plan {
         let volume_width = if usual <= most { VolumeWidth::Narrow } else { VolumeWidth::Wide };
 
         let last = levels.len() - 1;
-        let phases = match method.schedule {
-            Schedule::Together => vec![Phase { finest: 0, iterations: method.iterations }],
-            Schedule::CoarseFirst => (0..=last)
+        let phases = match method.schedule.order {
+            Order::Together => vec![Phase { finest: 0, iterations: method.schedule.iterations }],
+            Order::CoarseFirst => (0..=last)
                 .rev()
                 .map(|finest| Phase {
                     finest,
-                    iterations: if finest == 0 { method.final_iterations } else { method.iterations },
+                    iterations: if finest == 0 {
+                        method.schedule.final_iterations
+                    } else {
+                        method.schedule.iterations
+                    },
                 })
                 .collect(),
         };
         Ok(Self {
-            outside_cost: (method.outside_cost * cost_units + 0.5).floor() as u8,
+            outside_cost: (method.cost.outside_cost * cost_units + 0.5).floor() as u8,
             range,
             levels,
             neighbours,
@@ -331,32 +339,32 @@ impl Plan {
     /// Whether the texture zones limit the labels of their pixels.
     #[must_use]
     pub fn limits_labels(&self) -> bool {
-        self.method.zone_sigmas > 0.0
+        self.method.front.zone_sigmas > 0.0
     }
 
     /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
     #[must_use]
     pub fn colour_weight(&self) -> u32 {
-        if self.method.cost == Cost::AdCensus { COLOUR_WEIGHT } else { 0 }
+        if self.method.cost.matching == MatchingCost::AdCensus { COLOUR_WEIGHT } else { 0 }
     }
 
     /// Squared [`CENSUS_PLACES`] times the variance of grey, in squared 8-bit levels, from which on colour counts in full.
     #[must_use]
     pub fn colour_variance(&self) -> u32 {
-        let contrast = self.method.colour_contrast;
+        let contrast = self.method.cost.colour_contrast;
         (f64::from(CENSUS_PLACES * CENSUS_PLACES) * (contrast * contrast) + 0.5).floor() as u32
     }
 
     /// Whether the pyramid takes the minimum over d instead of the low-pass.
     #[must_use]
     pub fn minimum_over_d(&self) -> bool {
-        self.method.pyramid == Pyramid::Minimum
+        self.method.cost.pyramid == Pyramid::Minimum
     }
 
     /// Whether odd labels agree with both their coarse neighbours.
     #[must_use]
     pub fn interpolating(&self) -> bool {
-        self.method.resolution == Resolution::Interpolating
+        self.method.messages.agreement == Agreement::Interpolating
     }
 
     /// `2 z_min - d_min` between `level` - 1 and `level`: 0, or -1 where the finer level's smallest label is odd.
@@ -394,7 +402,7 @@ impl Plan {
     pub fn front_bytes(&self) -> u64 {
         let graphs =
             self.levels.iter().map(|l| l.pixels() * (self.neighbours + 4 * self.slots() + 4)).sum::<usize>();
-        let corrected = if self.method.illumination == Illumination::None { 0 } else { 66 };
+        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
         let zones = if self.limits_labels() { 200 } else { 0 };
         (17 + corrected + zones) * self.levels[0].pixels() as u64 + graphs as u64
     }
@@ -410,7 +418,7 @@ impl Plan {
     /// 4 each, validity and confidence 1 each), and 12 while they are made; 9 more where the left view is corrected.
     #[must_use]
     pub fn mosaic_bytes(&self) -> u64 {
-        let corrected = if self.method.illumination == Illumination::None { 0 } else { 9 };
+        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
         (20 + 12 + corrected) * self.levels[0].pixels() as u64
     }
 
@@ -454,7 +462,8 @@ mod tests {
     #[test]
     fn percentiles_count_neighbours() {
         for (percentile, count) in [(97.0, 2), (92.0, 4), (84.0, 8), (75.0, 12), (100.0, 0), (0.0, 48)] {
-            let method = Method { percentile, ..Method::default() };
+            let mut method = Method::default();
+            method.graph.percentile = percentile;
             let p = Plan::new(9, 9, DisparityRange::new(0, 3).unwrap(), &method).unwrap();
             assert_eq!(p.neighbours, count, "{percentile} %");
         }
@@ -469,7 +478,8 @@ mod tests {
     #[test]
     fn evidence_is_monotone_and_reaches_its_cap() {
         for temperature in [0.001, 0.15, 0.8, 40.0] {
-            let method = Method { temperature, ..Method::default() };
+            let mut method = Method::default();
+            method.messages.temperature = temperature;
             for gain in [1.0, 243.0] {
                 let scale = EvidenceScale::new(gain, CENSUS_UNITS, &method);
                 let mut last = 0;

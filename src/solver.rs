@@ -5,7 +5,7 @@
 use crate::backend::{Backend, Stage};
 use crate::error::Result;
 use crate::front::Prepared;
-use crate::options::{Fill, LeftRightCheck, Median, Method, Schedule};
+use crate::options::{Fill, LeftRightCheck, Median, Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::watch::Watch;
 use std::iter;
@@ -76,7 +76,7 @@ pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run:
 /// Those of [`estimate`].
 pub fn flood(backend: &mut dyn Backend, plan: &Plan, run: &mut Run) -> Result<u32> {
     let coarsest = plan.levels.len() - 1;
-    let tolerance = plan.method.tolerance;
+    let tolerance = plan.method.schedule.tolerance;
     let mut iterations = 0;
     for phase in &plan.phases {
         if phase.finest < coarsest && plan.phases.len() > 1 {
@@ -113,13 +113,13 @@ pub fn flood(backend: &mut dyn Backend, plan: &Plan, run: &mut Run) -> Result<u3
 fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> + use<> {
     let (finest, coarsest) = (phase.finest, plan.levels.len() - 1);
     // The coarsest levels that are coarsest_resolution and that are flooded.
-    let (exchanged, flooded) = match plan.method.schedule {
-        Schedule::Together => (coarsest, coarsest),
+    let (exchanged, flooded) = match plan.method.schedule.order {
+        Order::Together => (coarsest, coarsest),
         // What joining has just coarsest_resolution would give the same messages again.
-        Schedule::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
+        Order::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
         // The coarser levels have settled: they and level 0 speak in turns. A level that is farther away than messages
         // between levels still go has no say any more.
-        Schedule::CoarseFirst => {
+        Order::CoarseFirst => {
             let reach = coarsest.min((phase.iterations / 2 - i / 2) as usize);
             if i.is_multiple_of(2) { (0, reach) } else { (reach, 0) }
         }
@@ -129,7 +129,7 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
 
 /// What follows the labels and looks at volumes.
 fn read_out(method: &Method) -> Vec<Stage> {
-    let right = (method.left_right_check == LeftRightCheck::RightView).then_some(Stage::RightView);
+    let right = (method.refinement.left_right_check == LeftRightCheck::RightView).then_some(Stage::RightView);
     iter::once(Stage::WinnerTakesAll).chain(right).chain([Stage::SubPixel]).collect()
 }
 
@@ -137,16 +137,16 @@ fn read_out(method: &Method) -> Vec<Stage> {
 #[must_use]
 pub fn post_processing(method: &Method) -> Vec<Stage> {
     let mut stages = vec![Stage::LeftRightCheck];
-    if method.speckle_size > 1 {
+    if method.refinement.speckle_size > 1 {
         stages.push(Stage::SpeckleFilter);
     }
     stages.push(Stage::Confidence);
-    match method.fill {
+    match method.refinement.fill {
         Fill::None => {}
         Fill::Row => stages.push(Stage::Fill),
         Fill::Median => stages.extend([Stage::Fill, Stage::FillMedian]),
     }
-    if method.median != Median::Off {
+    if method.refinement.median != Median::Off {
         stages.push(Stage::Median);
     }
     stages

@@ -81,8 +81,9 @@ impl MedianWeights {
     /// The weights that `method` asks for, in every second row of the window.
     #[must_use]
     pub fn of(method: &Method) -> Self {
-        let window = method.median_window as usize;
-        let weights = Self::new(window, method.median_sigma_space, method.median_sigma_range);
+        let window = method.refinement.median_window as usize;
+        let weights =
+            Self::new(window, method.refinement.median_sigma_space, method.refinement.median_sigma_range);
         Self { row_bits: SPARSE_ROW_BITS, ..weights }
     }
 
@@ -90,8 +91,12 @@ impl MedianWeights {
     /// quarter of the range sigma.
     #[must_use]
     pub fn stretched(method: &Method) -> Self {
-        let window = method.median_window as usize;
-        let weights = Self::new(window, method.median_sigma_space, method.median_sigma_range / STRETCH_SIGMA);
+        let window = method.refinement.median_window as usize;
+        let weights = Self::new(
+            window,
+            method.refinement.median_sigma_space,
+            method.refinement.median_sigma_range / STRETCH_SIGMA,
+        );
         Self { step_bits: STRETCH_BITS, ..weights }
     }
 

@@ -7,7 +7,7 @@
 use mrfgs::evaluation::{Report, evaluate};
 use mrfgs::image::{Plane, calib::Calibration, pfm, read};
 use mrfgs::maps::FRACTION;
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
 use mrfgs::{Matched, match_pair};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -18,7 +18,7 @@ fn matched(folder: &Path, method: &Method) -> Matched {
     let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
     let range = DisparityRange::new(0, ndisp as i32 - 1).unwrap();
     let pair = read::pair(&left, &right, None).unwrap();
-    let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+    let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
     match_pair(&pair, range, method, &execution, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
@@ -67,10 +67,10 @@ fn colour_counts_where_there_is_contrast() {
     let folder = Path::new("testdata/light");
     let bad2 = |colour_contrast| {
         let mut method = Method::default();
-        method.colour_contrast = colour_contrast;
+        method.cost.colour_contrast = colour_contrast;
         report(folder, &matched(folder, &method).maps.final_map()).all.bad[2]
     };
-    let (weighed, in_full) = (bad2(Method::default().colour_contrast), bad2(0.0));
+    let (weighed, in_full) = (bad2(Method::default().cost.colour_contrast), bad2(0.0));
     assert!(in_full > 1.5 * weighed, "{in_full} against {weighed}");
 }
 

@@ -12,7 +12,7 @@ use mrfgs::backend::{Backend, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
-use mrfgs::options::{Method, Potential, Resolution, Schedule};
+use mrfgs::options::{Agreement, Method, Order, Potential};
 use mrfgs::plan::{HARD_CAP, Plan};
 
 /// Neighbours of a dependency factor in these graphs, most slots of which stay empty.
@@ -91,7 +91,7 @@ impl Model {
             Factor::Dependency(_) => labels.iter().all(|&d| d == labels[0]),
             Factor::Resolution(v) => {
                 let z = self.disparity(v[0], labels[0]);
-                let reach = i64::from(self.plan.method.resolution == Resolution::Interpolating);
+                let reach = i64::from(self.plan.method.messages.agreement == Agreement::Interpolating);
                 (1..v.len()).all(|i| (self.disparity(v[i], labels[i]) - 2 * z).abs() <= reach)
             }
         }
@@ -99,7 +99,7 @@ impl Model {
 
     /// Cost of disagreement in `factor`.
     fn penalty(&self, factor: &Factor) -> u64 {
-        match (self.plan.method.potential, factor) {
+        match (self.plan.method.messages.potential, factor) {
             (Potential::Hard, _) => FORBIDDEN,
             (_, Factor::Dependency(_)) => self.plan.dependency.tau.into(),
             (_, Factor::Resolution(_)) => self.plan.resolution.tau.into(),
@@ -237,14 +237,15 @@ fn tree(random: &mut Random, plan: Plan, most: u32) -> Model {
     Model::new(plan, graphs)
 }
 
-fn method(potential: Potential, resolution: Resolution, levels: u32) -> Method {
+fn method(potential: Potential, resolution: Agreement, levels: u32) -> Method {
     let mut method = Method::default();
-    (method.potential, method.resolution, method.levels) = (potential, resolution, levels);
-    method.percentile = 100.0 - NEIGHBOURS as f64 * 100.0 / 48.0;
-    method.schedule = Schedule::Together;
+    (method.messages.potential, method.messages.agreement, method.graph.levels) =
+        (potential, resolution, levels);
+    method.graph.percentile = 100.0 - NEIGHBOURS as f64 * 100.0 / 48.0;
+    method.schedule.order = Order::Together;
     // Longer than the longest path in any of the trees.
-    (method.iterations, method.final_iterations) = (30, 30);
-    method.tolerance = 0.0;
+    (method.schedule.iterations, method.schedule.final_iterations) = (30, 30);
+    method.schedule.tolerance = 0.0;
     method
 }
 
@@ -291,15 +292,15 @@ const SHAPES: &[((usize, usize), i32, usize, u32)] = &[
 ];
 
 /// Trees of every shape, with the evidence of each: dense, sparse, and with resolution factors alone.
-fn trees(potential: Potential, resolution: Resolution, schedule: Schedule) -> Vec<(Model, Vec<Vec<u32>>)> {
+fn trees(potential: Potential, resolution: Agreement, schedule: Order) -> Vec<(Model, Vec<Vec<u32>>)> {
     let mut out = Vec::new();
     for &(size, min, labels, levels) in SHAPES {
         for most in [NEIGHBOURS as u32; 4].into_iter().chain([1, 1, 0]) {
             let mut random = Random::new(out.len() as u64 + 1000);
             let mut method = method(potential, resolution, levels);
-            method.schedule = schedule;
-            method.dependency_truncation = random.pick(&[0.25, 1.0, 2.0, 4.5]);
-            method.resolution_truncation = random.pick(&[0.5, 1.5, 8.0]);
+            method.schedule.order = schedule;
+            method.messages.dependency_truncation = random.pick(&[0.25, 1.0, 2.0, 4.5]);
+            method.messages.resolution_truncation = random.pick(&[0.5, 1.5, 8.0]);
             let plan = random::plan(size, min, labels, &method);
             assert_eq!(plan.levels.len(), levels as usize);
             let tree = tree(&mut random, plan, most);
@@ -317,8 +318,8 @@ fn trees(potential: Potential, resolution: Resolution, schedule: Schedule) -> Ve
 #[test]
 fn beliefs_on_trees_are_min_marginals() {
     for potential in [Potential::Hard, Potential::Exact] {
-        for resolution in [Resolution::Strict, Resolution::Interpolating] {
-            for schedule in [Schedule::Together, Schedule::CoarseFirst] {
+        for resolution in [Agreement::Strict, Agreement::Interpolating] {
+            for schedule in [Order::Together, Order::CoarseFirst] {
                 for (tree, evidence) in trees(potential, resolution, schedule) {
                     let marginals = tree.min_marginals(&evidence);
                     for (name, mut backend) in backends() {
@@ -336,7 +337,7 @@ fn beliefs_on_trees_are_min_marginals() {
 /// The trees are worth something: joined across levels, with factors of three members and more, cut somewhere.
 #[test]
 fn the_trees_cover_what_they_should() {
-    let trees = trees(Potential::Exact, Resolution::Interpolating, Schedule::Together);
+    let trees = trees(Potential::Exact, Agreement::Interpolating, Order::Together);
     let factors: Vec<&Factor> = trees.iter().flat_map(|(tree, _)| &tree.factors).collect();
     let count = |wanted: &dyn Fn(&Factor) -> bool| factors.iter().filter(|f| wanted(f)).count();
     for members in 2..=5 {
@@ -358,7 +359,7 @@ fn the_trees_cover_what_they_should() {
 #[test]
 fn control_the_normalised_cut_is_another_model() {
     let mut different = 0;
-    for (tree, evidence) in trees(Potential::Soft, Resolution::Interpolating, Schedule::Together) {
+    for (tree, evidence) in trees(Potential::Soft, Agreement::Interpolating, Order::Together) {
         let marginals = tree.min_marginals(&evidence);
         for (_, mut backend) in backends() {
             let beliefs = tree.beliefs(backend.as_mut(), &evidence);
@@ -372,7 +373,7 @@ fn control_the_normalised_cut_is_another_model() {
 #[test]
 fn control_a_changed_model_is_found() {
     let (mut checked, mut noticed) = ([0; 3], [0; 3]);
-    for (mut tree, evidence) in trees(Potential::Exact, Resolution::Strict, Schedule::Together) {
+    for (mut tree, evidence) in trees(Potential::Exact, Agreement::Strict, Order::Together) {
         let (_, mut backend) = backends().swap_remove(0);
         let beliefs = tree.beliefs(backend.as_mut(), &evidence);
         let mut check = |i: usize, tree: &Model, evidence: &[Vec<u32>]| {
@@ -387,7 +388,7 @@ fn control_a_changed_model_is_found() {
             check(1, &tree, &evidence);
             tree.factors.push(factor);
         }
-        tree.plan.method.resolution = Resolution::Interpolating;
+        tree.plan.method.messages.agreement = Agreement::Interpolating;
         check(2, &tree, &evidence);
     }
     // A constant of a pixel does not count, a factor may matter to nobody, and one level has no resolution factor.
@@ -493,8 +494,8 @@ fn loopy(seed: u64) -> (Model, Vec<Vec<u32>>) {
     let size = random.pick(&[(4, 3), (5, 2), (1, 8), (3, 3)]);
     let labels = random.within(2, 5) as usize;
     let min = random.pick(&[-3, -1, 0]);
-    let mut method = method(Potential::Hard, Resolution::Strict, levels);
-    method.iterations = 1;
+    let mut method = method(Potential::Hard, Agreement::Strict, levels);
+    method.schedule.iterations = 1;
     let plan = random::plan(size, min, labels, &method);
     let graphs = plan
         .levels

@@ -16,7 +16,8 @@ use mrfgs::front::Prepared;
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::maps::{Maps, flag};
 use mrfgs::options::{
-    Choice, Cost, DisparityRange, Execution, Fill, LeftRightCheck, Median, Method, Potential, Schedule,
+    DeviceChoice, DisparityRange, Execution, Fill, LeftRightCheck, MatchingCost, Median, Method, Order,
+    Potential,
 };
 use mrfgs::plan::Plan;
 use mrfgs::tiles::Tiles;
@@ -41,10 +42,10 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::left_right_check::left_right_check(plan, pair, maps);
     twin::speckle_filter::speckle_filter(plan, maps);
     twin::confidence::confidence(plan, maps);
-    if plan.method.fill != Fill::None {
+    if plan.method.refinement.fill != Fill::None {
         twin::fill::fill(maps);
     }
-    if plan.method.fill == Fill::Median {
+    if plan.method.refinement.fill == Fill::Median {
         twin::fill_median::fill_median(plan, pair, maps);
     }
     twin::median::median(plan, pair, maps);
@@ -71,7 +72,7 @@ fn solve(pair: &Pair, plan: &Plan) -> Vec<(String, Solution)> {
 }
 
 fn matched(pair: &Pair, plan: &Plan, threads: usize) -> Maps {
-    let execution = Execution { backend: Choice::Cpu, threads: Some(threads), ..Execution::default() };
+    let execution = Execution { device: DeviceChoice::Cpu, threads: Some(threads), ..Execution::default() };
     let observer = &mut |_| ControlFlow::Continue(());
     match_pair(pair, plan.range, &plan.method, &execution, observer).unwrap().maps
 }
@@ -93,7 +94,7 @@ fn the_stages_run_in_order() {
             finest.label = backend.map(Map::Label).unwrap();
             finest.best = backend.map(Map::Best).unwrap();
             finest.runner_up = backend.map(Map::RunnerUp).unwrap();
-            finest.right_label = match plan.method.left_right_check {
+            finest.right_label = match plan.method.refinement.left_right_check {
                 LeftRightCheck::SecondMatch => second_match(&pair, &plan),
                 _ => backend.map(Map::RightLabel).unwrap(),
             };
@@ -117,7 +118,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         let mut random = Random::new(seed);
         let (width, height) = random.pick(&[(100, 80), (60, 130), (131, 61)]);
         let mut method = random::method(&mut random, [0, 2, 8][seed as usize % 3]);
-        (method.levels, method.memory) = (method.levels.min(3), 1);
+        (method.graph.levels, method.tiles.memory) = (method.graph.levels.min(3), 1);
         let plan =
             random::plan((width, height), random.pick(&[-12, -3, 0]), random.pick(&[2, 9, 17]), &method);
         let Ok(tiles) = Tiles::with_overlap(&plan, random.pick(&[0, 2, 5])) else { continue };
@@ -143,7 +144,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
                 Pair::new(cut(pair.left()), cut(pair.right())).unwrap()
             };
             let mut cpu = Cpu::default();
-            if method.left_right_check == LeftRightCheck::SecondMatch {
+            if method.refinement.left_right_check == LeftRightCheck::SecondMatch {
                 estimated(&mut cpu, &part(&mirrored(&pair)), &tile.plan);
                 let labels = cpu.map(Map::Label).unwrap();
                 for (x, y) in places(core) {
@@ -158,7 +159,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
                 (finest.label[(x, y)], finest.best[(x, y)]) = (maps[0][at], maps[1][at]);
                 (finest.runner_up[(x, y)], finest.raw[(x, y)]) = (maps[2][at], maps[3][at]);
             }
-            if method.left_right_check != LeftRightCheck::SecondMatch {
+            if method.refinement.left_right_check != LeftRightCheck::SecondMatch {
                 for (x, y) in places(&Rect { x: crop.x.clone(), y: core.y.clone() }) {
                     let at = (x - crop.x.start, y - crop.y.start);
                     let (label, best) = (&mut finest.right_label[(x, y)], &mut finest.right_best[(x, y)]);
@@ -178,7 +179,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
             assert_eq!(actual.iterations, iterations, "{name}, seed {seed}");
         }
         tiled += 1;
-        twice += usize::from(method.left_right_check == LeftRightCheck::SecondMatch);
+        twice += usize::from(method.refinement.left_right_check == LeftRightCheck::SecondMatch);
         // Control: one piece is something else.
         other += usize::from(matched_whole(&pair, &plan) != expected);
     }
@@ -219,7 +220,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
 fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     let mirrored = mirrored(pair);
     let mut method = plan.method.clone();
-    (method.left_right_check, method.sub_pixel) = (LeftRightCheck::Off, false);
+    (method.refinement.left_right_check, method.refinement.sub_pixel) = (LeftRightCheck::Off, false);
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, plan.range, &method).unwrap();
     let raw = matched(&mirrored, &plan, 1).raw;
@@ -246,7 +247,7 @@ fn identical_views_have_no_disparity() {
         let pair = Pair::new(view.clone(), view).unwrap();
         for sub_pixel in [false, true] {
             let mut method = Method::preset(preset).unwrap();
-            method.sub_pixel = sub_pixel;
+            method.refinement.sub_pixel = sub_pixel;
             for (min, labels) in [(-3, 16), (0, 17), (-12, 13)] {
                 let plan = random::plan((47, 26), min, labels, &method);
                 for (name, solution) in solve(&pair, &plan) {
@@ -275,9 +276,9 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
     let (width, height, levels, labels) = (420, 9, 3u32, 8);
     let shift = 1 << (levels - 1);
     for (cost, potential, schedule) in [
-        (Cost::AdCensus, Potential::Soft, Schedule::CoarseFirst),
-        (Cost::Sad, Potential::Hard, Schedule::Together),
-        (Cost::AdCensus, Potential::Exact, Schedule::CoarseFirst),
+        (MatchingCost::AdCensus, Potential::Soft, Order::CoarseFirst),
+        (MatchingCost::Sad, Potential::Hard, Order::Together),
+        (MatchingCost::AdCensus, Potential::Exact, Order::CoarseFirst),
     ] {
         let mut random = Random::new(31);
         let left = texture(&mut random, width, height);
@@ -292,13 +293,15 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
             if x + shift < width { moved[(x + shift, y)] } else { [200, 20, 2] }
         }));
         let mut method = Method::default();
-        (method.cost, method.potential, method.schedule) = (cost, potential, schedule);
-        (method.levels, method.iterations, method.final_iterations) = (levels, 1, 1);
-        if cost == Cost::Sad {
-            (method.outside_cost, method.temperature) = (20.0, 8.0);
+        (method.cost.matching, method.messages.potential, method.schedule.order) =
+            (cost, potential, schedule);
+        (method.graph.levels, method.schedule.iterations, method.schedule.final_iterations) = (levels, 1, 1);
+        if cost == MatchingCost::Sad {
+            (method.cost.outside_cost, method.messages.temperature) = (20.0, 8.0);
         }
         // The region filter and the fill reach as far as they like.
-        (method.speckle_size, method.fill, method.median_window) = (0, Fill::None, 5);
+        (method.refinement.speckle_size, method.refinement.fill, method.refinement.median_window) =
+            (0, Fill::None, 5);
         let iterations = 3;
         let per_iteration = (2 * 3 + 2) * shift;
         let margin = 4 + 2 * shift + iterations * per_iteration + (labels + shift) + 2 + labels + shift;
@@ -342,7 +345,7 @@ fn the_number_of_threads_changes_no_bit() {
     for seed in 0..6 {
         let mut random = Random::new(seed);
         let mut method = random::method(&mut random, 4);
-        (method.median, method.fill) = (Median::All, Fill::Row);
+        (method.refinement.median, method.refinement.fill) = (Median::All, Fill::Row);
         let plan = random::plan((37, 23), -3, 17, &method);
         let pair = random::pair(&mut random, 37, 23);
         let one = matched(&pair, &plan, 1);
@@ -372,7 +375,7 @@ fn masked_values_are_never_looked_at() {
     for seed in 0..40 {
         let mut random = Random::new(seed);
         let mut method = random::method(&mut random, 8);
-        (method.levels, method.median) = (4, Median::All);
+        (method.graph.levels, method.refinement.median) = (4, Median::All);
         let plan = random::plan((29, 18), random.pick(&[-9, -3, 0]), 13, &method);
         let pair = random::pair(&mut random, 29, 18);
         let other =

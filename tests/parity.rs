@@ -80,7 +80,7 @@ fn one_option_less_shows() {
     let (pair, range) = load(Path::new("testdata/slanted"));
     let method = Method::default();
     let mut other = method.clone();
-    other.temperature *= 1.1;
+    other.messages.temperature *= 1.1;
     let (a, b) = (
         matched(&mut Cpu::default(), &pair, range, &method),
         matched(&mut Cpu::default(), &pair, range, &other),
@@ -144,7 +144,7 @@ fn small_devices() {
 fn poisoned_buffers() {
     for (preset, _) in PRESETS {
         let mut method = Method::preset(preset).unwrap();
-        method.tolerance = 0.5;
+        method.schedule.tolerance = 0.5;
         let (pair, range) = load(Path::new("testdata/thin"));
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         let mut backends: Vec<Box<dyn Backend>> = vec![Box::new(Cpu::default())];
@@ -190,7 +190,7 @@ fn nothing_leaves_the_device_in_between() {
     assert_eq!(traffic.bytes_down, 3 * 4 * 256 * 180, "{traffic:?}");
     // The sums of every row of each iteration, too, where they are asked for.
     let mut tolerant = method.clone();
-    tolerant.tolerance = 1e-6;
+    tolerant.schedule.tolerance = 1e-6;
     let iterations = matched(&mut gpu, &pair, range, &tolerant).iterations;
     let sums = gpu.traffic().bytes_down - traffic.bytes_down;
     assert!(sums >= 8 * 180 && sums <= u64::from(iterations + 1) * 8 * 180, "{sums}");

@@ -14,7 +14,7 @@ use mrfgs::backend::Backend;
 use mrfgs::backend::cpu::Cpu;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::{FRACTION, Maps, flag, has_disparity};
-use mrfgs::options::{Choice, DisparityRange, Execution, Illumination, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Illumination, Method};
 use mrfgs::plan::Plan;
 use mrfgs::tiles::Tiles;
 use mrfgs::{Error, Matcher, engine};
@@ -83,13 +83,13 @@ impl Case {
     fn method(&self) -> Method {
         let mut random = Random::new(self.seed);
         let mut method = random::method(&mut random, self.neighbours);
-        method.memory = if self.tiled { 1 } else { method.memory };
+        method.tiles.memory = if self.tiled { 1 } else { method.tiles.memory };
         if self.front {
-            method.illumination = Illumination::Homomorphic;
-            method.zones = random.within(1, 6);
-            method.zone_sigmas = f64::from(random.within(1, 3));
+            method.front.illumination = Illumination::Homomorphic;
+            method.front.zones = random.within(1, 6);
+            method.front.zone_sigmas = f64::from(random.within(1, 3));
         }
-        method.tolerance = random.pick(&[0.0, 0.5]);
+        method.schedule.tolerance = random.pick(&[0.0, 0.5]);
         method.validated().unwrap()
     }
 
@@ -164,7 +164,7 @@ fn number_of_cases() -> u32 {
 #[test]
 fn every_match_keeps_its_promises_on_every_backend() {
     let config = Config { cases: number_of_cases(), failure_persistence: None, ..Config::default() };
-    let execution = Execution { backend: Choice::Cpu, threads: Some(2), ..Execution::default() };
+    let execution = Execution { device: DeviceChoice::Cpu, threads: Some(2), ..Execution::default() };
     let matcher = RefCell::new(Matcher::new(&execution).unwrap());
     let gpu = RefCell::new(devices::gpu());
     let counts = RefCell::new([0; 3]);
@@ -220,7 +220,7 @@ fn broken_promises_are_noticed() {
     left.masked = Plane::filled(9, 7, false);
     left.masked[(8, 6)] = true;
     pair = Pair::new(left, pair.right().clone()).unwrap();
-    let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+    let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
     let go_on = &mut |_| ControlFlow::Continue(());
     let maps = mrfgs::match_pair(&pair, range, &case.method(), &execution, go_on).unwrap().maps;
     assert_eq!(broken(&maps, &pair, range), None);

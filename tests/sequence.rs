@@ -9,7 +9,7 @@ use common::random::{self, Random};
 use mrfgs::backend::gpu::FaultInjection;
 use mrfgs::image::Pair;
 use mrfgs::maps::Maps;
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
 use mrfgs::{Error, Matched, Matcher, Result};
 use std::cell::RefCell;
 use std::fmt::Write;
@@ -32,7 +32,7 @@ fn method() -> Method {
 }
 
 fn one_by_one() -> Vec<Maps> {
-    let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+    let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
     let mut matcher = Matcher::new(&execution).unwrap();
     let mut run = |(pair, range): (Pair, DisparityRange)| {
         let matched = matcher.run(&pair, range, &method(), &mut |_| ControlFlow::Continue(())).unwrap();
@@ -75,7 +75,7 @@ fn assert_same(found: Vec<Matched>, expected: &[Maps]) {
 #[test]
 fn a_sequence_is_its_pairs() {
     let expected = one_by_one();
-    let cpu = Execution { backend: Choice::Cpu, ..Execution::default() };
+    let cpu = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
     let (result, found, log) = all(&mut Matcher::new(&cpu).unwrap(), pairs(), usize::MAX);
     result.unwrap();
     assert!(log.starts_with("ask 0, take 0, ask 1, take 1, "), "{log}");
@@ -134,7 +134,7 @@ fn results_before_a_failure_are_handed_out() {
     // No tile is small enough for the method's memory.
     with_a_bad_one[2].1 = DisparityRange::new(0, 16_000).unwrap();
     let mut matchers =
-        vec![Matcher::new(&Execution { backend: Choice::Cpu, ..Execution::default() }).unwrap()];
+        vec![Matcher::new(&Execution { device: DeviceChoice::Cpu, ..Execution::default() }).unwrap()];
     matchers.extend(
         device(FaultInjection::default())
             .map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap()),

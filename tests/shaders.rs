@@ -19,7 +19,7 @@ fn methods() -> Vec<Method> {
     for (key, value) in [
         ("potential", "exact"),
         ("potential", "hard"),
-        ("resolution", "strict"),
+        ("agreement", "strict"),
         ("pyramid", "low-pass"),
         ("percentile", "100"),
         ("percentile", "0"),

@@ -12,7 +12,7 @@ use mrfgs::engine::{Solution, solve, solve_tiles};
 use mrfgs::error::BudgetError;
 use mrfgs::image::{Pair, Plane, calib::Calibration, read};
 use mrfgs::maps::{Maps, has_disparity};
-use mrfgs::options::{Choice, DisparityRange, Execution, LeftRightCheck, Method, PRESETS};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, LeftRightCheck, Method, PRESETS};
 use mrfgs::plan::Plan;
 use mrfgs::tiles::{OVERLAP, Tiles};
 use mrfgs::watch::Progress;
@@ -27,7 +27,7 @@ fn quiet(_: Progress) -> ControlFlow<()> {
 /// The plan of `method` with so many MiB.
 fn plan((width, height): (usize, usize), range: DisparityRange, method: &Method, memory: u32) -> Plan {
     let mut method = method.clone();
-    method.memory = memory;
+    method.tiles.memory = memory;
     Plan::new(width, height, range, &method).unwrap()
 }
 
@@ -35,7 +35,7 @@ fn plan((width, height): (usize, usize), range: DisparityRange, method: &Method,
 fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
     let whole = tiles.whole();
     let ((width, height), range) = (whole.size(), whole.range);
-    let memory = u64::from(whole.method.memory) << 20;
+    let memory = u64::from(whole.method.tiles.memory) << 20;
     let ensure = |holds: bool, what: &str| if holds { Ok(()) } else { Err(what.to_owned()) };
     ensure(tiles.bytes() <= memory, "within the memory")?;
     let grid = 1 << (whole.levels.len() - 1);
@@ -85,8 +85,8 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
         let range = DisparityRange::new(min, min + labels - 1).unwrap();
         let (preset, _) = random.pick(PRESETS);
         let mut method = Method::preset(preset).unwrap();
-        method.levels = random.pick(&[1, 2, 3, 6, 6, 6, 9, 16]);
-        method.memory = random.log_within(1.0, 4096.0) as u32;
+        method.graph.levels = random.pick(&[1, 2, 3, 6, 6, 6, 9, 16]);
+        method.tiles.memory = random.log_within(1.0, 4096.0) as u32;
         let plan = Plan::new(size.0, size.1, range, &method).unwrap();
         let overlap = random.pick(&[0, OVERLAP, OVERLAP, 100]);
         match Tiles::with_overlap(&plan, overlap) {
@@ -102,7 +102,7 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
                 // What it asks for is enough, and the least that is.
                 let Error::Budget(BudgetError::NoTileFits { needed, .. }) = error else { panic!("{error}") };
                 let needed = u32::try_from(needed).unwrap();
-                assert!(needed > method.memory, "{error}");
+                assert!(needed > method.tiles.memory, "{error}");
                 for (memory, enough) in [(needed, true), (needed - 1, false)] {
                     let plan = self::plan(size, range, &method, memory);
                     assert_eq!(Tiles::with_overlap(&plan, overlap).is_ok(), enough, "{memory} MiB: {error}");
@@ -223,7 +223,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
     let (pair, range) = load(Path::new("testdata/slanted"));
     for left_right_check in [LeftRightCheck::RightView, LeftRightCheck::SecondMatch] {
         let mut method = Method::default();
-        (method.left_right_check, method.iterations) = (left_right_check, 1);
+        (method.refinement.left_right_check, method.schedule.iterations) = (left_right_check, 1);
         let tiles = Tiles::new(&plan(pair.size(), range, &method, 12)).unwrap();
         let count = tiles.count() * if left_right_check == LeftRightCheck::SecondMatch { 2 } else { 1 };
         let mut seen = Vec::new();
@@ -249,10 +249,11 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
 fn the_matcher_cuts_what_its_method_says() {
     let (pair, range) = load(Path::new("testdata/thin"));
     let mut matcher =
-        Matcher::new(&Execution { backend: Choice::Cpu, timings: true, ..Execution::default() }).unwrap();
+        Matcher::new(&Execution { device: DeviceChoice::Cpu, timings: true, ..Execution::default() })
+            .unwrap();
     for (memory, tiled) in [(4096, false), (12, true)] {
         let mut method = Method::default();
-        method.memory = memory;
+        method.tiles.memory = memory;
         let matched = matcher.run(&pair, range, &method, &mut quiet).unwrap();
         let tiles = Tiles::new(&plan(pair.size(), range, &method, memory)).unwrap();
         assert!(matched.tiles == tiles && (tiles.count() > 1) == tiled);

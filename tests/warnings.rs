@@ -6,7 +6,7 @@
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
 use mrfgs::maps::Maps;
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -40,7 +40,7 @@ impl Case {
     }
 
     fn maps(&self, range: DisparityRange) -> Maps {
-        let execution = Execution { backend: Choice::Cpu, ..Execution::default() };
+        let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
         let go_on = &mut |_| ControlFlow::Continue(());
         mrfgs::match_pair(&self.pair, range, &Method::default(), &execution, go_on).unwrap().maps
     }

@@ -1,4 +1,4 @@
-from typing import Any, Literal, Mapping, final
+from typing import Any, Mapping, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
@@ -7,7 +7,6 @@ __version__: str
 
 # Whatever numpy makes an array of: uint8, uint16, float32 or float64, (height, width) or (height, width, channels).
 _Image = npt.ArrayLike
-_Backend = Literal["auto", "cpu", "gpu"]
 
 class MatchWarning(UserWarning):
     """What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."""
@@ -52,7 +51,7 @@ class Matched:
 class Matcher:
     """Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between."""
 
-    def __new__(cls, *, backend: _Backend = "auto", device: str | None = None, threads: int | None = None) -> Matcher: ...
+    def __new__(cls, *, device: str = "auto", threads: int | None = None) -> Matcher: ...
     def match(
         self,
         left: _Image,
@@ -79,8 +78,20 @@ def match(
     preset: str = "default",
     options: Mapping[str, Any] | None = None,
     warn: bool = True,
-    backend: _Backend = "auto",
-    device: str | None = None,
+    device: str = "auto",
     threads: int | None = None,
 ) -> Matched:
     """Matches one rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
+
+class _Option(TypedDict):
+    meaning: str
+    takes: str
+    words: dict[str, str]
+    source: str
+    default: bool | int | float | str
+    paper: bool | int | float | str
+    fgs: bool | int | float | str
+
+def options() -> dict[str, dict[str, _Option]]:
+    """Describes the options: a dict from each group to a dict from each of its keys to what it does, which values it takes, where
+    it comes from, and its value in each preset."""

@@ -14,7 +14,7 @@ use std::time::Duration;
 use mrfgs::error::RangeError;
 use mrfgs::front::check::{self, Warning};
 use mrfgs::image::{Pair, Plane, raster};
-use mrfgs::options::{Choice, DisparityRange, Execution, Method};
+use mrfgs::options::{DisparityRange, Execution, GROUPS, Key, Method, PRESETS, Takes};
 use mrfgs::solver::Observer;
 use mrfgs::{Error, Matched, Matcher};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -51,26 +51,33 @@ fn warn(py: Python, warnings: impl IntoIterator<Item = Warning>) -> PyResult<()>
 
 /// The method: a preset, and what replaces some of its keys.
 fn method(preset: &str, options: Option<&Bound<PyDict>>) -> PyResult<Method> {
-    let mut method = Method::preset(preset).map_err(exception)?;
+    let mut changes = Vec::new();
     for (key, value) in options.into_iter().flatten() {
-        // As the command line writes them.
-        let value = match value.extract::<bool>() {
-            Ok(flag) => flag.to_string(),
-            Err(_) => value.str()?.to_string(),
-        };
-        method.set(&key.extract::<String>()?, &value).map_err(exception)?;
+        let key: String = key.extract()?;
+        match value.cast::<PyDict>() {
+            Ok(group) => {
+                for (inner, value) in group {
+                    changes.push((format!("{key}.{}", inner.extract::<String>()?), as_written(&value)?));
+                }
+            }
+            Err(_) => changes.push((key, as_written(&value)?)),
+        }
     }
-    method.validated().map_err(exception)
+    let mut method = Method::preset(preset).map_err(exception)?;
+    method.set_all(changes.iter().map(|(key, value)| (&**key, &**value))).map_err(exception)?;
+    Ok(method)
 }
 
-fn execution(backend: &str, device: Option<String>, threads: Option<usize>) -> PyResult<Execution> {
-    let backend = match backend {
-        "auto" => Choice::Auto,
-        "cpu" => Choice::Cpu,
-        "gpu" => Choice::Gpu,
-        _ => return Err(PyValueError::new_err(format!("backend: {backend} is none of auto, cpu and gpu"))),
-    };
-    Ok(Execution { backend, device, threads, ..Execution::default() })
+/// The value of an option as the command line writes it.
+fn as_written(value: &Bound<PyAny>) -> PyResult<String> {
+    match value.extract::<bool>() {
+        Ok(flag) => Ok(flag.to_string()),
+        Err(_) => Ok(value.str()?.to_string()),
+    }
+}
+
+fn execution(device: &str, threads: Option<usize>) -> Execution {
+    Execution { device: device.into(), threads, ..Execution::default() }
 }
 
 /// The maps of a pair, and what made them. All maps have the shape (height, width) of the images.
@@ -173,9 +180,9 @@ impl PyMatched {
 
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 ///
-/// backend: "auto" takes a GPU where there is one, else the CPU; "gpu" takes a GPU or any Vulkan or Metal driver and raises
-///     RuntimeError where there is none; "cpu" takes the CPU. The maps are the same, bit for bit.
-/// device: an adapter by its index or a part of its name, as `mrfgs devices` lists them; None takes the fastest kind.
+/// device: "auto" takes a GPU where there is one, else the CPU; "cpu" takes the CPU; "gpu" takes a GPU or any Vulkan or Metal
+///     driver, and raises RuntimeError where there is none; anything else is the index of a device, such as "0", or a part of its
+///     name, as `mrfgs devices` lists them. The maps are the same, bit for bit.
 /// threads: those of the CPU path; None takes one a core.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
 struct PyMatcher(Mutex<Matcher>);
@@ -183,9 +190,9 @@ struct PyMatcher(Mutex<Matcher>);
 #[pymethods]
 impl PyMatcher {
     #[new]
-    #[pyo3(signature = (*, backend="auto", device=None, threads=None))]
-    fn new(py: Python, backend: &str, device: Option<String>, threads: Option<usize>) -> PyResult<Self> {
-        let execution = execution(backend, device, threads)?;
+    #[pyo3(signature = (*, device="auto", threads=None))]
+    fn new(py: Python, device: &str, threads: Option<usize>) -> PyResult<Self> {
+        let execution = execution(device, threads);
         let matcher = py.detach(|| Matcher::new(&execution)).map_err(exception)?;
         Ok(Self(Mutex::new(matcher)))
     }
@@ -200,8 +207,9 @@ impl PyMatcher {
     ///     find the range; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
-    /// preset: "default", "paper" or "fgs"; `mrfgs presets` lists them with every key.
-    /// options: keys that replace the preset's, such as {"fill": "none", "memory": 2048}.
+    /// preset: "default", "paper" or "fgs".
+    /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
+    ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
     /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of
     ///     the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
     ///
@@ -267,7 +275,7 @@ impl PyMatcher {
 #[pyo3(
     name = "match",
     signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
-                 options=None, warn=true, backend="auto", device=None, threads=None)
+                 options=None, warn=true, device="auto", threads=None)
 )]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 fn match_(
@@ -281,12 +289,54 @@ fn match_(
     preset: &str,
     options: Option<&Bound<PyDict>>,
     warn: bool,
-    backend: &str,
-    device: Option<String>,
+    device: &str,
     threads: Option<usize>,
 ) -> PyResult<PyMatched> {
-    let matcher = PyMatcher::new(py, backend, device, threads)?;
+    let matcher = PyMatcher::new(py, device, threads)?;
     matcher.run(py, left, right, max_disparity, min_disparity, mask, no_data, preset, options, warn)
+}
+
+/// Describes the options: a dict from each group to a dict from each of its keys to a dict with
+///
+/// meaning: what it does,
+/// takes: the unit and the range of its values,
+/// words: the words that it takes, with what each means; empty where it takes no words,
+/// source: the section of the paper that it comes from, or other work; "open" where the paper leaves the choice open,
+/// default, paper, fgs: its value in each preset.
+#[pyfunction]
+fn options(py: Python) -> PyResult<Bound<PyDict>> {
+    let groups = PyDict::new(py);
+    for group in GROUPS {
+        let keys = PyDict::new(py);
+        for key in group.keys {
+            keys.set_item(key.name(), option(py, group.name, key)?)?;
+        }
+        groups.set_item(group.name, keys)?;
+    }
+    Ok(groups)
+}
+
+/// Describes an option.
+fn option<'py>(py: Python<'py>, group: &str, key: &Key) -> PyResult<Bound<'py, PyDict>> {
+    let (option, words) = (PyDict::new(py), PyDict::new(py));
+    if let Takes::Words(all) = key.takes {
+        for word in all {
+            words.set_item(word.word, word.meaning)?;
+        }
+    }
+    option.set_item("meaning", key.meaning)?;
+    option.set_item("takes", key.to_string())?;
+    option.set_item("words", words)?;
+    option.set_item("source", key.source)?;
+    for (preset, _) in PRESETS {
+        match &Method::preset(preset).map_err(exception)?.table()[group][key.name()] {
+            toml::Value::Boolean(value) => option.set_item(preset, value)?,
+            toml::Value::Integer(value) => option.set_item(preset, value)?,
+            toml::Value::Float(value) => option.set_item(preset, value)?,
+            value => option.set_item(preset, value.as_str())?,
+        }
+    }
+    Ok(option)
 }
 
 /// How long a Ctrl-C may wait until somebody looks.
@@ -336,6 +386,7 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("MatchWarning", module.py().get_type::<MatchWarning>())?;
     module.add_function(wrap_pyfunction!(match_, module)?)?;
+    module.add_function(wrap_pyfunction!(options, module)?)?;
     module.add_class::<PyMatched>()?;
     module.add_class::<PyMatcher>()
 }

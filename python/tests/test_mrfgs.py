@@ -58,7 +58,7 @@ def by_program(left, right, *arguments):
 class Match(unittest.TestCase):
     def same(self, left, right, *arguments, **keywords):
         expected = by_program(left, right, "--max-disparity", "15", *arguments)
-        matched = mrfgs.match(left, right, max_disparity=15, backend="cpu", **keywords)
+        matched = mrfgs.match(left, right, max_disparity=15, device="cpu", **keywords)
         self.assertEqual(matched.disparity.dtype, np.float32)
         self.assertTrue(np.array_equal(matched.disparity, expected))
         return matched
@@ -80,23 +80,23 @@ class Match(unittest.TestCase):
         left, right = pair()
         self.same(left[..., 0].copy(), right[..., 0].copy())
         self.same(left.astype(np.uint16) * 16 + 3, right.astype(np.uint16) * 16 + 3)
-        alone = mrfgs.match(left, right, 15, backend="cpu").disparity
+        alone = mrfgs.match(left, right, 15, device="cpu").disparity
         # Slices that do not lie in one piece, and alpha that says nothing.
         wide = np.dstack([left, left])[..., :3]
         self.assertFalse(wide.flags.c_contiguous)
-        self.assertTrue(np.array_equal(mrfgs.match(wide, right, 15, backend="cpu").disparity, alone))
+        self.assertTrue(np.array_equal(mrfgs.match(wide, right, 15, device="cpu").disparity, alone))
         opaque = [np.dstack([image, np.full(image.shape[:2], 7, np.uint8)]) for image in (left, right)]
-        self.assertTrue(np.array_equal(mrfgs.match(*opaque, 15, backend="cpu").disparity, alone))
+        self.assertTrue(np.array_equal(mrfgs.match(*opaque, 15, device="cpu").disparity, alone))
         grey = [image[..., 0].astype(np.float64) / 255 for image in (left, right)]
-        found = mrfgs.match(*grey, 15, backend="cpu").disparity
+        found = mrfgs.match(*grey, 15, device="cpu").disparity
         self.assertLess(abs(np.median(found[32:, 16:]) - 9), 0.1)
 
     def test_layouts_of_memory(self):
         left, right = pair()
-        expected = mrfgs.match(left, right, 15, backend="cpu").disparity
+        expected = mrfgs.match(left, right, 15, device="cpu").disparity
         # Control: a layout that is taken for another makes another map.
         scrambled = left.reshape(left.shape[1], left.shape[0], 3).transpose(1, 0, 2)
-        self.assertFalse(np.array_equal(mrfgs.match(scrambled, right, 15, backend="cpu").disparity, expected))
+        self.assertFalse(np.array_equal(mrfgs.match(scrambled, right, 15, device="cpu").disparity, expected))
 
         def layouts(image):
             yield "C", image.copy()
@@ -122,56 +122,56 @@ class Match(unittest.TestCase):
 
         for dtype in (np.uint8, np.uint16, np.float32, np.float64):
             images = [image.astype(dtype) for image in (left, right)]
-            expected = mrfgs.match(*images, 15, backend="cpu").disparity
+            expected = mrfgs.match(*images, 15, device="cpu").disparity
             for (name, l), (_, r) in zip(layouts(images[0]), layouts(images[1])):
                 np.testing.assert_array_equal(l, images[0])
                 for one, two in ((l, r), (l, images[1]), (images[0], r)):
-                    found = mrfgs.match(one, two, 15, backend="cpu", warn=False).disparity
+                    found = mrfgs.match(one, two, 15, device="cpu", warn=False).disparity
                     self.assertTrue(np.array_equal(found, expected), f"{dtype.__name__}, {name}")
         grey = [image[..., 0] for image in (left, right)]
-        expected = mrfgs.match(*(image.copy() for image in grey), 15, backend="cpu").disparity
-        self.assertTrue(np.array_equal(mrfgs.match(*map(np.asfortranarray, grey), 15, backend="cpu").disparity, expected))
+        expected = mrfgs.match(*(image.copy() for image in grey), 15, device="cpu").disparity
+        self.assertTrue(np.array_equal(mrfgs.match(*map(np.asfortranarray, grey), 15, device="cpu").disparity, expected))
         # The same row again and again, without a stride.
         row = grey[0][:1].copy()
         broadcast = np.broadcast_to(row, (60, 80))
         self.assertEqual(broadcast.strides[0], 0)
-        expected = mrfgs.match(broadcast.copy(), grey[1].copy(), 15, backend="cpu", warn=False).disparity
-        self.assertTrue(np.array_equal(mrfgs.match(broadcast, grey[1], 15, backend="cpu", warn=False).disparity, expected))
+        expected = mrfgs.match(broadcast.copy(), grey[1].copy(), 15, device="cpu", warn=False).disparity
+        self.assertTrue(np.array_equal(mrfgs.match(broadcast, grey[1], 15, device="cpu", warn=False).disparity, expected))
 
         mask = np.random.default_rng(1).random((60, 80)) < 0.1
-        expected = mrfgs.match(left, right, 15, mask=mask, backend="cpu").disparity
+        expected = mrfgs.match(left, right, 15, mask=mask, device="cpu").disparity
         self.assertTrue(np.array_equal(np.isinf(expected), mask))
         for name, other in layouts(mask):
-            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, mask=other, backend="cpu").disparity, expected), name)
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, mask=other, device="cpu").disparity, expected), name)
         for dtype in (np.uint8, np.int64, np.float32):
             other = mask.astype(dtype) * 255
-            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, mask=other, backend="cpu").disparity, expected))
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, mask=other, device="cpu").disparity, expected))
 
     def test_masked_arrays(self):
         left, right = pair()
         mask = np.zeros((60, 80), bool)
         mask[:, :10] = True
-        expected = mrfgs.match(left, right, 15, mask=mask, backend="cpu").disparity
+        expected = mrfgs.match(left, right, 15, mask=mask, device="cpu").disparity
         masked = np.ma.masked_array(left, np.repeat(mask[..., None], 3, 2))
-        self.assertTrue(np.array_equal(mrfgs.match(masked, right, 15, backend="cpu").disparity, expected))
+        self.assertTrue(np.array_equal(mrfgs.match(masked, right, 15, device="cpu").disparity, expected))
         # One channel is enough, and none is nothing.
         one = np.ma.masked_array(left, np.dstack([mask, mask & False, mask & False]))
-        self.assertTrue(np.array_equal(mrfgs.match(one, right, 15, backend="cpu").disparity, expected))
-        plain = mrfgs.match(left, right, 15, backend="cpu").disparity
-        self.assertTrue(np.array_equal(mrfgs.match(np.ma.masked_array(left), right, 15, backend="cpu").disparity, plain))
+        self.assertTrue(np.array_equal(mrfgs.match(one, right, 15, device="cpu").disparity, expected))
+        plain = mrfgs.match(left, right, 15, device="cpu").disparity
+        self.assertTrue(np.array_equal(mrfgs.match(np.ma.masked_array(left), right, 15, device="cpu").disparity, plain))
         # In the right view there is nothing to match then.
-        both = mrfgs.match(left, np.ma.masked_array(right, np.repeat(mask[..., None], 3, 2)), 15, backend="cpu").disparity
+        both = mrfgs.match(left, np.ma.masked_array(right, np.repeat(mask[..., None], 3, 2)), 15, device="cpu").disparity
         self.assertFalse(np.array_equal(both, plain))
         self.assertTrue(np.isfinite(both).all())
         # By value.
         holed = left.copy()
         holed[:, :10] = 7
-        found = mrfgs.match(holed, right, 15, no_data=7, backend="cpu").disparity
+        found = mrfgs.match(holed, right, 15, no_data=7, device="cpu").disparity
         self.assertTrue(np.array_equal(found, expected))
 
     def test_more_than_memory_is_an_exception(self):
         code = ("import numpy as np, mrfgs; a = np.broadcast_to(np.uint8(7), (200_000, 200_000));\n"
-                "try: mrfgs.match(a, a, 15, backend='cpu')\n"
+                "try: mrfgs.match(a, a, 15, device='cpu')\n"
                 "except MemoryError as e: print('told', e)")
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -181,7 +181,7 @@ class Match(unittest.TestCase):
         def told(*arguments, **keywords):
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                mrfgs.match(*arguments, backend="cpu", **keywords)
+                mrfgs.match(*arguments, device="cpu", **keywords)
             self.assertTrue(all(w.category is mrfgs.MatchWarning and w.filename == __file__ for w in caught))
             return [str(w.message) for w in caught]
 
@@ -198,10 +198,10 @@ class Match(unittest.TestCase):
         with warnings.catch_warnings():
             warnings.simplefilter("error", mrfgs.MatchWarning)
             with self.assertRaises(mrfgs.MatchWarning):
-                mrfgs.Matcher(backend="cpu").match(right, left, 15)
+                mrfgs.Matcher(device="cpu").match(right, left, 15)
 
     def test_results_pickle_and_copy(self):
-        matched = mrfgs.match(*pair(), 15, backend="cpu")
+        matched = mrfgs.match(*pair(), 15, device="cpu")
         for other in (pickle.loads(pickle.dumps(matched)), copy.copy(matched), copy.deepcopy(matched)):
             self.assertIsInstance(other, mrfgs.Matched)
             for name in ("disparity", "raw", "confidence", "validity", "min_disparity", "max_disparity", "iterations",
@@ -221,18 +221,33 @@ class Match(unittest.TestCase):
     def test_options(self):
         left, right = pair()
         self.same(left, right, "--set", "fill=none", "--set", "sub-pixel=false", options={"fill": "none", "sub-pixel": False})
+        # With its group in front, and a group as a dict, in any order.
+        grouped = {"cost": {"outside-cost": 20, "matching": "sad"}, "refinement.fill": "row"}
+        flags = [flag for change in ("matching=sad", "outside-cost=20", "fill=row") for flag in ("--set", change)]
+        self.same(left, right, *flags, options=grouped)
         self.same(left, right, "--preset", "fgs", preset="fgs")
         mask = np.zeros(left.shape[:2], bool)
         mask[:, :10] = True
-        matched = mrfgs.match(left, right, 15, mask=mask, backend="cpu")
+        matched = mrfgs.match(left, right, 15, mask=mask, device="cpu")
         self.assertTrue(np.isinf(matched.disparity[:, :10]).all() and np.isfinite(matched.disparity[:, 10:]).all())
         self.assertTrue((matched.validity[:, :10] == 32).all())
 
+    def test_options_are_described(self):
+        described = mrfgs.options()
+        window = described["cost"]["sad-window"]
+        self.assertEqual((window["takes"], window["source"], window["default"]), ("pixels, odd, 1 to 31", "section 3.1: 7", 7))
+        self.assertIn("census", described["cost"]["matching"]["words"])
+        self.assertIs(described["refinement"]["sub-pixel"]["default"], True)
+        # What a preset sets is an option as it stands.
+        left, right = pair()
+        paper = {group: {key: option["paper"] for key, option in keys.items()} for group, keys in described.items()}
+        self.same(left, right, "--preset", "paper", options=paper)
+
     def test_a_matcher_matches_again_and_again(self):
-        matcher = mrfgs.Matcher(backend="cpu", threads=1)
+        matcher = mrfgs.Matcher(device="cpu", threads=1)
         for seed in (1, 2, 1):
             images = pair(seed=seed)
-            alone = mrfgs.match(*images, 15, backend="cpu")
+            alone = mrfgs.match(*images, 15, device="cpu")
             self.assertTrue(np.array_equal(matcher.match(*images, 15).disparity, alone.disparity))
 
     def test_what_makes_no_sense_is_an_exception(self):
@@ -255,8 +270,9 @@ class Match(unittest.TestCase):
             (ValueError, "no preset", lambda: mrfgs.match(left, right, 15, preset="best")),
             (ValueError, "no-such-key", lambda: mrfgs.match(left, right, 15, options={"no-such-key": 1})),
             (ValueError, "levels", lambda: mrfgs.match(left, right, 15, options={"levels": 0})),
-            (ValueError, "backend", lambda: mrfgs.match(left, right, 15, backend="tpu")),
-            (ValueError, "threads", lambda: mrfgs.match(left, right, 15, backend="cpu", threads=0)),
+            (ValueError, "levels", lambda: mrfgs.match(left, right, 15, options={"graph": {"levels": 0}})),
+            (ValueError, "is a group", lambda: mrfgs.match(left, right, 15, options={"cost": "sad"})),
+            (ValueError, "threads", lambda: mrfgs.match(left, right, 15, device="cpu", threads=0)),
             (ValueError, "max_disparity", lambda: mrfgs.match(left * 0, right * 0)),
         ):
             with self.assertRaises(error) as raised:
@@ -271,9 +287,6 @@ class Match(unittest.TestCase):
         with self.assertRaises(ValueError) as raised:
             mrfgs.match(left, right, 15, options={"memory": 1})
         self.assertIn('options["memory"]: 1 MiB', str(raised.exception))
-        with self.assertRaises(ValueError) as raised:
-            mrfgs.match(left, right, 15, backend="cpu", device="0")
-        self.assertIn('backend="cpu"', str(raised.exception))
 
     def test_other_threads_run_meanwhile(self):
         images = pair(400, 600)
@@ -287,7 +300,7 @@ class Match(unittest.TestCase):
         thread = threading.Thread(target=tick)
         thread.start()
         start = time.monotonic()
-        mrfgs.match(*images, 63, backend="cpu")
+        mrfgs.match(*images, 63, device="cpu")
         end = time.monotonic()
         done.set()
         thread.join()
@@ -296,7 +309,7 @@ class Match(unittest.TestCase):
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_match(self):
         code = ("import numpy as np, mrfgs; a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8); "
-                "print('ready', flush=True); mrfgs.match(a, a, 255, backend='cpu', options={'final-iterations': 1000})")
+                "print('ready', flush=True); mrfgs.match(a, a, 255, device='cpu', options={'final-iterations': 1000})")
         with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             self.addCleanup(process.kill)
             self.assertEqual(process.stdout.readline(), "ready\n")

@@ -75,7 +75,7 @@ macro_rules! for_every_stage {
                 /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest): at (x, y) the label with the smallest belief of left pixel (x + d, y) among
                 /// those in the columns [`Plan::core`](crate::plan::Plan::core), the lowest on ties, and that belief.
                 RightView right_view;
-                /// [`Map::Raw`](super::Map::Raw), and [`Map::Disparity`](super::Map::Disparity) equal to it: the label and, where [`crate::options::Method::sub_pixel`] asks
+                /// [`Map::Raw`](super::Map::Raw), and [`Map::Disparity`](super::Map::Disparity) equal to it: the label and, where [`crate::options::RefinementOptions::sub_pixel`] asks
                 /// for it, its offset.
                 ///
                 /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
@@ -87,7 +87,7 @@ macro_rules! for_every_stage {
             }
             maps {
                 /// [`Map::Validity`](super::Map::Validity): [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
-                /// [`crate::options::Method::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
+                /// [`crate::options::RefinementOptions::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
                 /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
                 ///
                 /// [`flag::MASKED`]: crate::maps::flag::MASKED
@@ -95,13 +95,13 @@ macro_rules! for_every_stage {
                 /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
                 LeftRightCheck left_right_check;
                 /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE) on every pixel of each region of fewer than
-                /// [`crate::options::Method::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
+                /// [`crate::options::RefinementOptions::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
                 /// flag, 4-connected; labels that differ by at most one connect.
                 SpeckleFilter speckle_filter;
                 /// [`Map::Confidence`](super::Map::Confidence): how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
                 /// 255 where there is no runner-up, 0 for invalid pixels. Sets
                 /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
-                /// [`crate::options::Method::confidence_floor`].
+                /// [`crate::options::RefinementOptions::confidence_floor`].
                 Confidence confidence;
                 /// Fills [`Map::Disparity`](super::Map::Disparity) on every invalid pixel that is not masked with the smaller of the nearest valid
                 /// disparities to the left and to the right on its row, or the one there is: what is occluded belongs to the
@@ -111,7 +111,7 @@ macro_rules! for_every_stage {
                 /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
                 /// apart, distance counts in places, and the range parameter is a quarter.
                 FillMedian fill_median;
-                /// Weighted median of [`Map::Disparity`](super::Map::Disparity), on the pixels that [`crate::options::Method::median`] names and that have a
+                /// Weighted median of [`Map::Disparity`](super::Map::Disparity), on the pixels that [`crate::options::RefinementOptions::median`] names and that have a
                 /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
                 /// smallest value at which half of the weight is reached. Weights are [`crate::weights::MedianWeights`] of the left image.
                 Median median;

@@ -68,7 +68,8 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match
 /// First and last label index of each pixel, at every level of `plan`, as backends take them.
 #[must_use]
 pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 2]>> {
-    let mut label_range = zonal(plan.range, (&zones.map, zones.count), matches, plan.method.zone_sigmas);
+    let mut label_range =
+        zonal(plan.range, (&zones.map, zones.count), matches, plan.method.front.zone_sigmas);
     let mut levels = Vec::new();
     for level in &plan.levels {
         if !levels.is_empty() {

@@ -56,7 +56,7 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     }
     memory::check(plan.front_bytes(), Purpose::Match)?;
     let method = &plan.method;
-    let pair = match method.illumination {
+    let pair = match method.front.illumination {
         Illumination::None => pair,
         Illumination::Homomorphic => {
             let both = || Pair::new(homomorphic(pair.left()), homomorphic(pair.right()));
@@ -66,7 +66,7 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     let graphs = watch.host("graph", || Ok(graph::build(pair.left(), plan)))?;
     let mut prepared = Prepared::new(&pair, graphs);
     if plan.limits_labels() {
-        let options = zones::Options { zones: method.zones as usize, ..zones::Options::default() };
+        let options = zones::Options { zones: method.front.zones as usize, ..zones::Options::default() };
         let zones = watch.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
         let split = Some((&zones.map, zones.count));
         let matches = watch.host("matches", || Ok(matches::find(&pair, split, Some(plan.range))))?;

@@ -63,7 +63,7 @@ impl Tiles {
     /// As [`Tiles::new`].
     pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
         let (width, height) = whole.size();
-        let memory = u64::from(whole.method.memory) << 20;
+        let memory = u64::from(whole.method.tiles.memory) << 20;
         let all = Rect::whole((width, height));
         if whole.bytes() <= memory {
             let tile = Tile { core: all.clone(), crop: all, plan: whole.clone() };
@@ -86,7 +86,7 @@ impl Tiles {
         let Some((_, (width, height))) = candidates.min_by_key(|&(pixels, _)| pixels) else {
             let least = bytes((across.crop(across.most()), down.crop(down.most()))).min(whole.bytes());
             return Err(BudgetError::NoTileFits {
-                memory: whole.method.memory,
+                memory: whole.method.tiles.memory,
                 width: all.x.len(),
                 height: all.y.len(),
                 labels: range.labels(),

@@ -50,7 +50,7 @@ impl Mosaic {
         for map in [Map::Label, Map::Best, Map::RunnerUp, Map::Raw] {
             self.maps.write_part(map, &backend.map(map)?, &part, (core.x.start, core.y.start));
         }
-        if self.plan.method.left_right_check == LeftRightCheck::RightView {
+        if self.plan.method.refinement.left_right_check == LeftRightCheck::RightView {
             let (labels, best) = (backend.map(Map::RightLabel)?, backend.map(Map::RightBest)?);
             for (y, row) in core.y.clone().zip(part.y.clone()) {
                 let old_best = self.maps.right_best.row_mut(y)[crop.x.clone()].iter_mut();
@@ -63,7 +63,7 @@ impl Mosaic {
                 }
             }
         }
-        if self.plan.method.illumination != Illumination::None {
+        if self.plan.method.front.illumination != Illumination::None {
             // What follows looks at colours as they were matched.
             let left = &mut Arc::make_mut(&mut self.left).pixels;
             for (y, row) in core.y.clone().zip(part.y) {

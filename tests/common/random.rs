@@ -6,7 +6,7 @@ use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::flag;
 use mrfgs::options::{
-    Cost, DisparityRange, Fill, LeftRightCheck, Median, Method, Potential, Pyramid, Resolution, Schedule,
+    Agreement, DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential, Pyramid,
 };
 use mrfgs::plan::Plan;
 
@@ -107,45 +107,50 @@ pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
 /// A method with every parameter that the stages read drawn anew, and `neighbours` a factor.
 pub fn method(random: &mut Random, neighbours: usize) -> Method {
     let mut m = Method::default();
-    m.cost = random.pick(&[Cost::Sad, Cost::Census, Cost::AdCensus, Cost::AdCensus]);
-    m.colour_contrast = random.pick(&[0.0, 0.3, 5.0, 40.0, 128.0]);
-    m.sad_window = random.pick(&[1, 3, 5, 7, 9]);
-    m.outside_cost = match m.cost {
-        Cost::Sad => f64::from(random.within(0, 254)),
-        Cost::Census | Cost::AdCensus => f64::from(random.within(0, 1625)) / 1000.0,
+    m.cost.matching = random.pick(&[
+        MatchingCost::Sad,
+        MatchingCost::Census,
+        MatchingCost::AdCensus,
+        MatchingCost::AdCensus,
+    ]);
+    m.cost.colour_contrast = random.pick(&[0.0, 0.3, 5.0, 40.0, 128.0]);
+    m.cost.sad_window = random.pick(&[1, 3, 5, 7, 9]);
+    m.cost.outside_cost = match m.cost.matching {
+        MatchingCost::Sad => f64::from(random.within(0, 254)),
+        MatchingCost::Census | MatchingCost::AdCensus => f64::from(random.within(0, 1625)) / 1000.0,
     };
-    m.temperature = match m.cost {
-        Cost::Sad => random.log_within(0.1, 300.0),
-        Cost::Census | Cost::AdCensus => random.log_within(0.01, 10.0),
+    m.messages.temperature = match m.cost.matching {
+        MatchingCost::Sad => random.log_within(0.1, 300.0),
+        MatchingCost::Census | MatchingCost::AdCensus => random.log_within(0.01, 10.0),
     };
-    m.evidence_cap = random.pick(&[0.25, 3.0, 8.0, 63.75]);
-    m.evidence_gain = random.pick(&[1.0, 1.7, 3.0, 4.0]);
-    m.pyramid = random.pick(&[Pyramid::LowPass, Pyramid::Minimum]);
-    m.levels = random.within(1, 5);
-    m.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
-    m.sigma_space = random.log_within(0.5, 30.0);
-    m.sigma_range = random.log_within(0.01, 3.0);
-    m.potential = random.pick(&[Potential::Soft, Potential::Exact, Potential::Hard]);
-    m.dependency_truncation = random.pick(&[0.25, 2.0, 10.0, 63.75, 64.0, 255.75]);
-    m.resolution = random.pick(&[Resolution::Strict, Resolution::Interpolating]);
-    m.resolution_truncation = random.pick(&[0.25, 8.0, 63.75, 255.75]);
-    m.schedule = random.pick(&[Schedule::Together, Schedule::CoarseFirst]);
-    m.iterations = random.within(1, 3);
-    m.final_iterations = random.within(0, 3);
-    m.left_right_check = random.pick(&[
+    m.messages.evidence_cap = random.pick(&[0.25, 3.0, 8.0, 63.75]);
+    m.messages.evidence_gain = random.pick(&[1.0, 1.7, 3.0, 4.0]);
+    m.cost.pyramid = random.pick(&[Pyramid::LowPass, Pyramid::Minimum]);
+    m.graph.levels = random.within(1, 5);
+    m.graph.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
+    m.graph.sigma_space = random.log_within(0.5, 30.0);
+    m.graph.sigma_range = random.log_within(0.01, 3.0);
+    m.messages.potential = random.pick(&[Potential::Soft, Potential::Exact, Potential::Hard]);
+    m.messages.dependency_truncation = random.pick(&[0.25, 2.0, 10.0, 63.75, 64.0, 255.75]);
+    m.messages.agreement = random.pick(&[Agreement::Strict, Agreement::Interpolating]);
+    m.messages.resolution_truncation = random.pick(&[0.25, 8.0, 63.75, 255.75]);
+    m.schedule.order = random.pick(&[Order::Together, Order::CoarseFirst]);
+    m.schedule.iterations = random.within(1, 3);
+    m.schedule.final_iterations = random.within(0, 3);
+    m.refinement.left_right_check = random.pick(&[
         LeftRightCheck::Off,
         LeftRightCheck::RightView,
         LeftRightCheck::RightView,
         LeftRightCheck::SecondMatch,
     ]);
-    m.speckle_size = random.pick(&[0, 3, 20]);
-    m.sub_pixel = random.pick(&[false, true]);
-    m.fill = random.pick(&[Fill::None, Fill::Row, Fill::Median, Fill::Median]);
-    m.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
-    m.median_window = random.pick(&[3, 5, 15]);
-    m.median_sigma_space = random.log_within(0.3, 30.0);
-    m.median_sigma_range = random.log_within(0.01, 3.0);
-    m.confidence_floor = random.pick(&[0, 16, 255]);
+    m.refinement.speckle_size = random.pick(&[0, 3, 20]);
+    m.refinement.sub_pixel = random.pick(&[false, true]);
+    m.refinement.fill = random.pick(&[Fill::None, Fill::Row, Fill::Median, Fill::Median]);
+    m.refinement.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
+    m.refinement.median_window = random.pick(&[3, 5, 15]);
+    m.refinement.median_sigma_space = random.log_within(0.3, 30.0);
+    m.refinement.median_sigma_range = random.log_within(0.01, 3.0);
+    m.refinement.confidence_floor = random.pick(&[0, 16, 255]);
     m
 }
 

@@ -10,7 +10,7 @@ use mrfgs::backend::Volume;
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
-use mrfgs::options::{Cost, Method, Pyramid, Resolution, Schedule};
+use mrfgs::options::{Agreement, MatchingCost, Method, Order, Pyramid};
 use mrfgs::plan::{Plan, TruncationRule};
 
 /// A change of a plan, as a negative control makes it.
@@ -22,7 +22,7 @@ fn control_one_wrong_element_is_found() {
     let mut random = Random::new(5);
     let plan = random::plan((7, 5), -20, 33, &{
         let mut method = random::method(&mut random, 4);
-        method.levels = 3;
+        method.graph.levels = 3;
         method
     });
     let pair = random::pair(&mut random, 7, 5);
@@ -74,8 +74,8 @@ fn twin_of_the_control(plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) -> Vec<(
 #[test]
 fn control_a_changed_parameter_is_found() {
     let mut method = Method::default();
-    (method.levels, method.iterations, method.final_iterations) = (3, 2, 2);
-    (method.percentile, method.temperature) = (92.0, 0.1);
+    (method.graph.levels, method.schedule.iterations, method.schedule.final_iterations) = (3, 2, 2);
+    (method.graph.percentile, method.messages.temperature) = (92.0, 0.1);
     let plan = random::plan((24, 15), -3, 19, &method);
     let mut random = Random::new(77);
     let pair = loop {
@@ -90,8 +90,8 @@ fn control_a_changed_parameter_is_found() {
     let base = twin_of_the_control(&plan, &pair, &graphs);
     let changes: &[(&str, &str, Change)] = &[
         ("outside cost", "Cost(0)", |p| p.outside_cost += 1),
-        ("kind of cost", "Cost(0)", |p| p.method.cost = Cost::Sad),
-        ("pyramid", "Cost(1)", |p| p.method.pyramid = Pyramid::LowPass),
+        ("kind of cost", "Cost(0)", |p| p.method.cost.matching = MatchingCost::Sad),
+        ("pyramid", "Cost(1)", |p| p.method.cost.pyramid = Pyramid::LowPass),
         ("evidence cap", "Evidence(2)", |p| p.levels[2].evidence.cap -= 1),
         ("evidence limit", "Evidence(1)", |p| p.levels[1].evidence.limit /= 2),
         ("evidence up", "Evidence(0)", |p| p.levels[0].evidence.up += 1),
@@ -101,10 +101,10 @@ fn control_a_changed_parameter_is_found() {
         ("dependency rule", "Dependency(0)", |p| p.dependency.rule = TruncationRule::Absolute),
         ("resolution tau", "Up(2)", |p| p.resolution.tau += 1),
         ("resolution rule", "Down(0)", |p| p.resolution.rule = TruncationRule::Absolute),
-        ("resolution kind", "Down(1)", |p| p.method.resolution = Resolution::Strict),
-        ("iterations", "Belief(0)", |p| p.method.iterations += 1),
-        ("final iterations", "Belief(0)", |p| p.method.final_iterations += 1),
-        ("schedule", "Belief(1)", |p| p.method.schedule = Schedule::Together),
+        ("resolution kind", "Down(1)", |p| p.method.messages.agreement = Agreement::Strict),
+        ("iterations", "Belief(0)", |p| p.method.schedule.iterations += 1),
+        ("final iterations", "Belief(0)", |p| p.method.schedule.final_iterations += 1),
+        ("schedule", "Belief(1)", |p| p.method.schedule.order = Order::Together),
         ("smallest labels", "Cost(0)", |p| {
             for (z, level) in p.levels.iter_mut().enumerate() {
                 level.min += 4 >> z;
@@ -136,6 +136,6 @@ fn control_a_changed_sigma_is_found() {
     };
     let built = graph::build(&image, &plan);
     assert_eq!(built[0].codes(), twin::graph::graphs(&image, &plan)[0]);
-    plan.method.sigma_range *= 1.05;
+    plan.method.graph.sigma_range *= 1.05;
     assert_ne!(built[0].codes(), twin::graph::graphs(&image, &plan)[0]);
 }

@@ -7,14 +7,14 @@ use crate::{cells, on_all, same};
 use mrfgs::backend::{Stage, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph;
-use mrfgs::options::Cost;
+use mrfgs::options::MatchingCost;
 
 #[test]
 fn cost() {
     on_all(|case, backend, random| {
-        for cost in [Cost::Sad, Cost::Census, Cost::AdCensus] {
+        for cost in [MatchingCost::Sad, MatchingCost::Census, MatchingCost::AdCensus] {
             let mut plan = case.plan.clone();
-            plan.method.cost = cost;
+            plan.method.cost.matching = cost;
             backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
             let poison: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, 255)).collect();
             backend.probe().write(Volume::Cost(0), &poison).unwrap();
@@ -29,7 +29,7 @@ fn cost() {
 fn cost_with_the_largest_window() {
     let mut random = Random::new(31);
     let mut method = random::method(&mut random, 0);
-    (method.cost, method.sad_window, method.outside_cost) = (Cost::Sad, 31, 20.0);
+    (method.cost.matching, method.cost.sad_window, method.cost.outside_cost) = (MatchingCost::Sad, 31, 20.0);
     let plan = random::plan((37, 33), -3, 9, &method);
     let pair = random::pair(&mut random, 37, 33);
     for (name, mut backend) in backends() {

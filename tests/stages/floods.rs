@@ -9,7 +9,7 @@ use mrfgs::backend::{Backend, Stage, Volume};
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
-use mrfgs::options::{Cost, Method, PRESETS, Potential, Resolution, Schedule};
+use mrfgs::options::{Agreement, MatchingCost, Method, Order, PRESETS, Potential};
 use mrfgs::plan::Plan;
 use std::collections::HashSet;
 
@@ -54,22 +54,22 @@ fn a_flood_goes_on_from_a_written_state() {
 pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) -> u32 {
     let last = plan.levels.len() - 1;
     let method = &plan.method;
-    let additions: Vec<(usize, u32)> = match method.schedule {
-        Schedule::Together => vec![(0, method.iterations)],
-        Schedule::CoarseFirst => (0..=last)
+    let additions: Vec<(usize, u32)> = match method.schedule.order {
+        Order::Together => vec![(0, method.schedule.iterations)],
+        Order::CoarseFirst => (0..=last)
             .rev()
-            .map(|z| (z, if z == 0 { method.final_iterations } else { method.iterations }))
+            .map(|z| (z, if z == 0 { method.schedule.final_iterations } else { method.schedule.iterations }))
             .collect(),
     };
     let mut total = 0;
     let mut map = vec![0; plan.levels[0].pixels()];
     for (finest, iterations) in additions {
-        if method.schedule == Schedule::CoarseFirst && finest < last {
+        if method.schedule.order == Order::CoarseFirst && finest < last {
             resolve(plan, state, finest + 1);
             state.believe_at(plan, graphs, finest);
             state.believe_at(plan, graphs, finest + 1);
         }
-        let watched = finest == 0 && method.tolerance > 0.0;
+        let watched = finest == 0 && method.schedule.tolerance > 0.0;
         if watched {
             twin::change::change(&state.belief[0], plan.levels[0].labels, &mut map);
         }
@@ -78,7 +78,7 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
             // Levels that speak, and levels that hear from the next finer one.
             let mut speak: Vec<usize> = (finest..=last).collect();
             let mut hear: Vec<usize> = (finest + 1..=last).collect();
-            if method.schedule == Schedule::CoarseFirst {
+            if method.schedule.order == Order::CoarseFirst {
                 if finest == 0 {
                     // Messages between levels go one level at a time, in every second iteration.
                     let exchanges = (i..iterations).filter(|j| j % 2 == 1).count();
@@ -100,7 +100,7 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
             }
             if watched {
                 let sum = twin::change::change(&state.belief[0], plan.levels[0].labels, &mut map);
-                if (sum as f64 / map.len() as f64).sqrt() <= method.tolerance {
+                if (sum as f64 / map.len() as f64).sqrt() <= method.schedule.tolerance {
                     break;
                 }
             }
@@ -162,8 +162,8 @@ fn floods_of_the_presets() {
     for (i, (preset, _)) in PRESETS.iter().enumerate() {
         let mut random = Random::new(i as u64);
         let mut method = Method::preset(preset).unwrap();
-        method.iterations = method.iterations.min(8);
-        method.tolerance = 0.0;
+        method.schedule.iterations = method.schedule.iterations.min(8);
+        method.schedule.tolerance = 0.0;
         let pair = random::pair(&mut random, 45, 27);
         whole_flood(&random::plan((45, 27), -3, 19, &method), &pair);
     }
@@ -172,15 +172,15 @@ fn floods_of_the_presets() {
 #[test]
 fn floods_of_every_kind() {
     let mut seed = 100;
-    for schedule in [Schedule::Together, Schedule::CoarseFirst] {
+    for schedule in [Order::Together, Order::CoarseFirst] {
         for potential in [Potential::Soft, Potential::Exact, Potential::Hard] {
-            for resolution in [Resolution::Strict, Resolution::Interpolating] {
+            for resolution in [Agreement::Strict, Agreement::Interpolating] {
                 for levels in [1, 3, 5] {
                     seed += 1;
                     let mut random = Random::new(seed);
                     let mut method = random::method(&mut random, [2, 4, 8][seed as usize % 3]);
-                    (method.schedule, method.potential) = (schedule, potential);
-                    (method.resolution, method.levels) = (resolution, levels);
+                    (method.schedule.order, method.messages.potential) = (schedule, potential);
+                    (method.messages.agreement, method.graph.levels) = (resolution, levels);
                     let size = random.pick(&[(23, 14), (1, 30), (30, 1), (16, 16), (9, 21)]);
                     let labels = random.pick(&[1, 2, 15, 16, 17, 33]);
                     let pair = random::pair(&mut random, size.0, size.1);
@@ -195,14 +195,15 @@ fn floods_of_every_kind() {
 fn floods_that_stop_by_themselves() {
     let mut counts = HashSet::new();
     for (i, tolerance) in [0.05, 0.3, 0.6, 1.0, 3.0, 1e6, 1e-9].into_iter().enumerate() {
-        for schedule in [Schedule::Together, Schedule::CoarseFirst] {
+        for schedule in [Order::Together, Order::CoarseFirst] {
             let mut random = Random::new(i as u64 + 7);
             let mut method = random::method(&mut random, 4);
-            (method.cost, method.outside_cost, method.temperature) = (Cost::AdCensus, 0.8, 0.8);
-            (method.potential, method.dependency_truncation, method.schedule) =
+            (method.cost.matching, method.cost.outside_cost, method.messages.temperature) =
+                (MatchingCost::AdCensus, 0.8, 0.8);
+            (method.messages.potential, method.messages.dependency_truncation, method.schedule.order) =
                 (Potential::Soft, 2.0, schedule);
-            (method.levels, method.iterations, method.final_iterations) = (3, 5, 5);
-            method.tolerance = tolerance;
+            (method.graph.levels, method.schedule.iterations, method.schedule.final_iterations) = (3, 5, 5);
+            method.schedule.tolerance = tolerance;
             let pair = random::pair(&mut random, 24, 17);
             let plan = random::plan((24, 17), 0, 12, &method);
             let before: u32 =

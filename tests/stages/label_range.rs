@@ -11,7 +11,7 @@ use mrfgs::plan::Plan;
 fn label_range() {
     on_all(|case, backend, random| {
         let mut method = case.plan.method.clone();
-        method.zone_sigmas = 1.0;
+        method.front.zone_sigmas = 1.0;
         let (width, height) = case.plan.size();
         let plan = Plan::new(width, height, case.plan.range, &method).unwrap();
         let label_ranges: Vec<Plane<[u16; 2]>> = plan

@@ -112,9 +112,12 @@ fn random_cost(random: &mut Random, plan: &Plan, z: usize) -> Vec<u32> {
 fn the_cases_cover_what_they_should() {
     let cases = cases();
     let seen = |f: &dyn Fn(&Plan) -> String| cases.iter().map(|c| f(&c.plan)).collect::<HashSet<_>>();
-    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.potential, p.method.resolution)).len(), 6);
+    assert_eq!(
+        seen(&|p| format!("{:?} {:?}", p.method.messages.potential, p.method.messages.agreement)).len(),
+        6
+    );
     assert_eq!(seen(&|p| format!("{:?} {:?}", p.volume_width, p.dependency.rule)).len(), 4);
-    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost, p.method.pyramid)).len(), 6);
+    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost.matching, p.method.cost.pyramid)).len(), 6);
     assert_eq!(seen(&|p| p.neighbours.to_string()).len(), NEIGHBOURS.len());
     assert_eq!(seen(&|p| p.levels.len().to_string()).len(), 5);
     assert_eq!(

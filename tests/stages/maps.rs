@@ -20,7 +20,7 @@ pub(crate) type Twin = fn(&Plan, &Pair, &mut Finest);
 /// A plan with one level and no neighbours for a method drawn anew.
 pub(crate) fn small_plan(random: &mut Random, size: (usize, usize), change: impl Fn(&mut Method)) -> Plan {
     let mut method = random::method(random, 0);
-    method.levels = 1;
+    method.graph.levels = 1;
     change(&mut method);
     let labels = random.pick(&[1, 2, 3, 9, 40]);
     random::plan(size, random.pick(&[-20, -1, 0, 5]), labels, &method)
@@ -63,7 +63,9 @@ pub(crate) fn on_maps(
 fn nothing_valid() {
     for &size in SIZES {
         let mut random = Random::new(1);
-        let plan = small_plan(&mut random, size, |m| (m.median, m.speckle_size) = (Median::All, 100));
+        let plan = small_plan(&mut random, size, |m| {
+            (m.refinement.median, m.refinement.speckle_size) = (Median::All, 100);
+        });
         let pair = random::pair(&mut random, size.0, size.1);
         for all in [flag::MASKED, flag::OCCLUDED, flag::OUTSIDE | flag::LOW_CONFIDENCE, flag::SPECKLE] {
             let mut maps = random::finest(&mut random, &plan, false);
@@ -94,7 +96,7 @@ type Control = (Stage, bool, Twin, fn(&mut Plan));
 fn control_changes_are_found() {
     let mut random = Random::new(21);
     let mut method = Method::default();
-    (method.levels, method.percentile, method.median_window) = (1, 100.0, 5);
+    (method.graph.levels, method.graph.percentile, method.refinement.median_window) = (1, 100.0, 5);
     let plan = random::plan((24, 31), 0, 9, &method);
     // Faint enough for neighbours to have weight in the median.
     let faint = Plane::from_fn(24, 31, |_, _| [0; 3].map(|_: i32| random.within(100, 130) as u8));
@@ -119,18 +121,20 @@ fn control_changes_are_found() {
     };
     let changes: &[Control] = &[
         (Stage::LeftRightCheck, false, twin::left_right_check::left_right_check, |p| p.range.min += 1),
-        (Stage::SpeckleFilter, true, region, |p| p.method.speckle_size += 1),
+        (Stage::SpeckleFilter, true, region, |p| p.method.refinement.speckle_size += 1),
         (Stage::Fill, false, larger, |_| ()),
-        (Stage::Confidence, false, confidence, |p| p.method.confidence_floor += 4),
-        (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.median_window = 7),
-        (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.median_sigma_range = 0.02),
-        (Stage::FillMedian, false, twin::median::median, |p| p.method.median = Median::Filled),
-        (Stage::Median, false, twin::median::median, |p| p.method.median_window = 7),
-        (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_space = 1.0),
-        (Stage::Median, false, twin::median::median, |p| p.method.median_sigma_range = 0.02),
+        (Stage::Confidence, false, confidence, |p| p.method.refinement.confidence_floor += 4),
+        (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.refinement.median_window = 7),
+        (Stage::FillMedian, false, twin::fill_median::fill_median, |p| {
+            p.method.refinement.median_sigma_range = 0.02
+        }),
+        (Stage::FillMedian, false, twin::median::median, |p| p.method.refinement.median = Median::Filled),
+        (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_window = 7),
+        (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_space = 1.0),
+        (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_range = 0.02),
     ];
     let mut plan = plan;
-    plan.method.speckle_size = 3;
+    plan.method.refinement.speckle_size = 3;
     for (name, mut backend) in backends() {
         for (stage, bare, twin, change) in changes {
             let input = if *bare { &unflagged } else { &maps };

@@ -10,10 +10,10 @@ use mrfgs::weights::MedianWeights;
 
 /// Any parameters of the median.
 pub(crate) fn any_method(random: &mut Random, method: &mut Method) {
-    method.median = random.pick(&[Median::Off, Median::Filled, Median::All, Median::All]);
-    method.median_sigma_space = random.log_within(0.1, 100.0);
-    method.median_sigma_range = random.log_within(0.001, 10.0);
-    method.median_window = random.pick(&[3, 5, 15, 31]);
+    method.refinement.median = random.pick(&[Median::Off, Median::Filled, Median::All, Median::All]);
+    method.refinement.median_sigma_space = random.log_within(0.1, 100.0);
+    method.refinement.median_sigma_range = random.log_within(0.001, 10.0);
+    method.refinement.median_window = random.pick(&[3, 5, 15, 31]);
 }
 
 /// Any maps, now and then with disparities as far apart as they get.

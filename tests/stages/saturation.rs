@@ -9,7 +9,7 @@ use crate::{NEIGHBOURS, cells, resolve, same};
 use mrfgs::backend::{Stage, Volume, volume_shape};
 use mrfgs::front::Prepared;
 use mrfgs::graph::{self, LevelGraph};
-use mrfgs::options::{Method, Resolution};
+use mrfgs::options::{Agreement, Method};
 use mrfgs::plan::{LevelPlan, Plan, Truncation, TruncationRule, VolumeWidth};
 use std::collections::HashSet;
 
@@ -65,10 +65,10 @@ fn flood_of_the_sure(plan: &Plan) -> u32 {
 /// The largest in-degree there is, the strongest potential, the largest evidence: 16 bits hold it.
 #[test]
 fn wide_beliefs_stay_below_their_largest() {
-    for (resolution, levels) in [(Resolution::Strict, 3), (Resolution::Interpolating, 2)] {
+    for (resolution, levels) in [(Agreement::Strict, 3), (Agreement::Interpolating, 2)] {
         let mut method = Method::preset("paper").unwrap();
-        (method.percentile, method.resolution, method.levels) = (0.0, resolution, levels);
-        method.iterations = 6;
+        (method.graph.percentile, method.messages.agreement, method.graph.levels) = (0.0, resolution, levels);
+        method.schedule.iterations = 6;
         let plan = random::plan((15, 13), 0, 5, &method);
         assert_eq!(plan.levels[0].evidence.cap, 255);
         let largest = flood_of_the_sure(&plan);
@@ -79,12 +79,12 @@ fn wide_beliefs_stay_below_their_largest() {
 }
 
 /// A plan of either width whose cuts are larger than a plan's own: beliefs exceed what it stores on full graphs.
-fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resolution: Resolution) -> Plan {
+fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resolution: Agreement) -> Plan {
     let mut method = Method::default();
-    method.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
-    method.evidence_cap = 10.0;
-    (method.levels, method.iterations, method.final_iterations) = (2, 2, 2);
-    method.resolution = resolution;
+    method.graph.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
+    method.messages.evidence_cap = 10.0;
+    (method.graph.levels, method.schedule.iterations, method.schedule.final_iterations) = (2, 2, 2);
+    method.messages.agreement = resolution;
     let mut plan = random::plan((15, 13), -3, 20, &method);
     let tau = match width {
         VolumeWidth::Narrow => 40,
@@ -99,7 +99,7 @@ fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resol
 fn beliefs_that_saturate() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
         for rule in [TruncationRule::Relative, TruncationRule::Absolute] {
-            for resolution in [Resolution::Strict, Resolution::Interpolating] {
+            for resolution in [Agreement::Strict, Agreement::Interpolating] {
                 let plan = saturating(48, width, rule, resolution);
                 assert_eq!(flood_of_the_sure(&plan), belief_most(&plan));
             }
@@ -112,7 +112,7 @@ fn beliefs_that_saturate() {
 #[test]
 fn control_saturated_sums_say_nothing() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
-        for resolution in [Resolution::Strict, Resolution::Interpolating] {
+        for resolution in [Agreement::Strict, Agreement::Interpolating] {
             let plan = saturating(48, width, TruncationRule::Relative, resolution);
             let pair = random::pair(&mut Random::new(3), 15, 13);
             let graphs = full_graphs(&plan);
@@ -165,7 +165,7 @@ fn control_saturated_sums_say_nothing() {
 #[test]
 fn control_padding_stays_behind_beliefs_that_saturate() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
-        let plan = saturating(1, width, TruncationRule::Relative, Resolution::Interpolating);
+        let plan = saturating(1, width, TruncationRule::Relative, Agreement::Interpolating);
         let level = &plan.levels[0];
         assert!(level.labels < level.stride);
         let graphs: Vec<LevelGraph> = plan
@@ -223,7 +223,7 @@ fn every_plan_leaves_room_for_its_beliefs() {
 /// Negative control: twins that saturate later than a narrow plan does give other volumes.
 #[test]
 fn control_saturation_in_8_bits_is_found() {
-    let plan = saturating(48, VolumeWidth::Narrow, TruncationRule::Relative, Resolution::Interpolating);
+    let plan = saturating(48, VolumeWidth::Narrow, TruncationRule::Relative, Agreement::Interpolating);
     let mut wider = plan.clone();
     wider.volume_width = VolumeWidth::Wide;
     let graphs = full_graphs(&plan);

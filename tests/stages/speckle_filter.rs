@@ -16,7 +16,8 @@ use mrfgs::plan::Plan;
 #[test]
 fn speckle_filter() {
     let sizes = [0, 1, 2, 3, 5, 20, 10_000];
-    let change = |random: &mut Random, method: &mut Method| method.speckle_size = random.pick(&sizes);
+    let change =
+        |random: &mut Random, method: &mut Method| method.refinement.speckle_size = random.pick(&sizes);
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, false);
         // As the left-right check leaves it.
@@ -52,7 +53,7 @@ fn regions_that_wind() {
     for (shape, inside) in shapes {
         let area = (0..width * height).filter(|i| inside(i % width, i / width)).count() as u32;
         for speckle_size in [2, 3, area / 2, area, area + 1] {
-            let plan = small_plan(&mut random, (width, height), |m| m.speckle_size = speckle_size);
+            let plan = small_plan(&mut random, (width, height), |m| m.refinement.speckle_size = speckle_size);
             let labels = plan.levels[0].labels as i32;
             let mut maps = Finest::zero((width, height));
             maps.validity = Plane::from_fn(width, height, |x, y| i32::from(!inside(x, y)) * 2);

@@ -5,7 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use mrfgs::backend::gpu;
-use mrfgs::options::{Choice, Execution};
+use mrfgs::options::{DeviceChoice, Execution};
 
 /// Where a match runs.
 #[derive(clap::Args)]
@@ -79,9 +79,9 @@ impl Device {
     pub(crate) fn execution(&self, threads: &ThreadArgs) -> Execution {
         Execution {
             backend: match self {
-                Self::Auto => Choice::Auto,
-                Self::Cpu => Choice::Cpu,
-                Self::Gpu | Self::Named(_) => Choice::Gpu,
+                Self::Auto => DeviceChoice::Auto,
+                Self::Cpu => DeviceChoice::Cpu,
+                Self::Gpu | Self::Named(_) => DeviceChoice::Gpu,
             },
             device: self.name().map(str::to_owned),
             threads: threads.threads.map(usize::from),

@@ -15,7 +15,7 @@ pub(crate) struct MethodArgs {
     /// several times, a later file replaces keys of an earlier one [default: default]
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) method: Vec<PathBuf>,
-    /// Sets one key, after --method: `--set levels=4 --set cost=sad`
+    /// Sets one key, after --method: `--set levels=4 --set matching=sad`
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub(crate) set: Vec<(String, String)>,
     /// Memory that a match may take, such as 2GiB or 512MiB. A pair that needs more is matched tile by tile, which changes
@@ -65,7 +65,7 @@ impl MethodArgs {
             }
         }
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
-        method.memory = self.memory.unwrap_or(method.memory);
+        method.tiles.memory = self.memory.unwrap_or(method.tiles.memory);
         method.validated()
     }
 

@@ -33,7 +33,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
             told.stdout
         );
         let method = &json["methods"][preset];
-        assert_eq!(method["levels"], 1, "--set counts for every preset");
+        assert_eq!(method["graph"]["levels"], 1, "--set counts for every preset");
         assert_eq!(pair["backends"].as_object().unwrap().len(), backends.len());
 
         for &backend in backends {

@@ -123,7 +123,7 @@ fn workshop() -> TempDir {
     image::GrayImage::from_pixel(60, 40, image::Luma([90])).save(at("flat.png")).unwrap();
     fs::create_dir(at("taken.pfm")).unwrap();
     fs::create_dir(at("taken.png")).unwrap();
-    fs::write(at("syntax.toml"), "levels = 3\ncost sad\n").unwrap();
+    fs::write(at("syntax.toml"), "levels = 3\nmatching sad\n").unwrap();
     fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
     fs::write(at("value.toml"), "levels = 3\n\ntemperature = -1\n").unwrap();
     for (name, calib) in [
@@ -226,17 +226,18 @@ fn the_later_word_counts() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(
         folder.path().join("my.toml"),
-        "levels = 3\niterations = 2\ncost = \"ad-census\"\noutside-cost = 1\n",
+        "levels = 3\nschedule.iterations = 2\n[cost]\nmatching = \"ad-census\"\noutside-cost = 1\n",
     )
     .unwrap();
     let dir = scene("wall").to_str().unwrap().to_owned();
-    let args = ["evaluate", &dir, "--json", "-", "--set", "levels=2", "--set", "levels=1"];
+    let args = ["evaluate", &dir, "--json", "-", "--set", "levels=2", "--set", "graph.levels=1"];
     let told = run(folder.path(), &[&args[..], &["--preset", "paper", "--config", "my.toml"]].concat());
     let method = &told.succeeded().json()["method"];
-    assert_eq!(method["levels"], 1, "--set after --config, the last --set last");
-    assert_eq!(method["iterations"], 2, "--config after --preset");
-    assert_eq!((&method["cost"], &method["outside-cost"]), (&"ad-census".into(), &1.0.into()));
-    assert_eq!(method["potential"], "hard", "--preset before all");
+    assert_eq!(method["graph"]["levels"], 1, "--set after --config, the last --set last");
+    assert_eq!(method["schedule"]["iterations"], 2, "--config after --preset");
+    let cost = &method["cost"];
+    assert_eq!((&cost["matching"], &cost["outside-cost"]), (&"ad-census".into(), &1.0.into()));
+    assert_eq!(method["messages"]["potential"], "hard", "--preset before all");
 }
 
 #[test]
@@ -253,12 +254,16 @@ fn presets_can_be_pasted_into_a_config_file() {
         }
     }
     let listing = run(folder.path(), &["presets"]).succeeded().stdout;
-    for (key, unit, _) in options::keys() {
-        let line = listing.lines().find(|l| l.split(' ').next() == Some(&key)).unwrap();
-        assert!(line.contains(unit), "{line}");
-        for (name, _) in options::PRESETS {
-            let value = Method::preset(name).unwrap().table()[&key].to_string().replace('"', "");
-            assert!(line.split_whitespace().any(|word| word == value), "{value} in {line}");
+    for group in options::GROUPS {
+        assert!(listing.lines().any(|l| l.starts_with(&format!("[{}] ", group.name))), "{}", group.name);
+        for key in group.keys {
+            let line = listing.lines().find(|l| l.split(' ').next() == Some(&key.name())).unwrap();
+            assert!(line.contains(&key.to_string()), "{line}");
+            for (name, _) in options::PRESETS {
+                let table = Method::preset(name).unwrap().table();
+                let value = table[group.name][key.name()].to_string().replace('"', "");
+                assert!(line.split_whitespace().any(|word| word == value), "{value} in {line}");
+            }
         }
     }
     assert!(listing.lines().all(|l| l.chars().count() <= 110), "lines fit a terminal");

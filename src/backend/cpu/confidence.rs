@@ -6,7 +6,7 @@ use crate::maps::flag;
 use crate::plan::Plan;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
-    let floor = plan.method.confidence_floor;
+    let floor = plan.method.refinement.confidence_floor;
     let Finest { optima, validity, confidence, .. } = maps;
     let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(optima.data());
     for ((confidence, flags), optimum) in pixels {

@@ -3,7 +3,7 @@
 use super::units::{Blocks, Units, block, block_mut};
 use super::volumes::Volumes;
 use crate::image::{Image, Pair, Pixel};
-use crate::options::Cost;
+use crate::options::MatchingCost;
 use crate::plan::{
     CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, CENSUS_RADIUS_X, CENSUS_RADIUS_Y, COLOUR_MOST, COST_MAX,
     Plan,
@@ -16,9 +16,9 @@ const CENSUS_Y: isize = CENSUS_RADIUS_Y as isize;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let Volumes { plan, pair, fine_cost: out, .. } = v;
-    match plan.method.cost {
-        Cost::Census | Cost::AdCensus => census(plan, pair, out),
-        Cost::Sad => sad(plan, pair, out),
+    match plan.method.cost.matching {
+        MatchingCost::Census | MatchingCost::AdCensus => census(plan, pair, out),
+        MatchingCost::Sad => sad(plan, pair, out),
     }
 }
 
@@ -282,7 +282,7 @@ fn colour_weights_on<'a, S: pulp::Simd>(
 fn sad(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
     let (width, height) = (level.width, level.height);
-    let radius = plan.method.sad_window as usize / 2;
+    let radius = plan.method.cost.sad_window as usize / 2;
     let (left, right) = (pair.left(), pair.right());
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
         || vec![(0u64, 0u32); width + 1],

@@ -16,7 +16,7 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, left: &Image) {
             let xr = x as i64 - min - i64::from(label);
             *flags = if left.masked[(x, y)] {
                 flag::MASKED
-            } else if plan.method.left_right_check == LeftRightCheck::Off {
+            } else if plan.method.refinement.left_right_check == LeftRightCheck::Off {
                 0
             } else if xr < 0 || xr >= width as i64 {
                 flag::OUTSIDE

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::array::from_fn;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
-    let touched = |f: u8| match plan.method.median {
+    let touched = |f: u8| match plan.method.refinement.median {
         Median::Off => false,
         Median::Filled => f & flag::FILLED != 0,
         Median::All => has_disparity(f),

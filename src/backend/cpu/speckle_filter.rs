@@ -6,7 +6,7 @@ use crate::maps::flag;
 use crate::plan::Plan;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
-    let size = plan.method.speckle_size as usize;
+    let size = plan.method.refinement.speckle_size as usize;
     let Finest { optima, validity, .. } = maps;
     let (width, height) = optima.size();
     let flags = validity.data_mut();

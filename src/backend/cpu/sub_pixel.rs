@@ -15,7 +15,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
         for (x, raw) in row.iter_mut().enumerate() {
             let label = |x: usize, y: usize| optima[(x, y)].label;
             *raw = FRACTION * (plan.range.min + i32::from(label(x, y)));
-            if plan.method.sub_pixel {
+            if plan.method.refinement.sub_pixel {
                 *raw += offset(plan, cost, label, (x, y));
             }
         }

@@ -16,6 +16,6 @@ pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
-    let own = Uniform { floor: r.plan.method.confidence_floor };
+    let own = Uniform { floor: r.plan.method.refinement.confidence_floor };
     r.rows(&jobs(r.plan, 0)[0], &own, l.width, |rows| vec![(1, b.optima.bind(rows)), (2, b.flags.bind(rows))])
 }

@@ -8,7 +8,7 @@ use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
 use crate::error::Result;
-use crate::options::Cost;
+use crate::options::MatchingCost;
 use crate::plan::{
     CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, CENSUS_RADIUS_X, CENSUS_RADIUS_Y, COLOUR_MOST, COST_MAX,
     Plan,
@@ -34,8 +34,8 @@ pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
             .with("COLOUR_MOST", COLOUR_MOST);
         Job::new::<Uniform>(kernel, loops)
     };
-    if plan.method.cost == Cost::Sad {
-        let (window, run) = (plan.method.sad_window as usize, SAD_RUN as usize);
+    if plan.method.cost.matching == MatchingCost::Sad {
+        let (window, run) = (plan.method.cost.sad_window as usize, SAD_RUN as usize);
         return vec![job("sad", (window + run - 1) * (1 + 5 * window + run) + run * 5)];
     }
     let window = (2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2);
@@ -48,7 +48,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         outside_cost: plan.outside_cost.into(),
         colour_weight: plan.colour_weight(),
         colour_variance: plan.colour_variance(),
-        sad_radius: (plan.method.sad_window / 2) as i32,
+        sad_radius: (plan.method.cost.sad_window / 2) as i32,
     };
     let cost = &r.here().cost;
     match &jobs(plan, 0)[..] {
@@ -75,7 +75,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         }
         jobs => {
             r.rows(&jobs[0], &own, l.width.div_ceil(SAD_RUN) * l.quads, |rows| {
-                let seen = with_halo(rows, plan.method.sad_window / 2, l.height);
+                let seen = with_halo(rows, plan.method.cost.sad_window / 2, l.height);
                 vec![(1, b.left.bind(&seen)), (2, b.right.bind(&seen)), (3, cost.bind(rows))]
             })?;
         }

@@ -17,7 +17,7 @@ pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
-    let is_on = r.plan.method.left_right_check != LeftRightCheck::Off;
+    let is_on = r.plan.method.refinement.left_right_check != LeftRightCheck::Off;
     let own = Uniform { is_on: is_on.into() };
     r.rows(&jobs(r.plan, 0)[0], &own, l.width, |rows| {
         vec![

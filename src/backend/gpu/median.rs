@@ -18,7 +18,7 @@ uniform! { radius: u32, step_bits: u32, row_bits: u32, scale: u32, doublings: u3
 /// A job for `kernel`, which imports the weighted median.
 pub(super) fn job(plan: &Plan, kernel: Kernel) -> Job {
     // One pass, and one for every three bits of what the disparities of a window may span.
-    let window = plan.method.median_window as usize;
+    let window = plan.method.refinement.median_window as usize;
     Job::new::<Uniform>(kernel, (1 + 8) * (window + 1) * window + 8)
 }
 
@@ -27,7 +27,7 @@ pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
-    let median = r.plan.method.median;
+    let median = r.plan.method.refinement.median;
     if median == Median::Off {
         return Ok(());
     }

@@ -39,8 +39,8 @@ pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
     let [runs, join, flatten, count, flag] = &jobs(r.plan, 0)[..] else { unreachable!("five kernels") };
-    let halo = r.plan.method.speckle_size;
-    let base = Uniform { halo, size: r.plan.method.speckle_size, ..Uniform::default() };
+    let halo = r.plan.method.refinement.speckle_size;
+    let base = Uniform { halo, size: r.plan.method.refinement.speckle_size, ..Uniform::default() };
     let (parents, sizes) = (&b.speckle_parents, &b.speckle_sizes);
     // What is found in a band goes to the first rows of the scratch maps.
     let found = |what: &Rows, seen: &Range<u32>| what.bind(&(0..seen.end - seen.start));

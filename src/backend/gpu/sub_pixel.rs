@@ -17,7 +17,7 @@ pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, here, l) = (r.buffers, r.here(), r.params());
-    let own = Uniform { is_on: r.plan.method.sub_pixel.into() };
+    let own = Uniform { is_on: r.plan.method.refinement.sub_pixel.into() };
     r.rows(&jobs(r.plan, 0)[0], &own, l.width, |rows| {
         let seen = with_halo(rows, 1, l.height);
         vec![

@@ -11,7 +11,9 @@ pub fn confidence(plan: &Plan, maps: &mut Finest) {
             let at = (x, y);
             let lead = ((maps.runner_up[at] - maps.best[at]) * 16 / 8).min(255);
             maps.confidence[at] = if invalid(maps.validity[at]) { 0 } else { lead };
-            if !invalid(maps.validity[at]) && i64::from(lead) < i64::from(plan.method.confidence_floor) {
+            if !invalid(maps.validity[at])
+                && i64::from(lead) < i64::from(plan.method.refinement.confidence_floor)
+            {
                 maps.validity[at] |= i32::from(flag::LOW_CONFIDENCE);
             }
         }

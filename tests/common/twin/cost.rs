@@ -1,6 +1,6 @@
 use super::census::census;
 use mrfgs::image::{Image, Pair};
-use mrfgs::options::Cost;
+use mrfgs::options::MatchingCost;
 use mrfgs::plan::{COST_MAX, Plan};
 
 /// Matching cost of level 0.
@@ -17,16 +17,16 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
                     out.push(u32::from(plan.outside_cost));
                     continue;
                 }
-                let cost = match plan.method.cost {
-                    Cost::Sad => sad(left, right, x, y, d, i64::from(plan.method.sad_window)),
-                    Cost::Census | Cost::AdCensus => {
+                let cost = match plan.method.cost.matching {
+                    MatchingCost::Sad => sad(left, right, x, y, d, i64::from(plan.method.cost.sad_window)),
+                    MatchingCost::Census | MatchingCost::AdCensus => {
                         let at = |x: i64| (y * level.width as i64 + x) as usize;
                         let (l, r) = (&left_census[at(x)], &right_census[at(x - d)]);
                         let hamming = l.iter().zip(r).filter(|(l, r)| l != r).count();
                         let census = 4 * (hamming as i64).min(40);
                         let colour = difference(left, x, right, x - d, y, |level| level / 256).min(64);
-                        match plan.method.cost {
-                            Cost::AdCensus => census + (weight(plan, left, x, y) * colour + 32) / 64,
+                        match plan.method.cost.matching {
+                            MatchingCost::AdCensus => census + (weight(plan, left, x, y) * colour + 32) / 64,
                             _ => census,
                         }
                     }
@@ -40,7 +40,8 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
 
 /// How much colour counts, 0 to 48: by the variance of grey, in 8-bit levels, in the window of the census.
 fn weight(plan: &Plan, image: &Image, x: i64, y: i64) -> i64 {
-    let enough = (3969.0 * plan.method.colour_contrast * plan.method.colour_contrast).round() as i64;
+    let enough =
+        (3969.0 * plan.method.cost.colour_contrast * plan.method.cost.colour_contrast).round() as i64;
     let grey = |x: i64, y: i64| i64::from(image.pixels[(x as usize, y as usize)][3]) / 256;
     let mut greys = Vec::new();
     for dy in -3..=3 {

@@ -5,5 +5,5 @@ use mrfgs::plan::Plan;
 
 /// The median of filled pixels, the window's places four pixels apart.
 pub fn fill_median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    smooth(plan, pair, maps, (4, 1), plan.method.median_sigma_range / 4.0, filled);
+    smooth(plan, pair, maps, (4, 1), plan.method.refinement.median_sigma_range / 4.0, filled);
 }

@@ -14,7 +14,7 @@ pub fn left_right_check(plan: &Plan, pair: &Pair, maps: &mut Finest) {
             let inside = right >= 0 && right < width as i64;
             let reason = if pair.left().masked[(x, y)] {
                 flag::MASKED
-            } else if plan.method.left_right_check == LeftRightCheck::Off {
+            } else if plan.method.refinement.left_right_check == LeftRightCheck::Off {
                 0
             } else if !inside {
                 flag::OUTSIDE

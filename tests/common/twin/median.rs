@@ -23,8 +23,8 @@ pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
 
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    let sigma_range = plan.method.median_sigma_range;
-    smooth(plan, pair, maps, (1, 2), sigma_range, |validity| match plan.method.median {
+    let sigma_range = plan.method.refinement.median_sigma_range;
+    smooth(plan, pair, maps, (1, 2), sigma_range, |validity| match plan.method.refinement.median {
         Median::Off => false,
         Median::Filled => filled(validity),
         Median::All => known(validity),
@@ -51,8 +51,8 @@ pub fn smooth(
 ) {
     let (width, height) = plan.size();
     let method = &plan.method;
-    let sigma_space = method.median_sigma_space;
-    let radius = i64::from(method.median_window / 2);
+    let sigma_space = method.refinement.median_sigma_space;
+    let radius = i64::from(method.refinement.median_window / 2);
     let guide = pair.left();
     let Finest { disparity, validity, .. } = &*maps;
     maps.disparity = Plane::from_fn(width, height, |x, y| {

@@ -25,7 +25,7 @@ pub fn pyramid(plan: &Plan, level: usize, fine: &[u32]) -> Vec<u32> {
                 (sum + 128) >> 8
             };
             for z in (0..c.labels as i64).map(|label| i64::from(c.min) + label) {
-                let cost = match plan.method.pyramid {
+                let cost = match plan.method.cost.pyramid {
                     Pyramid::LowPass => {
                         let at = |d: i64| mean(d.max(*fine_labels.start()).min(*fine_labels.end()));
                         let sum: i64 = (-2..=2).map(|k| binomial(k) * at(2 * z + k)).sum();

@@ -1,5 +1,5 @@
 use super::{cut, most, variable_message};
-use mrfgs::options::Resolution;
+use mrfgs::options::Agreement;
 use mrfgs::plan::Plan;
 
 /// New messages (down, up) of the resolution factors between `level` and the next finer one.
@@ -15,9 +15,9 @@ pub fn resolution(
     let (f, c) = (&plan.levels[level - 1], &plan.levels[level]);
     let agree = |d: usize, z: usize| {
         let (d, z) = (i64::from(f.min) + d as i64, i64::from(c.min) + z as i64);
-        match plan.method.resolution {
-            Resolution::Strict => d == 2 * z,
-            Resolution::Interpolating => (d - 2 * z).abs() <= 1,
+        match plan.method.messages.agreement {
+            Agreement::Strict => d == 2 * z,
+            Agreement::Interpolating => (d - 2 * z).abs() <= 1,
         }
     };
     let smallest = |values: &mut dyn Iterator<Item = i64>| values.min().unwrap_or(infinite);

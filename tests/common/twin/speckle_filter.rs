@@ -34,7 +34,7 @@ pub fn speckle_filter(plan: &Plan, maps: &mut Finest) {
         members[r] += 1;
     }
     for (validity, &r) in maps.validity.data_mut().iter_mut().zip(region.data()) {
-        if *validity == 0 && members[r] < plan.method.speckle_size {
+        if *validity == 0 && members[r] < plan.method.refinement.speckle_size {
             *validity |= i32::from(flag::SPECKLE);
         }
     }

@@ -37,7 +37,7 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
     };
     maps.raw = Plane::from_fn(level.width, level.height, |x, y| {
         let whole = 256 * (plan.range.min + maps.label[(x, y)]);
-        if plan.method.sub_pixel { whole + offset(x, y) } else { whole }
+        if plan.method.refinement.sub_pixel { whole + offset(x, y) } else { whole }
     });
     maps.disparity = maps.raw.clone();
 }

@@ -79,7 +79,7 @@ impl Case<'_> {
         for (key, value) in &args.method.set {
             flag("--set=", &format!("{key}={value}"));
         }
-        if let Some(memory) = args.method.memory {
+        if let Some(memory) = args.method.tiles.memory {
             flag("--memory=", &format!("{memory}MiB"));
         }
         if let Some(threads) = args.threads.threads {

@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     stop::listen();
     let method = args.method.method()?;
     let names = args.dirs.iter().map(|dir| folder::name(dir)).collect::<Vec<_>>();
-    let submission = Submission::new(&args.folder, &args.called, &names, method.fill)?;
+    let submission = Submission::new(&args.folder, &args.called, &names, method.refinement.fill)?;
     if let Some(path) = files::json_file(args.scenes.json()) {
         files::outside(("DIR", submission.folder.place()), ("--json", path))?;
     }

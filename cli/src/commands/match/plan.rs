@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use mrfgs::options::Schedule;
+use mrfgs::options::Order;
 use mrfgs::plan::Plan;
 use mrfgs::tiles::Tiles;
 
@@ -58,18 +58,18 @@ fn schedule(plan: &Plan) -> Table {
     for (i, phase) in plan.phases.iter().enumerate() {
         let levels = match phase.finest {
             z if z == last => format!("level {last}"),
-            0 if plan.method.schedule == Schedule::CoarseFirst => "level 0, the others in between".into(),
+            0 if plan.method.schedule.order == Order::CoarseFirst => "level 0, the others in between".into(),
             z => format!("levels {z} to {last}"),
         };
         let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
         table.row([head, &format!("{n} iteration{} of {levels}", plural(n as usize))]);
     }
-    if plan.method.tolerance > 0.0 {
-        let sooner = match plan.method.schedule {
-            Schedule::Together => "or fewer",
-            Schedule::CoarseFirst => "or fewer of the last",
+    if plan.method.schedule.tolerance > 0.0 {
+        let sooner = match plan.method.schedule.order {
+            Order::Together => "or fewer",
+            Order::CoarseFirst => "or fewer of the last",
         };
-        let tolerance = plan.method.tolerance;
+        let tolerance = plan.method.schedule.tolerance;
         table.row(["", &format!("{sooner}, once the map changes by at most {tolerance} px (RMS)")]);
     }
     table

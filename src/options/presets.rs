@@ -1,0 +1,103 @@
+//! Presets: `default` is what the rows state, the others say what differs.
+
+use super::{
+    Agreement, CostOptions, Fill, FrontOptions, GraphOptions, Illumination, LeftRightCheck, MatchingCost,
+    MessageOptions, Method, Order, Potential, Pyramid, RefinementOptions, ScheduleOptions,
+};
+use crate::error::{Error, Result};
+use crate::text::one_line;
+
+/// Names of the presets, with what each is for.
+pub const PRESETS: &[(&str, &str)] = &[
+    ("default", "the best this engine does"),
+    ("paper", "the paper's whole method, with its choices wherever it states them"),
+    ("fgs", "the paper's predecessor: one resolution, and a left-right check by a second matching"),
+];
+
+impl Method {
+    /// The preset called `name`, one of [`PRESETS`].
+    ///
+    /// # Errors
+    /// [`Error::Preset`] when there is no such preset.
+    pub fn preset(name: &str) -> Result<Self> {
+        match name {
+            "default" => Ok(Self::default()),
+            "paper" => Ok(Self::paper()),
+            "fgs" => Ok(Self::fgs()),
+            _ => {
+                let known = PRESETS.iter().map(|p| p.0).collect();
+                Err(Error::Preset { name: one_line(name), known })
+            }
+        }
+    }
+
+    /// The paper's whole method, with its choices wherever it states them.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            front: FrontOptions {
+                illumination: Illumination::Homomorphic,
+                zone_sigmas: 1.0,
+                ..FrontOptions::default()
+            },
+            cost: CostOptions {
+                matching: MatchingCost::Sad,
+                outside_cost: 20.0,
+                pyramid: Pyramid::LowPass,
+                ..CostOptions::default()
+            },
+            messages: MessageOptions {
+                temperature: 0.5,
+                evidence_cap: 63.75,
+                evidence_gain: 1.0,
+                potential: Potential::Hard,
+                agreement: Agreement::Strict,
+                ..MessageOptions::default()
+            },
+            schedule: ScheduleOptions {
+                order: Order::Together,
+                iterations: 30,
+                tolerance: 0.1,
+                ..ScheduleOptions::default()
+            },
+            refinement: RefinementOptions {
+                left_right_check: LeftRightCheck::Off,
+                speckle_size: 0,
+                sub_pixel: false,
+                fill: Fill::Row,
+                ..RefinementOptions::default()
+            },
+            ..Self::default()
+        }
+    }
+
+    /// The paper's predecessor: one resolution, and a left-right check by a second matching.
+    #[must_use]
+    pub fn fgs() -> Self {
+        let paper = Self::paper();
+        Self {
+            graph: GraphOptions { levels: 1, ..paper.graph },
+            refinement: RefinementOptions {
+                left_right_check: LeftRightCheck::SecondMatch,
+                ..paper.refinement
+            },
+            ..paper
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_what_their_names_say() {
+        for ((name, _), expected) in PRESETS.iter().zip([Method::default(), Method::paper(), Method::fgs()]) {
+            let preset = Method::preset(name).unwrap();
+            assert_eq!(preset, expected);
+            assert_eq!(preset.clone().validated().unwrap(), preset, "{name} is within every range");
+        }
+        let error = Method::preset("best").unwrap_err().to_string();
+        assert_eq!(error, "there is no preset `best`; there are default, paper, fgs");
+    }
+}

@@ -1,0 +1,65 @@
+//! Options of the refinement of the disparity map.
+
+use super::row::{Takes, odd, one_of, options, real, whole, words};
+
+words! {
+    /// Where the right view's map for the left-right check comes from.
+    LeftRightCheck {
+        /// No check.
+        Off = "off",
+        /// From the same beliefs: a right pixel takes the best of the labels that see it.
+        RightView = "right-view",
+        /// From a second matching with the views exchanged, as in the paper's predecessor.
+        SecondMatch = "second-match",
+    }
+}
+
+words! {
+    /// What happens to pixels that left-right check or speckle filter made invalid.
+    Fill {
+        /// They stay invalid.
+        None = "none",
+        /// They take the smaller of the nearest valid disparities to the left and to the right on the row.
+        Row = "row",
+        /// As row, then a weighted median over a window four times as wide and high, so that filled pixels follow the colours
+        /// around them and not their row alone.
+        Median = "median",
+    }
+}
+
+words! {
+    /// Which pixels the weighted median changes.
+    Median {
+        /// None.
+        Off = "off",
+        /// Filled pixels.
+        Filled = "filled",
+        /// All pixels.
+        All = "all",
+    }
+}
+
+options! {
+    /// What is done with the disparity map after belief propagation.
+    "refinement" RefinementOptions {
+        /// Compare with the disparities of the right view: a pixel that differs by more than one pixel is occluded.
+        left_right_check: LeftRightCheck = LeftRightCheck::RightView, takes one_of(LeftRightCheck::WORDS),
+            source "section 2.5: off";
+        /// Regions with fewer pixels than this become invalid; 0 keeps all regions.
+        speckle_size: u32 = 200, takes whole(0..=u32::MAX), unit "pixels", source "open";
+        /// Place the disparity between the labels, by the matching cost around the optimum.
+        sub_pixel: bool = true, takes Takes::Switch, source "open";
+        /// What happens to invalid pixels.
+        fill: Fill = Fill::Median, takes one_of(Fill::WORDS), source "row in the paper";
+        /// Which pixels the weighted median changes.
+        median: Median = Median::All, takes one_of(Median::WORDS), source "section 2.5: all";
+        /// Side of the median's window; it uses every second row of the window.
+        median_window: u32 = 15, takes odd(3..=31), unit "pixels", source "open";
+        /// Spatial parameter of the median's weights.
+        median_sigma_space: f64 = 5.0, takes real(0.1..=100.0), unit "pixels", source "open";
+        /// Range parameter of the median's weights, for intensities from 0 to 1.
+        median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
+        /// Pixels with less confidence than this get the validity flag for low confidence.
+        confidence_floor: u32 = 16, takes whole(0..=255), unit "1/8 nat", source "not in the paper";
+    }
+}

@@ -1,0 +1,236 @@
+//! How an option is declared: one row that holds its key, type, default, range, unit, source and meaning. The field of
+//! the group's struct with its documentation, the validation, the listing of `mrfgs presets`, config files and Python's
+//! documentation all follow from that row.
+
+use crate::error::OptionError;
+use serde::Serialize;
+use std::fmt;
+use std::ops::RangeInclusive;
+
+/// A group of options: the struct that holds their values has one field for each.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// Its name, the heading in a config file: `cost`.
+    pub name: &'static str,
+    /// What its options are about.
+    pub meaning: &'static str,
+    /// Its options, in order.
+    pub keys: &'static [Key],
+}
+
+/// An option: its row.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// The name of the field.
+    pub(super) field: &'static str,
+    /// Which values it takes.
+    pub takes: Takes,
+    /// The unit of its values; empty where they have none.
+    pub unit: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+    /// Where it comes from: a section of the paper, with the paper's value, or other work. `open` means that the paper
+    /// leaves the choice open.
+    pub source: &'static str,
+}
+
+impl Key {
+    /// Its name, which no key of another group has: `sad-window`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.field.replace('_', "-")
+    }
+
+    /// `value` as this key stores it; else what is wrong with it.
+    pub(super) fn checked(&self, value: toml::Value) -> Result<toml::Value, OptionError> {
+        use toml::Value::{Boolean, Float, Integer, String};
+        let outside = |value: f64, low: f64, high: f64| Err(OptionError::OutOfRange { value, low, high });
+        let value = match (self.takes, value) {
+            // A whole number is also a real one.
+            (Takes::Real { .. }, Integer(v)) => Float(v as f64),
+            (_, value) => value,
+        };
+        match (self.takes, &value) {
+            (Takes::Whole { low, high, .. }, Integer(v)) if *v < low.into() || *v > high.into() => {
+                outside(*v as f64, low.into(), high.into())
+            }
+            (Takes::Whole { odd: true, .. }, Integer(v)) if v % 2 == 0 => {
+                Err(OptionError::NotOdd { value: *v as u32 })
+            }
+            // NaN is outside every range.
+            (Takes::Real { low, high }, Float(v)) if !(low..=high).contains(v) => outside(*v, low, high),
+            (Takes::Switch, Boolean(_))
+            | (Takes::Whole { .. }, Integer(_))
+            | (Takes::Real { .. }, Float(_)) => Ok(value),
+            (Takes::Words(words), String(word)) if words.iter().any(|w| w.word == word) => Ok(value),
+            _ => Err(OptionError::WrongKind {
+                expected: self.to_string(),
+                found: crate::text::one_line(&value.to_string()),
+            }),
+        }
+    }
+}
+
+/// The unit and the range: `pixels, odd, 1 to 31`.
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match (self.unit, self.takes) {
+            ("", takes) => write!(f, "{takes}"),
+            (unit, takes @ Takes::Whole { odd: true, .. }) => write!(f, "{unit}, odd, {takes}"),
+            (unit, takes) => write!(f, "{unit}, {takes}"),
+        }
+    }
+}
+
+/// Which values a key takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Takes {
+    /// True or false.
+    Switch,
+    /// One of some words.
+    Words(&'static [Word]),
+    /// A whole number.
+    Whole {
+        /// The smallest.
+        low: u32,
+        /// The largest.
+        high: u32,
+        /// Whether it must be odd.
+        odd: bool,
+    },
+    /// A real number.
+    Real {
+        /// The smallest.
+        low: f64,
+        /// The largest.
+        high: f64,
+    },
+}
+
+/// The range: `1 to 31`.
+impl fmt::Display for Takes {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Switch => f.write_str("true | false"),
+            Self::Words(words) => {
+                f.write_str(&words.iter().map(|word| word.word).collect::<Vec<_>>().join(" | "))
+            }
+            Self::Whole { low, high, .. } => write!(f, "{low} to {high}"),
+            Self::Real { low, high } => write!(f, "{low} to {high}"),
+        }
+    }
+}
+
+/// A whole number within `range`.
+pub(super) const fn whole(range: RangeInclusive<u32>) -> Takes {
+    Takes::Whole { low: *range.start(), high: *range.end(), odd: false }
+}
+
+/// An odd number within `range`.
+pub(super) const fn odd(range: RangeInclusive<u32>) -> Takes {
+    Takes::Whole { low: *range.start(), high: *range.end(), odd: true }
+}
+
+/// A real number within `range`.
+pub(super) const fn real(range: RangeInclusive<f64>) -> Takes {
+    Takes::Real { low: *range.start(), high: *range.end() }
+}
+
+/// One of some words.
+pub(super) const fn one_of(words: &'static [Word]) -> Takes {
+    Takes::Words(words)
+}
+
+/// A word that an option takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Word {
+    /// As users write it: `ad-census`.
+    pub word: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// Declares a group of options: a struct with one field a row, its defaults, and `GROUP`, which describes it.
+///
+/// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`.
+macro_rules! options {
+    (
+        $(#[doc = $about:literal])+
+        $name:literal $group:ident {
+            $(
+                $(#[doc = $meaning:literal])+
+                $field:ident: $type:ty = $default:expr, takes $takes:expr, $(unit $unit:literal,)? source $source:literal;
+            )+
+        }
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+        #[non_exhaustive]
+        pub struct $group {
+            $(
+                $(#[doc = $meaning])+
+                ///
+                #[doc = concat!("Range: `", stringify!($takes), "`" $(, " ", $unit)?, ".")]
+                #[doc = concat!("Default: `", stringify!($default), "`.")]
+                #[doc = concat!("Source: ", $source, ".")]
+                pub $field: $type,
+            )+
+        }
+
+        impl Default for $group {
+            fn default() -> Self {
+                Self { $( $field: $default, )+ }
+            }
+        }
+
+        impl $group {
+            /// The rows.
+            pub const GROUP: $crate::options::Group = $crate::options::Group {
+                name: $name,
+                meaning: concat!($($about),+).trim_ascii(),
+                keys: &[ $(
+                    $crate::options::Key {
+                        field: stringify!($field),
+                        takes: $takes,
+                        unit: concat!($($unit)?),
+                        meaning: concat!($($meaning),+).trim_ascii(),
+                        source: $source,
+                    },
+                )+ ],
+            };
+        }
+    };
+}
+
+/// Declares the words that an option takes: an enum with one variant a word, and `WORDS`, which describes them.
+macro_rules! words {
+    (
+        $(#[doc = $about:literal])+
+        $name:ident {
+            $(
+                $(#[doc = $meaning:literal])+
+                $variant:ident = $word:literal,
+            )+
+        }
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        pub enum $name {
+            $(
+                $(#[doc = $meaning])+
+                #[serde(rename = $word)]
+                $variant,
+            )+
+        }
+
+        impl $name {
+            /// The words, as users write them.
+            pub const WORDS: &[$crate::options::Word] = &[ $(
+                $crate::options::Word { word: $word, meaning: concat!($($meaning),+).trim_ascii() },
+            )+ ];
+        }
+    };
+}
+
+pub(super) use {options, words};

@@ -1,0 +1,29 @@
+//! Options of the message schedule.
+
+use super::row::{one_of, options, real, whole, words};
+
+words! {
+    /// The order in which levels exchange messages.
+    Order {
+        /// All levels in every iteration.
+        Together = "together",
+        /// The coarsest level starts, and the finer ones join one after the other. Once all have joined, level 0 and the
+        /// coarser levels take turns, as far as that still changes the result.
+        CoarseFirst = "coarse-first",
+    }
+}
+
+options! {
+    /// The order and number of iterations.
+    "schedule" ScheduleOptions {
+        /// The order in which levels exchange messages.
+        order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together";
+        /// Iterations of all levels together; with coarse-first, iterations after each level that joins but the finest.
+        iterations: u32 = 3, takes whole(1..=1000), unit "iterations", source "section 3: 20 to 30";
+        /// Iterations after the finest level joins: every second one with the messages between levels, the others with
+        /// those of the coarser levels. Only coarse-first uses it.
+        final_iterations: u32 = 3, takes whole(0..=1000), unit "iterations", source "not in the paper";
+        /// Stop when the RMS change of the finest map from one iteration to the next is at most this; 0 runs all iterations.
+        tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1";
+    }
+}
