@@ -44,6 +44,11 @@ pub const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
 pub const LABEL_BLOCK: usize = 16;
 
+// The largest costs of a label are those that the options promise.
+const _: () = assert!(MatchingCost::Sad.most() as u32 == COST_MAX as u32);
+const _: () = assert!(
+    (MatchingCost::AdCensus.most() * CENSUS_UNITS) as u32 == CENSUS_BITS * CENSUS_BIT_COST + COLOUR_WEIGHT
+);
 const _: () = assert!(255 + (GRAPH_WINDOW * GRAPH_WINDOW + 3) as u32 * HARD_CAP as u32 <= u16::MAX as u32);
 
 /// Size of one level.

@@ -19,7 +19,7 @@ words! {
 
 impl MatchingCost {
     /// The largest cost of a label.
-    const fn most(self) -> f64 {
+    pub(crate) const fn most(self) -> f64 {
         match self {
             Self::Sad => 254.0,
             Self::Census | Self::AdCensus => 1.625,
