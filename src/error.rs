@@ -38,7 +38,7 @@ pub enum Error {
         cause: OptionError,
     },
     /// There is no preset of this name.
-    #[error("there is no preset `{name}`; there are {}", known.join(", "))]
+    #[error("there is no preset `{name}`; the presets are {}", known.join(", "))]
     Preset {
         /// The name that was asked for.
         name: String,
@@ -225,10 +225,10 @@ pub enum RangeError {
 #[non_exhaustive]
 pub enum ExecutionError {
     /// A device is named for the CPU path.
-    #[error("a device is named, and the CPU path runs on none")]
+    #[error("a device is named, and the CPU path uses none")]
     NeedlessDevice,
     /// No device has this name or index.
-    #[error("no device is called `{wanted}`; there are {}", present.join(", "))]
+    #[error("no device is called `{wanted}`; the devices are {}", present.join(", "))]
     NoSuchDevice {
         /// The name or index that was asked for.
         wanted: String,
@@ -249,8 +249,8 @@ pub enum ExecutionError {
 pub enum BudgetError {
     /// Even the smallest tiles need more.
     #[error(
-        "{memory} MiB of memory are too few for {width} x {height} pixels and {labels} labels, which need {needed} MiB \
-         even in the smallest tiles"
+        "{memory} MiB of memory is too little for {width} x {height} pixels and {labels} labels: the smallest tiles need \
+         {needed} MiB"
     )]
     NoTileFits {
         /// The memory that is granted.
@@ -266,8 +266,8 @@ pub enum BudgetError {
     },
     /// The steps of a match are inspected, and the image is cut into tiles.
     #[error(
-        "the steps of a match can only be shown for an image in one piece: this one is cut into {tiles} tiles, and needs \
-         {needed} MiB of memory in one piece"
+        "only a match in one piece can show its steps, and this one is cut into {tiles} tiles: one piece needs {needed} \
+         MiB of memory"
     )]
     StepsOfTiles {
         /// The number of tiles.

@@ -142,7 +142,7 @@ fn results_before_a_failure_are_handed_out() {
     for mut matcher in matchers {
         let (result, found, _) = all(&mut matcher, with_a_bad_one.clone(), usize::MAX);
         let error = result.unwrap_err();
-        assert!(matches!(error, Error::Option { .. }), "{error}");
+        assert!(matches!(error, Error::Budget(_)), "{error}");
         assert_same(found, &expected[..2]);
     }
 }

@@ -76,10 +76,10 @@ fn execution(cause: &ExecutionError) -> String {
 fn budget(cause: &BudgetError) -> String {
     match cause {
         BudgetError::NoTileFits { needed, .. } => {
-            format!("--memory: {cause}: give at least {needed}MiB, or a smaller image or range")
+            format!("--memory: {cause}; give at least {needed}MiB, or a smaller image or range")
         }
         BudgetError::StepsOfTiles { needed, .. } => {
-            format!("--intermediates: {cause}: give --memory {needed}MiB")
+            format!("--intermediates: {cause}; give --memory {needed}MiB")
         }
         _ => format!("--memory: {cause}"),
     }

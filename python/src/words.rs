@@ -19,7 +19,7 @@ pub(crate) fn error(error: &Error) -> String {
         Error::Execution(cause @ ExecutionError::NoSuchDevice { .. }) => format!("device: {cause}"),
         Error::Execution(cause) => format!("threads: {cause}"),
         Error::Budget(cause @ BudgetError::NoTileFits { needed, .. }) => {
-            format!("options[\"memory\"]: {cause}: give {needed} or more, or a smaller image or range")
+            format!("options[\"memory\"]: {cause}; give {needed} or more, or a smaller image or range")
         }
         Error::Device(DeviceError::NoDriver) => format!("{error}: install the driver of the GPU, or {CPU}"),
         Error::Device(DeviceError::WrongMaps { .. }) => format!("{error}: update its driver, or {CPU}"),
