@@ -8,12 +8,12 @@
 mod synthetic;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::Gpu;
-use mrfgs::backend::{Backend, Stage};
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::gpu::Gpu;
+use mrfgs::low_level::backend::{Backend, Stage};
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::{engine, graph};
 use mrfgs::options::Method;
-use mrfgs::plan::Plan;
-use mrfgs::{engine, graph};
 use std::ops::ControlFlow;
 use std::time::Duration;
 use synthetic::{LARGE, SMALL, Synthetic};

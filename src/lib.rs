@@ -1,96 +1,132 @@
 //! Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
 //!
-//! From a rectified pair to a dense, sub-pixel disparity map with a confidence and a validity reason for every pixel,
-//! by belief propagation on the factor graph of Shabanian and Balasubramanian, *Multi-Resolution Factor Graph Based
-//! Stereo Correspondence Algorithm* (MR-FGS): variables V, evidence E and dependency factors S at every level of a
-//! pyramid, resolution factors R between levels.
+//! mrfgs takes a rectified pair to a dense, sub-pixel disparity map with a confidence and a validity reason for every pixel, by
+//! belief propagation on the factor graph of Shabanian and Balasubramanian, *Multi-Resolution Factor Graph Based Stereo
+//! Correspondence Algorithm* (MR-FGS): variables V, evidence E and dependency factors S at every level of a pyramid, and
+//! resolution factors R between levels.
 //!
 //! ```
-//! use mrfgs::image::read;
-//! use mrfgs::options::{DisparityRange, Execution, Method};
-//! use std::{ops::ControlFlow, path::Path};
+//! use mrfgs::{Matcher, Pair};
 //!
 //! # fn main() -> mrfgs::Result<()> {
-//! let (left, right) = ("testdata/slanted/im0.png", "testdata/slanted/im1.png");
-//! let pair = read::pair(Path::new(left), Path::new(right), None)?;
-//! let range = DisparityRange::new(0, 31)?;
-//! let execution = Execution::default();
-//! let matched =
-//!     mrfgs::match_pair(&pair, range, &Method::default(), &execution, &mut |_| ControlFlow::Continue(()))?;
-//! let map = matched.maps.final_map(); // pixels, +inf where there is none
-//! assert_eq!(map.size(), pair.size());
-//! assert!(map.data().iter().all(|d| (0.0..=31.0).contains(d)));
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let output = folder.path().join("disparity.pfm");
+//! let pair = Pair::open("testdata/slanted/im0.png", "testdata/slanted/im1.png")?;
+//! let found = Matcher::new()?.run(&pair, 0..=31)?; // `..` finds the range
+//! found.disparity().save(output)?;
+//! # assert!(found.disparity().data().iter().all(|d| (0.0..=31.0).contains(d)));
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! Frames that are in memory already are borrowed, and a [`Matcher`] keeps the device and its buffers from frame to frame:
+//! A [`Matcher`] keeps the device, its compiled shaders and its buffers from pair to pair. A job can be watched and stopped:
 //!
 //! ```
-//! use mrfgs::Matcher;
-//! use mrfgs::image::raster::{self, Raster, Samples};
-//! use mrfgs::options::{DisparityRange, Execution, Method};
-//! use std::{borrow::Cow, ops::ControlFlow};
+//! use mrfgs::{Matcher, Method, Pair};
+//! use std::sync::atomic::AtomicBool;
+//!
+//! # fn main() -> mrfgs::Result<()> {
+//! # let pair = Pair::open("testdata/slanted/im0.png", "testdata/slanted/im1.png")?;
+//! let stop = AtomicBool::new(false); // set it from another thread
+//! let mut matcher = Matcher::builder().method(Method::paper()).device("cpu").threads(4).build()?;
+//! let found = matcher.job(&pair, 0..=31).on_progress(|p| print!("{:.0} % ", 100.0 * p.done)).cancel(&stop).run()?;
+//! assert_eq!(found.disparity().size(), pair.size());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Frames that are in memory already are borrowed, and the disparities can go where you want them:
+//!
+//! ```
+//! use mrfgs::image::raster::Raster;
+//! use mrfgs::{Matcher, Pair};
 //!
 //! # fn main() -> mrfgs::Result<()> {
 //! # let noise = |i: u32| (i.wrapping_mul(0x9e37_79b9) >> 24) as u8;
 //! # let right: Vec<u8> = (0..64 * 48).map(noise).collect();
 //! # let left: Vec<u8> = (0..64 * 48_u32).map(|i| noise(i.saturating_sub(5))).collect();
 //! # let frames = [(&left[..], &right[..])];
-//! let (method, range) = (Method::default(), DisparityRange::new(0, 15)?);
-//! let mut matcher = Matcher::new(&Execution::default())?;
+//! let mut matcher = Matcher::new()?;
+//! let mut disparity = vec![0.0; 64 * 48];
 //! for (left, right) in frames {
-//!     // 64 x 48 grey bytes, row by row.
-//!     let view = |bytes| Raster::new(64, 48, 1, Samples::Byte(Cow::Borrowed(bytes)));
-//!     let pair = raster::pair(view(left)?, view(right)?, None)?;
-//!     let matched = matcher.run(&pair, range, &method, &mut |_| ControlFlow::Continue(()))?;
-//!     assert_eq!(matched.maps.final_map()[(40, 20)].round(), 5.0);
+//!     // 64 x 48 grey bytes, rows 64 bytes apart.
+//!     let view = |bytes| Raster::borrowed(bytes, (64, 48), 1, 64);
+//!     let pair = Pair::of_frames(view(left)?, view(right)?)?;
+//!     matcher.job(&pair, 0..=15).run_into(&mut disparity)?;
+//!     assert_eq!(disparity[20 * 64 + 40].round(), 5.0);
 //! }
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! # The way through
-//!
-//! ```text
-//! images ──> plan ──> front ──> graph ──> solver ──> maps, evaluation
-//!                                            │
-//!                                         backend (the one seam): cpu, gpu
-//! ```
-//!
-//! - [`options::Method`] holds every parameter that determines the bits, [`options::Execution`] what does not.
-//! - [`plan::Plan`] works out levels, integer parameters, bounds and memory, before anything runs, and [`tiles::Tiles`] how
-//!   to cut what is too large.
-//! - [`front`] corrects the illumination and finds texture zones, sparse matches and the labels they leave, where asked.
-//! - [`graph`] picks the members of each dependency factor.
-//! - [`backend::Backend`] defines the stages, exactly; [`solver`] alone knows their order.
-//! - [`roofline`] counts what the messages cost at least, to hold a machine against.
-//! - [`maps`] is what comes out, [`Matcher`] puts it all together for pair after pair.
+//! - [`Method`] holds every option that determines the bits of the maps; [`options`] describes them all.
+//! - [`Matched`] is what a match gives: maps of disparity, confidence and validity, and what made them.
+//! - [`check`] warns of what is probably wrong with a pair, and finds its range.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
+//! - [`image`] reads and writes images and maps.
+//! - [`low_level`] has the parts of the engine, for those who build on it or study it.
 //!
-//! Beliefs, messages and evidence are costs in integers (see [`plan`]), so the CPU path and every GPU give the same
+//! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
 
-pub mod backend;
+mod backend;
 pub mod depth;
-pub mod engine;
+mod engine;
 pub mod error;
 pub mod evaluation;
-pub mod front;
-pub mod graph;
+mod front;
+mod graph;
 pub mod image;
 pub mod maps;
 mod matcher;
 mod memory;
 pub mod options;
-pub mod plan;
-pub mod roofline;
-pub mod solver;
-pub mod text;
-pub mod tiles;
-pub mod watch;
-pub mod weights;
+mod plan;
+mod roofline;
+mod solver;
+mod text;
+mod tiles;
+mod watch;
+mod weights;
 
 pub use error::{Error, Result};
-pub use matcher::{Matched, Matcher, Timing, match_pair};
+pub use front::check;
+pub use image::Pair;
+pub use matcher::{Answer, Builder, Job, Matched, Matcher, Search, Timing};
+pub use options::Method;
+pub use watch::Progress;
+
+/// The parts of the engine, for those who build on it or study it. They change more often than the rest.
+pub mod low_level {
+    macro_rules! parts {
+        ($( #[doc = $about:literal] $name:ident; )*) => {
+            $( #[doc = $about] pub mod $name { pub use crate::$name::*; } )*
+        };
+    }
+
+    parts! {
+        /// The stages, exactly defined, and what runs them: the CPU path and devices.
+        backend;
+        /// A pair through a backend, in one piece or tile by tile.
+        engine;
+        /// What a match needs of a pair: illumination, graphs, texture zones, sparse matches, label ranges.
+        front;
+        /// The members of the dependency factors.
+        graph;
+        /// What a match will do, before it does anything: levels, integer parameters, bounds, memory.
+        plan;
+        /// What the messages cost at least, to hold a machine against.
+        roofline;
+        /// The schedule: levels, iterations, convergence, and the order of what follows.
+        solver;
+        /// Small text files, and what messages quote of them.
+        text;
+        /// How a pair is cut that is too large for its memory.
+        tiles;
+        /// Progress and time of a match.
+        watch;
+        /// Weights in integers, and the functions that they come from.
+        weights;
+    }
+}

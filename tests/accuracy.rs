@@ -7,10 +7,9 @@
 use mrfgs::evaluation::{Report, evaluate};
 use mrfgs::image::{Plane, calib::Calibration, pfm, read};
 use mrfgs::maps::FRACTION;
-use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
-use mrfgs::{Matched, match_pair};
+use mrfgs::options::{DisparityRange, Method};
+use mrfgs::{Matched, Matcher};
 use std::io::Write;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 fn matched(folder: &Path, method: &Method) -> Matched {
@@ -18,8 +17,8 @@ fn matched(folder: &Path, method: &Method) -> Matched {
     let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
     let range = DisparityRange::new(0, ndisp as i32 - 1).unwrap();
     let pair = read::pair(&left, &right, None).unwrap();
-    let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
-    match_pair(&pair, range, method, &execution, &mut |_| ControlFlow::Continue(())).unwrap()
+    let mut matcher = Matcher::builder().method(method.clone()).device("cpu").build().unwrap();
+    matcher.run(&pair, range).unwrap()
 }
 
 fn report(folder: &Path, map: &Plane<f32>) -> Report {

@@ -6,15 +6,15 @@
 mod common;
 
 use common::devices::open as device;
-use mrfgs::backend::Backend;
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::engine::{Solution, solve};
 use mrfgs::error::{DeviceError, MemoryError};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
+use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
+use mrfgs::low_level::engine::{Solution, solve};
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Execution, Method};
-use mrfgs::plan::Plan;
 use mrfgs::{Error, Matched, Matcher, Result};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -47,7 +47,7 @@ fn expected(pair: &Pair, range: DisparityRange) -> Maps {
 }
 
 fn run(matcher: &mut Matcher, pair: &Pair, range: DisparityRange) -> Result<Matched> {
-    matcher.run(pair, range, &Method::default(), &mut |_| ControlFlow::Continue(()))
+    matcher.run(pair, range)
 }
 
 /// One line that names no flag: what to do about it is up to the front end.

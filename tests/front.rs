@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use mrfgs::front::illumination::homomorphic;
-use mrfgs::front::zones::{MASKED, Options, Zones, segment};
 use mrfgs::image::{Image, Plane, grey, read};
+use mrfgs::low_level::front::illumination::homomorphic;
+use mrfgs::low_level::front::zones::{MASKED, Options, Zones, segment};
 
 const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"];
 

@@ -8,12 +8,12 @@ mod common;
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::backend::{Backend, Volume};
-use mrfgs::front::Prepared;
-use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::low_level::backend::{Backend, Volume};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph::LevelGraph;
+use mrfgs::low_level::plan::{HARD_CAP, Plan};
 use mrfgs::options::{Agreement, Method, Order, Potential};
-use mrfgs::plan::{HARD_CAP, Plan};
 
 /// Neighbours of a dependency factor in these graphs, most slots of which stay empty.
 const NEIGHBOURS: usize = 4;

@@ -9,19 +9,17 @@ use common::compare::compare_maps;
 use common::devices::backends;
 use common::random::{self, Random, texture};
 use common::twin::{self, Finest};
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::{Backend, Map, NO_LABEL, Stage};
-use mrfgs::engine::{self, Solution};
-use mrfgs::front::Prepared;
+use mrfgs::Matcher;
 use mrfgs::image::{Image, Pair, Plane, Rect};
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::{Backend, Map, NO_LABEL, Stage};
+use mrfgs::low_level::engine::{self, Solution};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph;
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::tiles::Tiles;
 use mrfgs::maps::{Maps, flag};
-use mrfgs::options::{
-    DeviceChoice, DisparityRange, Execution, Fill, LeftRightCheck, MatchingCost, Median, Method, Order,
-    Potential,
-};
-use mrfgs::plan::Plan;
-use mrfgs::tiles::Tiles;
-use mrfgs::{graph, match_pair};
+use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential};
 use std::ops::ControlFlow;
 
 /// The maps that the naive twins make of what a match leaves in `finest`.
@@ -72,9 +70,8 @@ fn solve(pair: &Pair, plan: &Plan) -> Vec<(String, Solution)> {
 }
 
 fn matched(pair: &Pair, plan: &Plan, threads: usize) -> Maps {
-    let execution = Execution { device: DeviceChoice::Cpu, threads: Some(threads), ..Execution::default() };
-    let observer = &mut |_| ControlFlow::Continue(());
-    match_pair(pair, plan.range, &plan.method, &execution, observer).unwrap().maps
+    let matcher = Matcher::builder().method(plan.method.clone()).device("cpu").threads(threads);
+    matcher.build().unwrap().run(pair, plan.range).unwrap().maps
 }
 
 #[test]

@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::front::check::{self, Warning};
-use mrfgs::front::label_range::{self, LabelRanges, MIN_MATCHES};
-use mrfgs::front::matches::{self, Match};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, pfm, read};
+use mrfgs::low_level::front::check::{self, Warning};
+use mrfgs::low_level::front::label_range::{self, LabelRanges, MIN_MATCHES};
+use mrfgs::low_level::front::matches::{self, Match};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use std::io::Write;

@@ -6,16 +6,17 @@
 mod common;
 
 use common::devices;
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::FaultInjection;
-use mrfgs::backend::{Backend, Stage, Volume};
-use mrfgs::engine::{Solution, solve};
+use mrfgs::Error;
 use mrfgs::error::{DeviceError, MemoryError};
-use mrfgs::front::Prepared;
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::gpu::FaultInjection;
+use mrfgs::low_level::backend::{Backend, Stage, Volume};
+use mrfgs::low_level::engine::{Solution, solve};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
-use mrfgs::plan::Plan;
-use mrfgs::{Error, graph};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -10,14 +10,15 @@ mod common;
 
 use common::devices;
 use common::random::{self, Random};
-use mrfgs::backend::Backend;
-use mrfgs::backend::cpu::Cpu;
 use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::engine;
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::tiles::Tiles;
 use mrfgs::maps::{FRACTION, Maps, flag, has_disparity};
-use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Illumination, Method};
-use mrfgs::plan::Plan;
-use mrfgs::tiles::Tiles;
-use mrfgs::{Error, Matcher, engine};
+use mrfgs::options::{DisparityRange, Illumination, Method};
+use mrfgs::{Error, Matcher};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use std::cell::RefCell;
@@ -164,8 +165,7 @@ fn number_of_cases() -> u32 {
 #[test]
 fn every_match_keeps_its_promises_on_every_backend() {
     let config = Config { cases: number_of_cases(), failure_persistence: None, ..Config::default() };
-    let execution = Execution { device: DeviceChoice::Cpu, threads: Some(2), ..Execution::default() };
-    let matcher = RefCell::new(Matcher::new(&execution).unwrap());
+    let matcher = RefCell::new(Matcher::builder().device("cpu").threads(2).build().unwrap());
     let gpu = RefCell::new(devices::gpu());
     let counts = RefCell::new([0; 3]);
     let test = |case: Case| {
@@ -182,8 +182,7 @@ fn every_match_keeps_its_promises_on_every_backend() {
         let maps = if case.tiled {
             maps_on(&mut Cpu::default(), &case, &tiles).map_err(failed)?
         } else {
-            let go_on = &mut |_| ControlFlow::Continue(());
-            matcher.borrow_mut().run(&pair, range, &case.method(), go_on).map_err(failed)?.maps
+            matcher.borrow_mut().job(&pair, range).method(&case.method()).run().map_err(failed)?.maps
         };
         if let Some(what) = broken(&maps, &pair, range) {
             return Err(TestCaseError::fail(what));
@@ -220,9 +219,8 @@ fn broken_promises_are_noticed() {
     left.masked = Plane::filled(9, 7, false);
     left.masked[(8, 6)] = true;
     pair = Pair::new(left, pair.right().clone()).unwrap();
-    let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
-    let go_on = &mut |_| ControlFlow::Continue(());
-    let maps = mrfgs::match_pair(&pair, range, &case.method(), &execution, go_on).unwrap().maps;
+    let mut matcher = Matcher::builder().method(case.method()).device("cpu").build().unwrap();
+    let maps = matcher.run(&pair, range).unwrap().maps;
     assert_eq!(broken(&maps, &pair, range), None);
     let noticed = |word: &str, change: fn(&mut Maps)| {
         let mut changed = maps.clone();

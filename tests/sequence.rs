@@ -6,10 +6,10 @@ mod common;
 
 use common::devices::open as device;
 use common::random::{self, Random};
-use mrfgs::backend::gpu::FaultInjection;
 use mrfgs::image::Pair;
+use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::maps::Maps;
-use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
+use mrfgs::options::{DisparityRange, Execution, Method};
 use mrfgs::{Error, Matched, Matcher, Result};
 use std::cell::RefCell;
 use std::fmt::Write;
@@ -31,11 +31,14 @@ fn method() -> Method {
     method
 }
 
+fn on_cpu() -> Matcher {
+    Matcher::builder().device("cpu").build().unwrap()
+}
+
 fn one_by_one() -> Vec<Maps> {
-    let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
-    let mut matcher = Matcher::new(&execution).unwrap();
+    let mut matcher = on_cpu();
     let mut run = |(pair, range): (Pair, DisparityRange)| {
-        let matched = matcher.run(&pair, range, &method(), &mut |_| ControlFlow::Continue(())).unwrap();
+        let matched = matcher.job(&pair, range).method(&method()).run().unwrap();
         (matched.maps, matched.tiles.count())
     };
     let (maps, tiles): (Vec<_>, Vec<_>) = pairs().into_iter().map(&mut run).unzip();
@@ -56,8 +59,9 @@ fn all(
         write!(log.borrow_mut(), "ask {i}, ").unwrap();
         pair
     });
+    matcher.set_method(method());
     let mut found = Vec::new();
-    let result = matcher.run_all(asked, &method(), &mut |_| ControlFlow::Continue(()), &mut |matched| {
+    let result = matcher.run_all(asked, |matched| {
         write!(log.borrow_mut(), "take {}, ", found.len()).unwrap();
         found.push(matched);
         if found.len() == stop_after { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -75,8 +79,7 @@ fn assert_same(found: Vec<Matched>, expected: &[Maps]) {
 #[test]
 fn a_sequence_is_its_pairs() {
     let expected = one_by_one();
-    let cpu = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
-    let (result, found, log) = all(&mut Matcher::new(&cpu).unwrap(), pairs(), usize::MAX);
+    let (result, found, log) = all(&mut on_cpu(), pairs(), usize::MAX);
     result.unwrap();
     assert!(log.starts_with("ask 0, take 0, ask 1, take 1, "), "{log}");
     assert_same(found, &expected);
@@ -133,8 +136,7 @@ fn results_before_a_failure_are_handed_out() {
     let mut with_a_bad_one = pairs();
     // No tile is small enough for the method's memory.
     with_a_bad_one[2].1 = DisparityRange::new(0, 16_000).unwrap();
-    let mut matchers =
-        vec![Matcher::new(&Execution { device: DeviceChoice::Cpu, ..Execution::default() }).unwrap()];
+    let mut matchers = vec![on_cpu()];
     matchers.extend(
         device(FaultInjection::default())
             .map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap()),

@@ -4,10 +4,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::backend::Stage;
-use mrfgs::backend::gpu::{Job, MAX_LOOP_ITERATIONS, UniformLayout, jobs};
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::backend::gpu::{Job, MAX_LOOP_ITERATIONS, UniformLayout, jobs};
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::plan::Plan;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use std::collections::HashSet;

@@ -6,16 +6,16 @@ mod common;
 
 use common::devices;
 use common::random::Random;
-use mrfgs::backend::Backend;
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::engine::{Solution, solve, solve_tiles};
 use mrfgs::error::BudgetError;
 use mrfgs::image::{Pair, Plane, calib::Calibration, read};
+use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::engine::{Solution, solve, solve_tiles};
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::tiles::{OVERLAP, Tiles};
+use mrfgs::low_level::watch::Progress;
 use mrfgs::maps::{Maps, has_disparity};
-use mrfgs::options::{DeviceChoice, DisparityRange, Execution, LeftRightCheck, Method, PRESETS};
-use mrfgs::plan::Plan;
-use mrfgs::tiles::{OVERLAP, Tiles};
-use mrfgs::watch::Progress;
+use mrfgs::options::{DisparityRange, LeftRightCheck, Method, PRESETS};
 use mrfgs::{Error, Matcher};
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
@@ -248,13 +248,11 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
 #[test]
 fn the_matcher_cuts_what_its_method_says() {
     let (pair, range) = load(Path::new("testdata/thin"));
-    let mut matcher =
-        Matcher::new(&Execution { device: DeviceChoice::Cpu, timings: true, ..Execution::default() })
-            .unwrap();
+    let mut matcher = Matcher::builder().device("cpu").timings(true).build().unwrap();
     for (memory, tiled) in [(4096, false), (12, true)] {
         let mut method = Method::default();
         method.tiles.memory = memory;
-        let matched = matcher.run(&pair, range, &method, &mut quiet).unwrap();
+        let matched = matcher.job(&pair, range).method(&method).run().unwrap();
         let tiles = Tiles::new(&plan(pair.size(), range, &method, memory)).unwrap();
         assert!(matched.tiles == tiles && (tiles.count() > 1) == tiled);
         assert_eq!(&matched.plan, tiles.whole());

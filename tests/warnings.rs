@@ -3,12 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::front::check::{self, Warning};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
+use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::maps::Maps;
-use mrfgs::options::{DeviceChoice, DisparityRange, Execution, Method};
+use mrfgs::options::DisparityRange;
 use std::io::Write;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 struct Case {
@@ -40,9 +39,8 @@ impl Case {
     }
 
     fn maps(&self, range: DisparityRange) -> Maps {
-        let execution = Execution { device: DeviceChoice::Cpu, ..Execution::default() };
-        let go_on = &mut |_| ControlFlow::Continue(());
-        mrfgs::match_pair(&self.pair, range, &Method::default(), &execution, go_on).unwrap().maps
+        let mut matcher = Matcher::builder().device("cpu").build().unwrap();
+        matcher.run(&self.pair, range).unwrap().maps
     }
 
     /// The warnings where the right view has `change` applied to each 8-bit level.

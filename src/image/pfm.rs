@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use super::Plane;
 use super::file::{self, MAX_PIXELS};
-use super::{Plane, write};
+use super::save::save;
 use crate::error::{Error, ReadError, Result};
 
 /// What a PFM file holds, the top row first (the file has the bottom row first).
@@ -31,7 +32,7 @@ pub fn read(path: &Path) -> Result<Pfm> {
 /// # Errors
 /// [`Error::Write`] when the file cannot be written.
 pub fn write(path: &Path, plane: &Plane<f32>) -> Result<()> {
-    write::save(path, &encode(plane))
+    save(path, &encode(plane))
 }
 
 /// The bytes of the file that [`write()`] would write.

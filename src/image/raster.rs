@@ -40,7 +40,69 @@ pub struct Raster<'a> {
     pub(super) no_data: Option<Vec<bool>>,
 }
 
+/// A type of samples that a frame in memory may have: `u8`, `u16`, `f32` and `f64`.
+pub trait Sample: Copy {
+    /// Samples of this type.
+    fn samples(values: Cow<[Self]>) -> Samples
+    where
+        [Self]: ToOwned<Owned = Vec<Self>>;
+}
+
+impl Sample for u8 {
+    fn samples(values: Cow<[Self]>) -> Samples {
+        Samples::Byte(values)
+    }
+}
+
+impl Sample for u16 {
+    fn samples(values: Cow<[Self]>) -> Samples {
+        Samples::Word(values)
+    }
+}
+
+impl Sample for f32 {
+    fn samples(values: Cow<[Self]>) -> Samples {
+        Samples::Float(values)
+    }
+}
+
+impl Sample for f64 {
+    fn samples(values: Cow<[Self]>) -> Samples {
+        Samples::Double(values)
+    }
+}
+
 impl<'a> Raster<'a> {
+    /// A frame of `width` x `height` pixels with `channels` samples each, borrowed. Rows begin `stride` samples apart; where
+    /// that is more than a row takes, the rows are copied.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] when it has no pixel, a number of channels other than 1 to 4, or rows that `data` does not hold;
+    /// [`Error::Memory`] when the system has not enough for the copy.
+    pub fn borrowed<S: Sample>(
+        data: &'a [S],
+        (width, height): (usize, usize),
+        channels: usize,
+        stride: usize,
+    ) -> Result<Self> {
+        let row = width.checked_mul(channels).filter(|row| *row > 0 && *row <= stride && height > 0);
+        let needed = row.and_then(|row| stride.checked_mul(height - 1)?.checked_add(row));
+        let (Some(row), Some(needed)) = (row, needed.filter(|needed| *needed <= data.len())) else {
+            return Err(Error::Mismatch(format!(
+                "{} samples for {width} x {height} pixels of {channels} channels in rows of {stride} samples",
+                data.len()
+            )));
+        };
+        if row == stride {
+            return Self::new(width, height, channels, S::samples(Cow::Borrowed(&data[..needed])));
+        }
+        let mut rows = memory::reserved(row * height)?;
+        for line in data.chunks(stride).take(height) {
+            rows.extend_from_slice(&line[..row]);
+        }
+        Self::new(width, height, channels, S::samples(Cow::Owned(rows)))
+    }
+
     /// An image of `channels` a pixel: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 those and alpha.
     ///
     /// # Errors
@@ -186,6 +248,16 @@ pub(super) fn holding(
 /// An 8-bit level on the 16-bit scale.
 pub(in crate::image) fn stretched(v: u8) -> u16 {
     v as u16 * 257
+}
+
+impl Pair {
+    /// The pair that two frames in memory make, as [`pair`] does.
+    ///
+    /// # Errors
+    /// Those of [`pair`].
+    pub fn of_frames(left: Raster, right: Raster) -> Result<Self> {
+        pair(left, right, None)
+    }
 }
 
 /// The pair that two images make, their values scaled alike; where `ignored`, the left one is masked. [`Reader::pair`] says

@@ -201,6 +201,16 @@ impl Reader {
     }
 }
 
+impl Pair {
+    /// Reads a rectified pair from two files, as [`Reader::pair`] does.
+    ///
+    /// # Errors
+    /// Those of [`Reader::pair`].
+    pub fn open(left: impl AsRef<Path>, right: impl AsRef<Path>) -> Result<Self> {
+        Reader::default().pair(left.as_ref(), right.as_ref(), None)
+    }
+}
+
 /// [`Reader::pair`] by the default.
 ///
 /// # Errors

@@ -52,6 +52,16 @@ pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
     save(path, &bytes)
 }
 
+impl Plane<f32> {
+    /// Writes this map of disparities, as [`disparity`] does.
+    ///
+    /// # Errors
+    /// Those of [`disparity`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        disparity(path.as_ref(), self)
+    }
+}
+
 /// Writes a depth map (what is not finite is invalid) as [`disparity`] writes disparities, but not as PNG, which holds no
 /// unit.
 ///

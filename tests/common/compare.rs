@@ -1,9 +1,9 @@
 //! Comparison of volumes and maps that says where they part.
 
 use super::twin::Finest;
-use mrfgs::backend::{Backend, Volume, volume_shape};
 use mrfgs::image::Plane;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::backend::{Backend, Volume, volume_shape};
+use mrfgs::low_level::plan::Plan;
 use std::fmt::Debug;
 
 /// Where `actual` first differs from `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and how often.

@@ -1,14 +1,14 @@
 //! Every backend that this machine can run, for tests that hold each of them to the twins.
 
 use mrfgs::Result;
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::backend::probe::Probe;
-use mrfgs::backend::{Backend, Map, Stage, Ticket, Traffic};
-use mrfgs::front::Prepared;
 use mrfgs::image::Plane;
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
+use mrfgs::low_level::backend::probe::Probe;
+use mrfgs::low_level::backend::{Backend, Map, Stage, Ticket, Traffic};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::Maps;
-use mrfgs::plan::Plan;
 use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;

@@ -10,10 +10,10 @@ pub mod devices;
 pub mod random;
 pub mod twin;
 
-use mrfgs::backend::Backend;
-use mrfgs::plan::Plan;
-use mrfgs::solver::{self, Run};
-use mrfgs::watch::Watch;
+use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::solver::{self, Run};
+use mrfgs::low_level::watch::Watch;
 use std::ops::ControlFlow;
 
 /// Runs the flooding of `plan` on the evidence that `backend` holds; the number of iterations.

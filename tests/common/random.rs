@@ -1,14 +1,14 @@
 //! Seeded random input: images, pairs, methods, graphs, and states of the volumes that keep the invariants.
 
 use super::twin::{self, Finest};
-use mrfgs::backend::{Backend, NO_LABEL, Volume};
-use mrfgs::graph::LevelGraph;
 use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::low_level::backend::{Backend, NO_LABEL, Volume};
+use mrfgs::low_level::graph::LevelGraph;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{
     Agreement, DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential, Pyramid,
 };
-use mrfgs::plan::Plan;
 
 /// The splitmix64 generator (Steele, Lea and Flood 2014).
 pub struct Random(u64);

@@ -2,7 +2,7 @@
 
 use crate::common::{random, twin};
 use crate::{cells, on_all, same};
-use mrfgs::backend::{Stage, Volume};
+use mrfgs::low_level::backend::{Stage, Volume};
 
 #[test]
 fn belief() {

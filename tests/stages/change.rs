@@ -3,7 +3,7 @@
 use crate::common::twin;
 use crate::common::twin::belief::belief_most;
 use crate::{cells, on_all};
-use mrfgs::backend::Volume;
+use mrfgs::low_level::backend::Volume;
 
 #[test]
 fn change() {

@@ -6,12 +6,12 @@ use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::floods::{twin_flood, whole_flood};
 use crate::{same, twin_start};
-use mrfgs::backend::Volume;
-use mrfgs::front::Prepared;
-use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
+use mrfgs::low_level::backend::Volume;
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph::{self, LevelGraph};
+use mrfgs::low_level::plan::{Plan, TruncationRule};
 use mrfgs::options::{Agreement, MatchingCost, Method, Order, Pyramid};
-use mrfgs::plan::{Plan, TruncationRule};
 
 /// A change of a plan, as a negative control makes it.
 type Change = fn(&mut Plan);

@@ -4,9 +4,9 @@ use crate::common::devices::backends;
 use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::{cells, on_all, same};
-use mrfgs::backend::{Stage, Volume};
-use mrfgs::front::Prepared;
-use mrfgs::graph;
+use mrfgs::low_level::backend::{Stage, Volume};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph;
 use mrfgs::options::MatchingCost;
 
 #[test]

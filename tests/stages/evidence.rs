@@ -2,7 +2,7 @@
 
 use crate::common::twin;
 use crate::{on_all, random_cost, same};
-use mrfgs::backend::{Stage, Volume};
+use mrfgs::low_level::backend::{Stage, Volume};
 
 #[test]
 fn evidence() {

@@ -3,9 +3,9 @@
 use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::maps::on_maps;
-use mrfgs::backend::Stage;
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
-use mrfgs::plan::Plan;
 
 #[test]
 fn fill() {

@@ -3,7 +3,7 @@
 use crate::common::twin;
 use crate::maps::on_maps;
 use crate::median::{any_maps, any_method};
-use mrfgs::backend::Stage;
+use mrfgs::low_level::backend::Stage;
 
 #[test]
 fn fill_median() {

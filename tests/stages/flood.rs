@@ -3,10 +3,10 @@
 use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::{on_all, same};
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::{Backend, Stage, Volume};
-use mrfgs::front::Prepared;
-use mrfgs::graph;
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::{Backend, Stage, Volume};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph;
 use mrfgs::options::Method;
 
 #[test]

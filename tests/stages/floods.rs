@@ -5,12 +5,12 @@ use crate::common::devices::backends;
 use crate::common::random::{self, Random, State};
 use crate::common::twin;
 use crate::{MINIMA, on_all, resolve, same, twin_start};
-use mrfgs::backend::{Backend, Stage, Volume};
-use mrfgs::front::Prepared;
-use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
+use mrfgs::low_level::backend::{Backend, Stage, Volume};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph::{self, LevelGraph};
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{Agreement, MatchingCost, Method, Order, PRESETS, Potential};
-use mrfgs::plan::Plan;
 use std::collections::HashSet;
 
 /// What was written must carry a flood on, whatever a backend stores beside the labels.

@@ -2,10 +2,10 @@
 
 use crate::common::twin;
 use crate::{on_all, random_cost, same};
-use mrfgs::backend::{Stage, Volume};
-use mrfgs::front::Prepared;
 use mrfgs::image::Plane;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::backend::{Stage, Volume};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::plan::Plan;
 
 #[test]
 fn label_range() {

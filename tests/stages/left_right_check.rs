@@ -3,8 +3,8 @@
 use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::maps::on_maps;
-use mrfgs::backend::Stage;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::plan::Plan;
 
 #[test]
 fn left_right_check() {

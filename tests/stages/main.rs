@@ -27,11 +27,11 @@ use common::compare::{compare, compare_maps};
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::backend::{Backend, Volume};
-use mrfgs::front::Prepared;
-use mrfgs::graph::{self, LevelGraph};
 use mrfgs::image::Pair;
-use mrfgs::plan::{COST_MAX, Plan};
+use mrfgs::low_level::backend::{Backend, Volume};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph::{self, LevelGraph};
+use mrfgs::low_level::plan::{COST_MAX, Plan};
 use std::collections::HashSet;
 
 /// One pixel, one column, one row, odd, divisible by no power of two, and wider than a block of anything.

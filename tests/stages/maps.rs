@@ -4,13 +4,13 @@ use super::common::compare::compare_finest;
 use super::common::devices::backends;
 use super::common::random::{self, Random, texture};
 use super::common::twin::{self, Finest};
-use mrfgs::backend::Stage;
-use mrfgs::front::Prepared;
-use mrfgs::graph;
 use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{Median, Method};
-use mrfgs::plan::Plan;
 
 const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (24, 31), (150, 4)];
 

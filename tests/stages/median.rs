@@ -3,10 +3,10 @@
 use crate::common::random::{self, Random};
 use crate::common::twin::{self, Finest};
 use crate::maps::on_maps;
-use mrfgs::backend::Stage;
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::weights::MedianWeights;
 use mrfgs::options::{Median, Method};
-use mrfgs::plan::Plan;
-use mrfgs::weights::MedianWeights;
 
 /// Any parameters of the median.
 pub(crate) fn any_method(random: &mut Random, method: &mut Method) {

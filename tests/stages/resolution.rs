@@ -2,7 +2,7 @@
 
 use crate::common::random;
 use crate::{on_all, resolve, same};
-use mrfgs::backend::{Stage, Volume};
+use mrfgs::low_level::backend::{Stage, Volume};
 
 #[test]
 fn resolution() {

@@ -6,11 +6,11 @@ use crate::common::twin;
 use crate::common::twin::belief::belief_most;
 use crate::floods::twin_flood;
 use crate::{NEIGHBOURS, cells, resolve, same};
-use mrfgs::backend::{Stage, Volume, volume_shape};
-use mrfgs::front::Prepared;
-use mrfgs::graph::{self, LevelGraph};
+use mrfgs::low_level::backend::{Stage, Volume, volume_shape};
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph::{self, LevelGraph};
+use mrfgs::low_level::plan::{LevelPlan, Plan, Truncation, TruncationRule, VolumeWidth};
 use mrfgs::options::{Agreement, Method};
-use mrfgs::plan::{LevelPlan, Plan, Truncation, TruncationRule, VolumeWidth};
 use std::collections::HashSet;
 
 /// Graphs in which everyone is everyone's neighbour in every window: as many factors a pixel as there can be.

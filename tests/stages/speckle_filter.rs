@@ -5,13 +5,13 @@ use crate::common::devices::backends;
 use crate::common::random::{self, Random};
 use crate::common::twin::{self, Finest};
 use crate::maps::{on_maps, small_plan};
-use mrfgs::backend::Stage;
-use mrfgs::front::Prepared;
-use mrfgs::graph;
 use mrfgs::image::Plane;
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Method;
-use mrfgs::plan::Plan;
 
 #[test]
 fn speckle_filter() {

@@ -4,7 +4,7 @@ use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;
 use crate::common::{random, twin};
 use crate::{cells, on_all};
-use mrfgs::backend::{Stage, Volume};
+use mrfgs::low_level::backend::{Stage, Volume};
 
 #[test]
 fn winner_takes_all() {

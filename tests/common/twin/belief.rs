@@ -1,6 +1,6 @@
 use super::{members, most};
-use mrfgs::graph::LevelGraph;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::graph::LevelGraph;
+use mrfgs::low_level::plan::Plan;
 
 /// The largest belief: a message less than the largest value.
 pub fn belief_most(plan: &Plan) -> u32 {

@@ -1,7 +1,7 @@
 use super::Finest;
 use super::fill::invalid;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
-use mrfgs::plan::Plan;
 
 /// Confidence of each pixel: 16 for every 8 units that the runner-up is behind.
 pub fn confidence(plan: &Plan, maps: &mut Finest) {

@@ -1,7 +1,7 @@
 use super::census::census;
 use mrfgs::image::{Image, Pair};
+use mrfgs::low_level::plan::{COST_MAX, Plan};
 use mrfgs::options::MatchingCost;
-use mrfgs::plan::{COST_MAX, Plan};
 
 /// Matching cost of level 0.
 pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {

@@ -1,6 +1,6 @@
 use super::{cut, members, most, variable_message};
-use mrfgs::graph::LevelGraph;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::graph::LevelGraph;
+use mrfgs::low_level::plan::Plan;
 
 /// New messages of the dependency factors of `level`.
 pub fn dependency(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[u32], old: &[u32]) -> Vec<u32> {

@@ -1,4 +1,4 @@
-use mrfgs::plan::Plan;
+use mrfgs::low_level::plan::Plan;
 
 /// Evidence of `level` from its cost.
 pub fn evidence(plan: &Plan, level: usize, cost: &[u32]) -> Vec<u32> {

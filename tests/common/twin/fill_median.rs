@@ -1,7 +1,7 @@
 use super::Finest;
 use super::median::{filled, smooth};
 use mrfgs::image::Pair;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::plan::Plan;
 
 /// The median of filled pixels, the window's places four pixels apart.
 pub fn fill_median(plan: &Plan, pair: &Pair, maps: &mut Finest) {

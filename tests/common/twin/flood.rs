@@ -1,7 +1,7 @@
 use super::belief::belief;
 use super::dependency::dependency;
-use mrfgs::graph::LevelGraph;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::graph::LevelGraph;
+use mrfgs::low_level::plan::Plan;
 
 /// New dependency messages of `level` and the beliefs that follow from them, from old ones of both; `others` are the evidence and
 /// the messages from above and from below.

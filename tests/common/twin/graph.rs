@@ -1,6 +1,6 @@
 use super::binomial;
 use mrfgs::image::{Image, Plane};
-use mrfgs::plan::Plan;
+use mrfgs::low_level::plan::Plan;
 
 /// Codes of the neighbours of every factor of every level, as `LevelGraph` holds them.
 pub fn graphs(image: &Image, plan: &Plan) -> Vec<Vec<u8>> {

@@ -1,5 +1,5 @@
 use mrfgs::image::Plane;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::plan::Plan;
 
 /// The costs of level `z`, the highest where a label is outside its pixel's label range.
 pub fn label_range(plan: &Plan, z: usize, label_range: &Plane<[u16; 2]>, cost: &[u32]) -> Vec<u32> {

@@ -1,8 +1,8 @@
 use super::Finest;
 use mrfgs::image::Pair;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::LeftRightCheck;
-use mrfgs::plan::Plan;
 
 /// Validity of each pixel by the mask and the map of the right view.
 pub fn left_right_check(plan: &Plan, pair: &Pair, maps: &mut Finest) {

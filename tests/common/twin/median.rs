@@ -1,9 +1,9 @@
 use super::Finest;
 use super::fill::invalid;
 use mrfgs::image::{Pair, Plane};
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Median;
-use mrfgs::plan::Plan;
 
 /// What distance takes off the weight of a pixel at (dx, dy).
 pub fn space(dx: i64, dy: i64, sigma_space: f64) -> i64 {

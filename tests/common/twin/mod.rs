@@ -2,7 +2,7 @@
 //! else: one cell at a time, wide integers, no padding, no table, nothing clever. It shares data types and documented
 //! constants with the library, and no function that computes.
 //!
-//! Volumes are `Vec<u32>` in the layout of [`mrfgs::backend::probe::Volume`]: \[y\]\[x\]\[slot\]\[label\].
+//! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::probe::Volume`]: \[y\]\[x\]\[slot\]\[label\].
 
 pub mod census;
 pub mod graph;
@@ -19,10 +19,10 @@ macro_rules! declare {
 
 mrfgs::for_every_stage!(declare);
 
-use mrfgs::backend::{Backend, Map};
-use mrfgs::graph::LevelGraph;
 use mrfgs::image::Plane;
-use mrfgs::plan::{Plan, Truncation, TruncationRule, VolumeWidth};
+use mrfgs::low_level::backend::{Backend, Map};
+use mrfgs::low_level::graph::LevelGraph;
+use mrfgs::low_level::plan::{Plan, Truncation, TruncationRule, VolumeWidth};
 
 /// What the finest level knows of each pixel: the plane of every [`Map`].
 #[derive(Clone, Debug, PartialEq, Eq)]

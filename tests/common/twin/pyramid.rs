@@ -1,6 +1,6 @@
 use super::binomial;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Pyramid;
-use mrfgs::plan::Plan;
 
 /// Cost of `level` from that of the next finer one.
 pub fn pyramid(plan: &Plan, level: usize, fine: &[u32]) -> Vec<u32> {

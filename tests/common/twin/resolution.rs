@@ -1,6 +1,6 @@
 use super::{cut, most, variable_message};
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Agreement;
-use mrfgs::plan::Plan;
 
 /// New messages (down, up) of the resolution factors between `level` and the next finer one.
 pub fn resolution(

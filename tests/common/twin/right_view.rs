@@ -1,7 +1,7 @@
 use super::Finest;
-use mrfgs::backend::NO_LABEL;
 use mrfgs::image::Plane;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::backend::NO_LABEL;
+use mrfgs::low_level::plan::Plan;
 
 /// The map of the right view.
 pub fn right_view(plan: &Plan, belief: &[u32], maps: &mut Finest) {

@@ -1,7 +1,7 @@
 use super::Finest;
 use mrfgs::image::Plane;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
-use mrfgs::plan::Plan;
 
 /// Flags small regions. Every pixel starts as its own region; regions that touch take the smaller number until
 /// nothing changes.

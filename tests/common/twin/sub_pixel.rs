@@ -1,6 +1,6 @@
 use super::Finest;
 use mrfgs::image::Plane;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::plan::Plan;
 
 /// The disparity of each pixel, in 1/256 px.
 pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {

@@ -1,7 +1,7 @@
 use super::Finest;
 use super::change::labels;
 use mrfgs::image::Plane;
-use mrfgs::plan::Plan;
+use mrfgs::low_level::plan::Plan;
 
 /// The optimum of every pixel and its best runner-up.
 pub fn winner_takes_all(plan: &Plan, belief: &[u32], maps: &mut Finest) {

@@ -1,0 +1,106 @@
+//! One match, with everything that one may want of it.
+
+use super::search::Search;
+use super::{Matched, Matcher};
+use crate::error::{Error, Result};
+use crate::image::Pair;
+use crate::options::{DisparityRange, Method};
+use crate::solver::Inspection;
+use crate::watch::Progress;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What a listener to progress may answer: nothing, or whether to go on.
+pub trait Answer {
+    /// Whether the match goes on.
+    fn goes_on(self) -> bool;
+}
+
+impl Answer for () {
+    fn goes_on(self) -> bool {
+        true
+    }
+}
+
+impl Answer for ControlFlow<()> {
+    fn goes_on(self) -> bool {
+        self.is_continue()
+    }
+}
+
+type Listener<'a> = Box<dyn FnMut(Progress) -> bool + Send + 'a>;
+type Inspect<'a> = Box<dyn FnMut(&mut Inspection) -> Result<()> + Send + 'a>;
+
+/// A match that has not begun: [`Matcher::job`] makes one, [`Job::run`] does it.
+#[must_use = "a job does nothing until it is run"]
+pub struct Job<'a> {
+    matcher: &'a mut Matcher,
+    pair: &'a Pair,
+    range: Result<DisparityRange>,
+    method: Option<&'a Method>,
+    cancel: Option<&'a AtomicBool>,
+    listener: Option<Listener<'a>>,
+    inspect: Option<Inspect<'a>>,
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn new(matcher: &'a mut Matcher, pair: &'a Pair, search: impl Search) -> Self {
+        let range = matcher.pool.install(|| search.range(pair));
+        Self { matcher, pair, range, method: None, cancel: None, listener: None, inspect: None }
+    }
+
+    /// By `method` instead of the matcher's own.
+    pub fn method(self, method: &'a Method) -> Self {
+        Self { method: Some(method), ..self }
+    }
+
+    /// `listener` hears of progress as each stage begins. It may answer with a [`ControlFlow`]; a break ends the match with
+    /// [`Error::Interrupted`].
+    pub fn on_progress<A: Answer>(self, mut listener: impl FnMut(Progress) -> A + Send + 'a) -> Self {
+        Self { listener: Some(Box::new(move |progress| listener(progress).goes_on())), ..self }
+    }
+
+    /// The match ends with [`Error::Interrupted`] soon after `cancel` becomes true.
+    pub fn cancel(self, cancel: &'a AtomicBool) -> Self {
+        Self { cancel: Some(cancel), ..self }
+    }
+
+    /// `inspect` looks into the match on its way, for diagnosis. It may read any volume and map, at the price of time.
+    pub fn inspect(self, inspect: impl FnMut(&mut Inspection) -> Result<()> + Send + 'a) -> Self {
+        Self { inspect: Some(Box::new(inspect)), ..self }
+    }
+
+    /// Matches the pair.
+    ///
+    /// # Errors
+    /// [`Error::Range`] for the disparities to search, [`Error::Option`] for options out of range, [`Error::Budget`] where no
+    /// tile is small enough for the method's memory, [`Error::Device`] where the wanted device fails, [`Error::Memory`] when
+    /// the machine or the device cannot hold the match, [`Error::Interrupted`] when it was stopped, and those of
+    /// [`Job::inspect`].
+    pub fn run(self) -> Result<Matched> {
+        let Self { matcher, pair, range, method, cancel, mut listener, mut inspect } = self;
+        let own = matcher.method.clone();
+        let mut observer = |progress| {
+            let stopped = cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
+            let goes_on = !stopped && listener.as_mut().is_none_or(|listener| listener(progress));
+            if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        let inspector = inspect.as_mut().map(|inspect| &mut **inspect as _);
+        matcher.solve(pair, range?, method.unwrap_or(&own), &mut observer, inspector)
+    }
+
+    /// Matches the pair, and writes the disparities to `out` as well, row by row, in pixels, `+inf` where there is none.
+    ///
+    /// # Errors
+    /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` has not as many elements as the images have pixels.
+    pub fn run_into(self, out: &mut [f32]) -> Result<Matched> {
+        let (width, height) = self.pair.size();
+        if out.len() != width * height {
+            let reason = format!("{} values for a map of {width} x {height} pixels", out.len());
+            return Err(Error::Mismatch(reason));
+        }
+        let matched = self.run()?;
+        out.copy_from_slice(matched.disparity().data());
+        Ok(matched)
+    }
+}

@@ -1,0 +1,329 @@
+//! The front door: from pairs to their maps. It opens what runs the stages, checks it, and falls back where that is allowed.
+
+mod check;
+mod job;
+mod matched;
+mod search;
+
+use crate::backend::Backend;
+use crate::backend::cpu::Cpu;
+use crate::backend::gpu::{self, Gpu};
+use crate::engine::{self, Started};
+use crate::error::{BudgetError, Error, ExecutionError, Result};
+use crate::image::Pair;
+use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
+use crate::plan::Plan;
+use crate::solver::Inspector;
+use crate::tiles::Tiles;
+use crate::watch::Observer;
+use check::check;
+pub use job::{Answer, Job};
+use matched::summed;
+pub use matched::{Matched, Timing};
+pub use search::Search;
+use std::ops::ControlFlow;
+
+/// Chooses what a [`Matcher`] does, and where.
+#[derive(Clone, Debug, Default)]
+#[must_use = "a builder does nothing until `build`"]
+pub struct Builder {
+    method: Method,
+    execution: Execution,
+}
+
+impl Builder {
+    /// The method; the preset `default` where none is given.
+    pub fn method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// What runs the stages: `"auto"`, `"cpu"`, `"gpu"`, or the index of a device or a part of its name. No choice changes a bit
+    /// of the maps.
+    pub fn device(mut self, device: impl Into<DeviceChoice>) -> Self {
+        self.execution.device = device.into();
+        self
+    }
+
+    /// Threads of the CPU path; one for each core where none are given.
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.execution.threads = Some(threads);
+        self
+    }
+
+    /// Whether to measure the time of every stage.
+    pub fn timings(mut self, timings: bool) -> Self {
+        self.execution.timings = timings;
+        self
+    }
+
+    /// Device, threads and timings at once.
+    pub fn execution(self, execution: Execution) -> Self {
+        Self { execution, ..self }
+    }
+
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
+    /// driver or the device cannot be opened.
+    pub fn build(self) -> Result<Matcher> {
+        let Self { method, execution } = self;
+        let (gpu, falls_back) = match &execution.device {
+            DeviceChoice::Cpu => (None, false),
+            DeviceChoice::Gpu => (Some(Gpu::new(None)), false),
+            DeviceChoice::Named(name) => (Some(Gpu::new(Some(name))), false),
+            DeviceChoice::Auto => (gpu::has_automatic().then(|| Gpu::new(None)), true),
+        };
+        Matcher::build(method, gpu, falls_back, &execution)
+    }
+}
+
+/// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
+pub struct Matcher {
+    method: Method,
+    pool: rayon::ThreadPool,
+    cpu: Cpu,
+    gpu: Option<Gpu>,
+    /// The last method that the device was seen to compute as the CPU path does.
+    checked: Option<Method>,
+    /// Whether the CPU path may step in.
+    falls_back: bool,
+    /// Why there is no device any more.
+    given_up: Option<String>,
+    timings: bool,
+}
+
+impl Matcher {
+    /// A matcher of the preset `default`, on a GPU where there is one and on the CPU path where there is none.
+    ///
+    /// # Errors
+    /// Those of [`Builder::build`].
+    pub fn new() -> Result<Self> {
+        Self::builder().build()
+    }
+
+    /// A matcher of other choices.
+    pub fn builder() -> Builder {
+        Builder::default()
+    }
+
+    /// On `gpu`; where that fails or cannot serve, on the CPU path if it `falls_back`.
+    ///
+    /// # Errors
+    /// [`Error::Execution`] for a number of threads that cannot be had, and the error of `gpu` unless it falls back.
+    pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
+        Self::build(Method::default(), Some(gpu), falls_back, execution)
+    }
+
+    fn build(
+        method: Method,
+        gpu: Option<Result<Gpu>>,
+        falls_back: bool,
+        execution: &Execution,
+    ) -> Result<Self> {
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = execution.threads {
+            if threads == 0 {
+                return Err(ExecutionError::NoThreads.into());
+            }
+            pool = pool.num_threads(threads);
+        }
+        let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
+        let (gpu, given_up) = match gpu.transpose() {
+            Ok(gpu) => (gpu, None),
+            Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e.to_string())),
+            Err(e) => return Err(e),
+        };
+        Ok(Self {
+            method,
+            pool,
+            cpu: Cpu::default(),
+            gpu,
+            checked: None,
+            falls_back,
+            given_up,
+            timings: execution.timings,
+        })
+    }
+
+    /// Matches by `method` from now on.
+    pub fn set_method(&mut self, method: Method) {
+        self.method = method;
+    }
+
+    /// Measures the time of every stage from now on, or no longer.
+    pub fn keep_time(&mut self, on: bool) {
+        self.timings = on;
+    }
+
+    /// Matches `pair` over the disparities of `search`: `0..=47`, or `..` for the range that sparse matches find.
+    ///
+    /// # Errors
+    /// Those of [`Job::run`].
+    pub fn run(&mut self, pair: &Pair, search: impl Search) -> Result<Matched> {
+        self.job(pair, search).run()
+    }
+
+    /// A match of `pair` that can be watched, stopped and inspected. See [`Matcher::run`].
+    pub fn job<'a>(&'a mut self, pair: &'a Pair, search: impl Search) -> Job<'a> {
+        Job::new(self, pair, search)
+    }
+
+    fn solve(
+        &mut self,
+        pair: &Pair,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer,
+        mut inspector: Option<Inspector>,
+    ) -> Result<Matched> {
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?;
+        let tiles = Tiles::new(&plan)?;
+        if inspector.is_some() && tiles.count() > 1 {
+            let (tiles, needed) = (tiles.count(), plan.bytes().div_ceil(1 << 20));
+            return Err(BudgetError::StepsOfTiles { tiles, needed }.into());
+        }
+        let Self { pool, gpu, checked, timings, .. } = self;
+        let mut note = None;
+        if let Some(device) = gpu {
+            let served = pool.install(|| {
+                check(device, &plan.method, checked)?;
+                timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector))
+            });
+            match served {
+                Err(e) => note = Some(self.without_device(e)?),
+                served => return served,
+            }
+        }
+        let Self { pool, cpu, given_up, timings, .. } = self;
+        let note = note.or_else(|| given_up.clone());
+        let matched = pool.install(|| timed(cpu, *timings, &tiles, pair, observer, inspector))?;
+        Ok(Matched { note, ..matched })
+    }
+
+    /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks. While a
+    /// device is at one pair, the next one's graphs are built and go up, and the maps of the one before come down. (Not when
+    /// the stages are timed, nor where a pair is cut into tiles.)
+    ///
+    /// # Errors
+    /// Those of [`Job::run`]; the results of all pairs before have been handed out then.
+    pub fn run_all(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        mut take: impl FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        let method = &self.method.clone();
+        let observer: Observer = &mut |_| ControlFlow::Continue(());
+        let mut last: Option<Flight> = None;
+        for (pair, range) in pairs {
+            let started = self.start(&pair, range, method, &mut *observer);
+            if let Some(last) = last.take()
+                && take(self.land(last, method, &mut *observer)?).is_break()
+            {
+                return Ok(());
+            }
+            match started? {
+                Some((tiles, started)) => last = Some(Flight { pair, range, tiles, started }),
+                None => {
+                    if take(self.solve(&pair, range, method, &mut *observer, None)?).is_break() {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        if let Some(last) = last {
+            let _ = take(self.land(last, method, observer)?);
+        }
+        Ok(())
+    }
+
+    /// Starts a match on the device, where it can be left to itself.
+    fn start(
+        &mut self,
+        pair: &Pair,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer,
+    ) -> Result<Option<(Tiles, Started)>> {
+        let Self { pool, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?;
+        let tiles = Tiles::new(&plan)?;
+        if tiles.count() > 1 {
+            return Ok(None);
+        }
+        let started = pool.install(|| {
+            check(device, &plan.method, checked)?;
+            device.keep_time(false)?;
+            engine::start(device, &plan, pair, observer)
+        });
+        match started {
+            Ok(started) => Ok(Some((tiles, started))),
+            Err(e) => self.without_device(e).map(|_| None),
+        }
+    }
+
+    /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
+    fn land(&mut self, flight: Flight, method: &Method, observer: Observer) -> Result<Matched> {
+        let Flight { pair, range, tiles, started } = flight;
+        if let Some(device) = &mut self.gpu {
+            match self.pool.install(|| engine::finish(device, started)) {
+                Ok(solution) => return Ok(Matched::new(device, &tiles, solution, Vec::new())),
+                Err(e) => self.without_device(e)?,
+            };
+        }
+        self.solve(&pair, range, method, observer, None)
+    }
+
+    /// What to tell of a device that failed, where the CPU path may step in: the bits are the same there, so it costs only time.
+    ///
+    /// # Errors
+    /// The failure, where it may not.
+    fn without_device(&mut self, failure: Error) -> Result<String> {
+        if !self.falls_back || !matches!(failure, Error::Device(_) | Error::Memory(_)) {
+            return Err(failure);
+        }
+        let note = failure.to_string();
+        // What is too large for it this time may fit the next.
+        if matches!(failure, Error::Device(_)) {
+            self.gpu = None;
+            self.given_up = Some(note.clone());
+        }
+        Ok(note)
+    }
+}
+
+/// A match that was started on a device.
+struct Flight {
+    pair: Pair,
+    range: DisparityRange,
+    tiles: Tiles,
+    started: Started,
+}
+
+fn timed(
+    backend: &mut dyn Backend,
+    timings: bool,
+    tiles: &Tiles,
+    pair: &Pair,
+    observer: Observer,
+    inspector: Option<Inspector>,
+) -> Result<Matched> {
+    backend.keep_time(timings)?;
+    let solution = if tiles.count() == 1 {
+        engine::inspect(backend, tiles.whole(), pair, observer, inspector)?
+    } else {
+        engine::solve_tiles(backend, tiles, pair, observer)?
+    };
+    let timings = if timings { summed(&solution, &backend.times()?) } else { Vec::new() };
+    Ok(Matched::new(backend, tiles, solution, timings))
+}
+
+/// The same inspector once more, for a shorter time.
+fn again<'a>(inspector: &'a mut Option<Inspector>) -> Option<Inspector<'a>> {
+    match inspector {
+        Some(inspector) => Some(&mut **inspector),
+        None => None,
+    }
+}
