@@ -146,7 +146,10 @@ fn a_batch_writes_depth_and_points() {
     }
     fs::remove_file(folder.path().join("data/wall/calib.txt")).unwrap();
     let told = batch(folder.path(), &[&["list.csv", "none"], &also[..]].concat());
-    assert!(told.stderr.contains("wall: --also depth: takes the cameras, and there is no calib.txt"), "{told:?}");
+    assert!(
+        told.stderr.contains("wall: --also depth: takes the cameras, and there is no calib.txt"),
+        "{told:?}"
+    );
     assert_eq!(told.code, Some(1));
 }
 
@@ -360,7 +363,8 @@ fn status_tells_and_runs_nothing() {
     fs::write(&image, good).unwrap();
     batch(folder.path(), &["list.csv", "out"]).succeeded();
     assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
-    let other = batch(folder.path(), &["list.csv", "out", "--status", "--also", "validity"]).succeeded().stdout;
+    let other =
+        batch(folder.path(), &["list.csv", "out", "--status", "--also", "validity"]).succeeded().stdout;
     assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
 }
 

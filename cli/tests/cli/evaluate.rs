@@ -47,9 +47,7 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
     let told = run(folder.path(), &["evaluate", &dirs[0], &dirs[1], "--json", "out.json"]).succeeded();
     let lines: Vec<&str> = told.stdout.lines().collect();
     assert_eq!(lines.len(), 3 + 4 + 3, "{}", told.stdout);
-    for (line, start) in
-        [(3, "slanted  raw   |"), (5, "exposure raw   |"), (8, "mean     raw   |")]
-    {
+    for (line, start) in [(3, "slanted  raw   |"), (5, "exposure raw   |"), (8, "mean     raw   |")] {
         assert!(lines[line].starts_with(start), "{}", told.stdout);
         assert!(lines[line + 1].starts_with("         final |"), "{}", told.stdout);
     }

@@ -103,11 +103,7 @@ const FAILURES: &[Failure] = &[
         1,
         &["silent/calib.txt", "does not say cam0 and doffs and baseline", "cam0=[f 0 cx; 0 f cy; 0 0 1]"],
     ),
-    (
-        "M out.pfm --calib half/calib.txt --also points",
-        1,
-        &["half/calib.txt", "say doffs and baseline"],
-    ),
+    ("M out.pfm --calib half/calib.txt --also points", 1, &["half/calib.txt", "say doffs and baseline"]),
     ("M out.pfm --calib zero/calib.txt --also depth", 1, &["zero/calib.txt", "baseline=0 is not above 0"]),
     (
         "M out.pfm --calib larger/calib.txt --also depth",
@@ -223,7 +219,11 @@ const FAILURES: &[Failure] = &[
     ("evaluate map unknown.pfm misfit --truth unknown.pfm", 2, &["misfit", "mrfgs evaluate map --help"]),
     ("evaluate --levels 3 map unknown.pfm --truth unknown.pfm", 2, &["--levels"]),
     ("evaluate map unknown.pfm --truth unknown.pfm --method paper", 2, &["--method", "mrfgs evaluate map"]),
-    ("evaluate --breakdown map unknown.pfm --truth unknown.pfm", 2, &["map", "--breakdown", "cannot be used"]),
+    (
+        "evaluate --breakdown map unknown.pfm --truth unknown.pfm",
+        2,
+        &["map", "--breakdown", "cannot be used"],
+    ),
     ("evaluate map none.pfm --truth unknown.pfm", 1, &["none.pfm", "check the name"]),
     ("evaluate map left.png --truth unknown.pfm", 1, &["left.png", "channel", "16-bit .png"]),
     ("evaluate map unknown.pfm --truth unknown.pfm", 1, &["unknown.pfm", "no known disparity"]),

@@ -89,7 +89,8 @@ fn match_writes_every_output_in_every_format() {
     assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
 
     // Without the fill, what is invalid stays so.
-    let args = ["match", &left, &right, "d.pfm", "--set", "fill=row", "--set", "fill=none", "--mask", "mask.png"];
+    let args =
+        ["match", &left, &right, "d.pfm", "--set", "fill=row", "--set", "fill=none", "--mask", "mask.png"];
     run(folder.path(), &[&args[..], &["--also", "validity"]].concat()).succeeded();
     let map = read::read_disparity(&at("d.pfm")).unwrap();
     let validity = read::grey8(&at("d.validity.png")).unwrap();
@@ -230,8 +231,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
 #[test]
 fn inspect_shows_every_step() {
     let folder = workshop();
-    let args =
-        "inspect left.png right.png steps --max-disparity 20 --set levels=3";
+    let args = "inspect left.png right.png steps --max-disparity 20 --set levels=3";
     let args: Vec<&str> = args.split_whitespace().collect();
     for (preset, more) in
         [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "label-range-width"][..])]

@@ -235,8 +235,7 @@ fn json_tells_what_ran_and_what_came_of_it() {
     let at = |name: &str| folder.path().join(name);
     let args =
         ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt", "--device", "cpu"];
-    let args =
-        [&args[..], &["--mask", "flat-mask.png", "--also", "confidence,validity"]].concat();
+    let args = [&args[..], &["--mask", "flat-mask.png", "--also", "confidence,validity"]].concat();
     let mask = image::GrayImage::from_fn(60, 40, |x, _| image::Luma([u8::from(x < 6)]));
     mask.save(at("flat-mask.png")).unwrap();
     let told = run(folder.path(), &[&args[..], &["--json", "m.json", "--threads", "1"]].concat()).succeeded();
@@ -267,7 +266,8 @@ fn json_tells_what_ran_and_what_came_of_it() {
     assert!(found["stages"].is_null(), "the time of stages is for `inspect`");
 
     // Shares of all pixels, in percent.
-    let (validity, confidence) = (read::grey8(&at("out.validity.png")).unwrap(), read::grey8(&at("out.confidence.png")).unwrap());
+    let (validity, confidence) =
+        (read::grey8(&at("out.validity.png")).unwrap(), read::grey8(&at("out.confidence.png")).unwrap());
     let share = |of: &dyn Fn(u8) -> bool| {
         100.0 * validity.data().iter().filter(|&&v| of(v)).count() as f64 / (60.0 * 40.0)
     };

@@ -120,7 +120,8 @@ fn the_sign_turns_map_and_range_around() {
     let folder = tempfile::tempdir().unwrap();
     let matched = |name: &str, more: &[&str]| {
         let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
-        let args = [&["match", &left, &right, name, "--set", "fill=none", "--device", "cpu", "--json", "-"], more];
+        let args =
+            [&["match", &left, &right, name, "--set", "fill=none", "--device", "cpu", "--json", "-"], more];
         let told = run(folder.path(), &args.concat()).succeeded();
         (read_map(&folder.path().join(name)), told.json())
     };

@@ -76,20 +76,19 @@ fn a_full_disk_is_told_with_the_name_of_the_output() {
             "match left.png right.png out.png --max-disparity 9 --also depth --calib camera/calib.txt --set fill=none",
             "cannot write out.depth.pfm: File",
         ),
-        (
-            "inspect left.png right.png steps --max-disparity 9",
-            "cannot write steps: File too large",
-        ),
+        ("inspect left.png right.png steps --max-disparity 9", "cannot write steps: File too large"),
         ("batch camera.csv out", "cannot write out/camera.pfm: File too large"),
     ] {
         fs::write(folder.path().join("camera.csv"), "name,left,right\ncamera,camera/left.png,right.png\n")
             .unwrap();
-        let output =
-            shell(folder.path(), "trap '' XFSZ; ulimit -f 8", &format!("{line} --device cpu"));
+        let output = shell(folder.path(), "trap '' XFSZ; ulimit -f 8", &format!("{line} --device cpu"));
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{line}: {said}");
         let lines = if line.starts_with("inspect") { 2 } else { 1 };
-        assert!(said.contains(name) && said.lines().count() == lines && !said.contains(".tmp"), "{line}: {said}");
+        assert!(
+            said.contains(name) && said.lines().count() == lines && !said.contains(".tmp"),
+            "{line}: {said}"
+        );
         fs::remove_file(folder.path().join("camera.csv")).unwrap();
         let _ = fs::remove_dir(folder.path().join("out"));
         assert!(listing(folder.path()) == before, "{line}");
@@ -118,11 +117,11 @@ fn killed(folder: &Path, after: Duration, line: &str) {
 fn a_killed_match_leaves_nothing_half_written() {
     let folder = workshop();
     let before = listing(folder.path());
-    let line =
-        "match left.png right.png out.pfm --max-disparity 9 --device cpu --also raw,confidence";
+    let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --also raw,confidence";
     run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
-    let whole: Vec<_> =
-        ["out.pfm", "out.raw.pfm", "out.confidence.png"].map(|name| fs::read(folder.path().join(name)).unwrap()).into();
+    let whole: Vec<_> = ["out.pfm", "out.raw.pfm", "out.confidence.png"]
+        .map(|name| fs::read(folder.path().join(name)).unwrap())
+        .into();
     for ms in [1, 5, 10, 15, 20, 25, 30, 40, 60] {
         for name in ["out.pfm", "out.raw.pfm", "out.confidence.png"] {
             let _ = fs::remove_file(folder.path().join(name));
@@ -143,8 +142,7 @@ fn a_killed_match_leaves_nothing_half_written() {
 fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     let folder = workshop();
     let before = listing(folder.path());
-    let line =
-        "inspect left.png right.png steps --max-disparity 9 --device cpu";
+    let line = "inspect left.png right.png steps --max-disparity 9 --device cpu";
     let args: Vec<_> = line.split(' ').collect();
     // As a run leaves it that is killed on its way.
     let staging = folder.path().join(".steps.tmp");
