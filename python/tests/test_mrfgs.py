@@ -51,7 +51,7 @@ def by_program(left, right, *arguments):
         write_ppm(folder / "left.ppm", left)
         write_ppm(folder / "right.ppm", right)
         subprocess.run([PROGRAM, "match", folder / "left.ppm", folder / "right.ppm", folder / "out.pfm", "--quiet",
-                        "--backend", "cpu", *arguments], check=True)
+                        "--device", "cpu", *arguments], check=True)
         return read_pfm(folder / "out.pfm")
 
 
@@ -225,7 +225,7 @@ class Match(unittest.TestCase):
         grouped = {"cost": {"outside-cost": 20, "matching": "sad"}, "refinement.fill": "row"}
         flags = [flag for change in ("matching=sad", "outside-cost=20", "fill=row") for flag in ("--set", change)]
         self.same(left, right, *flags, options=grouped)
-        self.same(left, right, "--preset", "fgs", preset="fgs")
+        self.same(left, right, "--method", "fgs", preset="fgs")
         mask = np.zeros(left.shape[:2], bool)
         mask[:, :10] = True
         matched = mrfgs.match(left, right, 15, mask=mask, device="cpu")

@@ -17,11 +17,10 @@ pub(crate) fn run() -> Result<()> {
         table.row(["", "name", "kind", "API", "driver", "largest buffer", "largest binding"]);
         table.rule();
         for device in &devices {
-            let software = if device.software { " (software)" } else { "" };
             table.row([
                 device.index.to_string(),
                 device.name.clone(),
-                format!("{}{software}", device.kind),
+                device.kind.to_string(),
                 device.api.to_string(),
                 device.driver.clone(),
                 bytes(device.max_buffer),
@@ -35,7 +34,7 @@ pub(crate) fn run() -> Result<()> {
         None if devices.is_empty() => {
             writeln!(out, "no Vulkan or Metal driver found: `auto` takes the CPU path")
         }
-        None => writeln!(out, "`auto` takes the CPU path: software devices are slower"),
+        None => writeln!(out, "`auto` takes the CPU path"),
     };
     console::print(&out)
 }

@@ -34,7 +34,7 @@ fn pairs(count: usize, (width, height): (u32, u32)) -> TempDir {
 }
 
 fn batch(folder: &Path, args: &[&str]) -> Run {
-    run(folder, &[&["batch"], args, &["--backend", "cpu"]].concat())
+    run(folder, &[&["batch"], args, &["--device", "cpu"]].concat())
 }
 
 fn record(folder: &Path, name: &str) -> Value {
@@ -68,7 +68,7 @@ fn started(folder: &Path, args: &[&str]) -> Child {
         .current_dir(folder)
         .arg("batch")
         .args(args)
-        .args(["--backend", "cpu", "--threads", "1"])
+        .args(["--device", "cpu", "--threads", "1"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -87,19 +87,19 @@ fn wait_for(folder: &Path, records: usize) {
 #[test]
 fn a_batch_is_its_single_matches() {
     let folder = pairs(3, (96, 64));
-    let told = batch(folder.path(), &["list.csv", "out", "--confidence", "--validity"]).succeeded();
+    let told = batch(folder.path(), &["list.csv", "out", "--also", "confidence,validity,raw"]).succeeded();
     assert_eq!((told.stdout.as_str(), told.stderr.as_str()), ("", "mrfgs: 3 done, 0 skipped, 0 failed\n"));
     let at = |name: &str| fs::read(folder.path().join(name)).unwrap();
     for i in 0..3 {
         let [left, right] = ["left", "right"].map(|side| format!("images/{i}-{side}.png"));
         let single = |max| {
-            let args = ["match", &left, &right, "a.pfm", "--max-disparity", max, "--backend", "cpu"];
-            let more = ["--confidence", "c.png", "--validity", "v.png"];
+            let args = ["match", &left, &right, "a.pfm", "--max-disparity", max, "--device", "cpu"];
+            let more = ["--also", "validity,confidence,raw"];
             run(folder.path(), &[args.as_slice(), &more].concat()).succeeded();
         };
         single("31");
-        for (one, many) in [("a.pfm", ".pfm"), ("c.png", "-confidence.png"), ("v.png", "-validity.png")] {
-            assert!(at(one) == at(&format!("out/pair-{i}{many}")), "{many} of {i}");
+        for end in [".pfm", ".raw.pfm", ".confidence.png", ".validity.png"] {
+            assert!(at(&format!("a{end}")) == at(&format!("out/pair-{i}{end}")), "{end} of {i}");
         }
         single("15");
         assert!(at("a.pfm") != at(&format!("out/pair-{i}.pfm")), "another range is another map");
@@ -109,15 +109,48 @@ fn a_batch_is_its_single_matches() {
     assert_eq!((&record["labels"], &record["width"]), (&32.into(), &96.into()));
     assert_eq!(record["files"]["output"], "pair-1.pfm");
     assert!(record["density"].as_f64().unwrap() > 90.0 && record["seconds"].as_f64().unwrap() > 0.0);
-    assert_eq!(listing(&folder.path().join("out")).len(), 12, "nothing else is left");
+    assert_eq!(listing(&folder.path().join("out")).len(), 15, "nothing else is left");
 
     for format in ["png", "tif"] {
         let name = format!("a.{format}");
         batch(folder.path(), &["list.csv", format, "--format", format, "--quiet"]).succeeded();
         let args = ["match", "images/0-left.png", "images/0-right.png", &name, "--max-disparity", "31"];
-        run(folder.path(), &[args.as_slice(), &["--backend", "cpu"]].concat()).succeeded();
+        run(folder.path(), &[args.as_slice(), &["--device", "cpu"]].concat()).succeeded();
         assert!(at(&name) == at(&format!("{format}/pair-0.{format}")));
     }
+}
+
+/// Outputs that take the cameras, with the calib.txt beside the left image or in the folder of the pair.
+#[test]
+fn a_batch_writes_depth_and_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    fs::create_dir_all(folder.path().join("data/wall")).unwrap();
+    for file in ["im0.png", "im1.png", "calib.txt"] {
+        fs::copy(scene("wall").join(file), folder.path().join("data/wall").join(file)).unwrap();
+    }
+    let row = "wall,data/wall/im0.png,data/wall/im1.png,31\n";
+    fs::write(folder.path().join("list.csv"), format!("name,left,right,max_disparity\n{row}")).unwrap();
+    let also = ["--also", "points,depth,preview,side-by-side", "--colours", "viridis"];
+    let args = ["match", "data/wall/im0.png", "data/wall/im1.png", "one.tif", "--device", "cpu"];
+    run(folder.path(), &[&args[..], &also].concat()).succeeded();
+    for list in ["list.csv", "data"] {
+        let out = format!("out-{}", list.trim_end_matches(".csv"));
+        let args = [&[list, &out, "--format", "tif"], &also[..]].concat();
+        batch(folder.path(), &args).succeeded();
+        for end in [".tif", ".depth.tif", ".points.ply", ".preview.png", ".side-by-side.png"] {
+            assert!(at(&format!("one{end}")) == at(&format!("{out}/wall{end}")), "{end} of {list}");
+        }
+        let inputs = record(&folder.path().join(&out), "wall")["request"]["inputs"].to_string();
+        assert!(inputs.contains("calib.txt"), "a new calibration is another request: {inputs}");
+    }
+    fs::remove_file(folder.path().join("data/wall/calib.txt")).unwrap();
+    let told = batch(folder.path(), &[&["list.csv", "none"], &also[..]].concat());
+    assert!(
+        told.stderr.contains("wall: --also depth: takes the cameras, and there is no calib.txt"),
+        "{told:?}"
+    );
+    assert_eq!(told.code, Some(1));
 }
 
 #[test]
@@ -150,9 +183,9 @@ fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
     let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
     fs::write(folder.path().join("list.csv"), list.replacen(",31\n", ",30\n", 1)).unwrap();
     again(&[], "1 done, 2 skipped, 0 failed");
-    again(&["--validity"], "3 done, 0 skipped, 0 failed");
+    again(&["--also", "validity"], "3 done, 0 skipped, 0 failed");
     again(&["--set", "temperature=0.3"], "3 done, 0 skipped, 0 failed");
-    assert!(names(&out, "-validity.png").is_empty(), "maps of an earlier request go with its record");
+    assert!(names(&out, ".validity.png").is_empty(), "maps of an earlier request go with its record");
     again(&["--set", "temperature=0.3"], "0 done, 3 skipped, 0 failed");
     // The record of another version.
     let text = fs::read_to_string(out.join("pair-2.json")).unwrap();
@@ -330,7 +363,8 @@ fn status_tells_and_runs_nothing() {
     fs::write(&image, good).unwrap();
     batch(folder.path(), &["list.csv", "out"]).succeeded();
     assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
-    let other = batch(folder.path(), &["list.csv", "out", "--status", "--validity"]).succeeded().stdout;
+    let other =
+        batch(folder.path(), &["list.csv", "out", "--status", "--also", "validity"]).succeeded().stdout;
     assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
 }
 
@@ -346,7 +380,7 @@ fn the_folders_in_a_folder_are_pairs() {
     fs::create_dir(folder.path().join("data/.hidden")).unwrap();
     fs::write(folder.path().join("data/readme"), "").unwrap();
     batch(folder.path(), &["data", "out"]).succeeded();
-    let args = ["match", "data/wall/im0.png", "data/wall/im1.png", "wall.pfm", "--backend", "cpu"];
+    let args = ["match", "data/wall/im0.png", "data/wall/im1.png", "wall.pfm", "--device", "cpu"];
     run(folder.path(), &args).succeeded();
     assert_eq!(names(&folder.path().join("out"), ".pfm"), ["slanted", "wall"]);
     assert!(maps(&folder.path().join("out"))["wall"] == maps(folder.path())["wall"]);
@@ -398,7 +432,7 @@ fn a_bad_list_is_refused_before_anything_runs() {
         ("name,left,right\na.,l,r\n", &["line 2", "`a.` is no name", ". or space last"]),
         ("name,left,right\nwhat?,l,r\n", &["line 2", "`what?` is no name"]),
         ("name,left,right\nÄ,l,r\nä,l,r\n", &["line 3", "name ä is taken by line 2"]),
-        ("name,left,right\na-Validity,l,r\n", &["line 2", "ends in -validity", "rename"]),
+        ("name,left,right\na.Validity,l,r\n", &["line 2", "ends in .validity", "rename"]),
         (&long, &["line 2", "at most 200"]),
         ("name,left,right,max_disparity\na,l,r,many\n", &["line 2", "max_disparity", "whole number"]),
         ("name,left,right,max_disparity\na,l,r,-3\n", &["line 2", "max_disparity", "below", "min_disparity"]),

@@ -9,10 +9,14 @@ use super::{has_gpu, listing, run, workshop};
 #[test]
 fn a_bench_gives_every_figure_of_both_backends() {
     let folder = workshop();
-    let (backends, which) = if has_gpu() { (&["cpu", "gpu"][..], "both") } else { (&["cpu"][..], "cpu") };
+    let (backends, which) = if has_gpu() {
+        (&["cpu", "gpu"][..], &["--device", "cpu", "--device", "gpu"][..])
+    } else {
+        (&["cpu"][..], &["--device", "cpu"][..])
+    };
     let args = ["bench", "misfit", "without-disp0GT.pfm", "--repeats", "2", "--json", "out.json"];
-    let more = ["--backend", which, "--threads", "2", "--set", "levels=1", "--set", "percentile=92"];
-    let told = run(folder.path(), &[&args[..], &more].concat()).succeeded();
+    let more = ["--threads", "2", "--set", "levels=1", "--set", "percentile=92"];
+    let told = run(folder.path(), &[&args[..], which, &more].concat()).succeeded();
     let json = fs::read_to_string(folder.path().join("out.json")).unwrap();
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
@@ -23,8 +27,8 @@ fn a_bench_gives_every_figure_of_both_backends() {
     let expected = expected.iter().flat_map(|pair| ["default", "paper"].map(|preset| (pair, preset)));
     assert_eq!(pairs.len(), 4);
     for (pair, (&(name, width, height), preset)) in pairs.iter().zip(expected) {
-        let what = format!("{name}, preset {preset}");
-        assert_eq!((&pair["name"], &pair["preset"]), (&name.into(), &preset.into()));
+        let what = format!("{name}, method {preset}");
+        assert_eq!((&pair["name"], &pair["method"]), (&name.into(), &preset.into()));
         assert_eq!((&pair["width"], &pair["height"]), (&width.into(), &height.into()), "{what}");
         assert_eq!(pair["labels"], 32, "{what}");
         assert!(
@@ -34,10 +38,10 @@ fn a_bench_gives_every_figure_of_both_backends() {
         );
         let method = &json["methods"][preset];
         assert_eq!(method["graph"]["levels"], 1, "--set counts for every preset");
-        assert_eq!(pair["backends"].as_object().unwrap().len(), backends.len());
+        assert_eq!(pair["devices"].as_object().unwrap().len(), backends.len());
 
         for &backend in backends {
-            let found = &pair["backends"][backend];
+            let found = &pair["devices"][backend];
             let value = |key: &str| {
                 let value = found[key].as_f64().unwrap_or_else(|| panic!("{what}, {backend}: no {key}"));
                 assert!(value > 0.0 && value.is_finite(), "{what}, {backend}: {key} is {value}");
@@ -87,24 +91,24 @@ fn a_bench_gives_every_figure_of_both_backends() {
         }
         // The same bits take the same work.
         for key in ["iterations", "label_updates", "plan_bytes"] {
-            let of = |backend: &&str| &pair["backends"][*backend][key];
+            let of = |backend: &&str| &pair["devices"][*backend][key];
             assert!(backends.iter().all(|backend| of(backend) == of(&"cpu")), "{what}: {key}");
         }
     }
 
     // A single case, printed.
-    let args = ["bench", "misfit", "--preset", "fgs", "--backend", "cpu", "--repeats", "1", "--json", "-"];
+    let args = ["bench", "misfit", "--method", "fgs", "--device", "cpu", "--repeats", "1", "--json", "-"];
     let pairs = &run(folder.path(), &args).succeeded().json()["pairs"];
-    assert_eq!((pairs.as_array().unwrap().len(), &pairs[0]["preset"]), (1, &"fgs".into()));
-    assert_eq!(pairs[0]["backends"]["gpu"], Value::Null);
+    assert_eq!((pairs.as_array().unwrap().len(), &pairs[0]["method"]), (1, &"fgs".into()));
+    assert_eq!(pairs[0]["devices"]["gpu"], Value::Null);
 }
 
 #[test]
 fn a_bench_without_folders_makes_up_its_pair() {
     let folder = tempfile::tempdir().unwrap();
-    let args = ["bench", "--preset", "default", "--backend", "cpu", "--repeats", "1", "--set", "levels=1"];
+    let args = ["bench", "--method", "default", "--device", "cpu", "--repeats", "1", "--set", "levels=1"];
     let told = run(folder.path(), &args).succeeded();
-    assert!(told.stdout.contains("small, preset default: 450 x 375 pixels, 60 labels"), "{}", told.stdout);
+    assert!(told.stdout.contains("small, method default: 450 x 375 pixels, 60 labels"), "{}", told.stdout);
     assert!(listing(folder.path()).is_empty());
 }
 
@@ -113,7 +117,7 @@ fn a_bench_without_folders_makes_up_its_pair() {
 fn a_bench_that_cannot_be_written_fails() {
     let folder = workshop();
     let before = listing(folder.path());
-    let args = ["bench", "misfit", "--preset", "default", "--backend", "cpu", "--repeats", "1"];
+    let args = ["bench", "misfit", "--method", "default", "--device", "cpu", "--repeats", "1"];
     let told = run(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat());
     assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""), "{told:?}");
     assert!(told.stderr.lines().last().unwrap().contains("/dev/full"), "{told:?}");

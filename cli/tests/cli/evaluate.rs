@@ -1,4 +1,4 @@
-//! `mrfgs evaluate`: figures, older layouts, the paper's tables, breakdown, ablations.
+//! `mrfgs evaluate` and its modes: figures, older layouts, the paper's tables, breakdown, ablations.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,7 +11,7 @@ use mrfgs::options::{self, Method};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::{listing, run, scene, scene_file};
+use super::{in_cells, listing, run, scene, scene_file};
 
 /// Evaluates; the standard output.
 pub(super) fn evaluated(folder: &Path, args: &[&str]) -> String {
@@ -47,11 +47,9 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
     let told = run(folder.path(), &["evaluate", &dirs[0], &dirs[1], "--json", "out.json"]).succeeded();
     let lines: Vec<&str> = told.stdout.lines().collect();
     assert_eq!(lines.len(), 3 + 4 + 3, "{}", told.stdout);
-    for (line, start) in
-        [(3, "slanted      raw   |"), (5, "exposure     raw   |"), (8, "mean         raw   |")]
-    {
+    for (line, start) in [(3, "slanted  raw   |"), (5, "exposure raw   |"), (8, "mean     raw   |")] {
         assert!(lines[line].starts_with(start), "{}", told.stdout);
-        assert!(lines[line + 1].starts_with("             final |"), "{}", told.stdout);
+        assert!(lines[line + 1].starts_with("         final |"), "{}", told.stdout);
     }
 
     let json: Value =
@@ -72,9 +70,9 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
 
     let at = |file: &str| scene_file("slanted", file);
     let (left, right, truth, mask) = (at("im0.png"), at("im1.png"), at("disp0GT.pfm"), at("mask0nocc.png"));
-    run(folder.path(), &["match", &left, &right, "map.pfm", "--raw", "raw.pfm", "--quiet"]).succeeded();
-    for (map, file) in [("final", "map.pfm"), ("raw", "raw.pfm")] {
-        let args = ["evaluate", "--disparity", file, "--truth", &truth, "--mask", &mask, "--json", "-"];
+    run(folder.path(), &["match", &left, &right, "map.pfm", "--also", "raw", "--quiet"]).succeeded();
+    for (map, file) in [("final", "map.pfm"), ("raw", "map.raw.pfm")] {
+        let args = ["evaluate", "map", file, "--truth", &truth, "--mask", &mask, "--json", "-"];
         let told = run(folder.path(), &args).succeeded();
         assert_eq!(told.stderr, "");
         let json = told.json();
@@ -87,9 +85,9 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
         }
     }
     // Without the mask there is a table all the same.
-    let args = ["evaluate", "--disparity", "map.pfm", "--truth", &truth];
+    let args = ["evaluate", "map", "map.pfm", "--truth", &truth];
     let told = run(folder.path(), &args).succeeded();
-    assert!(told.stdout.contains("map          final |"), "{}", told.stdout);
+    assert!(told.stdout.contains("map  final |"), "{}", told.stdout);
 }
 
 /// Copies a rendered scene, 2014's layout, to a folder of another name.
@@ -144,14 +142,14 @@ fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
         let largest = pixels.data().iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, b| a.max(*b));
         let max = (largest.ceil() as i32).to_string();
         let images: Vec<_> = images.split(' ').collect();
-        let args = ["match", images[0], images[1], "map.pfm", "--raw", "raw.pfm", "--max-disparity", &max];
+        let args = ["match", images[0], images[1], "map.pfm", "--also", "raw", "--max-disparity", &max];
         assert_eq!(run(folder.path(), &args).code, Some(0));
         write::disparity(&at("truth.pfm"), &pixels).unwrap();
 
-        for (map, file) in [("final", "map.pfm"), ("raw", "raw.pfm")] {
-            let by_pfm = ["--disparity", file, "--truth", "truth.pfm", "--json", "-"];
+        for (map, file) in [("final", "map.pfm"), ("raw", "map.raw.pfm")] {
+            let by_pfm = ["map", file, "--truth", "truth.pfm", "--json", "-"];
             let scale = scale.to_string();
-            let by_png = ["--disparity", file, "--truth", truth, "--truth-scale", &scale, "--json", "-"];
+            let by_png = ["map", file, "--truth", truth, "--truth-scale", &scale, "--json", "-"];
             let expected = json(&evaluated(folder.path(), &by_pfm));
             assert_eq!(json(&evaluated(folder.path(), &by_png)), expected);
             let (found, expected) = (&figures["pairs"][0][map], &expected["pairs"][0]["final"]);
@@ -182,7 +180,7 @@ fn scales_and_incomplete_folders_are_refused() {
     write::disparity(&at("map.pfm"), &Plane::filled(240, 180, 1.0)).unwrap();
     let word = ["--truth-scale", "leave it out"];
     refused(folder.path(), &["new", "--truth-scale", "3"], 2, &word);
-    let args = ["--disparity", "map.pfm", "--truth", "map.pfm", "--truth-scale", "3"];
+    let args = ["map", "map.pfm", "--truth", "map.pfm", "--truth-scale", "3"];
     refused(folder.path(), &args, 1, &["map.pfm", "8-bit PNG", "leave --truth-scale out"]);
     refused(folder.path(), &[&args[..3], &["old/disp2.png"]].concat(), 1, &["disp2.png", "--truth-scale"]);
     refused(folder.path(), &[&args[..3], &["old/im2.png"], &args[4..]].concat(), 1, &["im2.png", "grey"]);
@@ -213,17 +211,18 @@ fn tables_stand_beside_the_papers() {
         .filter(|name| options::PRESETS.iter().any(|preset| preset.0 == *name))
         .collect();
 
-    let text = evaluated(folder.path(), &["Teddy", "Cones", "--tables", "--json", "out.json"]);
+    let text = evaluated(folder.path(), &["paper", "Teddy", "Cones", "--json", "out.json"]);
     assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    let cells = in_cells(&text);
     for words in [
         "Table 1: raw maps, before post-processing.",
         "Table 2: final maps, after post-processing.",
-        "Teddy       |  2.60  32.02  14.17|  2.09  32.43  13.90|",
-        "Cones       |  2.32  33.33  15.11|  1.98  33.43  15.06|",
-        "mean        |  2.11  33.29  12.33|  1.83  33.36  12.15|",
-        "|   paper: MR-FGS    |",
+        "\nTeddy | 2.60 32.02 14.17 | 2.09 32.43 13.90 |",
+        "\nCones | 2.32 33.33 15.11 | 1.98 33.43 15.06 |",
+        "\nmean | 2.11 33.29 12.33 | 1.83 33.36 12.15 |",
+        "| paper: MR-FGS |",
     ] {
-        assert!(text.contains(words), "no `{words}` in:\n{text}");
+        assert!(cells.contains(words), "no `{words}` in:\n{text}");
     }
     for preset in &presets {
         assert!(text.contains(&format!(" ours: {preset} ")) || text.contains(&format!(" ours: {preset}\n")));
@@ -244,7 +243,7 @@ fn tables_stand_beside_the_papers() {
 
     // Ours are those that the preset gives by itself.
     for preset in presets {
-        let alone = evaluated(folder.path(), &["Teddy", "Cones", "--preset", preset, "--json", "-"]);
+        let alone = evaluated(folder.path(), &["Teddy", "Cones", "--method", preset, "--json", "-"]);
         let alone = json(&alone);
         for (table, map) in [(raw, "raw"), (finished, "final")] {
             for name in ["avg", "psnr", "bad2.0"] {
@@ -258,23 +257,20 @@ fn tables_stand_beside_the_papers() {
     }
 
     // A pair that the paper lacks leaves its columns, and those of the mean, empty.
-    let text = evaluated(folder.path(), &["Teddy", "thin", "--tables"]);
+    let text = evaluated(folder.path(), &["paper", "Teddy", "thin"]);
     for line in ["thin", "mean"] {
-        let empty = format!("{line:12}|     -      -      -|     -      -      -|  ");
-        assert!(text.contains(&empty), "no `{empty}` in:\n{text}");
+        let empty = format!("\n{line} | - - - | - - - | ");
+        assert!(in_cells(&text).contains(&empty), "no `{empty}` in:\n{text}");
     }
-    let printed = json(&evaluated(folder.path(), &["thin", "--tables", "--json", "-"]));
+    let printed = json(&evaluated(folder.path(), &["paper", "thin", "--json", "-"]));
     assert!(printed["tables"][0]["pairs"][0]["published"].is_null());
 
-    for flags in [
-        ["--preset", "paper"],
-        ["--set", "levels=2"],
-        ["--memory", "1GiB"],
-        ["--config", "x"],
-        ["--report", "r"],
-    ] {
-        let args = [&["Teddy", "--tables"], &flags[..]].concat();
-        refused(folder.path(), &args, 2, &["--tables", flags[0], "cannot be used"]);
+    for flags in [["--method", "paper"], ["--set", "levels=2"], ["--memory", "1GiB"], ["--report", "r"]] {
+        let args = [&["paper", "Teddy"], &flags[..]].concat();
+        let words = [flags[0], "unexpected argument", "`mrfgs evaluate paper --help`"];
+        refused(folder.path(), &args, 2, &words);
+        let args = [&flags[..], &["paper", "Teddy"]].concat();
+        refused(folder.path(), &args, 2, &["'paper' cannot be used with", flags[0]]);
     }
 }
 
@@ -307,16 +303,17 @@ fn a_breakdown_adds_up() {
         assert!(optimal < auc && auc < bad, "{confidence}");
 
         // The text has the same.
-        let found: Vec<&str> = text.lines().filter(|line| line.starts_with(&format!("{name:12}|"))).collect();
+        let cells = in_cells(&text);
+        let found: Vec<&str> = cells.lines().filter(|line| line.starts_with(&format!("{name} | "))).collect();
         let [errors, worth] = found[..] else { panic!("two lines of {name}:\n{text}") };
         let classes = ["border", "occluded", "edge", "plain", "slanted", "other"].map(|class| {
             let [share, points] = ["share", "points"].map(|key| breakdown[class][key].as_f64().unwrap());
-            format!("{share:>6.2} {points:>6.2}")
+            format!("{share:.2} {points:.2}")
         });
-        assert_eq!(errors, format!("{name:12}|{}|{bad:>6.2}", classes.join("|")));
+        assert_eq!(errors, format!("{name} | {} | {bad:.2}", classes.join(" | ")));
         let figure = |value: &Value| value.as_f64().map_or_else(|| "-".into(), |v| format!("{v:.2}"));
         let [precision, recall] = ["precision", "recall"].map(|key| figure(&of["validity"][key]));
-        let expected = format!("{name:12}|{auc:>6.2} {optimal:>7.2} {bad:>7.2}|{precision:>10} {recall:>7}");
+        let expected = format!("{name} | {auc:.2} {optimal:.2} {bad:.2} | {precision} {recall}");
         assert_eq!(worth, expected);
     }
     assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
@@ -325,15 +322,15 @@ fn a_breakdown_adds_up() {
     assert!(thin["validity"].is_null() && figures["mean"]["validity"].is_null());
 
     // Of the maps that the program writes.
-    let args = ["match", "Teddy/im0.png", "Teddy/im1.png", "map.pfm", "--confidence", "c.png", "--validity"];
-    assert_eq!(run(folder.path(), &[&args[..], &["v.png"]].concat()).code, Some(0));
+    let args = ["match", "Teddy/im0.png", "Teddy/im1.png", "map.pfm", "--also", "confidence,validity"];
+    assert_eq!(run(folder.path(), &args).code, Some(0));
     let truth = read::read_disparity(&at("Teddy/disp0GT.pfm")).unwrap();
     let (map, grey) = (read::read_disparity(&at("map.pfm")).unwrap(), |file: &str| read::grey8(&at(file)));
-    let expected = sparsify(&map, &truth, &grey("c.png").unwrap()).unwrap();
+    let expected = sparsify(&map, &truth, &grey("map.confidence.png").unwrap()).unwrap();
     // JSON is read to the last bit but one.
     let auc = teddy["confidence"]["auc"].as_f64().unwrap();
     assert!((auc - expected.auc).abs() <= 1e-12 * expected.auc, "{auc} against {}", expected.auc);
-    let (validity, mask) = (grey("v.png").unwrap(), grey("Teddy/mask0nocc.png").unwrap());
+    let (validity, mask) = (grey("map.validity.png").unwrap(), grey("Teddy/mask0nocc.png").unwrap());
     let of = |flagged: bool, unseen: bool| {
         let pixels = validity.data().iter().zip(mask.data());
         pixels.filter(|&(v, m)| (v & 7 != 0) == flagged && (*m != 255) == unseen).count() as f64
@@ -347,13 +344,14 @@ fn a_breakdown_adds_up() {
     assert!(text.starts_with(&plain) && text.len() > plain.len());
     let again = json(&evaluated(folder.path(), &["Teddy", "thin", "--json", "-"]));
     assert_eq!(again["mean"], figures["mean"]);
-    let args = ["--disparity", "map.pfm", "--truth", "Teddy/disp0GT.pfm", "--json", "-"];
+    let args = ["map", "map.pfm", "--truth", "Teddy/disp0GT.pfm", "--json", "-"];
     let others = json(&evaluated(folder.path(), &args));
     for key in ["breakdown", "confidence", "validity"] {
         assert!(others["pairs"][0][key].is_null() && others["mean"][key].is_null());
     }
-    refused(folder.path(), &[&args[..4], &["--breakdown"]].concat(), 2, &["--breakdown", "cannot be used"]);
-    refused(folder.path(), &["Teddy", "--breakdown", "--tables"], 2, &["--breakdown", "--tables"]);
+    let words = ["--breakdown", "unexpected argument"];
+    refused(folder.path(), &[&args[..4], &["--breakdown"]].concat(), 2, &words);
+    refused(folder.path(), &["paper", "Teddy", "--breakdown"], 2, &words);
 }
 
 #[test]
@@ -373,7 +371,7 @@ fn ablations_are_held_against_the_default() {
     write::disparity(&at("part/disp0GT.pfm"), &part).unwrap();
     fs::write(at("part/calib.txt"), "ndisp=32\n").unwrap();
 
-    let text = evaluated(folder.path(), &["part", "--ablations", "--json", "out.json"]);
+    let text = evaluated(folder.path(), &["ablations", "part", "--json", "out.json"]);
     let all = json(&fs::read_to_string(at("out.json")).unwrap());
     assert_eq!(all["pairs"], serde_json::json!(["part"]));
     let rows = all["rows"].as_array().unwrap();
@@ -385,12 +383,13 @@ fn ablations_are_held_against_the_default() {
     for row in rows {
         let change = 100.0 * (number(row, "bad2.0") / number(default, "bad2.0") - 1.0);
         assert!((number(row, "change") - change).abs() < 1e-9 && number(row, "time") > 0.0, "{row}");
-        let start = format!("{:24} | ", row["name"].as_str().unwrap());
-        let line = text.lines().find(|line| line.starts_with(start.trim_end())).unwrap();
+        let start = format!("{} |", row["name"].as_str().unwrap());
+        let cells = in_cells(&text);
+        let line = cells.lines().find(|line| line.starts_with(&start)).unwrap();
         for (key, value) in row["changes"].as_object().unwrap() {
             assert!(line.contains(&format!("{key}={}", value.as_str().unwrap())), "{line}");
         }
-        assert!(line.contains(&format!(" {:.2} {change:>+9.1} ", number(row, "bad2.0"))), "{line}");
+        assert!(line.contains(&format!(" {:.2} {change:+.1} ", number(row, "bad2.0"))), "{line}");
     }
 
     // A row is what --set gives by itself.
@@ -404,18 +403,15 @@ fn ablations_are_held_against_the_default() {
     assert!(number(changed, "bad0.5") > number(default, "bad0.5"));
 
     for flags in [
-        &["--preset", "paper"][..],
+        &["--method", "paper"][..],
         &["--set", "levels=2"],
-        &["--config", "x"],
         &["--memory", "1GiB"],
         &["--report", "r"],
-        &["--tables"],
         &["--breakdown"],
+        &["--truth", "part/disp0GT.pfm"],
     ] {
-        let args = [&["part", "--ablations"], flags].concat();
-        refused(folder.path(), &args, 2, &["--ablations", flags[0], "cannot be used"]);
+        let args = [&["ablations", "part"], flags].concat();
+        refused(folder.path(), &args, 2, &[flags[0], "unexpected argument"]);
     }
-    let args = ["--ablations", "--disparity", "part/disp0GT.pfm", "--truth", "part/disp0GT.pfm"];
-    refused(folder.path(), &args, 2, &["--ablations", "--disparity"]);
-    refused(folder.path(), &["--ablations"], 2, &["DIR"]);
+    refused(folder.path(), &["ablations"], 2, &["DIR", "`mrfgs evaluate ablations --help`"]);
 }

@@ -8,7 +8,7 @@ use super::{NO_DRIVER, has_gpu, listing, run, run_with, workshop};
 /// Arguments, separated by spaces; exit status; what the message must say: the thing and the remedy.
 type Failure = (&'static str, i32, &'static [&'static str]);
 
-/// `M` stands for a `match` that would succeed, up to its output.
+/// `M` stands for a `match` that would succeed, up to its output, and `I` for such an `inspect`.
 const FAILURES: &[Failure] = &[
     // The command line itself.
     ("", 2, &["subcommand", "match, batch, evaluate", "--help"]),
@@ -65,63 +65,53 @@ const FAILURES: &[Failure] = &[
     ("M none/out.pfm", 1, &["none/out.pfm", "there is no folder none", "create it"]),
     ("M left.png/out.pfm", 1, &["left.png/out.pfm", "there is no folder", "create it"]),
     ("M taken.pfm", 1, &["taken.pfm", "is a folder", "name of a file"]),
-    ("M out.pfm --raw taken.pfm", 1, &["taken.pfm", "is a folder"]),
-    ("M out.pfm --raw raw.bmp", 1, &["raw.bmp", ".pfm"]),
-    ("M out.pfm --raw none/raw.pfm", 1, &["none/raw.pfm", "create it"]),
-    ("M out.pfm --confidence c.pfm", 1, &["c.pfm", "ends in .png"]),
-    ("M out.pfm --validity v.tif", 1, &["v.tif", "ends in .png"]),
-    ("M out.pfm --validity taken.png", 1, &["taken.png", "is a folder"]),
-    ("M out.pfm --preview p.jpg", 1, &["p.jpg", "ends in .png"]),
-    ("M out.pfm --preview none/p.png", 1, &["none/p.png", "create it"]),
+    ("M taken.tif --also raw", 1, &["taken.raw.tif", "is a folder"]),
+    ("M taken.tif --also confidence,validity", 1, &["taken.validity.png", "is a folder"]),
+    ("M out.pfm --also", 2, &["--also", "raw, depth, points", "preview, side-by-side"]),
+    ("M out.pfm --also raw,row", 2, &["--also", "'row'", "raw, depth, points"]),
+    ("M none/out.pfm --also preview", 1, &["none/out.pfm", "create it"]),
     ("M out.png --min-disparity -1", 1, &["out.png", "-1 to 9", ".pfm or .tif"]),
-    ("M out.pfm --raw raw.png --min-disparity -1", 1, &["raw.png", "-1 to 9", ".pfm or .tif"]),
     ("match left.png right.png out.png --max-disparity 256", 1, &["out.png", "0 to 256", ".pfm or .tif"]),
-    ("M out.pfm --raw out.pfm", 2, &["--raw", "out.pfm is OUTPUT already", "another name"]),
-    ("M out.pfm --raw ./folder/../out.pfm", 2, &["--raw", "OUTPUT", "another name"]),
-    ("M a.png --preview a.png", 2, &["--preview", "a.png is OUTPUT already", "another name"]),
+    ("M out.pfm --json out.pfm", 2, &["--json", "out.pfm is OUTPUT already", "another name"]),
+    ("M out.pfm --json ./folder/../out.pfm", 2, &["--json", "OUTPUT", "another name"]),
     (
-        "M out.pfm --confidence c.png --validity c.png",
+        "M out.pfm --also raw,validity --json ./out.validity.png",
         2,
-        &["--validity", "c.png is --confidence", "another name"],
+        &["--json", "out.validity.png is --also validity already", "another name"],
     ),
     ("M left.png", 2, &["OUTPUT", "left.png is LEFT already", "another name"]),
-    ("M out.pfm --preview folder/../right.png", 2, &["--preview", "is RIGHT already", "another name"]),
-    ("M narrow.png --mask left.png --preview left.png", 2, &["--preview", "LEFT", "another name"]),
+    ("M folder/../right.png", 2, &["OUTPUT", "is RIGHT already", "another name"]),
+    (
+        "match left.png view.preview.png folder/../view.pfm --max-disparity 9 --also preview",
+        2,
+        &["--also preview", "view.preview.png is RIGHT already", "another name"],
+    ),
+    ("M narrow.png --mask left.png --json left.png", 2, &["--json", "LEFT", "another name"]),
     ("M out.pfm --json none/a.json", 1, &["none/a.json", "create it"]),
     ("M out.pfm --json folder", 1, &["folder", "is a folder"]),
     ("M out.pfm --json right.png", 2, &["--json", "right.png is RIGHT", "another name"]),
     ("M - --json -", 2, &["--json", "- is OUTPUT already", "another name"]),
-    ("M out.pfm --raw -", 1, &["-:", ".pfm"]),
-    ("M out.pfm --side-by-side", 2, &["--preview", "--help"]),
-    ("M out.pfm --colours grey", 2, &["--preview", "--help"]),
-    ("M out.pfm --preview p.png --colours jet", 2, &["--colours", "'jet'", "turbo, viridis, grey"]),
-    ("M taken.pfm/out.pfm --intermediates taken.pfm", 2, &["OUTPUT", "folder of --intermediates"]),
+    ("M - --also raw", 2, &["--also raw", "beside OUTPUT", "give OUTPUT a name"]),
+    ("M out.pfm --colours grey", 2, &["--colours", "add --also preview"]),
+    ("M out.pfm --also validity --colours grey", 2, &["--colours", "add --also preview"]),
+    ("M out.pfm --also preview --colours jet", 2, &["--colours", "'jet'", "turbo, viridis, grey"]),
     // Cameras.
-    ("M out.pfm --depth z.pfm", 2, &["--depth", "no calib.txt beside left.png", "--calib"]),
-    ("M out.pfm --point-cloud c.ply", 2, &["--point-cloud", "no calib.txt beside left.png", "--calib"]),
+    ("M out.pfm --also depth", 2, &["--also depth", "no calib.txt beside left.png", "--calib"]),
+    ("M out.pfm --also points", 2, &["--also points", "no calib.txt beside left.png", "--calib"]),
     (
-        "match silent/left.png right.png out.pfm --max-disparity 9 --depth z.pfm",
+        "match silent/left.png right.png out.pfm --max-disparity 9 --also depth",
         1,
         &["silent/calib.txt", "does not say cam0 and doffs and baseline", "cam0=[f 0 cx; 0 f cy; 0 0 1]"],
     ),
+    ("M out.pfm --calib half/calib.txt --also points", 1, &["half/calib.txt", "say doffs and baseline"]),
+    ("M out.pfm --calib zero/calib.txt --also depth", 1, &["zero/calib.txt", "baseline=0 is not above 0"]),
     (
-        "M out.pfm --calib half/calib.txt --point-cloud c.ply",
-        1,
-        &["half/calib.txt", "say doffs and baseline"],
-    ),
-    ("M out.pfm --calib zero/calib.txt --depth z.tif", 1, &["zero/calib.txt", "baseline=0 is not above 0"]),
-    (
-        "M out.pfm --calib larger/calib.txt --depth z.tif",
+        "M out.pfm --calib larger/calib.txt --also depth",
         1,
         &["larger/calib.txt is for images of 120 x 80", "left.png is 60 x 40"],
     ),
     ("M out.pfm --calib none.txt", 1, &["none.txt", "no such file", "check the name"]),
     ("M out.pfm --calib damaged/calib.txt", 1, &["damaged/calib.txt", "line 1", "ndisp"]),
-    ("M out.pfm --calib camera/calib.txt --depth z.png", 1, &["z.png", ".pfm or .tif (float)"]),
-    ("M out.pfm --calib camera/calib.txt --depth none/z.pfm", 1, &["none/z.pfm", "create it"]),
-    ("M out.pfm --calib camera/calib.txt --depth ./out.pfm", 2, &["--depth", "OUTPUT", "another name"]),
-    ("M out.pfm --calib camera/calib.txt --point-cloud c.pcd", 1, &["c.pcd", "ends in .ply"]),
-    ("M out.pfm --calib camera/calib.txt --point-cloud none/c.ply", 1, &["none/c.ply", "create it"]),
     (
         "M out.pfm --calib camera/calib.txt --json camera/calib.txt",
         2,
@@ -141,10 +131,15 @@ const FAILURES: &[Failure] = &[
         2,
         &["--memory", "1 MiB", "60 x 40", "at least", "smaller"],
     ),
-    ("M out.pfm --intermediates folder/full", 1, &["folder/full", "not empty"]),
-    ("M out.pfm --intermediates left.png", 1, &["left.png", "is a file"]),
-    ("M out.pfm --intermediates none/steps", 1, &["none/steps", "no folder none", "create it"]),
-    ("M out.pfm --intermediates out.pfm", 2, &["--intermediates", "out.pfm is OUTPUT", "another name"]),
+    // Inspection.
+    ("inspect left.png", 2, &["<RIGHT>", "mrfgs inspect --help"]),
+    ("I folder/full", 1, &["folder/full", "not empty"]),
+    ("I left.png", 1, &["left.png", "is a file"]),
+    ("I none/steps", 1, &["none/steps", "no folder none", "create it"]),
+    ("I steps --json steps", 2, &["--json", "steps is DIR already", "another name"]),
+    ("I taken.pfm --json taken.pfm/a.json", 2, &["--json", "folder of DIR", "another name"]),
+    ("I steps --json left.png", 2, &["--json", "left.png is LEFT already", "another name"]),
+    ("I steps --quiet", 2, &["--quiet", "mrfgs inspect --help"]),
     ("match damaged/left.png right.png out.pfm", 1, &["calib.txt", "line 1", "ndisp"]),
     ("match huge/left.png right.png out.pfm", 1, &["calib.txt", "ndisp=100000", "at most 16384"]),
     ("M out.pfm --max-disparity 9", 2, &["--max-disparity", "multiple times"]),
@@ -167,7 +162,10 @@ const FAILURES: &[Failure] = &[
         &["--max-disparity", "60 to 70", "60 pixels wide"],
     ),
     // The method.
-    ("M out.pfm --preset best", 2, &["--preset", "`best`", "default, paper"]),
+    ("M out.pfm --method best", 2, &["--method", "`best`", "default, paper, fgs", "TOML file"]),
+    ("M out.pfm --method none/best.toml", 1, &["none/best.toml", "no such file"]),
+    ("M out.pfm --method value.toml --method paper", 1, &["value.toml", "line 3"]),
+    ("M out.pfm --method default --method paper", 2, &["--method", "paper would replace", "give it first"]),
     ("M out.pfm --set colour=red", 2, &["--set colour", "no such key", "mrfgs presets"]),
     ("M out.pfm --set levels", 2, &["--set", "levels=4"]),
     ("M out.pfm --set =4", 2, &["--set", "levels=4"]),
@@ -178,19 +176,19 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --set graph.sad-window=7", 2, &["--set graph.sad-window", "it is `cost.sad-window`"]),
     ("M out.pfm --set temperature=nan", 2, &["--set temperature", "outside"]),
     ("M out.pfm --set sad-window=4", 2, &["--set sad-window", "odd", "3 or 5"]),
-    ("M out.pfm --config none.toml", 1, &["none.toml", "no such file", "check the name"]),
-    ("M out.pfm --config folder", 1, &["folder"]),
-    ("M out.pfm --config syntax.toml", 1, &["syntax.toml", "line 2"]),
-    ("M out.pfm --config key.toml", 1, &["key.toml", "line 2", "level", "mrfgs presets"]),
-    ("M out.pfm --config value.toml", 1, &["value.toml", "line 3", "temperature", "-1 is outside"]),
-    ("M out.pfm --config left.png", 1, &["left.png", "TOML"]),
+    ("M out.pfm --method none.toml", 1, &["none.toml", "no such file", "check the name"]),
+    ("M out.pfm --method folder", 1, &["folder"]),
+    ("M out.pfm --method syntax.toml", 1, &["syntax.toml", "line 2"]),
+    ("M out.pfm --method key.toml", 1, &["key.toml", "line 2", "level", "mrfgs presets"]),
+    ("M out.pfm --method value.toml", 1, &["value.toml", "line 3", "temperature", "-1 is outside"]),
+    ("M out.pfm --method left.png", 1, &["left.png", "TOML"]),
     // Where it runs.
     ("M out.pfm --threads 0", 2, &["--threads", "1..=1024"]),
     ("M out.pfm --threads -1", 2, &["-1"]),
     ("M out.pfm --threads 1000000", 2, &["--threads", "1..=1024"]),
     ("M out.pfm --threads two", 2, &["--threads", "two"]),
-    ("M out.pfm --backend tpu", 2, &["--backend", "auto, gpu, cpu"]),
-    ("M out.pfm --backend cpu --device 0", 2, &["--device", "--backend cpu"]),
+    ("M out.pfm --device cpu --device 0", 2, &["--device", "multiple times"]),
+    ("M out.pfm --threads 2 --backend cpu", 2, &["--backend", "mrfgs match --help"]),
     // Evaluation.
     ("evaluate", 2, &["DIR", "mrfgs evaluate --help"]),
     ("evaluate none", 1, &["none/im0.png", "disp0GT.pfm, calib.txt"]),
@@ -201,41 +199,50 @@ const FAILURES: &[Failure] = &[
     ("evaluate without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to evaluate holds"]),
     ("evaluate misfit without-calib.txt", 1, &["without-calib.txt/calib.txt"]),
     ("evaluate misfit", 1, &["disp0GT.pfm is 240 x 180", "im0.png is 60 x 40"]),
-    ("evaluate misfit --preset best", 2, &["--preset", "default, paper"]),
+    ("evaluate misfit --method best", 2, &["--method", "default, paper"]),
     ("evaluate misfit --json none/a.json", 1, &["none/a.json", "create it"]),
     ("evaluate misfit --json folder", 1, &["folder", "is a folder"]),
     ("evaluate misfit --json misfit/calib.txt", 2, &["--json", "misfit/calib.txt", "another name"]),
-    ("evaluate misfit --submission subs", 2, &["--submission <DIR> <METHOD>", "2 values"]),
-    ("evaluate misfit --submission subs a.b", 2, &["--submission", "a.b is no METHOD", "letters, digits"]),
-    ("evaluate misfit --submission subs X_s", 2, &["--submission", "X_s", "sparse", "another METHOD"]),
-    ("evaluate misfit --submission none/subs X", 1, &["none/subs", "create it"]),
-    ("evaluate misfit --submission folder/full X", 1, &["folder/full", "not empty"]),
-    ("evaluate misfit ./misfit --submission subs X", 2, &["two pairs are called misfit", "rename"]),
-    ("evaluate misfit --submission subs X --tables", 2, &["--submission", "--tables"]),
-    ("evaluate misfit --submission subs X --report subs", 2, &["--submission", "folder of --report"]),
+    ("evaluate submission subs", 2, &["<METHOD> <PAIR>...", "mrfgs evaluate submission --help"]),
+    ("evaluate submission subs a.b misfit", 2, &["METHOD", "a.b", "letters, digits"]),
+    ("evaluate submission subs X_s misfit", 2, &["METHOD", "X_s", "sparse", "another name"]),
+    ("evaluate submission none/subs X misfit", 1, &["none/subs", "create it"]),
+    ("evaluate submission folder/full X misfit", 1, &["folder/full", "not empty"]),
+    ("evaluate submission subs X misfit ./misfit", 2, &["two pairs are called misfit", "rename"]),
+    ("evaluate submission subs X misfit --report subs", 2, &["--report", "mrfgs evaluate submission --help"]),
     (
-        "evaluate misfit --submission taken.png X --json taken.png/a.json",
+        "evaluate submission taken.png X misfit --json taken.png/a.json",
         2,
-        &["--json", "folder of --submission"],
+        &["--json", "folder of DIR", "another name"],
     ),
-    ("evaluate --disparity unknown.pfm", 2, &["--truth"]),
-    ("evaluate --truth unknown.pfm", 2, &["--disparity"]),
-    ("evaluate misfit --disparity unknown.pfm --truth unknown.pfm", 2, &["DIR", "--disparity"]),
-    ("evaluate --levels 3 --disparity unknown.pfm --truth unknown.pfm", 2, &["--levels"]),
-    ("evaluate --preset paper --disparity unknown.pfm --truth unknown.pfm", 2, &["--preset", "--disparity"]),
-    ("evaluate --disparity none.pfm --truth unknown.pfm", 1, &["none.pfm", "check the name"]),
-    ("evaluate --disparity left.png --truth unknown.pfm", 1, &["left.png", "channel", "16-bit .png"]),
-    ("evaluate --disparity unknown.pfm --truth unknown.pfm", 1, &["unknown.pfm", "no known disparity"]),
+    ("evaluate map unknown.pfm", 2, &["--truth", "mrfgs evaluate map --help"]),
+    ("evaluate map --truth unknown.pfm", 2, &["<MAP>", "mrfgs evaluate map --help"]),
+    ("evaluate misfit --truth unknown.pfm", 2, &["--truth", "mrfgs evaluate --help"]),
+    ("evaluate map unknown.pfm misfit --truth unknown.pfm", 2, &["misfit", "mrfgs evaluate map --help"]),
+    ("evaluate --levels 3 map unknown.pfm --truth unknown.pfm", 2, &["--levels"]),
+    ("evaluate map unknown.pfm --truth unknown.pfm --method paper", 2, &["--method", "mrfgs evaluate map"]),
     (
-        "evaluate --disparity unknown.pfm --truth misfit/disp0GT.pfm",
-        1,
-        &["240 x 180", "unknown.pfm is 1 x 1"],
+        "evaluate --breakdown map unknown.pfm --truth unknown.pfm",
+        2,
+        &["map", "--breakdown", "cannot be used"],
     ),
+    ("evaluate map none.pfm --truth unknown.pfm", 1, &["none.pfm", "check the name"]),
+    ("evaluate map left.png --truth unknown.pfm", 1, &["left.png", "channel", "16-bit .png"]),
+    ("evaluate map unknown.pfm --truth unknown.pfm", 1, &["unknown.pfm", "no known disparity"]),
+    ("evaluate map unknown.pfm --truth misfit/disp0GT.pfm", 1, &["240 x 180", "unknown.pfm is 1 x 1"]),
     (
-        "evaluate --disparity misfit/disp0GT.pfm --truth misfit/disp0GT.pfm --mask left.png",
+        "evaluate map misfit/disp0GT.pfm --truth misfit/disp0GT.pfm --mask left.png",
         1,
         &["left.png is 60 x 40", "240 x 180"],
     ),
+    (
+        "evaluate map misfit/disp0GT.pfm --truth misfit/disp0GT.pfm --json misfit/disp0GT.pfm",
+        2,
+        &["--json", "misfit/disp0GT.pfm is an input", "another name"],
+    ),
+    ("evaluate paper", 2, &["DIR", "mrfgs evaluate paper --help"]),
+    ("evaluate paper misfit --json folder", 1, &["folder", "is a folder"]),
+    ("evaluate ablations misfit --json misfit/calib.txt", 2, &["--json", "misfit/calib.txt", "another name"]),
     // Batches.
     ("batch", 2, &["<LIST> <OUTDIR>", "mrfgs batch --help"]),
     ("batch none.csv out", 1, &["none.csv", "no such file", "check the name"]),
@@ -250,26 +257,26 @@ const FAILURES: &[Failure] = &[
     ("batch pairs.csv out --shard 4/3", 2, &["--shard", "K from 1 to N"]),
     ("batch pairs.csv out --shard 2", 2, &["--shard", "2/8"]),
     ("batch pairs.csv out --format jpg", 2, &["--format", "pfm, tif, png"]),
-    ("batch pairs.csv out --preset best", 2, &["--preset", "default, paper"]),
+    ("batch pairs.csv out --method best", 2, &["--method", "default, paper"]),
     ("batch pairs.csv out --set levels=17", 2, &["--set levels", "17 is outside 1 to 16"]),
-    ("batch pairs.csv out --backend cpu --device 0", 2, &["--device", "--backend cpu"]),
-    ("batch pairs.csv out --quiet --timings", 2, &["--quiet", "--timings"]),
+    ("batch pairs.csv out --device cpu --device 0", 2, &["--device", "multiple times"]),
+    ("batch pairs.csv out --also raw,row", 2, &["--also", "'row'", "raw, depth, points"]),
+    ("batch pairs.csv out --colours grey", 2, &["--colours", "add --also preview"]),
     // Benches.
     ("bench none", 1, &["none/im0.png", "a folder to match holds im0.png, im1.png, calib.txt; or"]),
     ("bench left.png", 1, &["left.png/im0.png", "a folder to match holds"]),
     ("bench misfit without-im1.png", 1, &["without-im1.png/im1.png", "a folder to match holds im0.png"]),
     ("bench misfit without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to match holds"]),
-    ("bench broken --backend cpu", 1, &["broken/im1.png", "not an image", "give PNG"]),
-    ("bench broken --backend cpu --preset fgs --json a.json", 1, &["broken/im1.png", "not an image"]),
+    ("bench broken --device cpu", 1, &["broken/im1.png", "not an image", "give PNG"]),
+    ("bench broken --device cpu --method fgs --json a.json", 1, &["broken/im1.png", "not an image"]),
     ("bench misfit --repeats 0", 2, &["--repeats", "1..=1000"]),
     ("bench misfit --repeats some", 2, &["--repeats", "some"]),
     ("bench misfit --large", 2, &["--large", "DIR"]),
-    ("bench misfit --backend auto", 2, &["--backend", "cpu, gpu, both"]),
-    ("bench misfit --backend cpu --device 0", 2, &["--device", "--backend cpu"]),
-    ("bench misfit --backend both --threads 0", 2, &["--threads", "1..=1024"]),
-    ("bench misfit --preset best", 2, &["--preset", "default, paper"]),
+    ("bench misfit --device", 2, &["--device", "value"]),
+    ("bench misfit --device cpu --threads 0", 2, &["--threads", "1..=1024"]),
+    ("bench misfit --method best", 2, &["--method", "default, paper"]),
     ("bench misfit --set levels=17", 2, &["--set levels", "17 is outside 1 to 16"]),
-    ("bench misfit --config key.toml", 1, &["key.toml", "line 2", "mrfgs presets"]),
+    ("bench misfit --method key.toml", 1, &["key.toml", "line 2", "mrfgs presets"]),
     ("bench misfit --json none/a.json", 1, &["none/a.json", "create it"]),
     ("bench misfit --json folder", 1, &["folder", "is a folder"]),
     ("bench misfit --json misfit/im1.png", 2, &["--json", "misfit/im1.png", "another name"]),
@@ -282,7 +289,12 @@ fn every_failure_is_one_line_and_leaves_nothing() {
     let before = listing(folder.path());
     let mut other = Vec::new();
     for (line, code, words) in FAILURES {
-        let words_of_line = line.replacen("M ", "match left.png right.png --max-disparity 9 ", 1);
+        let pair = |command| format!("{command} left.png right.png --max-disparity 9 ");
+        let words_of_line = match line.split_once(' ') {
+            Some(("M", rest)) => pair("match") + rest,
+            Some(("I", rest)) => pair("inspect") + rest,
+            _ => (*line).into(),
+        };
         let args: Vec<&str> = words_of_line.split_whitespace().collect();
         let told = run(folder.path(), &args);
         if told.code != Some(*code) {
@@ -314,9 +326,9 @@ fn a_folder_without_permission_is_named() {
     }
     let output = locked.join("out.pfm");
     let output = output.to_str().unwrap();
-    for outputs in [[output, "raw.pfm"], ["out.pfm", output]] {
+    for outputs in [[output, "a.json"], ["out.pfm", output]] {
         let args =
-            ["match", "left.png", "right.png", outputs[0], "--raw", outputs[1], "--max-disparity", "9"];
+            ["match", "left.png", "right.png", outputs[0], "--json", outputs[1], "--max-disparity", "9"];
         run(folder.path(), &args).failed(1, &[output, "no file can be created"], "locked");
         assert!(!folder.path().join("out.pfm").exists());
     }
@@ -327,14 +339,25 @@ fn a_folder_without_permission_is_named() {
 fn what_was_written_before_a_failure_is_removed() {
     let folder = workshop();
     let before = listing(folder.path());
-    // The disk that is always full lets itself be opened.
-    for full in ["--raw", "--validity", "--preview", "--depth", "--point-cloud", "--json"] {
-        let args = ["match", "left.png", "right.png", "out.pfm", "--confidence", "c.png", full, "/dev/full"];
-        let args =
-            [&args[..], &["--calib", "camera/calib.txt", "--intermediates", "steps", "--quiet"]].concat();
-        run(folder.path(), &args).failed(1, &["/dev/full", "No space left"], full);
-        assert!(listing(folder.path()) == before, "{full}");
+    let args = ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt", "--quiet"];
+    let words = "raw,depth,points,confidence,validity,preview,side-by-side";
+    let args = [&args[..], &["--also", words, "--json", "out.json"]].concat();
+    let endings =
+        ["raw.pfm", "depth.pfm", "points.ply", "validity.png", "preview.png", "side-by-side.png", "json"];
+    for end in endings {
+        // The disk that is always full lets itself be opened.
+        let name = format!("out.{end}");
+        let link = folder.path().join(&name);
+        std::os::unix::fs::symlink("/dev/full", &link).unwrap();
+        run(folder.path(), &args).failed(1, &[&name, "No space left"], end);
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink(), "{end}");
+        fs::remove_file(link).unwrap();
+        assert!(listing(folder.path()) == before, "{end}");
     }
+    let args = ["inspect", "left.png", "right.png", "steps", "--max-disparity", "9", "--json", "/dev/full"];
+    let told = run(folder.path(), &args);
+    assert!(told.code == Some(1) && told.stderr.contains("/dev/full: No space left"), "{told:?}");
+    assert!(listing(folder.path()) == before, "inspect");
     assert!(Path::new("/dev/full").exists());
 }
 
@@ -343,15 +366,16 @@ fn what_was_written_before_a_failure_is_removed() {
 fn without_a_driver_gpu_says_what_to_do() {
     let folder = workshop();
     let before = listing(folder.path());
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "gpu"];
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", "gpu"];
     let told = run_with(folder.path(), &args, NO_DRIVER);
-    told.failed(1, &["driver", "install", "--backend cpu"], "--backend gpu without a driver");
-    let told = run_with(folder.path(), &[&args[..], &["--device", "0"]].concat(), NO_DRIVER);
-    told.failed(1, &["driver", "install", "--backend cpu"], "--device 0 without a driver");
-    for backend in ["gpu", "both"] {
-        let args = ["bench", "misfit", "--json", "a.json", "--backend", backend];
+    told.failed(1, &["driver", "install", "--device cpu"], "--device gpu without a driver");
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", "0"];
+    let told = run_with(folder.path(), &args, NO_DRIVER);
+    told.failed(1, &["driver", "install", "--device cpu"], "--device 0 without a driver");
+    for devices in [&["--device", "gpu"][..], &["--device", "cpu", "--device", "gpu"]] {
+        let args = [&["bench", "misfit", "--json", "a.json"], devices].concat();
         let told = run_with(folder.path(), &args, NO_DRIVER);
-        told.failed(1, &["driver", "install", "--backend cpu"], "bench without a driver");
+        told.failed(1, &["driver", "install", "--device cpu"], "bench without a driver");
     }
     assert!(listing(folder.path()) == before);
 }
@@ -360,7 +384,7 @@ fn without_a_driver_gpu_says_what_to_do() {
 fn an_unknown_device_is_named() {
     let folder = workshop();
     let before = listing(folder.path());
-    for device in ["no-such-device", "999"] {
+    for device in ["no-such-device", "999", "tpu"] {
         if has_gpu() {
             let args = ["bench", "misfit", "--device", device, "--json", "a.json"];
             run(folder.path(), &args).failed(2, &["--device", device, "mrfgs devices"], device);

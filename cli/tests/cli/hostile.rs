@@ -95,9 +95,9 @@ fn what_a_header_claims_is_refused_everywhere() {
         }
         for line in [
             "match left.png right.png out.pfm --max-disparity 9 --mask NAME",
-            "evaluate --disparity NAME --truth unknown.pfm",
-            "evaluate --disparity unknown.pfm --truth NAME",
-            "evaluate --disparity unknown.pfm --truth unknown.pfm --mask NAME",
+            "evaluate map NAME --truth unknown.pfm",
+            "evaluate map unknown.pfm --truth NAME",
+            "evaluate map unknown.pfm --truth unknown.pfm --mask NAME",
         ] {
             let line = line.replace("NAME", name);
             // A truth of nothing is refused before its mask is read.
@@ -127,8 +127,8 @@ fn the_limit_on_pixels_is_kept_everywhere() {
             ["left.png", "60 x 40", "2399"],
         ),
         (format!("evaluate {dir} --max-pixels 43199"), size),
-        (format!("evaluate --disparity {disparity} --truth {disparity} --max-pixels 43199"), size),
-        (format!("bench {dir} --repeats 1 --backend cpu --max-pixels 43199"), size),
+        (format!("evaluate map {disparity} --truth {disparity} --max-pixels 43199"), size),
+        (format!("bench {dir} --repeats 1 --device cpu --max-pixels 43199"), size),
     ] {
         run(folder.path(), &line.split(' ').collect::<Vec<_>>()).failed(1, &words, &line);
     }
@@ -138,7 +138,7 @@ fn the_limit_on_pixels_is_kept_everywhere() {
     }
     assert!(listing(folder.path()) == before);
     // As many as there are will do.
-    let args = "match left.png right.png out.pfm --max-disparity 31 --max-pixels 2400 --backend cpu --quiet";
+    let args = "match left.png right.png out.pfm --max-disparity 31 --max-pixels 2400 --device cpu --quiet";
     run(folder.path(), &args.split(' ').collect::<Vec<_>>()).succeeded();
 }
 
@@ -187,7 +187,7 @@ mod memory {
         encoder.write_image(&[7; 2400], 60, 40, ExtendedColorType::L8).unwrap();
         assert!(bytes.len() < 2 << 20, "{} bytes", bytes.len());
         fs::write(folder.path().join("profile.png"), bytes).unwrap();
-        let line = "match profile.png left.png out.pfm --max-disparity 9 --backend cpu --threads 1";
+        let line = "match profile.png left.png out.pfm --max-disparity 9 --device cpu --threads 1";
         let output = limited(folder.path(), line);
         // It may be refused or read without its profile.
         assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
@@ -197,7 +197,7 @@ mod memory {
     #[test]
     fn the_limit_holds() {
         let folder = workshop();
-        let line = "match left.png right.png out.pfm --max-disparity 9 --backend cpu --threads 1";
+        let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --threads 1";
         assert!(limited(folder.path(), line).status.success());
         // Random bytes between header and pixels, so that the claim of 900 million pixels is not absurd.
         let filler = vec![b'x'; 100_000];
@@ -210,7 +210,7 @@ mod memory {
             rows: &[0],
         };
         fs::write(folder.path().join("claim.png"), png.bytes()).unwrap();
-        let line = "match claim.png claim.png out.pfm --max-disparity 9 --backend cpu --max-pixels 900000000";
+        let line = "match claim.png claim.png out.pfm --max-disparity 9 --device cpu --max-pixels 900000000";
         let output = limited(folder.path(), line);
         assert_eq!(output.status.code(), Some(1), "{output:?}");
         let said = String::from_utf8_lossy(&output.stderr);

@@ -96,6 +96,11 @@ fn listing(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
     all
 }
 
+/// A text with one space between the words of a line, whatever the widths of its columns.
+fn in_cells(text: &str) -> String {
+    text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ") + "\n").collect()
+}
+
 fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)
 }
@@ -122,7 +127,12 @@ fn workshop() -> TempDir {
     fs::write(at("folder/full/of"), "something").unwrap();
     image::GrayImage::from_pixel(60, 40, image::Luma([90])).save(at("flat.png")).unwrap();
     fs::create_dir(at("taken.pfm")).unwrap();
+    // Where outputs beside taken.tif would be.
+    fs::create_dir(at("taken.raw.tif")).unwrap();
+    fs::create_dir(at("taken.validity.png")).unwrap();
     fs::create_dir(at("taken.png")).unwrap();
+    // Inputs with the name of an output.
+    fs::copy(at("right.png"), at("view.preview.png")).unwrap();
     fs::write(at("syntax.toml"), "levels = 3\nmatching sad\n").unwrap();
     fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
     fs::write(at("value.toml"), "levels = 3\n\ntemperature = -1\n").unwrap();
@@ -195,11 +205,29 @@ fn has_gpu() -> bool {
     found
 }
 
+/// The program, its commands and theirs.
+const COMMANDS: [&str; 14] = [
+    "",
+    "match",
+    "batch",
+    "evaluate",
+    "evaluate map",
+    "evaluate paper",
+    "evaluate ablations",
+    "evaluate submission",
+    "bench",
+    "inspect",
+    "devices",
+    "presets",
+    "completions",
+    "man",
+];
+
 #[test]
 fn help_fits_a_terminal_of_80_columns() {
     let folder = tempfile::tempdir().unwrap();
-    for command in ["", "match", "batch", "evaluate", "bench", "devices", "presets", "completions", "man"] {
-        let args: Vec<_> = [command, "--help"].into_iter().filter(|arg| !arg.is_empty()).collect();
+    for command in COMMANDS {
+        let args: Vec<_> = command.split_whitespace().chain(["--help"]).collect();
         let help = run_with(folder.path(), &args, &[("COLUMNS", "80")]).succeeded().stdout;
         let (_, examples) = help.split_once("Examples:\n").unwrap_or_default();
         for line in help.lines() {
@@ -231,17 +259,17 @@ fn the_later_word_counts() {
     .unwrap();
     let dir = scene("wall").to_str().unwrap().to_owned();
     let args = ["evaluate", &dir, "--json", "-", "--set", "levels=2", "--set", "graph.levels=1"];
-    let told = run(folder.path(), &[&args[..], &["--preset", "paper", "--config", "my.toml"]].concat());
+    let told = run(folder.path(), &[&args[..], &["--method", "paper", "--method", "my.toml"]].concat());
     let method = &told.succeeded().json()["method"];
-    assert_eq!(method["graph"]["levels"], 1, "--set after --config, the last --set last");
-    assert_eq!(method["schedule"]["iterations"], 2, "--config after --preset");
+    assert_eq!(method["graph"]["levels"], 1, "--set after --method, the last --set last");
+    assert_eq!(method["schedule"]["iterations"], 2, "a file after the preset");
     let cost = &method["cost"];
     assert_eq!((&cost["matching"], &cost["outside-cost"]), (&"ad-census".into(), &1.0.into()));
-    assert_eq!(method["messages"]["potential"], "hard", "--preset before all");
+    assert_eq!(method["messages"]["potential"], "hard", "--method before all");
 }
 
 #[test]
-fn presets_can_be_pasted_into_a_config_file() {
+fn presets_can_be_pasted_into_a_file() {
     let folder = tempfile::tempdir().unwrap();
     for (name, _) in options::PRESETS {
         let told = run(folder.path(), &["presets", name]).succeeded();
@@ -344,16 +372,15 @@ fn shells_and_readers_get_every_flag() {
     run(folder.path(), &["man", "pages"]).succeeded();
     let pages = listing(&folder.path().join("pages"));
     let names: Vec<_> = pages.keys().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
-    for name in
-        ["", "-match", "-batch", "-evaluate", "-bench", "-devices", "-presets", "-completions", "-man"]
-    {
-        assert!(names.contains(&format!("mrfgs{name}.1").as_str()), "{name}: {names:?}");
+    for command in COMMANDS {
+        let name = format!("mrfgs {command}").trim_end().replace(' ', "-") + ".1";
+        assert!(names.contains(&name.as_str()), "{name}: {names:?}");
     }
-    assert_eq!(names.len(), 9);
+    assert_eq!(names.len(), COMMANDS.len());
     let page = pages.iter().find(|(path, _)| path.ends_with("mrfgs-match.1")).unwrap().1.clone().unwrap();
     let page = String::from_utf8(page).unwrap();
     assert!(page.starts_with(".ie") && page.contains(".TH mrfgs-match 1"), "{page}");
-    for flag in ["max\\-disparity", "point\\-cloud", "memory"] {
+    for flag in ["max\\-disparity", "side\\-by\\-side", "memory"] {
         assert!(page.contains(flag), "no {flag} in:\n{page}");
     }
     // Again, over what is there.

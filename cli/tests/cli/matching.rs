@@ -1,4 +1,4 @@
-//! `mrfgs match`: what it writes.
+//! `mrfgs match` and `mrfgs inspect`: what they write and say.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use mrfgs::image::read;
 use mrfgs::maps::flag;
 
-use super::{NO_DRIVER, listing, run, run_with, scene, scene_file, workshop};
+use super::{NO_DRIVER, in_cells, listing, run, run_with, scene, scene_file, workshop};
 
 #[test]
 fn match_writes_every_output_in_every_format() {
@@ -18,9 +18,9 @@ fn match_writes_every_output_in_every_format() {
     let mask = image::GrayImage::from_fn(240, 180, |x, y| image::Luma([u8::from(x > 200 && y < 9) * 9]));
     mask.save(at("mask.png")).unwrap();
 
-    let common = ["--mask", "mask.png", "--threads", "2", "--backend", "cpu"];
-    let first = ["match", &left, &right, "a.pfm", "--raw", "raw.tif", "--confidence", "confidence.png"];
-    let first = [&first[..], &["--validity", "validity.png", "--preview", "preview.png"], &common].concat();
+    let common = ["--mask", "mask.png", "--threads", "2", "--device", "cpu"];
+    let first = ["match", &left, &right, "a.pfm", "--also", "raw,confidence", "--also", "validity,preview"];
+    let first = [&first[..], &common].concat();
     let told = run(folder.path(), &first).succeeded();
     assert_eq!(told.stdout, "");
     assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
@@ -29,11 +29,11 @@ fn match_writes_every_output_in_every_format() {
     }
 
     let map = read::read_disparity(&at("a.pfm")).unwrap();
-    let raw = read::read_disparity(&at("raw.tif")).unwrap();
-    let validity = read::grey8(&at("validity.png")).unwrap();
-    let confidence = read::grey8(&at("confidence.png")).unwrap();
+    let raw = read::read_disparity(&at("a.raw.pfm")).unwrap();
+    let validity = read::grey8(&at("a.validity.png")).unwrap();
+    let confidence = read::grey8(&at("a.confidence.png")).unwrap();
     assert_eq!([map.size(), raw.size(), validity.size(), confidence.size()], [(240, 180); 4]);
-    let preview = image::open(at("preview.png")).unwrap();
+    let preview = image::open(at("a.preview.png")).unwrap();
     assert_eq!((preview.width(), preview.color()), (240, image::ColorType::Rgb8));
     assert!(preview.height() > 180, "the scale is below the map");
     let (mut measured, mut filled) = (0, 0);
@@ -56,12 +56,16 @@ fn match_writes_every_output_in_every_format() {
     assert!(map != raw, "post-processing does something");
 
     // The same map in the other formats; the number of threads changes nothing.
-    for (output, raw, step) in [("b.png", "raw.png", 256.0), ("c.tiff", "raw.PFM", f32::INFINITY)] {
-        let args = ["match", &left, &right, output, "--raw", raw, "--mask", "mask.png", "--threads", "1"];
+    for (output, raw, step) in [
+        ("b.png", "b.raw.png", 256.0),
+        ("c.tiff", "c.raw.tiff", f32::INFINITY),
+        ("C.PFM", "C.raw.PFM", f32::INFINITY),
+    ] {
+        let args = ["match", &left, &right, output, "--also", "raw", "--mask", "mask.png", "--threads", "1"];
         let quiet = run(folder.path(), &[&args[..], &["--quiet", "--max-disparity", "31"]].concat());
         let quiet = quiet.succeeded();
         assert_eq!((quiet.stdout, quiet.stderr), (String::new(), String::new()));
-        for (name, expected) in [(output, &map), (raw, &read::read_disparity(&at("raw.tif")).unwrap())] {
+        for (name, expected) in [(output, &map), (raw, &read::read_disparity(&at("a.raw.pfm")).unwrap())] {
             let same = read::read_disparity(&at(name)).unwrap();
             for (a, b) in same.data().iter().zip(expected.data()) {
                 // In 16-bit PNG a disparity of 0 is 1/256.
@@ -85,15 +89,16 @@ fn match_writes_every_output_in_every_format() {
     assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
 
     // Without the fill, what is invalid stays so.
-    let args = ["match", &left, &right, "d.pfm", "--no-fill", "--set", "fill=row", "--mask", "mask.png"];
-    run(folder.path(), &[&args[..], &["--validity", "v.png"]].concat()).succeeded();
+    let args =
+        ["match", &left, &right, "d.pfm", "--set", "fill=row", "--set", "fill=none", "--mask", "mask.png"];
+    run(folder.path(), &[&args[..], &["--also", "validity"]].concat()).succeeded();
     let map = read::read_disparity(&at("d.pfm")).unwrap();
-    let validity = read::grey8(&at("v.png")).unwrap();
+    let validity = read::grey8(&at("d.validity.png")).unwrap();
     assert!(map.data().iter().zip(validity.data()).all(|(d, f)| d.is_finite() == (f & flag::INVALID == 0)));
     assert!(map.data().iter().filter(|d| !d.is_finite()).count() > 1000);
 
     let names: Vec<_> = listing(folder.path()).into_keys().collect();
-    assert_eq!(names.len(), 12, "nothing else is left: {names:?}");
+    assert_eq!(names.len(), 14, "nothing else is left: {names:?}");
 }
 
 #[test]
@@ -154,11 +159,11 @@ fn swapped_views_are_told_whatever_the_range() {
     let list = format!("name,left,right,max_disparity\nauto,{right},{left},auto\ngiven,{right},{left},47\n");
     fs::write(folder.path().join("list.csv"), list).unwrap();
     for (range, told) in [(&["auto"][..], true), (&["47"], true), (&["0", "--min-disparity", "-47"], false)] {
-        let args = ["match", &right, &left, "out.pfm", "--backend", "cpu", "--max-disparity"];
+        let args = ["match", &right, &left, "out.pfm", "--device", "cpu", "--max-disparity"];
         let said = run(folder.path(), &[&args[..], range].concat()).succeeded().stderr;
         assert_eq!(said.contains("warning: the views seem to be swapped"), told, "{range:?}: {said}");
     }
-    run(folder.path(), &["batch", "list.csv", "maps", "--backend", "cpu"]).succeeded();
+    run(folder.path(), &["batch", "list.csv", "maps", "--device", "cpu"]).succeeded();
     for name in ["auto", "given"] {
         let record = fs::read_to_string(folder.path().join(format!("maps/{name}.json"))).unwrap();
         assert!(record.contains("the views seem to be swapped"), "{name}: {record}");
@@ -185,7 +190,7 @@ fn what_stands_for_no_data_is_ignored() {
             "out.tif",
             "--max-disparity",
             "47",
-            "--backend",
+            "--device",
             "cpu",
             "--quiet",
         ];
@@ -205,7 +210,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
     let said = |more: &[&str]| {
-        let args = ["match", &left, &right, "out.pfm", "--backend", "cpu"];
+        let args = ["match", &left, &right, "out.pfm", "--device", "cpu"];
         run(folder.path(), &[&args[..], more].concat()).succeeded().stderr
     };
     let warning = "warning: ";
@@ -224,15 +229,14 @@ fn a_range_that_cuts_off_the_scene_is_told() {
 }
 
 #[test]
-fn intermediates_show_every_step() {
+fn inspect_shows_every_step() {
     let folder = workshop();
-    let args =
-        "match left.png right.png out.pfm --max-disparity 20 --quiet --intermediates steps --set levels=3";
+    let args = "inspect left.png right.png steps --max-disparity 20 --set levels=3";
     let args: Vec<&str> = args.split_whitespace().collect();
     for (preset, more) in
         [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "label-range-width"][..])]
     {
-        run(folder.path(), &[&args[..], &["--preset", preset]].concat()).succeeded();
+        run(folder.path(), &[&args[..], &["--method", preset]].concat()).succeeded();
         let steps = folder.path().join("steps");
         let size = |name: &str| {
             let picture = image::open(steps.join(format!("{name}.png"))).unwrap();
@@ -260,9 +264,9 @@ fn intermediates_show_every_step() {
 fn what_is_stopped_leaves_nothing_behind() {
     let (left, right) = (scene_file("mixed", "im0.png"), scene_file("mixed", "im1.png"));
     let dirs = ["slanted", "mixed"].map(|name| scene(name).to_str().unwrap().to_owned());
-    // `match` once its folder is begun, `evaluate` once it has told of the first pair.
+    // `inspect` once its folder is begun, `evaluate` once it has told of the first pair.
     let runs: [(&str, &[&str]); 2] = [
-        ("-INT", &["match", &left, &right, "d.pfm", "--intermediates", "steps", "--json", "told.json"]),
+        ("-INT", &["inspect", &left, &right, "steps", "--json", "told.json"]),
         ("-TERM", &["evaluate", &dirs[0], &dirs[1], "--report", "report"]),
     ];
     for (signal, args) in runs {
@@ -270,7 +274,7 @@ fn what_is_stopped_leaves_nothing_behind() {
         let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
             .current_dir(folder.path())
             .args(args)
-            .args(["--preset", "paper", "--set", "tolerance=0", "--backend", "cpu", "--threads", "1"])
+            .args(["--method", "paper", "--set", "tolerance=0", "--device", "cpu", "--threads", "1"])
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -303,11 +307,19 @@ fn files_in_the_way_are_replaced_and_devices_are_not() {
     let folder = workshop();
     fs::write(folder.path().join("out.pfm"), "old").unwrap();
     let mut args = vec!["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
-    if cfg!(unix) {
-        args.extend(["--raw", "/dev/null", "--preview", "/dev/null"]);
+    #[cfg(unix)]
+    {
+        args.extend(["--also", "raw,preview"]);
+        for file in ["out.raw.pfm", "out.preview.png"] {
+            std::os::unix::fs::symlink("/dev/null", folder.path().join(file)).unwrap();
+        }
     }
     run(folder.path(), &args).succeeded();
     assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (60, 40));
+    #[cfg(unix)]
+    for file in ["out.raw.pfm", "out.preview.png"] {
+        assert!(fs::symlink_metadata(folder.path().join(file)).unwrap().is_symlink(), "{file}");
+    }
 }
 
 #[test]
@@ -315,21 +327,21 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     let folder = workshop();
     let before = listing(folder.path());
     let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "20", "--dry-run"];
-    let plan = run(folder.path(), &[&args[..], &["--quiet", "--raw", "raw.pfm"]].concat()).succeeded();
+    let plan = run(folder.path(), &[&args[..], &["--quiet", "--also", "raw"]].concat()).succeeded();
     assert_eq!(plan.stderr, "");
     for words in [
         "60 x 40 pixels, disparities 0 to 20 (21 labels)",
-        "0             60 x 40    0 to 20 (21)",
-        "5               2 x 2    0 to 1 (2)",
-        "messages   8 bits",
+        "\n0 | 60 x 40 | 0 to 20 (21) | ",
+        "\n5 | 2 x 2 | 0 to 1 (2) | ",
+        "\nmessages | 8 bits",
         "3 iterations of levels 1 to 5",
         "3 iterations of level 0, the others in between",
         "KiB",
-        "  all",
+        "\nall | ",
     ] {
-        assert!(plan.stdout.contains(words), "no `{words}` in:\n{}", plan.stdout);
+        assert!(in_cells(&plan.stdout).contains(words), "no `{words}` in:\n{}", plan.stdout);
     }
-    let paper = run(folder.path(), &[&args[..], &["--preset", "paper"]].concat()).succeeded();
+    let paper = run(folder.path(), &[&args[..], &["--method", "paper"]].concat()).succeeded();
     for words in
         ["16 bits", "30 iterations of levels 0 to 5", "or fewer, once the map changes by at most 0.1 px"]
     {
@@ -346,37 +358,44 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
 fn little_memory_makes_tiles() {
     let folder = workshop();
     let (left, right) = (scene_file("thin", "im0.png"), scene_file("thin", "im1.png"));
-    let args = ["match", &left, &right, "out.pfm", "--backend", "cpu"];
+    let args = ["match", &left, &right, "out.pfm", "--device", "cpu"];
     let with = |more: &[&str]| run(folder.path(), &[&args[..], more].concat());
     let one = with(&["--dry-run"]).succeeded();
     assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
     let tiled = with(&["--dry-run", "--memory", "12MiB"]).succeeded();
     for words in
-        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "  all"]
+        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "all"]
     {
         assert!(tiled.stdout.contains(words), "no `{words}` in:\n{}", tiled.stdout);
     }
     let told = with(&[]).succeeded();
     assert!(told.stderr.contains("32 labels, 18 iterations"), "{told:?}");
-    let told = with(&["--memory", "12MiB", "--timings"]).succeeded();
+    let told = with(&["--memory", "12MiB"]).succeeded();
+    assert!(told.stderr.contains("32 labels, 4 tiles, 18 iterations"), "{told:?}");
+    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (240, 180));
+    let inspect = |more: &[&str]| {
+        let args = ["inspect", &left, &right, "--device", "cpu", "--memory", "12MiB"];
+        run(folder.path(), &[&args[..], more].concat())
+    };
+    let told = inspect(&[]).succeeded();
     assert!(told.stderr.contains("32 labels, 4 tiles, 18 iterations"), "{told:?}");
     for (stage, runs) in [("cost", 4), ("right_view", 4), ("left_right_check", 1), ("median", 1)] {
-        let row = told.stderr.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
+        let row = told.stdout.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }
-    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (240, 180));
     // Steps of one piece are what the folder shows.
     let before = listing(folder.path());
-    let refused = with(&["--memory", "12MiB", "--intermediates", "steps"]);
-    refused.failed(2, &["--intermediates", "4 tiles", "give --memory"], "intermediates of tiles");
+    let refused = inspect(&["steps"]);
+    refused.failed(2, &["DIR", "4 tiles", "give --memory"], "the steps of tiles");
     assert!(listing(folder.path()) == before);
 }
 
 #[test]
-fn timings_name_every_stage() {
+fn inspect_names_every_stage() {
     let folder = workshop();
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--timings"];
-    let table = run(folder.path(), &[&args[..], &["--backend", "cpu"]].concat()).succeeded().stderr;
+    let before = listing(folder.path());
+    let args = ["inspect", "left.png", "right.png", "--max-disparity", "9", "--device", "cpu"];
+    let table = run(folder.path(), &args).succeeded().stdout;
     let row = |name: &str| table.lines().find(|l| l.starts_with(name)).map(str::to_owned);
     for stage in [
         "stage ",
@@ -384,7 +403,7 @@ fn timings_name_every_stage() {
         "cost ",
         "pyramid, level 5",
         "flood, level 0",
-        "region filter ",
+        "speckle_filter ",
         "median ",
         "download ",
         "rest ",
@@ -395,15 +414,14 @@ fn timings_name_every_stage() {
     assert!(row("all ").unwrap().ends_with(" 100.0 %"), "{table}");
     assert!(row("flood, level 5").unwrap().split_whitespace().nth(3) == Some("15"), "{table}");
     assert!(!table.contains("dispatches"), "{table}");
-    let told = run(folder.path(), &[&args[..], &["--quiet"]].concat());
-    told.failed(2, &["--timings", "--quiet"], "--quiet and --timings");
+    assert!(listing(folder.path()) == before, "without DIR it writes nothing");
 }
 
 #[cfg(not(target_os = "macos"))]
 #[test]
 fn without_a_driver_auto_takes_the_cpu_path() {
     let folder = workshop();
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "auto"];
+    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", "auto"];
     let told = run_with(folder.path(), &args, NO_DRIVER).succeeded();
     assert!(told.stderr.contains(" on the CPU path, "), "{}", told.stderr);
     let told = run_with(folder.path(), &["devices"], NO_DRIVER).succeeded();

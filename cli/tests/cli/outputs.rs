@@ -19,7 +19,7 @@ const MIDDLE: [f64; 2] = [119.5, 89.5];
 /// Matches a scene in `folder`; what it says on standard error.
 fn matched(folder: &Path, name: &str, more: &[&str]) -> String {
     let (left, right) = (scene_file(name, "im0.png"), scene_file(name, "im1.png"));
-    let told = run(folder, &[&["match", &left, &right], more, &["--backend", "cpu"]].concat()).succeeded();
+    let told = run(folder, &[&["match", &left, &right], more, &["--device", "cpu"]].concat()).succeeded();
     told.stderr
 }
 
@@ -57,10 +57,10 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn depth_is_that_of_the_cameras() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let said = matched(folder.path(), "repetitive", &["d.pfm", "--depth", "z.pfm", "--no-fill"]);
+    let said = matched(folder.path(), "repetitive", &["d.pfm", "--also", "depth", "--set", "fill=none"]);
     let told = said.lines().find(|line| line.contains("depths ")).unwrap();
     assert!(told.contains("unit: that of the baseline in ") && told.ends_with("calib.txt"), "{told}");
-    let (disparities, depths) = (map(at("d.pfm")), map(at("z.pfm")));
+    let (disparities, depths) = (map(at("d.pfm")), map(at("d.depth.pfm")));
     assert!(depth_error(&depths, &disparities, 0.0) < 1e-6);
     assert!(depth_error(&depths, &disparities, 0.1) > 1e-3, "the comparison sees a tenth of a pixel");
     assert!(depths.data().contains(&f32::INFINITY), "what has no disparity has no depth");
@@ -82,15 +82,15 @@ fn offset_principal_points_move_the_depth() {
     let calib = fs::read_to_string(scene("slanted").join("calib.txt")).unwrap();
     for doffs in [2.5, -12.0] {
         fs::write(at("other.txt"), calib.replace("doffs=0", &format!("doffs={doffs}"))).unwrap();
-        let args = ["d.pfm", "--calib", "other.txt", "--quiet", "--depth"];
-        matched(folder.path(), "slanted", &[&args[..], &["z.pfm"]].concat());
-        matched(folder.path(), "slanted", &[&args[..], &["z.tif"]].concat());
-        let (disparities, depths) = (map(at("d.pfm")), map(at("z.pfm")));
+        let args = ["--calib", "other.txt", "--quiet", "--also", "depth"];
+        matched(folder.path(), "slanted", &[&args[..], &["d.pfm"]].concat());
+        matched(folder.path(), "slanted", &[&args[..], &["d.tif"]].concat());
+        let (disparities, depths) = (map(at("d.pfm")), map(at("d.depth.pfm")));
         assert!(depth_error(&depths, &disparities, doffs) < 1e-6, "{doffs}");
         let beyond = depths.data().iter().filter(|z| !z.is_finite()).count();
         assert_eq!(beyond > 1000, doffs < 0.0, "{beyond} pixels are at infinity or beyond");
         assert!(disparities.data().iter().all(|d| d.is_finite()), "the map is what it was");
-        let bytes = fs::read(at("z.tif")).unwrap();
+        let bytes = fs::read(at("d.depth.tif")).unwrap();
         let mut decoder = tiff::decoder::Decoder::new(std::io::Cursor::new(bytes)).unwrap();
         let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
             panic!("float")
@@ -115,13 +115,15 @@ fn a_calibration_file_elsewhere_gives_the_range() {
 #[test]
 fn the_pictures_of_the_readme_are_those_of_its_commands() {
     let folder = tempfile::tempdir().unwrap();
-    matched(folder.path(), "mixed", &["d.pfm", "--preview", "disparity.png", "--point-cloud", "cloud.ply"]);
+    matched(folder.path(), "mixed", &["d.pfm", "--also", "preview,points"]);
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    super::render_cloud::run(&[at("cloud.ply"), at("cloud.png")]).unwrap();
+    super::render_cloud::run(&[at("d.points.ply"), at("cloud.png")]).unwrap();
     // The sines of another system may put a point into the next pixel.
-    for (name, most) in [("disparity.png", 0), ("cloud.png", 640 * 480 / 1000)] {
+    for (made, name, most) in
+        [("d.preview.png", "disparity.png", 0), ("cloud.png", "cloud.png", 640 * 480 / 1000)]
+    {
         let [made, shown] =
-            [at(name), scene_file("mixed", name)].map(|path| image::open(path).unwrap().to_rgb8());
+            [at(made), scene_file("mixed", name)].map(|path| image::open(path).unwrap().to_rgb8());
         assert_eq!(made.dimensions(), shown.dimensions());
         let others = made.pixels().zip(shown.pixels()).filter(|(made, shown)| made != shown).count();
         assert!(others <= most, "{name} is another picture now, in {others} pixels; replace it");
@@ -174,12 +176,12 @@ fn cloud(path: &Path) -> Vec<Point> {
 fn points_are_what_is_measured_and_trusted() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let args = ["d.pfm", "--point-cloud", "c.ply", "--confidence", "c.png", "--validity", "v.png"];
-    let said = matched(folder.path(), "slanted", &[&args[..], &["--depth", "z.pfm"]].concat());
-    let points = cloud(&at("c.ply"));
+    let args = ["d.pfm", "--also", "depth,points,confidence,validity"];
+    let said = matched(folder.path(), "slanted", &args);
+    let points = cloud(&at("d.points.ply"));
     assert!(said.contains(&format!("; {} points; unit: ", points.len())), "{said}");
-    let (depths, confidence) = (map(at("z.pfm")), read::grey8(&at("c.png")).unwrap());
-    let validity = read::grey8(&at("v.png")).unwrap();
+    let (depths, confidence) = (map(at("d.depth.pfm")), read::grey8(&at("d.confidence.png")).unwrap());
+    let validity = read::grey8(&at("d.validity.png")).unwrap();
     let is_trusted = |v: u8| v == 0;
     let trusted = validity.data().iter().filter(|v| is_trusted(**v)).count();
     assert_eq!(points.len(), trusted);
@@ -208,9 +210,9 @@ fn above_the_floor([_, y, z]: [f64; 3]) -> f64 {
 #[test]
 fn points_of_a_plane_lie_in_it() {
     let folder = tempfile::tempdir().unwrap();
-    matched(folder.path(), "repetitive", &["d.pfm", "--point-cloud", "c.ply", "--quiet"]);
+    matched(folder.path(), "repetitive", &["d.pfm", "--also", "points", "--quiet"]);
     let truth = map(scene("repetitive").join("disp0GT.pfm"));
-    let on_floor: Vec<_> = cloud(&folder.path().join("c.ply"))
+    let on_floor: Vec<_> = cloud(&folder.path().join("d.points.ply"))
         .into_iter()
         .filter(|(p, ..)| {
             let pixel = [0, 1].map(|i| (p[i] / p[2] * FOCAL_LENGTH + MIDDLE[i]).round());
@@ -232,9 +234,8 @@ fn json_tells_what_ran_and_what_came_of_it() {
     let folder = workshop();
     let at = |name: &str| folder.path().join(name);
     let args =
-        ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt", "--backend", "cpu"];
-    let args =
-        [&args[..], &["--mask", "flat-mask.png", "--confidence", "c.png", "--validity", "v.png"]].concat();
+        ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt", "--device", "cpu"];
+    let args = [&args[..], &["--mask", "flat-mask.png", "--also", "confidence,validity"]].concat();
     let mask = image::GrayImage::from_fn(60, 40, |x, _| image::Luma([u8::from(x < 6)]));
     mask.save(at("flat-mask.png")).unwrap();
     let told = run(folder.path(), &[&args[..], &["--json", "m.json", "--threads", "1"]].concat()).succeeded();
@@ -262,10 +263,11 @@ fn json_tells_what_ran_and_what_came_of_it() {
     assert_eq!([&found["tiles"], &found["iterations"]], [1, 18]);
     let seconds = found["seconds"].as_f64().unwrap();
     assert!(seconds > 0.0 && told.stderr.contains(&format!("in {seconds:.2} s")), "{}", told.stderr);
-    assert!(found["stages"].as_object().unwrap().is_empty());
+    assert!(found["stages"].is_null(), "the time of stages is for `inspect`");
 
     // Shares of all pixels, in percent.
-    let (validity, confidence) = (read::grey8(&at("v.png")).unwrap(), read::grey8(&at("c.png")).unwrap());
+    let (validity, confidence) =
+        (read::grey8(&at("out.validity.png")).unwrap(), read::grey8(&at("out.confidence.png")).unwrap());
     let share = |of: &dyn Fn(u8) -> bool| {
         100.0 * validity.data().iter().filter(|&&v| of(v)).count() as f64 / (60.0 * 40.0)
     };
@@ -289,9 +291,13 @@ fn json_tells_what_ran_and_what_came_of_it() {
     assert!(share(&measured) > 20.0 && share(&filled) > 1.0, "neither is nothing");
 
     // Printed, standard output holds nothing else.
-    let told = run(folder.path(), &[&args[..], &["--json", "-", "--timings"]].concat()).succeeded();
+    let told = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded();
     let printed = told.json();
     assert_eq!(printed["measured"], found["measured"]);
+    let inspect = ["inspect", "left.png", "right.png", "--calib", "camera/calib.txt", "--device", "cpu"];
+    let inspect = [&inspect[..], &["--mask", "flat-mask.png", "--json", "-"]].concat();
+    let printed = run(folder.path(), &inspect).succeeded().json();
+    assert_eq!((&printed["measured"], &printed["files"]["output"]), (&found["measured"], &Value::Null));
     let stages = printed["stages"].as_object().unwrap();
     assert!(stages["flood, level 0"].as_f64().unwrap() > 0.0, "{stages:?}");
     let sum: f64 = stages.values().map(|ms| ms.as_f64().unwrap()).sum();
@@ -299,12 +305,12 @@ fn json_tells_what_ran_and_what_came_of_it() {
 
     // A device has a driver.
     if has_gpu() {
-        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--backend", "gpu"];
+        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", "gpu"];
         let told = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded();
         let (found, listed) = (told.json(), run(folder.path(), &["devices"]).succeeded().stdout);
         assert!(told.stderr.contains(&format!(" on {}", found["ran_on"].as_str().unwrap())), "{told:?}");
         let driver = found["driver"].as_str().unwrap();
-        assert!(!driver.is_empty() && listed.contains(&format!("driver: {driver}")), "{driver} in {listed}");
+        assert!(!driver.is_empty() && listed.contains(&format!("| {driver} ")), "{driver} in {listed}");
     }
 
     // A map without a pixel has no confidence.
@@ -319,17 +325,17 @@ fn the_colours_of_a_preview_can_be_chosen() {
     let folder = workshop();
     let picture = |name: &str, more: &[&str]| {
         let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
-        run(folder.path(), &[&args[..], &["--preview", name], more].concat()).succeeded();
-        image::open(folder.path().join(name)).unwrap().into_rgb8()
+        run(folder.path(), &[&args[..], &["--also", name], more].concat()).succeeded();
+        image::open(folder.path().join(format!("out.{name}.png"))).unwrap().into_rgb8()
     };
-    let usual = picture("a.png", &[]);
-    assert_eq!(usual, picture("b.png", &["--colours", "turbo"]));
-    let [viridis, grey] = ["viridis", "grey"].map(|name| picture("c.png", &["--colours", name]));
+    let usual = picture("preview", &[]);
+    assert_eq!(usual, picture("preview", &["--colours", "turbo"]));
+    let [viridis, grey] = ["viridis", "grey"].map(|name| picture("preview", &["--colours", name]));
     assert!(usual != viridis && viridis != grey && usual != grey);
     let even = |p: &image::Rgb<u8>| p.0[0] == p.0[1] && p.0[1] == p.0[2];
     assert!(grey.pixels().all(even) && !viridis.pixels().all(even));
 
-    let both = picture("d.png", &["--side-by-side", "--colours", "viridis"]);
+    let both = picture("side-by-side", &["--colours", "viridis"]);
     assert_eq!(both.dimensions(), (2 * 60, viridis.height()));
     let left = image::open(folder.path().join("left.png")).unwrap().into_rgb8();
     for (x, y, pixel) in both.enumerate_pixels() {
@@ -407,7 +413,7 @@ fn a_map_that_does_not_reach_its_reader_is_a_failure() {
     let folder = workshop();
     let before = listing(folder.path());
     let args = ["match", "left.png", "right.png", "-", "--max-disparity", "9", "--quiet"];
-    let args = [&args[..], &["--raw", "raw.pfm", "--json", "m.json", "--intermediates", "steps"]].concat();
+    let args = [&args[..], &["--json", "m.json"]].concat();
     for (closed, words) in [(true, "its reader left"), (false, "No space left")] {
         let stdout = if closed {
             Stdio::piped()
@@ -430,11 +436,15 @@ fn submissions_have_the_layout_of_the_benchmark() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let dirs = ["slanted", "thin"].map(|name| scene(name).to_str().unwrap().to_owned());
-    let args = ["evaluate", &dirs[0], &dirs[1], "--backend", "cpu", "--json", "a.json", "--submission"];
+    let args = ["--device", "cpu", "--json", "a.json"];
+    let submitted = |to: [&str; 2], more: &[&str]| {
+        let pairs = ["evaluate", "submission", to[0], to[1], &dirs[0], &dirs[1]];
+        run(folder.path(), &[&pairs, &args[..], more].concat()).succeeded();
+    };
     // A folder that is there and empty will do.
     fs::create_dir(at("trainingQ")).unwrap();
-    run(folder.path(), &[&args[..], &["trainingQ", "MR-FGS_2"]].concat()).succeeded();
-    run(folder.path(), &[&args[..], &["sparse", "X", "--set", "fill=none"]].concat()).succeeded();
+    submitted(["trainingQ", "MR-FGS_2"], &[]);
+    submitted(["sparse", "X"], &["--set", "fill=none"]);
     let names: Vec<_> = listing(folder.path()).into_keys().collect();
     let mut expected = vec![at("a.json"), at("sparse"), at("trainingQ")];
     for pair in ["slanted", "thin"] {
@@ -452,7 +462,7 @@ fn submissions_have_the_layout_of_the_benchmark() {
         let [dense, sparse] = [("trainingQ", "MR-FGS_2"), ("sparse", "X_s")]
             .map(|(dir, method)| fs::read(at(dir).join(pair).join(format!("disp0{method}.pfm"))).unwrap());
         assert!(dense == fs::read(at("d.pfm")).unwrap(), "{pair}: the map of a match");
-        matched(folder.path(), pair, &["d.pfm", "--quiet", "--no-fill"]);
+        matched(folder.path(), pair, &["d.pfm", "--quiet", "--set", "fill=none"]);
         assert!(
             sparse == fs::read(at("d.pfm")).unwrap() && sparse != dense,
             "{pair}: the map without a fill"

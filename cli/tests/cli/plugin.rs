@@ -86,7 +86,7 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
         (output.status.success(), String::from_utf8(output.stderr).unwrap())
     };
     // The pipeline tells plug-ins no range.
-    for options in ["--backend cpu", "--backend cpu --threads 1 --min-disparity -31 --max-disparity 0"] {
+    for options in ["--device cpu", "--device cpu --threads 1 --min-disparity -31 --max-disparity 0"] {
         let (success, told) = call(options);
         assert!(success, "{told}");
         let (found, truth) = (read_map(&at("out.tif")), read_pfm(&scene("slanted").join("disp0GT.pfm")));
@@ -110,8 +110,8 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
         assert!(errors.len() > width * height / 2 && holes > 0, "{} and {holes}", errors.len());
         assert!(errors[errors.len() / 2] < 0.25, "{}", errors[errors.len() / 2]);
     }
-    // Why the plug-in says that itself.
-    let (success, told) = call("--backend cpu --no-fill");
+    // Why the plug-in leaves holes itself: the pipeline takes no `=`, and gives every option a value.
+    let (success, told) = call("--device cpu --quiet");
     assert!(!success && told.lines().count() == 1, "{told}");
 }
 
@@ -120,7 +120,8 @@ fn the_sign_turns_map_and_range_around() {
     let folder = tempfile::tempdir().unwrap();
     let matched = |name: &str, more: &[&str]| {
         let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
-        let args = [&["match", &left, &right, name, "--no-fill", "--backend", "cpu", "--json", "-"], more];
+        let args =
+            [&["match", &left, &right, name, "--set", "fill=none", "--device", "cpu", "--json", "-"], more];
         let told = run(folder.path(), &args.concat()).succeeded();
         (read_map(&folder.path().join(name)), told.json())
     };
@@ -128,9 +129,9 @@ fn the_sign_turns_map_and_range_around() {
     let range = |told: &Value| ["min", "max"].map(|end| told["range"][end].as_i64().unwrap());
     assert_eq!((told["sign"].as_str(), range(&told)), (Some("left-minus-right"), [2, 30]));
     let turned = ["--sign", "right-minus-left", "--min-disparity", "-30", "--max-disparity", "-2"];
-    let (theirs, told) = matched("theirs.tif", &[&turned[..], &["--raw", "raw.tif"]].concat());
+    let (theirs, told) = matched("theirs.tif", &[&turned[..], &["--also", "raw"]].concat());
     assert_eq!((told["sign"].as_str(), range(&told)), (Some("right-minus-left"), [-30, -2]));
-    let raw = read_map(&folder.path().join("raw.tif"));
+    let raw = read_map(&folder.path().join("theirs.raw.tif"));
     let mut invalid = 0;
     for (i, (&d, &turned)) in ours.data().iter().zip(theirs.data()).enumerate() {
         invalid += usize::from(d.is_nan());
@@ -142,7 +143,7 @@ fn the_sign_turns_map_and_range_around() {
     // Printed, what is invalid is +infinity all the same.
     let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
     let printed = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .args(["match", &left, &right, "-", "--no-fill", "--backend", "cpu", "--quiet"])
+        .args(["match", &left, &right, "-", "--set", "fill=none", "--device", "cpu", "--quiet"])
         .args(turned)
         .output()
         .unwrap();

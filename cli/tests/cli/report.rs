@@ -64,7 +64,7 @@ fn a_report_is_whole_and_stands_alone() {
     assert_eq!(left, image::open(at("Teddy/im0.png")).unwrap().into_rgb8());
 
     // A later report takes its place; a map that others made has fewer pictures.
-    let args = ["--disparity", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
+    let args = ["map", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
     evaluated(folder.path(), &args);
     let mut names: Vec<_> =
         fs::read_dir(at("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -102,12 +102,12 @@ fn a_report_that_cannot_be_leaves_nothing() {
         refused(folder.path(), &["misfit", "--report", out], 1, &["disp0GT.pfm is 320 x 240"]);
     }
     if cfg!(target_os = "linux") {
-        let args = ["--disparity", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
+        let args = ["map", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
         refused(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat(), 1, &["/dev/full"]);
     }
 
     // A report with something else in it stays, and so does a page that is none.
-    let args = ["--disparity", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "empty"];
+    let args = ["map", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "empty"];
     evaluated(folder.path(), &args);
     fs::write(at("empty/notes.txt"), "precious").unwrap();
     refused(folder.path(), &args, 1, &["empty", "notes.txt", "new folder"]);

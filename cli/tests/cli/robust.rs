@@ -34,11 +34,11 @@ fn no_limit_of_memory_aborts() {
     let mut refused = 0;
     for (ending, options) in [
         ("jpg", "--max-disparity auto --memory 256MiB"),
-        ("png", "--max-disparity 15 --preview p.png --side-by-side --raw r.pfm"),
-        ("tif", "--max-disparity 7 --preset fgs"),
+        ("png", "--max-disparity 15 --also preview,side-by-side,raw"),
+        ("tif", "--max-disparity 7 --method fgs"),
     ] {
         let line = format!(
-            "match im0.png.{ending} im1.png.{ending} out.pfm --backend cpu --threads 1 --quiet {options}"
+            "match im0.png.{ending} im1.png.{ending} out.pfm --device cpu --threads 1 --quiet {options}"
         );
         // The program itself takes some 60 MiB of addresses.
         let enough = (80..1024).step_by(20).find(|limit| {
@@ -73,22 +73,22 @@ fn a_full_disk_is_told_with_the_name_of_the_output() {
     for (line, name) in [
         ("match left.png right.png out.pfm --max-disparity 9", "cannot write out.pfm: File too large"),
         (
-            "match left.png right.png - --max-disparity 9 --depth z.pfm --calib camera/calib.txt",
-            "cannot write z.pfm: File",
+            "match left.png right.png out.png --max-disparity 9 --also depth --calib camera/calib.txt --set fill=none",
+            "cannot write out.depth.pfm: File",
         ),
-        (
-            "match left.png right.png out.png --max-disparity 9 --intermediates steps",
-            "cannot write steps: File too large",
-        ),
+        ("inspect left.png right.png steps --max-disparity 9", "cannot write steps: File too large"),
         ("batch camera.csv out", "cannot write out/camera.pfm: File too large"),
     ] {
         fs::write(folder.path().join("camera.csv"), "name,left,right\ncamera,camera/left.png,right.png\n")
             .unwrap();
-        let output =
-            shell(folder.path(), "trap '' XFSZ; ulimit -f 8", &format!("{line} --backend cpu --quiet"));
+        let output = shell(folder.path(), "trap '' XFSZ; ulimit -f 8", &format!("{line} --device cpu"));
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{line}: {said}");
-        assert!(said.contains(name) && said.lines().count() == 1 && !said.contains(".tmp"), "{line}: {said}");
+        let lines = if line.starts_with("inspect") { 2 } else { 1 };
+        assert!(
+            said.contains(name) && said.lines().count() == lines && !said.contains(".tmp"),
+            "{line}: {said}"
+        );
         fs::remove_file(folder.path().join("camera.csv")).unwrap();
         let _ = fs::remove_dir(folder.path().join("out"));
         assert!(listing(folder.path()) == before, "{line}");
@@ -117,18 +117,18 @@ fn killed(folder: &Path, after: Duration, line: &str) {
 fn a_killed_match_leaves_nothing_half_written() {
     let folder = workshop();
     let before = listing(folder.path());
-    let line =
-        "match left.png right.png out.pfm --max-disparity 9 --backend cpu --raw raw.tif --confidence c.png";
+    let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --also raw,confidence";
     run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
-    let whole: Vec<_> =
-        ["out.pfm", "raw.tif", "c.png"].map(|name| fs::read(folder.path().join(name)).unwrap()).into();
+    let whole: Vec<_> = ["out.pfm", "out.raw.pfm", "out.confidence.png"]
+        .map(|name| fs::read(folder.path().join(name)).unwrap())
+        .into();
     for ms in [1, 5, 10, 15, 20, 25, 30, 40, 60] {
-        for name in ["out.pfm", "raw.tif", "c.png"] {
+        for name in ["out.pfm", "out.raw.pfm", "out.confidence.png"] {
             let _ = fs::remove_file(folder.path().join(name));
         }
         killed(folder.path(), Duration::from_millis(ms), line);
         let mut after = listing(folder.path());
-        for (name, whole) in ["out.pfm", "raw.tif", "c.png"].into_iter().zip(&whole) {
+        for (name, whole) in ["out.pfm", "out.raw.pfm", "out.confidence.png"].into_iter().zip(&whole) {
             if let Some(found) = after.remove(&folder.path().join(name)) {
                 assert!(found.as_ref() == Some(whole), "{name} after {ms} ms");
             }
@@ -142,8 +142,7 @@ fn a_killed_match_leaves_nothing_half_written() {
 fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     let folder = workshop();
     let before = listing(folder.path());
-    let line =
-        "match left.png right.png out.pfm --max-disparity 9 --backend cpu --quiet --intermediates steps";
+    let line = "inspect left.png right.png steps --max-disparity 9 --device cpu";
     let args: Vec<_> = line.split(' ').collect();
     // As a run leaves it that is killed on its way.
     let staging = folder.path().join(".steps.tmp");
@@ -155,7 +154,6 @@ fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     assert!(!folder.path().join("steps/half.png").exists());
     // One that runs is left alone.
     fs::remove_dir_all(folder.path().join("steps")).unwrap();
-    fs::remove_file(folder.path().join("out.pfm")).unwrap();
     fs::create_dir(&staging).unwrap();
     let lock = fs::File::create(staging.join("lock")).unwrap();
     lock.lock().unwrap();
@@ -174,13 +172,13 @@ fn links_are_followed_everywhere() {
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("below")).unwrap();
     let is_link = |name: &str| fs::symlink_metadata(at(name)).unwrap().is_symlink();
-    let line = "match left.png right.png out.pfm --max-disparity 9 --backend cpu --quiet --preview p.png";
+    let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --quiet --also preview";
     for _ in 0..2 {
-        for (link, to) in [("out.pfm", "below/map.pfm"), ("p.png", "below/picture.png")] {
+        for (link, to) in [("out.pfm", "below/map.pfm"), ("out.preview.png", "below/picture.png")] {
             let _ = symlink(to, at(link));
         }
         run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
-        assert!(is_link("out.pfm") && is_link("p.png"));
+        assert!(is_link("out.pfm") && is_link("out.preview.png"));
         assert!(fs::read(at("below/map.pfm")).unwrap().starts_with(b"Pf\n"));
         assert!(fs::read(at("below/picture.png")).unwrap().starts_with(b"\x89PNG"));
     }
@@ -194,7 +192,7 @@ fn links_are_followed_everywhere() {
     for name in ["a.pfm", "a.json"] {
         symlink(Path::new("../below").join(name), at("maps").join(name)).unwrap();
     }
-    let batch = ["batch", "list.csv", "maps", "--backend", "cpu", "--quiet"];
+    let batch = ["batch", "list.csv", "maps", "--device", "cpu", "--quiet"];
     for more in [&[][..], &["--set", "temperature=0.3"]] {
         run(folder.path(), &[&batch[..], more].concat()).succeeded();
         assert!(is_link("maps/a.pfm") && is_link("maps/a.json"));

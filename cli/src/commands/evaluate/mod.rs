@@ -42,7 +42,7 @@ pub(crate) struct Args {
     #[command(subcommand)]
     mode: Option<Mode>,
     #[command(flatten)]
-    pairs: pairs::Args,
+    pairs: pairs::PairsArgs,
 }
 
 #[derive(Subcommand)]

@@ -15,7 +15,7 @@ use super::{breakdown, metrics};
 
 /// What to match and print.
 #[derive(clap::Args)]
-pub(super) struct Args {
+pub(super) struct PairsArgs {
     /// Folders to match and evaluate
     #[arg(required = true, value_name = "DIR")]
     dirs: Vec<PathBuf>,
@@ -51,7 +51,7 @@ pub(super) struct Args {
     pub(super) execution: ExecutionArgs,
 }
 
-pub(super) fn run(args: &Args) -> Result<()> {
+pub(super) fn run(args: &PairsArgs) -> Result<()> {
     stop::listen();
     let destination = args.report.destination(args.scenes.json())?;
     args.scenes.check_json(&args.dirs, Some(&args.method))?;
