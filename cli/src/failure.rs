@@ -1,32 +1,53 @@
-//! Why the program ends early, and every place that turns an error of the library into words for the command line.
+//! Why the program ends early, and in which words.
 
 use std::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 
 use mrfgs::Error;
+use mrfgs::error::RangeError;
 
+use crate::remedy;
 use crate::stop;
 use crate::text::single_line;
+
+/// Shorthand for results of the program.
+pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 
 /// Why the program ends early.
 pub(crate) enum Failure {
     /// The command line makes no sense.
     Usage(String),
-    /// Some pairs of a batch failed.
-    Incomplete(String),
+    /// Something failed that the library has no error for, such as some pairs of a batch.
+    Failed(String),
     /// The user stopped it.
     Stopped(String),
-    /// Anything else.
+    /// An error of the library.
     Error(Error),
 }
 
 impl Failure {
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Usage(_) | Self::Error(Error::Option { .. }) => ExitCode::from(2),
+            Self::Error(Error::Range(RangeError::NotFound)) => ExitCode::FAILURE,
+            Self::Usage(_)
+            | Self::Error(
+                Error::Option { .. }
+                | Error::Preset { .. }
+                | Error::Range(_)
+                | Error::Execution(_)
+                | Error::Budget(_),
+            ) => ExitCode::from(2),
             Self::Stopped(_) => ExitCode::from(stop::STOPPED),
-            Self::Incomplete(_) | Self::Error(_) => ExitCode::FAILURE,
+            Self::Failed(_) | Self::Error(_) => ExitCode::FAILURE,
+        }
+    }
+
+    /// In one line, where the ends of the range are called `ends`.
+    pub(crate) fn message(&self, ends: &remedy::Ends) -> String {
+        match self {
+            Self::Usage(text) | Self::Failed(text) | Self::Stopped(text) => single_line(text),
+            Self::Error(error) => single_line(&remedy::error(error, ends)),
         }
     }
 }
@@ -34,12 +55,7 @@ impl Failure {
 impl fmt::Display for Failure {
     /// One line, whatever the names of files hold.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Usage(text) | Self::Incomplete(text) | Self::Stopped(text) => {
-                f.write_str(&single_line(text))
-            }
-            Self::Error(error) => f.write_str(&message(error)),
-        }
+        f.write_str(&self.message(&remedy::FLAGS))
     }
 }
 
@@ -52,37 +68,11 @@ impl From<Error> for Failure {
     }
 }
 
-/// What the library calls something, and what the command line calls it.
-const NAMES: [(&str, &str); 3] =
-    [("--backend cpu", "--device cpu"), ("--intermediates: shows", "DIR: shows"), ("--preset", "--method")];
-
-/// An error in one line.
-pub(crate) fn message(error: &Error) -> String {
-    in_flags(&error.to_string())
-}
-
-/// A text of the library in one line, with the flags of the program.
-pub(crate) fn in_flags(text: &str) -> String {
-    let text = single_line(text);
-    NAMES.iter().fold(text, |text, (library, program)| text.replace(library, program))
-}
-
-/// An error of the range that names the columns of a list instead of flags.
-pub(crate) fn in_columns(error: Error) -> Error {
-    match error {
-        Error::Option { name, reason } => Error::Option {
-            name: name.trim_start_matches("--").replace('-', "_"),
-            reason: reason.replace("--min-disparity", "min_disparity"),
-        },
-        Error::Mismatch(reason) => Error::Mismatch(reason.replace("--max-disparity", "max_disparity")),
-        error => error,
-    }
-}
-
 /// An error of a value that the file `path` holds: it names the file, and `what` in it.
 pub(crate) fn in_file(error: Error, path: &Path, what: &str) -> Error {
     match error {
-        Error::Option { reason, .. } => Error::read(path, format!("{what}{reason}")),
+        Error::Range(cause) => Error::read(path, format!("{what}{cause}")),
+        Error::Calibration(reason) => Error::read(path, format!("{what}{reason}")),
         error => error,
     }
 }

@@ -10,6 +10,7 @@ mod outputs;
 mod pairs;
 mod process;
 mod progress;
+mod remedy;
 mod stop;
 mod table;
 mod text;

@@ -3,12 +3,13 @@
 use std::time::{Duration, Instant};
 
 use mrfgs::image::Pair;
+use mrfgs::low_level::solver::Inspector;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::solver::Inspector;
-use mrfgs::{Matched, Matcher, Result};
+use mrfgs::{Matched, Matcher};
 
 use crate::console;
 use crate::failure;
+use crate::failure::Result;
 use crate::progress::Bar;
 use crate::text::plural;
 

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use mrfgs::solver::Progress;
+use mrfgs::Progress;
 
 use crate::console;
 use crate::stop;

@@ -4,7 +4,7 @@ use mrfgs::Error;
 use mrfgs::error::{
     BudgetError, DeviceError, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
 };
-use mrfgs::front::check::Warning;
+use mrfgs::check::Warning;
 
 /// What the ends of the range are called where the user gives them.
 pub(crate) struct Ends {
@@ -21,7 +21,7 @@ pub(crate) const COLUMNS: Ends = Ends { min: "min_disparity", max: "max_disparit
 pub(crate) fn error(error: &Error, ends: &Ends) -> String {
     match error {
         Error::Option { key, cause } => format!("--set {key}: {cause}{}", of_key(cause)),
-        Error::Preset { .. } => format!("--preset: {error}"),
+        Error::Preset { .. } => format!("--method: {error}"),
         Error::Range(cause) => range(cause, ends),
         Error::Execution(cause) => execution(cause),
         Error::Budget(cause) => budget(cause),
@@ -66,7 +66,7 @@ fn range(cause: &RangeError, Ends { min, max }: &Ends) -> String {
 fn execution(cause: &ExecutionError) -> String {
     match cause {
         ExecutionError::NeedlessDevice => {
-            "--device names a device and --backend cpu uses none: give only one of them".into()
+
         }
         ExecutionError::NoSuchDevice { .. } => format!("--device: {cause}; see `mrfgs devices`"),
         _ => format!("--threads: {cause}"),
@@ -101,11 +101,11 @@ fn reading(cause: &ReadError) -> &'static str {
 fn device(cause: &DeviceError) -> &'static str {
     match cause {
         DeviceError::NoDriver => {
-            ": install the driver of the GPU, or a software one (Mesa's lavapipe), or use --backend cpu"
+            ": install the driver of the GPU, or a software one (Mesa's lavapipe), or use --device cpu"
         }
-        DeviceError::WrongMaps { .. } => ": update its driver, or use --backend cpu",
-        DeviceError::TooLargeForShader { .. } => ": use --backend cpu",
-        _ => "; use another --device or --backend cpu",
+        DeviceError::WrongMaps { .. } => ": update its driver, or use --device cpu",
+        DeviceError::TooLargeForShader { .. } => ": use --device cpu",
+        _ => "; use another --device or --device cpu",
     }
 }
 
@@ -116,9 +116,9 @@ fn memory(cause: &MemoryError) -> &'static str {
              fewer neighbours (a higher --set percentile)"
         }
         MemoryError::Machine { .. } => ": use a smaller image, or a part of it",
-        MemoryError::Device { .. } => ": use --backend cpu, or a smaller --memory, image or range",
-        MemoryError::Exhausted { .. } => ": use --backend cpu, another --device, or a smaller image or range",
-        _ => ": use --backend cpu, or a smaller image or range",
+        MemoryError::Device { .. } => ": use --device cpu, or a smaller --memory, image or range",
+        MemoryError::Exhausted { .. } => ": use --device cpu, another --device, or a smaller image or range",
+        _ => ": use --device cpu, or a smaller image or range",
     }
 }
 
@@ -185,7 +185,7 @@ mod tests {
                 ["--max-disparity", "give a range"],
             ),
             (said(RangeError::NotFound), ["too few matches", "give --max-disparity"]),
-            (said(ExecutionError::NeedlessDevice), ["--device", "--backend cpu"]),
+            (said(ExecutionError::NeedlessDevice), ["--device", "--device cpu"]),
             (
                 said(ExecutionError::NoSuchDevice { wanted: "x".into(), present: found() }),
                 ["--device", "`mrfgs devices`"],
@@ -205,18 +205,18 @@ mod tests {
             (said(read(unknown(Some(2)))), ["line 2: colour", "`mrfgs presets`"]),
             (said(read(unknown(None))), ["a.png: colour", "`mrfgs presets`"]),
             (said(read(machine(Purpose::Image).into())), ["3.0 GiB", "smaller image"]),
-            (said(DeviceError::NoDriver), ["install the driver", "--backend cpu"]),
-            (said(DeviceError::WrongMaps { name: name() }), ["update its driver", "--backend cpu"]),
-            (said(many), ["9000 labels", "--backend cpu"]),
+            (said(DeviceError::NoDriver), ["install the driver", "--device cpu"]),
+            (said(DeviceError::WrongMaps { name: name() }), ["update its driver", "--device cpu"]),
+            (said(many), ["9000 labels", "--device cpu"]),
             (
                 said(DeviceError::Failed { name: name(), reason: "lost".into() }),
-                ["another --device", "--backend cpu"],
+                ["another --device", "--device cpu"],
             ),
             (said(machine(Purpose::Match)), ["3.0 GiB", "by --memory"]),
             (said(machine(Purpose::Image)), ["3.0 GiB", "smaller image"]),
             (
                 said(MemoryError::Device { name: name(), needed: 2 << 20, available: 1 << 20 }),
-                ["2 MiB", "--backend cpu"],
+                ["2 MiB", "--device cpu"],
             ),
             (
                 said(MemoryError::Buffer {
@@ -225,9 +225,9 @@ mod tests {
                     needed: 2048,
                     allowed: 1024,
                 }),
-                ["2 KiB", "--backend cpu"],
+                ["2 KiB", "--device cpu"],
             ),
-            (said(MemoryError::Exhausted { name: name() }), ["another --device", "--backend cpu"]),
+            (said(MemoryError::Exhausted { name: name() }), ["another --device", "--device cpu"]),
         ] {
             assert!(words.iter().all(|word| said.contains(word)) && !said.contains('\n'), "{said}");
         }

@@ -11,11 +11,11 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use mrfgs::check::{self, Warning};
 use mrfgs::error::RangeError;
-use mrfgs::front::check::{self, Warning};
 use mrfgs::image::{Pair, Plane, raster};
+use mrfgs::low_level::solver::Observer;
 use mrfgs::options::{DisparityRange, Execution, GROUPS, Key, Method, PRESETS, Takes};
-use mrfgs::solver::Observer;
 use mrfgs::{Error, Matched, Matcher};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError, PyUserWarning, PyValueError};

@@ -1,8 +1,8 @@
 //! What the library reports, in the words of Python: each cause with the argument or the option that helps.
 
 use mrfgs::Error;
+use mrfgs::check::Warning;
 use mrfgs::error::{BudgetError, DeviceError, ExecutionError, MemoryError, Purpose, RangeError};
-use mrfgs::front::check::Warning;
 
 /// What to do where the device does not serve.
 const CPU: &str = "use backend=\"cpu\"";

@@ -2,6 +2,7 @@
 
 use crate::backend::{Backend, Stage, Traffic};
 use crate::engine::Solution;
+use crate::error::Error;
 use crate::front::check::{self, Warning};
 use crate::image::Plane;
 use crate::maps::Maps;
@@ -26,9 +27,9 @@ pub struct Matched {
     pub ran_on: String,
     /// The driver of the device that did, as far as it says; `None` for the CPU path.
     pub driver: Option<String>,
-    /// Why it is not the device that was hoped for, where that is so.
-    pub note: Option<String>,
-    /// The time of every stage, in the order of their first run; empty unless [`Execution::timings`] asks.
+    /// Why it did not run on the preferred device, where that is so.
+    pub note: Option<Error>,
+    /// The time of every stage, in the order of their first run; empty unless they were asked for.
     pub timings: Vec<Timing>,
     /// What went through the device.
     pub traffic: Traffic,

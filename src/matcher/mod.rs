@@ -89,7 +89,7 @@ pub struct Matcher {
     /// Whether the CPU path may step in.
     falls_back: bool,
     /// Why there is no device any more.
-    given_up: Option<String>,
+    given_up: Option<Error>,
     timings: bool,
 }
 
@@ -131,7 +131,7 @@ impl Matcher {
         let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
         let (gpu, given_up) = match gpu.transpose() {
             Ok(gpu) => (gpu, None),
-            Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e.to_string())),
+            Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e)),
             Err(e) => return Err(e),
         };
         Ok(Self {
@@ -276,21 +276,20 @@ impl Matcher {
         self.solve(&pair, range, method, observer, None)
     }
 
-    /// What to tell of a device that failed, where the CPU path may step in: the bits are the same there, so it costs only time.
+    /// The failure of a device as a note, where the CPU path may step in: the bits are the same there, so it costs only time.
     ///
     /// # Errors
     /// The failure, where it may not.
-    fn without_device(&mut self, failure: Error) -> Result<String> {
+    fn without_device(&mut self, failure: Error) -> Result<Error> {
         if !self.falls_back || !matches!(failure, Error::Device(_) | Error::Memory(_)) {
             return Err(failure);
         }
-        let note = failure.to_string();
         // What is too large for it this time may fit the next.
         if matches!(failure, Error::Device(_)) {
             self.gpu = None;
-            self.given_up = Some(note.clone());
+            self.given_up = Some(failure.clone());
         }
-        Ok(note)
+        Ok(failure)
     }
 }
 

@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::fmt;
 use std::str::FromStr;
 
-use mrfgs::backend::gpu;
+use mrfgs::low_level::backend::gpu;
 use mrfgs::options::{DeviceChoice, Execution};
 
 /// Where a match runs.
@@ -27,40 +27,25 @@ pub(crate) struct ThreadArgs {
     pub(crate) threads: Option<u16>,
 }
 
-/// What runs the stages.
+/// What runs the stages, as the user gives it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Device {
-    /// A GPU where there is one, else the CPU path.
-    #[default]
-    Auto,
-    /// The CPU path.
-    Cpu,
-    /// The fastest kind of device that there is.
-    Gpu,
-    /// A device by its index or a part of its name.
-    Named(String),
-}
+pub(crate) struct Device(pub(crate) DeviceChoice);
 
 impl FromStr for Device {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match text {
-            "auto" => Self::Auto,
-            "cpu" => Self::Cpu,
-            "gpu" => Self::Gpu,
-            name => Self::Named(name.into()),
-        })
+        Ok(Self(text.into()))
     }
 }
 
 impl fmt::Display for Device {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::Cpu => "cpu",
-            Self::Gpu => "gpu",
-            Self::Named(name) => name,
+        f.write_str(match &self.0 {
+            DeviceChoice::Auto => "auto",
+            DeviceChoice::Cpu => "cpu",
+            DeviceChoice::Gpu => "gpu",
+            DeviceChoice::Named(name) => name,
         })
     }
 }
@@ -68,32 +53,23 @@ impl fmt::Display for Device {
 impl Device {
     /// Whether the drivers are asked which devices there are.
     pub(crate) fn asks_drivers(&self) -> bool {
-        match self {
-            Self::Auto => gpu::may_have_gpu(),
-            Self::Cpu => false,
-            Self::Gpu | Self::Named(_) => true,
+        match &self.0 {
+            DeviceChoice::Auto => gpu::may_have_gpu(),
+            DeviceChoice::Cpu => false,
+            DeviceChoice::Gpu | DeviceChoice::Named(_) => true,
         }
     }
 
     /// How the library takes it; the time of stages is not taken.
     pub(crate) fn execution(&self, threads: &ThreadArgs) -> Execution {
-        Execution {
-            backend: match self {
-                Self::Auto => DeviceChoice::Auto,
-                Self::Cpu => DeviceChoice::Cpu,
-                Self::Gpu | Self::Named(_) => DeviceChoice::Gpu,
-            },
-            device: self.name().map(str::to_owned),
-            threads: threads.threads.map(usize::from),
-            timings: false,
-        }
+        Execution { device: self.0.clone(), threads: threads.threads.map(usize::from), timings: false }
     }
 
     /// The index or name of a certain device.
     pub(crate) fn name(&self) -> Option<&str> {
-        match self {
-            Self::Named(name) => Some(name),
-            Self::Auto | Self::Cpu | Self::Gpu => None,
+        match &self.0 {
+            DeviceChoice::Named(name) => Some(name),
+            _ => None,
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use mrfgs::Error;
 use mrfgs::options::{Method, PRESETS};
-use mrfgs::{Error, Result};
 
 use crate::args::sizes::mebibytes;
+use crate::failure::{Failure, Result};
 
 /// The parameters that determine the result.
 #[derive(clap::Args)]
@@ -49,7 +50,7 @@ impl MethodArgs {
             if let Some(name) = preset(word) {
                 if i > 0 {
                     let reason = format!("the preset {name} would replace all keys before it; give it first");
-                    return Err(Error::option("--method", reason));
+                    return Err(Failure::Usage(format!("{}: {reason}", "--method")));
                 }
                 method = Method::preset(name)?;
             } else if word.extension().is_some_and(|extension| extension == "toml") || word.exists() {
@@ -61,7 +62,7 @@ impl MethodArgs {
                     word.display(),
                     names.join(", ")
                 );
-                return Err(Error::option("--method", reason));
+                return Err(Failure::Usage(format!("{}: {reason}", "--method")));
             }
         }
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;

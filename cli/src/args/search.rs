@@ -3,15 +3,16 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use mrfgs::front::check;
+use mrfgs::Error;
+use mrfgs::check;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
-use mrfgs::{Error, Result};
 use serde::Serialize;
 
 use crate::args::sign::Sign;
 use crate::failure;
+use crate::failure::{Failure, Result};
 
 /// The largest disparity to search, as users give it: a number of pixels, or `auto`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -104,7 +105,7 @@ impl Search {
             let reason = format!(
                 "no disparity from {min} to {max} is inside images {width} pixels wide; give those of the pair"
             );
-            return Err(Error::option("--max-disparity", reason));
+            return Err(Failure::Usage(format!("{}: {reason}", "--max-disparity")));
         }
         Ok(Found { range, by_matches: given.is_none() })
     }

@@ -1,7 +1,7 @@
 //! Which way disparities count.
 
 use clap::ValueEnum;
-use mrfgs::front::check::Warning;
+use mrfgs::check::Warning;
 use mrfgs::image::Plane;
 use mrfgs::options::DisparityRange;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use mrfgs::Result;
-use mrfgs::backend::gpu;
+use mrfgs::low_level::backend::gpu;
 
 use crate::console;
 use crate::table::Table;

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use mrfgs::Result;
 use mrfgs::options::{Method, PRESETS, keys};
 
 use crate::console;
+use crate::failure::Result;
 use crate::table::Table;
 use crate::text::wrapped;
 

@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mrfgs::Error;
 use mrfgs::depth::Rig;
 use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Image, Plane, ply, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
-use mrfgs::{Error, Result};
 
 use crate::args::sign::Sign;
+use crate::failure::{Failure, Result};
 use crate::text::plural;
 
 /// An output beside the disparity map.
@@ -142,7 +143,7 @@ impl AlsoArgs {
         let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
         if self.colours.is_some() && !self.wanted().any(is_picture) {
             let reason = "are those of a preview; add --also preview, or leave --colours out";
-            return Err(Error::option("--colours", reason));
+            return Err(Failure::Usage(format!("{}: {reason}", "--colours")));
         }
         Ok(())
     }

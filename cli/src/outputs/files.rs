@@ -3,11 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mrfgs::Error;
 use mrfgs::image::write;
-use mrfgs::{Error, Result};
 use serde::Serialize;
 
 use crate::console;
+use crate::failure::{Failure, Result};
 
 /// Refuses outputs that would overwrite an input or each other; each comes with the name of its flag or argument.
 pub(crate) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Result<()> {
@@ -17,7 +18,7 @@ pub(crate) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> R
         let Some(place) = place(path) else { continue };
         if let Some((other, _)) = taken.iter().find(|(_, p)| *p == place) {
             let reason = format!("{} is {other} already; give another name", path.display());
-            return Err(Error::option(*name, reason));
+            return Err(Failure::Usage(format!("{}: {reason}", *name)));
         }
         taken.push((name, place));
     }
@@ -41,7 +42,7 @@ fn parent(path: &Path) -> &Path {
 pub(crate) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
     if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
         let reason = format!("{} lies in the folder of {folder_name}; give another name", path.display());
-        return Err(Error::option(name, reason));
+        return Err(Failure::Usage(format!("{}: {reason}", name)));
     }
     Ok(())
 }

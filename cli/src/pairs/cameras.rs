@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use mrfgs::Error;
 use mrfgs::depth::Rig;
 use mrfgs::image::calib::Calibration;
-use mrfgs::{Error, Result};
 
 use crate::failure;
+use crate::failure::{Failure, Result};
 use crate::outputs::also::Also;
 
 /// The cameras that `word` takes, by the `calibration` file of the pair, whose left image is `left` and has `size`.
@@ -23,7 +24,7 @@ pub(crate) fn rig(
     let Some((path, calibration)) = calibration else {
         let reason =
             format!("takes the cameras, and there is no calib.txt beside {}; {remedy}", left.display());
-        return Err(Error::option(word.flag(), reason));
+        return Err(Failure::Usage(format!("{}: {reason}", word.flag())));
     };
     let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
     if size != (width as u32, height as u32) {

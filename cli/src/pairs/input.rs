@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::Result;
-use mrfgs::front::check::{self, Warning};
+use mrfgs::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::DisparityRange;
@@ -12,6 +11,7 @@ use crate::args::reading::ReadingArgs;
 use crate::args::search::{Found, Search};
 use crate::args::sign::Sign;
 use crate::console;
+use crate::failure::Result;
 use crate::outputs::record::Files;
 use crate::pairs::folder::CALIBRATION;
 

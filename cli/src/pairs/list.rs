@@ -8,8 +8,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
+use mrfgs::low_level::text::{self, quoted};
 use mrfgs::options::DisparityRange;
-use mrfgs::text::{self, quoted};
 use mrfgs::{Error, Result};
 
 pub use crate::args::search::{Largest, pixels};

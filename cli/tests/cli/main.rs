@@ -24,7 +24,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use mrfgs::backend::gpu;
+use mrfgs::low_level::backend::gpu;
 use mrfgs::maps::flag;
 use mrfgs::options::{self, Method};
 use serde_json::Value;

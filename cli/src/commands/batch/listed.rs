@@ -8,8 +8,9 @@ use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::Reader;
 use mrfgs::options::DisparityRange;
-use mrfgs::{Error, Result};
+use mrfgs::Error;
 
+use crate::failure::Result;
 use crate::args::search::{Found, Search};
 use crate::args::sign::Sign;
 use crate::failure;

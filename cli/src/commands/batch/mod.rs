@@ -12,17 +12,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
-use mrfgs::front::check;
+use mrfgs::check;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, write};
 use mrfgs::options::Method;
-use mrfgs::{Error, Matched, Matcher, Result};
+use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
 use crate::args::sign::Sign;
-use crate::failure::{self, Failure};
+use crate::failure::{self, Failure, Result};
 use crate::outputs::also::{self, Also, AlsoArgs, Outcome};
 use crate::outputs::claim::Claim;
 use crate::outputs::files;
@@ -322,7 +322,7 @@ impl Batch<'_> {
         let summary = format!("{done} done, {skipped} skipped, {} failed", failed.len());
         if !failed.is_empty() {
             let text = format!("{summary}: {}; run it again to try these once more", failed.join(", "));
-            return Err(Failure::Incomplete(text));
+            return Err(Failure::Failed(text));
         }
         if !self.args.quiet {
             console::say(&summary);

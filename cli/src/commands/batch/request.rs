@@ -6,10 +6,11 @@ use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use mrfgs::options::Method;
-use mrfgs::{Error, Result};
+use mrfgs::Error;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::failure::Result;
 use crate::args::search::Search;
 use crate::failure;
 use crate::outputs::files;

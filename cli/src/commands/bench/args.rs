@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use mrfgs::{Error, Result};
+use mrfgs::Error;
 
+use crate::failure::Result;
 use crate::args::execution::{Device, ThreadArgs};
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;

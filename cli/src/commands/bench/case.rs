@@ -8,14 +8,16 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use mrfgs::backend::Stage;
-use mrfgs::backend::cpu::Cpu;
-use mrfgs::backend::gpu::Gpu;
 use mrfgs::image::Pair;
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::gpu::Gpu;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
-use mrfgs::plan::Plan;
-use mrfgs::{Error, Matched, Matcher, Result, Timing, roofline};
+use mrfgs::{Error, Matched, Matcher, Timing};
+use mrfgs::low_level::roofline;
 
+use crate::failure::Result;
 use crate::args::execution::Device;
 use crate::outputs::record::stage_and_level;
 use crate::pairs::folder::{self, Folder};

@@ -7,10 +7,10 @@ mod synthetic;
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::Result;
-use mrfgs::backend::gpu::{self, Gpu};
 use mrfgs::image::write;
+use mrfgs::low_level::backend::gpu::{self, Gpu};
 
+use crate::failure::Result;
 use crate::args::execution::Device;
 use crate::outputs::files;
 use crate::pairs::folder::{self, Folder};

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use mrfgs::evaluation::Metrics;
 use mrfgs::options::Method;
-use mrfgs::{Matcher, Result};
+use mrfgs::Matcher;
 use serde::Serialize;
 
+use crate::failure::Result;
 use crate::args::execution::ExecutionArgs;
 use crate::outputs::files;
 use crate::stop;

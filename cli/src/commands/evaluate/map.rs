@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use mrfgs::Result;
 
+use crate::failure::Result;
 use crate::args::reading::ReadingArgs;
 use crate::outputs::files;
 use crate::pairs::folder;

@@ -12,7 +12,7 @@ mod scenes;
 mod submission;
 
 use clap::Subcommand;
-use mrfgs::Result;
+use crate::failure::Result;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use mrfgs::{Matcher, Result};
+use mrfgs::Matcher;
 
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::stop;
 

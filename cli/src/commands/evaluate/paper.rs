@@ -3,13 +3,14 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use mrfgs::Matcher;
 use mrfgs::evaluation::Report;
 use mrfgs::evaluation::paper::{Figures, Published, SOURCE, published};
 use mrfgs::options::Method;
-use mrfgs::{Matcher, Result};
 use serde::Serialize;
 
 use crate::args::execution::ExecutionArgs;
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::text::figure;
 use crate::{stop, table};

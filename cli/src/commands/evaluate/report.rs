@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use mrfgs::evaluation::{Metrics, Report};
-use mrfgs::front::zones;
+use mrfgs::low_level::front::zones;
 use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Pair, Plane, write};
 use mrfgs::maps::Maps;

@@ -6,10 +6,11 @@ use std::time::Duration;
 use mrfgs::image::write;
 use mrfgs::maps::Maps;
 use mrfgs::options::Method;
-use mrfgs::{Error, Matcher, Result};
+use mrfgs::{Error, Matcher};
 
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
+use crate::failure::{Failure, Result};
 use crate::matching;
 use crate::outputs::files;
 use crate::pairs::folder::{self, Folder, Scene};
@@ -62,7 +63,7 @@ impl SceneArgs {
         let folders = dirs.iter().map(|dir| Folder::of(dir)).collect::<Result<Vec<_>>>()?;
         if self.figures.truth_scale.is_some() && !folders.iter().any(Folder::is_scaled) {
             let reason = "no folder holds a truth of 8 bits, and disp0GT.pfm is in pixels; leave it out";
-            return Err(Error::option("--truth-scale", reason));
+            return Err(Failure::Usage(format!("{}: {reason}", "--truth-scale")));
         }
         Ok(folders)
     }

@@ -10,8 +10,9 @@ use std::time::Duration;
 
 use mrfgs::image::{Plane, write};
 use mrfgs::options::Fill;
-use mrfgs::{Error, Matcher, Result};
+use mrfgs::{Error, Matcher};
 
+use crate::failure::{Failure, Result};
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
 use crate::outputs::files;
@@ -85,7 +86,7 @@ struct Submission {
 impl Submission {
     /// Begins the folder `dir`, a new or an empty one, for the pairs called `names`.
     fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self> {
-        let error = |name: &str, reason: String| Err(Error::option(name, reason));
+        let error = |name: &str, reason: String| Err(Failure::Usage(format!("{}: {reason}", name)));
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let Some(method) = method.to_str().filter(|m| !m.is_empty() && m.chars().all(plain)) else {
             return error(

@@ -4,12 +4,13 @@ mod steps;
 
 use std::path::PathBuf;
 
-use mrfgs::plan::Plan;
-use mrfgs::solver::{Glimpse, Inspector};
-use mrfgs::{Matched, Matcher, Result};
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::solver::{Inspection, Inspector};
+use mrfgs::{Matched, Matcher};
 
 use std::time::Duration;
 
+use crate::failure::Result;
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
 use crate::args::sign::Sign;
@@ -69,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let plan = Plan::new(input.pair.size().0, input.pair.size().1, input.range, &method)?;
     let mut matcher = Matcher::new(&execution)?;
     let mut steps = args.folder.as_deref().map(|folder| Steps::new(folder, plan)).transpose()?;
-    let mut look = steps.as_mut().map(|steps| |glimpse: &mut Glimpse| steps.look(glimpse));
+    let mut look = steps.as_mut().map(|steps| |inspection: &mut Inspection| steps.look(inspection));
     let look: Option<Inspector> = match &mut look {
         Some(look) => Some(look),
         None => None,

@@ -4,14 +4,14 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Result;
-use mrfgs::backend::{Backend, Stage, Volume};
-use mrfgs::front::matches::Match;
-use mrfgs::front::zones::Zones;
-use mrfgs::graph::LevelGraph;
+use mrfgs::low_level::backend::{Backend, Stage, Volume};
+use mrfgs::low_level::front::matches::Match;
+use mrfgs::low_level::front::zones::Zones;
+use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Pair, Plane, write};
-use mrfgs::plan::{Plan, UNITS_PER_NAT};
-use mrfgs::solver::Glimpse;
+use mrfgs::low_level::plan::{Plan, UNITS_PER_NAT};
+use mrfgs::low_level::solver::Inspection;
 
 use crate::outputs::staged::StagedFolder;
 
@@ -34,30 +34,30 @@ impl Steps {
     }
 
     /// Writes what a match shows on its way.
-    pub(super) fn look(&mut self, glimpse: &mut Glimpse) -> Result<()> {
-        self.show(glimpse).map_err(|e| self.folder.named(e))
+    pub(super) fn look(&mut self, inspection: &mut Inspection) -> Result<()> {
+        self.show(inspection).map_err(|e| self.folder.named(e))
     }
 
-    fn show(&mut self, glimpse: &mut Glimpse) -> Result<()> {
-        match glimpse {
-            Glimpse::Corrected(pair) => self.corrected(pair),
-            Glimpse::Matches(pair, zones, matches) => self.zones(pair, zones, matches),
-            Glimpse::LabelRanges(label_ranges) => {
+    fn show(&mut self, inspection: &mut Inspection) -> Result<()> {
+        match inspection {
+            Inspection::Corrected(pair) => self.corrected(pair),
+            Inspection::Matches(pair, zones, matches) => self.zones(pair, zones, matches),
+            Inspection::LabelRanges(label_ranges) => {
                 let widths = label_ranges[0].map(|&[first, last]| f32::from(last - first) + 1.0);
                 self.map("label-range-width", &widths, 1.0, self.plan.levels[0].labels as f32)
             }
-            Glimpse::Graphs(graphs) => {
+            Inspection::Graphs(graphs) => {
                 graphs.iter().enumerate().try_for_each(|(z, graph)| self.degree(z, graph))
             }
-            Glimpse::Stage(backend, Stage::Evidence(z)) => {
+            Inspection::Stage(backend, Stage::Evidence(z)) => {
                 if *z == 0 {
                     self.change(*backend, 0)?;
                 }
                 self.slices(*backend, *z)
             }
-            Glimpse::Stage(backend, Stage::WinnerTakesAll) => self.levels(*backend),
-            Glimpse::Stage(..) => Ok(()),
-            Glimpse::Iteration(backend, iteration) => self.change(*backend, *iteration),
+            Inspection::Stage(backend, Stage::WinnerTakesAll) => self.levels(*backend),
+            Inspection::Stage(..) => Ok(()),
+            Inspection::Iteration(backend, iteration) => self.change(*backend, *iteration),
         }
     }
 
@@ -129,7 +129,7 @@ impl Steps {
                 cost[(y * level.width + x) * level.labels + label] as f32 / unit
             });
             let name = format!("cost-level-{z}-disparity-{}", level.min + label as i32);
-            self.map(&name, &slice, 0.0, f32::from(mrfgs::plan::COST_MAX))?;
+            self.map(&name, &slice, 0.0, f32::from(mrfgs::low_level::plan::COST_MAX))?;
         }
         Ok(())
     }

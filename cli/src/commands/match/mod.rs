@@ -4,12 +4,13 @@ mod plan;
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::front::check;
+use mrfgs::check;
 use mrfgs::image::{Pair, pfm, write};
-use mrfgs::plan::Plan;
-use mrfgs::tiles::Tiles;
-use mrfgs::{Error, Matcher, Result};
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::tiles::Tiles;
+use mrfgs::{Error, Matcher};
 
+use crate::failure::{Failure, Result};
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
 use crate::args::sign::Sign;
@@ -131,7 +132,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {
             let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
-            return Err(Error::option(word.flag(), reason));
+            return Err(Failure::Usage(format!("{}: {reason}", word.flag())));
         }
         console::check_takes_data()?;
     } else {

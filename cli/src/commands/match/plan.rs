@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::tiles::Tiles;
 use mrfgs::options::Order;
-use mrfgs::plan::Plan;
-use mrfgs::tiles::Tiles;
 
 use crate::table::Table;
 use crate::text::{bytes, plural};
