@@ -27,12 +27,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         if args.method.name().is_some() { &["default"] } else { &["default", "paper"] };
     let name = |base: &str| args.method.name().unwrap_or_else(|| base.into());
     let methods = bases.iter().map(|base| Ok((name(base), args.method.on(base)?))).collect::<Result<_>>()?;
-    let devices = devices(args)?;
+    let devices = devices(args);
     let dirs: Vec<Option<&Path>> = match args.dirs.as_slice() {
         [] => vec![None],
         dirs => dirs.iter().map(|dir| Some(dir.as_path())).collect(),
     };
     let alone = dirs.len() * bases.len() * devices.len() == 1;
+    if !alone {
+        // A device that is missing is said before the others are measured.
+        for device in devices.iter().filter(|device| **device != Device::Cpu) {
+            Gpu::new(device.name())?;
+        }
+    }
     let mut pairs = Vec::new();
     for dir in dirs {
         for base in bases {
@@ -66,8 +72,8 @@ fn check_output(args: &Args) -> Result<()> {
     files::distinct(&inputs.map(|path| ("an input", path)).collect::<Vec<_>>(), &[("--json", path)])
 }
 
-/// The devices to measure, each once; a device that is missing is an error before the others are measured.
-fn devices(args: &Args) -> Result<Vec<Device>> {
+/// The devices to measure, each once.
+fn devices(args: &Args) -> Vec<Device> {
     let mut devices: Vec<Device> = Vec::new();
     for device in &args.device {
         let device = match device {
@@ -79,10 +85,5 @@ fn devices(args: &Args) -> Result<Vec<Device>> {
             devices.push(device);
         }
     }
-    if devices.len() > 1 {
-        for device in devices.iter().filter(|device| **device != Device::Cpu) {
-            Gpu::new(device.name()).map(drop)?;
-        }
-    }
-    Ok(devices)
+    devices
 }

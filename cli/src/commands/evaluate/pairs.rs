@@ -18,7 +18,7 @@ use super::{breakdown, metrics};
 pub(super) struct PairsArgs {
     /// Folders to match and evaluate
     #[arg(required = true, value_name = "DIR")]
-    dirs: Vec<PathBuf>,
+    pub(super) dirs: Vec<PathBuf>,
     /// Prints two more tables: where the errors of the final map are, and how good confidence and validity are
     ///
     /// The first table puts every pixel with known truth into the first class that applies: border (its match, x - truth, lies
