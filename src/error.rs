@@ -224,9 +224,6 @@ pub enum RangeError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExecutionError {
-    /// A device is named for the CPU path.
-    #[error("a device is named, and the CPU path uses none")]
-    NeedlessDevice,
     /// No device has this name or index.
     #[error("no device is called `{wanted}`; the devices are {}", present.join(", "))]
     NoSuchDevice {
@@ -492,7 +489,6 @@ mod tests {
             RangeError::TooManyLabels { min: i32::MIN, max: i32::MAX, limit: 16_384 }.into(),
             RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
             RangeError::NotFound.into(),
-            ExecutionError::NeedlessDevice.into(),
             ExecutionError::NoSuchDevice { wanted: name(), present: vec!["0: other".into()] }.into(),
             ExecutionError::NoThreads.into(),
             ExecutionError::Threads("limit reached".into()).into(),

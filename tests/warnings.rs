@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
+use mrfgs::Matcher;
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
 use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::maps::Maps;

@@ -15,6 +15,7 @@ use crate::text::single_line;
 pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
 
 /// Why the program ends early.
+#[derive(Debug)]
 pub(crate) enum Failure {
     /// The command line makes no sense.
     Usage(String),
@@ -40,6 +41,14 @@ impl Failure {
             ) => ExitCode::from(2),
             Self::Stopped(_) => ExitCode::from(stop::STOPPED),
             Self::Failed(_) | Self::Error(_) => ExitCode::FAILURE,
+        }
+    }
+
+    /// As [`at`], where it is an error of the library.
+    pub(crate) fn at(self, path: &Path) -> Self {
+        match self {
+            Self::Error(error) => Self::Error(at(error, path)),
+            failure => failure,
         }
     }
 

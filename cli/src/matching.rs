@@ -8,9 +8,9 @@ use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Matched, Matcher};
 
 use crate::console;
-use crate::failure;
 use crate::failure::Result;
 use crate::progress::Bar;
+use crate::remedy;
 use crate::text::plural;
 
 /// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and says on standard error what ran where and how
@@ -26,12 +26,16 @@ pub(crate) fn run(
 ) -> Result<(Matched, Duration)> {
     let start = Instant::now();
     let mut bar = Bar::new(name, quiet);
-    let matched = matcher.inspect(pair, range, method, &mut |progress| bar.update(progress), inspector);
+    let mut job = matcher.job(pair, range).method(method).on_progress(|progress| bar.update(progress));
+    if let Some(inspector) = inspector {
+        job = job.inspect(inspector);
+    }
+    let matched = job.run();
     bar.finish();
     let (matched, time) = (matched?, start.elapsed());
     if !quiet {
         if let Some(note) = &matched.note {
-            console::say(&failure::in_flags(note));
+            console::say(&remedy::error(note, &remedy::FLAGS));
         }
         let (width, height) = matched.plan.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();

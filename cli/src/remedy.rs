@@ -1,10 +1,10 @@
 //! The program's words for what the library reports: each cause, and the flag, the key or the column that helps.
 
 use mrfgs::Error;
+use mrfgs::check::Warning;
 use mrfgs::error::{
     BudgetError, DeviceError, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
 };
-use mrfgs::check::Warning;
 
 /// What the ends of the range are called where the user gives them.
 pub(crate) struct Ends {
@@ -65,9 +65,6 @@ fn range(cause: &RangeError, Ends { min, max }: &Ends) -> String {
 
 fn execution(cause: &ExecutionError) -> String {
     match cause {
-        ExecutionError::NeedlessDevice => {
-
-        }
         ExecutionError::NoSuchDevice { .. } => format!("--device: {cause}; see `mrfgs devices`"),
         _ => format!("--threads: {cause}"),
     }
@@ -185,7 +182,6 @@ mod tests {
                 ["--max-disparity", "give a range"],
             ),
             (said(RangeError::NotFound), ["too few matches", "give --max-disparity"]),
-            (said(ExecutionError::NeedlessDevice), ["--device", "--device cpu"]),
             (
                 said(ExecutionError::NoSuchDevice { wanted: "x".into(), present: found() }),
                 ["--device", "`mrfgs devices`"],

@@ -13,9 +13,6 @@ pub(crate) fn error(error: &Error) -> String {
         Error::Option { key, cause } => format!("options[\"{key}\"]: {cause}"),
         Error::Preset { .. } => format!("preset: {error}"),
         Error::Range(cause) => range(cause),
-        Error::Execution(ExecutionError::NeedlessDevice) => {
-            "device: backend=\"cpu\" uses no device: give only one of the two".into()
-        }
         Error::Execution(cause @ ExecutionError::NoSuchDevice { .. }) => format!("device: {cause}"),
         Error::Execution(cause) => format!("threads: {cause}"),
         Error::Budget(cause @ BudgetError::NoTileFits { needed, .. }) => {

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::Error;
 use mrfgs::options::{Method, PRESETS};
 
 use crate::args::sizes::mebibytes;
@@ -67,7 +66,7 @@ impl MethodArgs {
         }
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;
         method.tiles.memory = self.memory.unwrap_or(method.tiles.memory);
-        method.validated()
+        Ok(method.validated()?)
     }
 
     /// The files that `--method` names.

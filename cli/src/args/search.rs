@@ -5,14 +5,14 @@ use std::str::FromStr;
 
 use mrfgs::Error;
 use mrfgs::check;
+use mrfgs::error::RangeError;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use serde::Serialize;
 
 use crate::args::sign::Sign;
-use crate::failure;
-use crate::failure::{Failure, Result};
+use crate::failure::{self, Result};
 
 /// The largest disparity to search, as users give it: a number of pixels, or `auto`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -95,25 +95,14 @@ impl Search {
         let range = if let Some(range) = given {
             range
         } else {
-            let found = by_matches(pair)?;
+            let found = check::range(pair)?.ok_or(Error::Range(RangeError::NotFound))?;
             let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
             between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };
-        let width = i64::from(u32::try_from(pair.size().0).unwrap_or(u32::MAX));
-        if i64::from(range.min) >= width || i64::from(range.max) <= -width {
-            let DisparityRange { min, max } = sign.range(range);
-            let reason = format!(
-                "no disparity from {min} to {max} is inside images {width} pixels wide; give those of the pair"
-            );
-            return Err(Failure::Usage(format!("{}: {reason}", "--max-disparity")));
-        }
+        // In the user's own terms where it makes no sense.
+        sign.range(range).within(pair.size().0)?;
         Ok(Found { range, by_matches: given.is_none() })
     }
-}
-
-fn by_matches(pair: &Pair) -> Result<DisparityRange> {
-    let lacking = "the views have too few matches to find the range of disparities; give --max-disparity";
-    check::range(pair)?.ok_or_else(|| Error::Mismatch(lacking.into()))
 }
 
 /// The range from `min` on that `calibration`, read from the file `path`, gives; `None` where it gives none.
@@ -121,7 +110,7 @@ pub(crate) fn calibrated_range(
     path: &Path,
     calibration: &Calibration,
     min: i32,
-) -> Result<Option<DisparityRange>> {
+) -> mrfgs::Result<Option<DisparityRange>> {
     let Some(ndisp) = calibration.ndisp else { return Ok(None) };
     let max = i32::try_from(ndisp).unwrap_or(i32::MAX) - 1;
     let range = DisparityRange::new(min, max);

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 use clap::Command;
 use clap_mangen::Man;
+use mrfgs::Error;
 use mrfgs::image::write;
-use mrfgs::{Error, Result};
 
+use crate::failure::Result;
 use crate::outputs::files::Written;
 
 /// Write the man pages: mrfgs.1 and one for each subcommand
@@ -22,9 +23,11 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, mut program: Command) -> Result<()> {
     match fs::create_dir(&args.folder) {
         Err(e) if e.kind() == ErrorKind::NotFound => {
-            return Err(Error::write(&args.folder, "there is no folder to make it in; create that first"));
+            return Err(
+                Error::write(&args.folder, "there is no folder to make it in; create that first").into()
+            );
         }
-        Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(&args.folder, e)),
+        Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(&args.folder, e).into()),
         _ => {}
     }
     program.build();

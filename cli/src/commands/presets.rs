@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use mrfgs::options::{Method, PRESETS, keys};
+use mrfgs::options::{GROUPS, Key, Method, PRESETS, Takes, Word};
 
 use crate::console;
 use crate::failure::Result;
@@ -18,19 +18,19 @@ Examples:
   mrfgs presets default > mine.toml   # edit it, and give it to --method
   mrfgs match left.png right.png out.pfm --max-disparity 63 --method mine.toml";
 
-/// List the keys of the method with unit and meaning, and what each preset sets them to
+/// List the options of the method by group, with range, meaning and source, and their value in each preset
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Print this preset alone, as a TOML file with comments, which --method takes
+    /// Print this preset alone, as a TOML file with comments which --method takes
     name: Option<String>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    console::print(&match &args.name {
+    Ok(console::print(&match &args.name {
         Some(name) => file(name)?,
         None => listing()?,
-    })
+    })?)
 }
 
 /// One preset as a TOML file.
@@ -39,9 +39,17 @@ fn file(name: &str) -> Result<String> {
     let mut out = String::new();
     let about = PRESETS.iter().find(|p| p.0 == name).map_or("", |p| p.1);
     let _ = writeln!(out, "# The preset `{name}` of mrfgs {}: {about}.", env!("CARGO_PKG_VERSION"));
-    for (key, unit, meaning) in keys() {
-        let _ = writeln!(out, "\n{}", wrapped(&format!("{meaning} [{unit}]"), WIDTH, "# "));
-        let _ = writeln!(out, "{key} = {}", table[&key]);
+    for group in GROUPS {
+        let _ = writeln!(out, "\n{}\n[{}]", wrapped(group.meaning, WIDTH, "# "), group.name);
+        for key in group.keys {
+            let _ = match key.takes {
+                Takes::Words(_) => {
+                    writeln!(out, "\n{}{}", wrapped(&meaning(key), WIDTH, "# "), words(key, "#   "))
+                }
+                _ => writeln!(out, "\n{}", wrapped(&format!("{} [{key}]", meaning(key)), WIDTH, "# ")),
+            };
+            let _ = writeln!(out, "{} = {}", key.name(), table[group.name][key.name()]);
+        }
     }
     Ok(out)
 }
@@ -54,18 +62,35 @@ fn listing() -> Result<String> {
     }
     let values =
         PRESETS.iter().map(|(name, _)| Ok(Method::preset(name)?.table())).collect::<Result<Vec<_>>>()?;
-    // One column a preset, and a space more between them.
+    // One column for each preset, and a space more between them.
     let mut table = Table::new(&format!("l{}l", "l".repeat(PRESETS.len())));
-    let cells = |key: &str, values: Vec<String>, unit: &str| {
+    let cells = |key: &str, values: Vec<String>, takes: &str| {
         let cells = std::iter::once(key.to_owned()).chain(values).map(|cell| cell + " ");
-        cells.chain([format!("[{unit}]")]).collect::<Vec<_>>()
+        cells.chain([format!("[{takes}]")]).collect::<Vec<_>>()
     };
     table.row(cells("key", PRESETS.iter().map(|p| p.0.to_owned()).collect(), "unit and range"));
-    for (key, unit, meaning) in keys() {
-        table.text("");
-        let values = values.iter().map(|values| values[&key].to_string().replace('"', ""));
-        table.row(cells(&key, values.collect(), unit));
-        table.text(wrapped(meaning, WIDTH, "    "));
+    for group in GROUPS {
+        table.text(format!("\n[{}] {}", group.name, group.meaning));
+        for key in group.keys {
+            let name = key.name();
+            let values = values.iter().map(|values| values[group.name][&name].to_string().replace('"', ""));
+            table.text("");
+            table.row(cells(&name, values.collect(), &key.to_string()));
+            table.text(format!("{}{}", wrapped(&meaning(key), WIDTH, "    "), words(key, "      ")));
+        }
     }
     Ok(format!("{presets}\n{table}"))
+}
+
+/// What a key does, and where it comes from.
+fn meaning(key: &Key) -> String {
+    format!("{} ({}).", key.meaning.trim_end_matches('.'), key.source)
+}
+
+/// The words that a key takes, each with its meaning on lines of its own behind `lead`.
+fn words(key: &Key, lead: &str) -> String {
+    let Takes::Words(words) = key.takes else { return String::new() };
+    let line =
+        |word: &Word| format!("\n{}", wrapped(&format!("{}: {}", word.word, word.meaning), WIDTH, lead));
+    words.iter().map(line).collect()
 }

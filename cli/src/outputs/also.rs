@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use mrfgs::Error;
 use mrfgs::depth::Rig;
 use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Image, Plane, ply, write};
@@ -215,7 +214,7 @@ impl Also {
     }
 
     /// Says before any computing whether it can be written to `path`, with disparities in `range`.
-    pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> Result<()> {
+    pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> mrfgs::Result<()> {
         match self.kind {
             Kind::Disparity(_) => write::check_disparity_path(path, range.min, range.max),
             Kind::Depth => write::check_depth_path(path),

@@ -53,12 +53,12 @@ pub(crate) struct Written(Vec<PathBuf>);
 
 impl Written {
     /// Notes that `path` has been written, if that went well.
-    pub(crate) fn note<T>(&mut self, path: &Path, result: Result<T>) -> Result<T> {
+    pub(crate) fn note<T, E: Into<Failure>>(&mut self, path: &Path, result: Result<T, E>) -> Result<T> {
         if result.is_ok() {
             self.0
                 .extend(place(path).or_else(|| fs::canonicalize(path).ok().filter(|folder| folder.is_dir())));
         }
-        result
+        result.map_err(Into::into)
     }
 
     /// Keeps them: all went well.
@@ -109,11 +109,11 @@ pub(crate) fn deliver(
     }
     more(&mut written)?;
     written.keep();
-    console::print(&printed)
+    Ok(console::print(&printed)?)
 }
 
 /// Where a folder for outputs is, or would be.
-pub(crate) fn folder_place(name: &Path) -> Result<PathBuf> {
+pub(crate) fn folder_place(name: &Path) -> mrfgs::Result<PathBuf> {
     match fs::canonicalize(name) {
         Ok(place) if place.is_dir() => Ok(place),
         Ok(_) => Err(Error::write(name, "is a file; give the name of a folder")),

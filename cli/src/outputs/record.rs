@@ -9,7 +9,7 @@ use mrfgs::{Matched, Timing};
 use serde::Serialize;
 
 use crate::args::sign::Sign;
-use crate::failure;
+use crate::remedy;
 
 /// The inputs of a match and its map, as the user wrote them.
 #[derive(Serialize)]
@@ -71,7 +71,7 @@ impl<'a> MatchRecord<'a> {
             method: &plan.method,
             ran_on: &matched.ran_on,
             driver: matched.driver.as_deref(),
-            note: matched.note.as_deref().map(failure::in_flags),
+            note: matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)),
             tiles: matched.tiles.count(),
             iterations: matched.iterations,
             seconds: time.as_secs_f64(),

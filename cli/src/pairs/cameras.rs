@@ -34,7 +34,8 @@ pub(crate) fn rig(
             size.0,
             size.1,
             left.display()
-        )));
+        ))
+        .into());
     }
-    Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))
+    Ok(Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?)
 }

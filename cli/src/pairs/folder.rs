@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::Error;
 use mrfgs::evaluation::GroundTruth;
 use mrfgs::image::{Pair, Plane, calib::Calibration, read::Reader};
 use mrfgs::options::DisparityRange;
+use mrfgs::{Error, Result};
 
 use crate::args::search::calibrated_range;
-use crate::failure::Result;
 
 /// What a folder holds.
 struct Layout {

@@ -13,8 +13,8 @@ use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 
 pub use crate::args::search::{Largest, pixels};
-use crate::failure::in_columns;
 use crate::outputs::also;
+use crate::remedy;
 
 /// The columns of a list; the first three are required.
 const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
@@ -121,7 +121,7 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     };
     if let Some(Largest::Pixels(max)) = row.max_disparity {
         let range = DisparityRange::new(row.min_disparity.unwrap_or(0), max);
-        range.map_err(|error| in_columns(error).to_string())?;
+        range.map_err(|error| remedy::error(&error, &remedy::COLUMNS))?;
     }
     Ok(row)
 }

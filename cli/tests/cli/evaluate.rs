@@ -269,9 +269,9 @@ fn tables_stand_beside_the_papers() {
         let args = [&["paper", "Teddy"], &flags[..]].concat();
         let words = [flags[0], "unexpected argument", "`mrfgs evaluate paper --help`"];
         refused(folder.path(), &args, 2, &words);
-        let args = [&flags[..], &["paper", "Teddy"]].concat();
-        refused(folder.path(), &args, 2, &["'paper' cannot be used with", flags[0]]);
     }
+    let words = ["paper", "right after `evaluate`", "before all flags"];
+    refused(folder.path(), &["--json", "a.json", "paper", "Teddy"], 2, &words);
 }
 
 /// What JSON holds of each entry of an object, added up.

@@ -3,17 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mrfgs::Error;
 use mrfgs::depth::Rig;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::Reader;
 use mrfgs::options::DisparityRange;
-use mrfgs::Error;
 
-use crate::failure::Result;
 use crate::args::search::{Found, Search};
 use crate::args::sign::Sign;
-use crate::failure;
+use crate::failure::Result;
 use crate::outputs::also::Also;
 use crate::outputs::record::Files;
 use crate::pairs::cameras;
@@ -67,7 +66,7 @@ impl List {
         if list.pairs.is_empty() {
             let reason =
                 "lists no pair; give a CSV file with a row for each, or a folder with a folder for each";
-            return Err(Error::read(path, reason));
+            return Err(Error::read(path, reason).into());
         }
         Ok(list)
     }
@@ -144,7 +143,7 @@ impl Listed {
                 };
                 let calibration_path = left_path.with_file_name(CALIBRATION);
                 let known = calibration.as_ref().map(|known| (calibration_path.as_path(), known));
-                let found = search.range(&pair, known, Sign::default()).map_err(failure::in_columns)?;
+                let found = search.range(&pair, known, Sign::default())?;
                 let Found { range, by_matches } = found;
                 let rig = rig(&pair, &left_path, known)?;
                 let calibration = known.map(|_| calibration_beside(left));

@@ -28,7 +28,7 @@ use crate::outputs::claim::Claim;
 use crate::outputs::files;
 use crate::outputs::record::MatchRecord;
 use crate::progress::PairBar;
-use crate::{console, stop};
+use crate::{console, remedy, stop};
 
 use listed::{Input, List, Listed};
 use request::{Request, State};
@@ -157,7 +157,7 @@ struct Batch<'a> {
     base: PathBuf,
 }
 
-pub(crate) fn run(args: &Args) -> std::result::Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<()> {
     args.maps.also.check()?;
     let method = args.method.method()?;
     let execution = args.execution.execution();
@@ -166,12 +166,12 @@ pub(crate) fn run(args: &Args) -> std::result::Result<(), Failure> {
     if let Some(shard) = args.shard {
         pairs.retain(|listed| shard.holds(&listed.name));
     }
-    let batch = Batch { args, method, reader: args.reading.reader(), base };
+    let batch = Batch { args, method: method.clone(), reader: args.reading.reader(), base };
     if args.status {
-        return Ok(batch.print_status(&pairs)?);
+        return batch.print_status(&pairs);
     }
     stop::listen();
-    let matcher = Matcher::new(&execution)?;
+    let matcher = Matcher::builder().method(method.clone()).execution(execution).build()?;
     match fs::create_dir(&args.folder) {
         Err(e) if e.kind() != ErrorKind::AlreadyExists => Err(Error::write(&args.folder, e).into()),
         _ => batch.run(&pairs, matcher),
@@ -185,7 +185,7 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
     if args.list.is_dir() {
         if args.list.canonicalize().is_ok_and(|list| place.starts_with(list)) {
             let reason = format!("lies in {}, the folder of the pairs; give another", args.list.display());
-            return Err(Error::write(folder, reason));
+            return Err(Error::write(folder, reason).into());
         }
         return Ok(());
     }
@@ -206,7 +206,7 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
     match owned.into_iter().find(|name| inside.contains(&name.to_lowercase())) {
         Some(name) => {
             let reason = "is an input, and an output would take its place; give another folder";
-            Err(Error::write(folder.join(name), reason))
+            Err(Error::write(folder.join(name), reason).into())
         }
         None => Ok(()),
     }
@@ -258,11 +258,11 @@ impl Batch<'_> {
             };
         }
         let _ = writeln!(text, "{complete} complete, {failed} failed, {missing} missing");
-        console::print(&text)
+        Ok(console::print(&text)?)
     }
 
     /// Matches every pair that is not complete.
-    fn run(&self, pairs: &[Listed], mut matcher: Matcher) -> std::result::Result<(), Failure> {
+    fn run(&self, pairs: &[Listed], mut matcher: Matcher) -> Result<()> {
         for listed in pairs {
             Claim::remove_remains(&self.args.folder, &listed.name)?;
         }
@@ -305,16 +305,16 @@ impl Batch<'_> {
                     done += 1;
                     // Why there is no device is the same for all that follow.
                     if note.is_some() && note != told && !self.args.quiet {
-                        bar.past(|| note.iter().for_each(|note| console::say(&failure::in_flags(note))));
+                        bar.past(|| note.iter().for_each(|note| console::say(note)));
                         told = note;
                     }
                 }
                 Ok(Err(error)) => {
                     failed.push(name);
-                    bar.past(|| console::say(&format!("{name}: {}", failure::message(&error))));
+                    bar.past(|| console::say(&format!("{name}: {}", error.message(&remedy::COLUMNS))));
                 }
-                Err(Error::Interrupted) => return Err(interrupted()),
-                Err(error) => return Err(error.into()),
+                Err(Failure::Stopped(_)) => return Err(interrupted()),
+                Err(failure) => return Err(failure),
             }
             bar.end();
         }
@@ -338,7 +338,7 @@ impl Batch<'_> {
         let (request, record) = (self.request(listed), self.record(listed));
         let (input, matched, time, warnings) = match self.compute(listed, matcher, claim) {
             Ok(computed) => computed,
-            Err(error @ (Error::Interrupted | Error::Device(_))) => return Err(error),
+            Err(failure @ (Failure::Stopped(_) | Failure::Error(Error::Device(_)))) => return Err(failure),
             Err(error) => {
                 let text = request.failed(&record, &self.method, &error)?;
                 self.publish(claim, &[], &record, &text)?;
@@ -352,10 +352,9 @@ impl Batch<'_> {
         let outcome = Outcome { maps, range, sign, left: pair.as_ref().map(Pair::left), rig };
         let staged = |file: &str| claim.folder().join(file);
         // The user knows the file by its place in the output folder.
-        let at =
-            |file: &str, result: Result<()>| result.map_err(|e| failure::at(e, &self.args.folder.join(file)));
+        let at = |file: &str, result: Result<()>| result.map_err(|e| e.at(&self.args.folder.join(file)));
         let map = wanted.map(&listed.name);
-        at(&map, write::disparity(&staged(&map), &maps.final_map()))?;
+        at(&map, write::disparity(&staged(&map), &maps.final_map()).map_err(Failure::from))?;
         for (word, file) in wanted.also(&listed.name) {
             at(&file, wanted.also.write(word, &staged(&file), &outcome).map(drop))?;
         }
@@ -363,7 +362,7 @@ impl Batch<'_> {
         let found = MatchRecord::new(&files, &matched, time, sign);
         let text = request.done(&record, claim.folder(), found, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
-        Ok(Ok(matched.note))
+        Ok(Ok(matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS))))
     }
 
     fn compute(
@@ -376,19 +375,24 @@ impl Batch<'_> {
         let input = listed.read(&self.base, self.reader, wanted.also.take_cameras())?;
         let (pair, range) = (&input.pair, input.range);
         // The folder is there, so what can be wrong is the range.
-        let check =
-            |file: &str, result: Result<()>| result.map_err(|e| failure::at(e, &self.args.folder.join(file)));
+        let check = |file: &str, result: Result<()>| result.map_err(|e| e.at(&self.args.folder.join(file)));
         let map = wanted.map(&listed.name);
-        check(&map, write::check_disparity_path(&claim.folder().join(&map), range.min, range.max))?;
+        let place = claim.folder().join(&map);
+        check(&map, write::check_disparity_path(&place, range.min, range.max).map_err(Failure::from))?;
         for (word, file) in wanted.also(&listed.name) {
-            check(&file, word.check(&claim.folder().join(&file), range))?;
+            check(&file, word.check(&claim.folder().join(&file), range).map_err(Failure::from))?;
         }
         let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
         let start = Instant::now();
-        let matched = matcher.run(pair, range, &self.method, &mut |_| stop::go_on())?;
+        let matched = matcher.job(pair, range).on_progress(|_| stop::go_on()).run()?;
         let time = start.elapsed();
         warnings.extend(check::clipped(&matched.maps, range));
-        Ok((input, matched, time, warnings.iter().map(ToString::to_string).collect()))
+        Ok((
+            input,
+            matched,
+            time,
+            warnings.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)).collect(),
+        ))
     }
 
     /// Puts `outputs` in their place, and then the record. Without a record the pair is not complete, so the old record is removed
@@ -406,6 +410,6 @@ impl Batch<'_> {
         for map in outputs {
             write::publish(&claim.folder().join(map), &self.args.folder.join(map))?;
         }
-        write::publish(&staged_record, record)
+        Ok(write::publish(&staged_record, record)?)
     }
 }

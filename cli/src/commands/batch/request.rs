@@ -5,16 +5,16 @@ use std::fs;
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
-use mrfgs::options::Method;
 use mrfgs::Error;
+use mrfgs::options::Method;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::failure::Result;
 use crate::args::search::Search;
-use crate::failure;
+use crate::failure::{Failure, Result};
 use crate::outputs::files;
 use crate::outputs::record::MatchRecord;
+use crate::remedy;
 
 use super::listed::Listed;
 
@@ -125,8 +125,8 @@ impl Request {
     }
 
     /// The text of the record `path` of a pair that failed.
-    pub(super) fn failed(&self, path: &Path, method: &Method, reason: &Error) -> Result<String> {
-        let reason = &failure::message(reason);
+    pub(super) fn failed(&self, path: &Path, method: &Method, failure: &Failure) -> Result<String> {
+        let reason = &failure.message(&remedy::COLUMNS);
         let version = env!("CARGO_PKG_VERSION");
         files::json_text(path, &Failed { status: "failed", reason, request: self, version, method })
     }

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use mrfgs::Error;
+use mrfgs::error::ExecutionError;
 
-use crate::failure::Result;
 use crate::args::execution::{Device, ThreadArgs};
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
+use crate::failure::Result;
 
 use super::synthetic::{LARGE, SMALL, Synthetic};
 
@@ -83,6 +84,6 @@ impl Args {
     pub(super) fn pool(&self) -> Result<rayon::ThreadPool> {
         let threads = self.threads.threads.map_or(0, usize::from);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.map_err(|e| Error::option("--threads", e.to_string()))
+        Ok(pool.map_err(|e| Error::from(ExecutionError::Threads(e.to_string())))?)
     }
 }

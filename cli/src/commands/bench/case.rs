@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::io::Write;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -13,16 +12,16 @@ use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::Gpu;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::options::DisparityRange;
-use mrfgs::{Error, Matched, Matcher, Timing};
 use mrfgs::low_level::roofline;
+use mrfgs::options::{DeviceChoice, DisparityRange};
+use mrfgs::{Error, Matched, Matcher, Timing};
 
-use crate::failure::Result;
 use crate::args::execution::Device;
+use crate::console;
+use crate::failure::{Failure, Result};
 use crate::outputs::record::stage_and_level;
 use crate::pairs::folder::{self, Folder};
 use crate::process::{peak_memory, processor_time};
-use crate::{console, failure};
 
 use super::args::Args;
 use super::findings::{Figures, Findings, Row};
@@ -40,8 +39,8 @@ pub(super) struct Case<'a> {
 impl Case<'_> {
     /// Measures in a process of its own, whose memory no case before has touched.
     pub(super) fn apart(&self) -> Result<Row> {
-        let failed = |reason: String| Error::Device(reason);
-        let program = std::env::current_exe().map_err(|e| Error::read("this program", e))?;
+        let failed = Failure::Failed;
+        let program = std::env::current_exe().map_err(|e| Failure::from(Error::read("this program", e)))?;
         let run = Command::new(program).args(self.arguments()).output();
         let run = run.map_err(|e| failed(format!("a process for a measurement cannot be started: {e}")))?;
         let said = String::from_utf8_lossy(&run.stderr);
@@ -81,7 +80,7 @@ impl Case<'_> {
         for (key, value) in &args.method.set {
             flag("--set=", &format!("{key}={value}"));
         }
-        if let Some(memory) = args.method.tiles.memory {
+        if let Some(memory) = args.method.memory {
             flag("--memory=", &format!("{memory}MiB"));
         }
         if let Some(threads) = args.threads.threads {
@@ -111,8 +110,8 @@ impl Case<'_> {
         let method = self.args.method.name().unwrap_or_else(|| self.base.into());
         let what = format!("{name}, method {method}, {device}");
         let figures = match self.figures(&pair, range) {
-            Err(Error::Memory(reason)) => {
-                console::say(&format!("{what}: left out: {}", failure::in_flags(&reason)));
+            Err(failure @ Failure::Error(Error::Memory(_))) => {
+                console::say(&format!("{what}: left out: {failure}"));
                 None
             }
             figures => Some(figures?),
@@ -127,10 +126,11 @@ impl Case<'_> {
 
     fn figures(&self, pair: &Pair, range: DisparityRange) -> Result<Figures> {
         let method = self.args.method.on(self.base)?;
-        let mut matcher = Matcher::new(&self.device.execution(&self.args.threads))?;
+        let mut matcher =
+            Matcher::builder().method(method).execution(self.device.execution(&self.args.threads)).build()?;
         let mut run = |timings: bool| {
             matcher.keep_time(timings);
-            matcher.run(pair, range, &method, &mut |_| ControlFlow::Continue(()))
+            matcher.run(pair, range)
         };
         let Matched { plan, tiles, iterations, ran_on, traffic, .. } = run(false)?;
         let (mut runs_ms, mut processor, mut timed) = (Vec::new(), Vec::new(), Vec::new());
@@ -145,7 +145,7 @@ impl Case<'_> {
         let peak_bytes = peak_memory();
         drop(matcher);
         let copy_gb_per_s = giga(match self.device {
-            Device::Cpu => self.args.pool()?.install(Cpu::copy_rate),
+            Device(DeviceChoice::Cpu) => self.args.pool()?.install(Cpu::copy_rate),
             device => Gpu::new(device.name())?.copy_rate()?,
         });
         let message_time = |timings: &Vec<Timing>| ms(messages(&plan, timings).map(|(_, t)| t.time).sum());

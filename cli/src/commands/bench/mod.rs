@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 
 use mrfgs::image::write;
 use mrfgs::low_level::backend::gpu::{self, Gpu};
+use mrfgs::options::DeviceChoice;
 
-use crate::failure::Result;
 use crate::args::execution::Device;
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::pairs::folder::{self, Folder};
 
@@ -27,12 +28,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         if args.method.name().is_some() { &["default"] } else { &["default", "paper"] };
     let name = |base: &str| args.method.name().unwrap_or_else(|| base.into());
     let methods = bases.iter().map(|base| Ok((name(base), args.method.on(base)?))).collect::<Result<_>>()?;
-    let devices = devices(args)?;
+    let devices = devices(args);
     let dirs: Vec<Option<&Path>> = match args.dirs.as_slice() {
         [] => vec![None],
         dirs => dirs.iter().map(|dir| Some(dir.as_path())).collect(),
     };
     let alone = dirs.len() * bases.len() * devices.len() == 1;
+    if !alone {
+        // A device that is missing is said before the others are measured.
+        for device in devices.iter().filter(|device| device.0 != DeviceChoice::Cpu) {
+            Gpu::new(device.name())?;
+        }
+    }
     let mut pairs = Vec::new();
     for dir in dirs {
         for base in bases {
@@ -66,23 +73,18 @@ fn check_output(args: &Args) -> Result<()> {
     files::distinct(&inputs.map(|path| ("an input", path)).collect::<Vec<_>>(), &[("--json", path)])
 }
 
-/// The devices to measure, each once; a device that is missing is an error before the others are measured.
-fn devices(args: &Args) -> Result<Vec<Device>> {
+/// The devices to measure, each once.
+fn devices(args: &Args) -> Vec<Device> {
     let mut devices: Vec<Device> = Vec::new();
     for device in &args.device {
         let device = match device {
-            Device::Auto if gpu::has_automatic() => Device::Gpu,
-            Device::Auto => Device::Cpu,
+            Device(DeviceChoice::Auto) if gpu::has_automatic() => Device(DeviceChoice::Gpu),
+            Device(DeviceChoice::Auto) => Device(DeviceChoice::Cpu),
             device => device.clone(),
         };
         if !devices.contains(&device) {
             devices.push(device);
         }
     }
-    if devices.len() > 1 {
-        for device in devices.iter().filter(|device| **device != Device::Cpu) {
-            Gpu::new(device.name()).map(drop)?;
-        }
-    }
-    Ok(devices)
+    devices
 }

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use mrfgs::Matcher;
 use mrfgs::evaluation::Metrics;
 use mrfgs::options::Method;
-use mrfgs::Matcher;
 use serde::Serialize;
 
-use crate::failure::Result;
 use crate::args::execution::ExecutionArgs;
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::stop;
 use crate::table::Table;
@@ -44,7 +44,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     stop::listen();
     args.scenes.check_json(&args.dirs, None)?;
     let folders = args.scenes.folders(&args.dirs)?;
-    let mut matcher = Matcher::new(&args.execution.execution())?;
+    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let mut run = |row: &Row, called: &str| {
         let see = |_: &_, _: &_, _| Ok(());
         scenes::match_all(&args.scenes, &folders, &mut matcher, method(row)?, Some(called), see)
@@ -99,7 +99,7 @@ const ROWS: &[Row] = &[
 fn method(row: &Row) -> Result<Method> {
     let mut method = Method::preset("default")?;
     method.set_all(row.1.iter().copied())?;
-    method.validated()
+    Ok(method.validated()?)
 }
 
 /// The table. The help explains the fields.

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-
-use crate::failure::Result;
 use crate::args::reading::ReadingArgs;
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::pairs::folder;
 

@@ -11,8 +11,11 @@ mod report;
 mod scenes;
 mod submission;
 
+use std::path::PathBuf;
+
 use clap::Subcommand;
-use crate::failure::Result;
+
+use crate::failure::{Failure, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -69,10 +72,26 @@ impl Args {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     match &args.mode {
-        None => pairs::run(&args.pairs),
+        None => {
+            check_modes(&args.pairs)?;
+            pairs::run(&args.pairs)
+        }
         Some(Mode::Map(args)) => map::run(args),
         Some(Mode::Paper(args)) => paper::run(args),
         Some(Mode::Ablations(args)) => ablations::run(args),
         Some(Mode::Submission(args)) => submission::run(args),
+    }
+}
+
+/// Refuses the name of a mode among the folders: after a flag the parser takes it for one.
+fn check_modes(args: &pairs::PairsArgs) -> Result<()> {
+    let is_mode =
+        |dir: &&PathBuf| dir.to_str().is_some_and(<Mode as Subcommand>::has_subcommand) && !dir.is_dir();
+    match args.dirs.iter().find(is_mode) {
+        Some(mode) => {
+            let mode = mode.display();
+            Err(Failure::Usage(format!("{mode}: give it right after `evaluate`, before all flags")))
+        }
+        None => Ok(()),
     }
 }

@@ -19,7 +19,7 @@ use super::{breakdown, metrics};
 pub(super) struct PairsArgs {
     /// Folders to match and evaluate
     #[arg(required = true, value_name = "DIR")]
-    dirs: Vec<PathBuf>,
+    pub(super) dirs: Vec<PathBuf>,
     /// Prints two more tables: where the errors of the final map are, and how good confidence and validity are
     ///
     /// The first table puts every pixel with known truth into the first class that applies: border (its match, x - truth, lies
@@ -58,7 +58,7 @@ pub(super) fn run(args: &PairsArgs) -> Result<()> {
     args.scenes.check_json(&args.dirs, Some(&args.method))?;
     let method = args.method.method()?;
     let folders = args.scenes.folders(&args.dirs)?;
-    let mut matcher = Matcher::new(&args.execution.execution())?;
+    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let mut pictures = Vec::new();
     let findings =
         scenes::match_all(&args.scenes, &folders, &mut matcher, method, None, |scene, maps, _| {

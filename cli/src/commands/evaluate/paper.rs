@@ -46,7 +46,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     stop::listen();
     args.scenes.check_json(&args.dirs, None)?;
     let folders = args.scenes.folders(&args.dirs)?;
-    let mut matcher = Matcher::new(&args.execution.execution())?;
+    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let mut found = Vec::new();
     for preset in COMPARED {
         let method = Method::preset(preset)?.validated()?;

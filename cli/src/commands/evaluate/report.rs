@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use mrfgs::Error;
 use mrfgs::evaluation::{Metrics, Report};
-use mrfgs::low_level::front::zones;
 use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Pair, Plane, write};
+use mrfgs::low_level::front::zones;
 use mrfgs::maps::Maps;
-use mrfgs::{Error, Result};
 
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::outputs::staged::StagedFolder;
 use crate::text::figure;
@@ -206,7 +207,7 @@ impl<'a> Destination<'a> {
                 let reason = format!(
                     "the folder holds {name}, which is no part of an earlier report; give a new folder or empty it"
                 );
-                return Err(Error::write(self.dir, reason));
+                return Err(Error::write(self.dir, reason).into());
             }
         }
         Ok(())
@@ -219,7 +220,7 @@ impl<'a> Destination<'a> {
             write::save(&staged.path().join(name), bytes).map_err(|e| staged.named(e))?;
         }
         self.refuse_strangers()?;
-        staged.publish()
+        Ok(staged.publish()?)
     }
 }
 

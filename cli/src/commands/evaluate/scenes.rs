@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use mrfgs::Matcher;
 use mrfgs::image::write;
 use mrfgs::maps::Maps;
 use mrfgs::options::Method;
-use mrfgs::{Error, Matcher};
 
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
@@ -60,7 +60,7 @@ impl SceneArgs {
 
     /// The folders, all complete: what is missing in the last is said before the first is matched.
     pub(super) fn folders<'a>(&self, dirs: &'a [PathBuf]) -> Result<Vec<Folder<'a>>> {
-        let folders = dirs.iter().map(|dir| Folder::of(dir)).collect::<Result<Vec<_>>>()?;
+        let folders = dirs.iter().map(|dir| Folder::of(dir)).collect::<mrfgs::Result<Vec<_>>>()?;
         if self.figures.truth_scale.is_some() && !folders.iter().any(Folder::is_scaled) {
             let reason = "no folder holds a truth of 8 bits, and disp0GT.pfm is in pixels; leave it out";
             return Err(Failure::Usage(format!("{}: {reason}", "--truth-scale")));

@@ -12,9 +12,9 @@ use mrfgs::image::{Plane, write};
 use mrfgs::options::Fill;
 use mrfgs::{Error, Matcher};
 
-use crate::failure::{Failure, Result};
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
+use crate::failure::{Failure, Result};
 use crate::outputs::files;
 use crate::outputs::staged::StagedFolder;
 use crate::pairs::folder;
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     args.scenes.check_json(&args.dirs, Some(&args.method))?;
     let folders = args.scenes.folders(&args.dirs)?;
-    let mut matcher = Matcher::new(&args.execution.execution())?;
+    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let findings =
         scenes::match_all(&args.scenes, &folders, &mut matcher, method, None, |scene, maps, time| {
             submission.add(&scene.name, &maps.final_map(), time)
@@ -113,8 +113,8 @@ impl Submission {
         let dir = folder.path().join(name);
         fs::create_dir(&dir).map_err(|e| Error::write(folder.place().join(name), e))?;
         let time = format!("{:.3}\n", time.as_secs_f64());
-        write::disparity(&dir.join(format!("disp0{method}{ending}.pfm")), map)
+        Ok(write::disparity(&dir.join(format!("disp0{method}{ending}.pfm")), map)
             .and_then(|()| write::save(&dir.join(format!("time{method}.txt")), time.as_bytes()))
-            .map_err(|e| folder.named(e))
+            .map_err(|e| folder.named(e))?)
     }
 }

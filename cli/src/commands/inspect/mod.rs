@@ -10,10 +10,10 @@ use mrfgs::{Matched, Matcher};
 
 use std::time::Duration;
 
-use crate::failure::Result;
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
 use crate::args::sign::Sign;
+use crate::failure::Result;
 use crate::outputs::files;
 use crate::outputs::record::{MatchRecord, stage_and_level};
 use crate::outputs::staged::StagedFolder;
@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     check_outputs(args, &input)?;
     input.warn();
     let plan = Plan::new(input.pair.size().0, input.pair.size().1, input.range, &method)?;
-    let mut matcher = Matcher::new(&execution)?;
+    let mut matcher = Matcher::builder().execution(execution).build()?;
     let mut steps = args.folder.as_deref().map(|folder| Steps::new(folder, plan)).transpose()?;
     let mut look = steps.as_mut().map(|steps| |inspection: &mut Inspection| steps.look(inspection));
     let look: Option<Inspector> = match &mut look {

@@ -4,14 +4,16 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Result;
+use mrfgs::image::colour::{self, ColourMap};
+use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
+use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::front::matches::Match;
 use mrfgs::low_level::front::zones::Zones;
 use mrfgs::low_level::graph::LevelGraph;
-use mrfgs::image::colour::{self, ColourMap};
-use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::plan::{Plan, UNITS_PER_NAT};
 use mrfgs::low_level::solver::Inspection;
+use mrfgs::options::Illumination;
 
 use crate::outputs::staged::StagedFolder;
 
@@ -40,15 +42,7 @@ impl Steps {
 
     fn show(&mut self, inspection: &mut Inspection) -> Result<()> {
         match inspection {
-            Inspection::Corrected(pair) => self.corrected(pair),
-            Inspection::Matches(pair, zones, matches) => self.zones(pair, zones, matches),
-            Inspection::LabelRanges(label_ranges) => {
-                let widths = label_ranges[0].map(|&[first, last]| f32::from(last - first) + 1.0);
-                self.map("label-range-width", &widths, 1.0, self.plan.levels[0].labels as f32)
-            }
-            Inspection::Graphs(graphs) => {
-                graphs.iter().enumerate().try_for_each(|(z, graph)| self.degree(z, graph))
-            }
+            Inspection::Prepared(prepared) => self.prepared(prepared),
             Inspection::Stage(backend, Stage::Evidence(z)) => {
                 if *z == 0 {
                     self.change(*backend, 0)?;
@@ -76,6 +70,24 @@ impl Steps {
     fn map(&self, name: &str, map: &Plane<f32>, min: f32, max: f32) -> Result<()> {
         let picture = colour::preview(map, min, max, ColourMap::default());
         write::rgb8(&self.path(&format!("{name}.png")), &picture)
+    }
+
+    fn prepared(&self, prepared: &Prepared) -> Result<()> {
+        let Prepared { pair, graphs, label_ranges, zones } = prepared;
+        if self.plan.method.front.illumination != Illumination::None {
+            self.corrected(pair)?;
+        }
+        for (z, graph) in graphs.iter().enumerate() {
+            self.degree(z, graph)?;
+        }
+        if let Some((zones, matches)) = zones {
+            self.zones(pair, zones, matches)?;
+        }
+        if let Some(ranges) = label_ranges.first() {
+            let widths = ranges.map(|&[first, last]| f32::from(last - first) + 1.0);
+            self.map("label-range-width", &widths, 1.0, self.plan.levels[0].labels as f32)?;
+        }
+        Ok(())
     }
 
     fn corrected(&self, pair: &Pair) -> Result<()> {
@@ -121,7 +133,7 @@ impl Steps {
     /// The cost of single labels.
     fn slices(&self, backend: &mut dyn Backend, z: usize) -> Result<()> {
         let level = &self.plan.levels[z];
-        let cost = backend.read(Volume::Cost(z))?;
+        let cost = backend.probe().read(Volume::Cost(z))?;
         let unit = if z == 0 { 1.0 } else { 256.0 };
         for quarter in SLICES {
             let label = (level.labels - 1) * quarter / 4;
@@ -137,7 +149,7 @@ impl Steps {
     /// The map of every level, and how undecided the finest is.
     fn levels(&self, backend: &mut dyn Backend) -> Result<()> {
         for (z, level) in self.plan.levels.iter().enumerate() {
-            let belief = backend.read(Volume::Belief(z))?;
+            let belief = backend.probe().read(Volume::Belief(z))?;
             let optima: Vec<usize> = belief.chunks_exact(level.labels).map(optimum).collect();
             let map = Plane::from_fn(level.width, level.height, |x, y| {
                 (level.min + optima[y * level.width + x] as i32) as f32
@@ -153,7 +165,7 @@ impl Steps {
     }
 
     fn change(&mut self, backend: &mut dyn Backend, iteration: u32) -> Result<()> {
-        let belief = backend.read(Volume::Belief(0))?;
+        let belief = backend.probe().read(Volume::Belief(0))?;
         let map: Vec<usize> = belief.chunks_exact(self.plan.levels[0].labels).map(optimum).collect();
         if iteration == 0 {
             // The start, also of another try where the device failed.

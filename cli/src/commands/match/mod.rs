@@ -4,16 +4,16 @@ mod plan;
 
 use std::path::{Path, PathBuf};
 
+use mrfgs::Matcher;
 use mrfgs::check;
 use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::tiles::Tiles;
-use mrfgs::{Error, Matcher};
 
-use crate::failure::{Failure, Result};
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
 use crate::args::sign::Sign;
+use crate::failure::{Failure, Result};
 use crate::outputs::also::{Also, AlsoArgs, Outcome};
 use crate::outputs::files::{self, Written};
 use crate::outputs::record::MatchRecord;
@@ -102,9 +102,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let plan = Plan::new(input.pair.size().0, input.pair.size().1, range, &method)?;
     if args.dry_run {
-        return console::print(&plan::describe(&Tiles::new(&plan)?));
+        return Ok(console::print(&plan::describe(&Tiles::new(&plan)?))?);
     }
-    let mut matcher = Matcher::new(&execution)?;
+    let mut matcher = Matcher::builder().execution(execution).build()?;
     let (matched, time) = matching::run(&mut matcher, &input.pair, range, &method, None, args.quiet, None)?;
     if !args.quiet {
         input::warn(
@@ -168,7 +168,8 @@ fn write_outputs(
     for (word, path) in also {
         said.extend(written.note(path, args.also.write(word, path, outcome))?);
     }
-    let json = args.json.as_deref().map(|path: &Path| Ok((path, files::json_text(path, record)?)));
+    let json =
+        args.json.as_deref().map(|path: &Path| Ok::<_, Failure>((path, files::json_text(path, record)?)));
     let json = json.transpose()?;
     if let Some((path, text)) = json.as_ref().filter(|(path, _)| !files::is_printed(path)) {
         written.note(path, write::save(path, text.as_bytes()))?;
