@@ -198,7 +198,7 @@ fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
 
 /// Runs all stages up to [`Stage::SubPixel`]; the number of iterations.
 fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
-    backend.prepare(&plan, Prepared::new(pair, graph::build(pair.left(), plan))).unwrap();
+    backend.prepare(plan, Prepared::new(pair, graph::build(pair.left(), plan))).unwrap();
     backend.run(Stage::Cost).unwrap();
     for z in 1..plan.levels.len() {
         backend.run(Stage::Pyramid(z)).unwrap();

@@ -125,7 +125,7 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     twin_read_out(plan, &costs[0], &state.belief[0], &mut maps);
     for (name, mut backend) in backends() {
         let backend = backend.as_mut();
-        backend.prepare(&plan, Prepared::new(pair, graphs.clone())).unwrap();
+        backend.prepare(plan, Prepared::new(pair, graphs.clone())).unwrap();
         backend.run(Stage::Cost).unwrap();
         for z in 1..plan.levels.len() {
             backend.run(Stage::Pyramid(z)).unwrap();

@@ -126,7 +126,7 @@ fn control_changes_are_found() {
         (Stage::Confidence, false, confidence, |p| p.method.refinement.confidence_floor += 4),
         (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.refinement.median_window = 7),
         (Stage::FillMedian, false, twin::fill_median::fill_median, |p| {
-            p.method.refinement.median_sigma_range = 0.02
+            p.method.refinement.median_sigma_range = 0.02;
         }),
         (Stage::FillMedian, false, twin::median::median, |p| p.method.refinement.median = Median::Filled),
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_window = 7),

@@ -50,7 +50,7 @@ fn flood_of_the_sure(plan: &Plan) -> u32 {
     let start = state.clone();
     twin_flood(plan, &graphs, &mut state);
     for (name, mut backend) in backends() {
-        backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
+        backend.prepare(plan, Prepared::new(&pair, graphs.clone())).unwrap();
         start.write(backend.as_mut());
         crate::common::flood(backend.as_mut(), plan).unwrap();
         for (volume, expected) in state.volumes() {

@@ -42,7 +42,7 @@ fn parent(path: &Path) -> &Path {
 pub(crate) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
     if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
         let reason = format!("{} lies in the folder of {folder_name}; give another name", path.display());
-        return Err(Failure::Usage(format!("{}: {reason}", name)));
+        return Err(Failure::Usage(format!("{name}: {reason}")));
     }
     Ok(())
 }

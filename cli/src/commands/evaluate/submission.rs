@@ -86,7 +86,7 @@ struct Submission {
 impl Submission {
     /// Begins the folder `dir`, a new or an empty one, for the pairs called `names`.
     fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self> {
-        let error = |name: &str, reason: String| Err(Failure::Usage(format!("{}: {reason}", name)));
+        let error = |name: &str, reason: String| Err(Failure::Usage(format!("{name}: {reason}")));
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let Some(method) = method.to_str().filter(|m| !m.is_empty() && m.chars().all(plain)) else {
             return error(
