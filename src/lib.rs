@@ -61,6 +61,7 @@
 //!
 //! - [`Method`] holds every option that determines the bits of the maps; [`options`] describes them all.
 //! - [`Matched`] is what a match gives: maps of disparity, confidence and validity, and what made them.
+//! - [`colour`] shows maps as pictures.
 //! - [`check`] warns of what is probably wrong with a pair, and finds its range.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
@@ -71,6 +72,7 @@
 //! maps bit for bit, whatever the number of threads.
 
 mod backend;
+pub mod colour;
 pub mod depth;
 mod engine;
 pub mod error;

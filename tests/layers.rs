@@ -48,9 +48,14 @@ impl Crate {
             sources.into_iter().map(|(module, text)| (module, code_of(&text))).collect();
         let mut exports = BTreeMap::new();
         for (module, code) in &files {
+            // A macro for all has its place at the root, wherever it is.
+            for macro_rules in code.split("#[macro_export]\nmacro_rules! ").skip(1) {
+                let path = ["crate".to_owned()].into_iter().chain(module.iter().cloned());
+                let name = macro_rules.split_whitespace().next().unwrap().to_owned();
+                exports.insert((Vec::new(), name.clone()), path.chain([name]).collect());
+            }
             for (start, _) in code.match_indices("use ") {
-                let before = code[..start].trim_end_matches(' ');
-                if before.ends_with("pub") || before.ends_with(')') {
+                if is_passed_on(code, start) {
                     for path in paths(&code[start + 4..]) {
                         let name = path.last().unwrap().clone();
                         exports.insert((module.clone(), name), path);
@@ -117,7 +122,8 @@ impl Crate {
             for start in ["crate::", "super::"] {
                 for (at, _) in code.match_indices(start) {
                     let before = code[..at].chars().next_back();
-                    if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':') {
+                    let in_use = code[..at].ends_with("use ");
+                    if in_use || before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':') {
                         continue;
                     }
                     for path in paths(&code[at..]) {
@@ -127,6 +133,13 @@ impl Crate {
             }
             for (at, _) in code.match_indices("use ") {
                 for path in paths(&code[at + 4..]) {
+                    // What is passed on alone is no import.
+                    let name = path.last().unwrap();
+                    let uses =
+                        code.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| word == name);
+                    if is_passed_on(code, at) && uses.count() < 2 {
+                        continue;
+                    }
                     all.extend(self.file_of(module, &path).filter(|to| to != module));
                 }
             }
@@ -134,6 +147,12 @@ impl Crate {
         }
         imports
     }
+}
+
+/// Whether the `use` at `start` passes names on to others, and takes none for its own module.
+fn is_passed_on(code: &str, start: usize) -> bool {
+    let before = code[..start].trim_end_matches(' ');
+    before.ends_with("pub") || before.ends_with(')')
 }
 
 /// The paths at the start of `code`: one, or all that its braces hold.

@@ -1,7 +1,6 @@
 //! Planes of pixels, and the pair that everything starts from.
 
 pub mod calib;
-pub mod colour;
 mod decode;
 mod file;
 mod jpeg;

@@ -156,19 +156,7 @@ impl Matcher {
         self.timings = on;
     }
 
-    /// Matches `pair` over the disparities of `search`: `0..=47`, or `..` for the range that sparse matches find.
-    ///
-    /// # Errors
-    /// Those of [`Job::run`].
-    pub fn run(&mut self, pair: &Pair, search: impl Search) -> Result<Matched> {
-        self.job(pair, search).run()
-    }
-
-    /// A match of `pair` that can be watched, stopped and inspected. See [`Matcher::run`].
-    pub fn job<'a>(&'a mut self, pair: &'a Pair, search: impl Search) -> Job<'a> {
-        Job::new(self, pair, search)
-    }
-
+    /// Matches `pair`, and tells of it as asked.
     fn solve(
         &mut self,
         pair: &Pair,

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
-use mrfgs::image::colour::{self, ColourMap};
 use mrfgs::image::{Image, Plane, ply, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;

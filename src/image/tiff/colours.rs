@@ -1,7 +1,7 @@
 //! What the samples of a TIFF file mean: grey, colours, palettes, inks and alpha.
 
 use super::directory::Directory;
-use super::{equal, tag};
+use super::tag;
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 use crate::image::raster::Samples;
@@ -51,7 +51,7 @@ impl Colours {
     /// What of it is not understood.
     pub(super) fn of(directory: &Directory) -> Result<Self, ReadError> {
         let samples = directory.first(tag::SAMPLES, 1)? as usize;
-        let bits = equal(directory, tag::BITS, 1, "depths")?;
+        let bits = directory.equal(tag::BITS, 1, "depths")?;
         if samples == 0 || samples > usize::from(u16::MAX) || !(1..=64).contains(&bits) {
             return Err(damaged(format!("the TIFF directory claims {samples} samples of {bits} bits")));
         }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::tag;
 use crate::error::ReadError;
-use crate::image::file::damaged;
+use crate::image::file::{damaged, unsupported};
 
 /// Directories that are looked at, at most: a file with more has no end.
 const MOST: usize = 1 << 12;
@@ -131,6 +131,16 @@ impl<'a> Directory<'a> {
                 self.file.len()
             ))),
         }
+    }
+
+    /// The value of a tag that has one for every sample, all alike.
+    pub(super) fn equal(&self, tag: u16, default: u64, what: &str) -> Result<u64, ReadError> {
+        let values = self.unsigned(tag)?.unwrap_or_default();
+        let first = values.first().copied().unwrap_or(default);
+        if values.iter().any(|value| *value != first) {
+            return Err(unsupported(format!("holds samples of different {what}")));
+        }
+        Ok(first)
     }
 
     /// The values of a tag that holds whole numbers; `None` where there is none.

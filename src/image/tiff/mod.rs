@@ -7,6 +7,7 @@
 mod chunks;
 mod colours;
 mod directory;
+mod tag;
 
 use std::borrow::Cow;
 
@@ -20,39 +21,6 @@ use super::raster::{Raster, Samples, holding};
 use crate::error::ReadError;
 use crate::memory;
 use crate::text::quoted;
-
-/// The tags that are looked at.
-mod tag {
-    pub(super) const NEW_SUBFILE_TYPE: u16 = 254;
-    pub(super) const SUBFILE_TYPE: u16 = 255;
-    pub(super) const WIDTH: u16 = 256;
-    pub(super) const HEIGHT: u16 = 257;
-    pub(super) const BITS: u16 = 258;
-    pub(super) const COMPRESSION: u16 = 259;
-    pub(super) const PHOTOMETRIC: u16 = 262;
-    pub(super) const FILL_ORDER: u16 = 266;
-    pub(super) const STRIP_OFFSETS: u16 = 273;
-    pub(super) const SAMPLES: u16 = 277;
-    pub(super) const ROWS_PER_STRIP: u16 = 278;
-    pub(super) const STRIP_BYTE_COUNTS: u16 = 279;
-    pub(super) const PLANAR_CONFIGURATION: u16 = 284;
-    pub(super) const PREDICTOR: u16 = 317;
-    pub(super) const COLOUR_MAP: u16 = 320;
-    pub(super) const TILE_WIDTH: u16 = 322;
-    pub(super) const TILE_HEIGHT: u16 = 323;
-    pub(super) const TILE_OFFSETS: u16 = 324;
-    pub(super) const TILE_BYTE_COUNTS: u16 = 325;
-    pub(super) const SUB_DIRECTORIES: u16 = 330;
-    pub(super) const INK_SET: u16 = 332;
-    pub(super) const EXTRA_SAMPLES: u16 = 338;
-    pub(super) const SAMPLE_FORMAT: u16 = 339;
-    pub(super) const JPEG_TABLES: u16 = 347;
-    pub(super) const YCBCR_COEFFICIENTS: u16 = 529;
-    pub(super) const YCBCR_SUBSAMPLING: u16 = 530;
-    pub(super) const REFERENCE_BLACK_WHITE: u16 = 532;
-    /// GDAL's, as text.
-    pub(super) const NO_DATA: u16 = 42_113;
-}
 
 /// How samples are numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,7 +91,7 @@ impl<'a> Layout<'a> {
         let (width, height) = (size.0 as usize, size.1 as usize);
 
         let bits = colours.bits;
-        let format = match equal(directory, tag::SAMPLE_FORMAT, 1, "formats")? {
+        let format = match directory.equal(tag::SAMPLE_FORMAT, 1, "formats")? {
             // 4 is undefined: there are bits, and nothing better to take them for.
             1 | 4 => Format::Unsigned,
             2 => Format::Signed,
@@ -351,16 +319,6 @@ impl<'a> Layout<'a> {
         }
         Ok(out)
     }
-}
-
-/// The value of a tag that has one for every sample, all alike.
-fn equal(directory: &Directory, tag: u16, default: u64, what: &str) -> Result<u64, ReadError> {
-    let values = directory.unsigned(tag)?.unwrap_or_default();
-    let first = values.first().copied().unwrap_or(default);
-    if values.iter().any(|value| *value != first) {
-        return Err(unsupported(format!("holds samples of different {what}")));
-    }
-    Ok(first)
 }
 
 /// Number `i` of `bits` bits in a row, the highest bit first.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Result;
-use mrfgs::image::colour::{self, ColourMap};
+use mrfgs::colour::{self, ColourMap};
 use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::front::Prepared;

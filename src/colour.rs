@@ -1,6 +1,6 @@
 //! Maps for the eye.
 
-use super::Plane;
+use crate::image::Plane;
 use crate::maps::{flag, has_disparity};
 
 type Rgb = [u8; 3];
