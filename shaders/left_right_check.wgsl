@@ -27,6 +27,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var reason = 0u;
     if left[row + id.x].z != 0u {
         reason = MASKED;
+    } else if (optima[row + id.x].x & 0xffffu) == NO_LABEL {
+        reason = OUTSIDE;
     } else if params.is_on == 1u {
         let label = i32(optima[row + id.x].x & 0xffffu);
         let x = i32(id.x) - params.level.low - label;

@@ -86,9 +86,10 @@ macro_rules! for_every_stage {
                 SubPixel sub_pixel;
             }
             maps {
-                /// [`Map::Validity`](super::Map::Validity): [`flag::MASKED`] alone on pixels masked in the left image. On the others, where
-                /// [`crate::options::RefinementOptions::left_right_check`] is not off, [`flag::OUTSIDE`] where the match is outside the right image
-                /// and [`flag::OCCLUDED`] where the right pixel's own label differs by more than one, and otherwise 0.
+                /// [`Map::Validity`](super::Map::Validity): [`flag::MASKED`] alone on pixels masked in the left image, [`flag::OUTSIDE`] on others
+                /// without a label. On the rest, where [`crate::options::RefinementOptions::left_right_check`] is not off,
+                /// [`flag::OUTSIDE`] where the match is outside the right image and [`flag::OCCLUDED`] where the right pixel's own
+                /// label differs by more than one, and otherwise 0.
                 ///
                 /// [`flag::MASKED`]: crate::maps::flag::MASKED
                 /// [`flag::OUTSIDE`]: crate::maps::flag::OUTSIDE

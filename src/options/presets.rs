@@ -98,6 +98,6 @@ mod tests {
             assert_eq!(preset.clone().validated().unwrap(), preset, "{name} is within every range");
         }
         let error = Method::preset("best").unwrap_err().to_string();
-        assert_eq!(error, "there is no preset `best`; there are default, paper, fgs");
+        assert_eq!(error, "there is no preset `best`; the presets are default, paper, fgs");
     }
 }

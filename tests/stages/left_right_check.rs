@@ -3,11 +3,18 @@
 use crate::common::random::{self, Random};
 use crate::common::twin;
 use crate::maps::on_maps;
-use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::backend::{NO_LABEL, Stage};
 use mrfgs::low_level::plan::Plan;
 
 #[test]
 fn left_right_check() {
-    let input = |random: &mut Random, plan: &Plan| random::finest(random, plan, false);
+    let input = |random: &mut Random, plan: &Plan| {
+        let mut maps = random::finest(random, plan, false);
+        // As the right view may be.
+        for label in maps.label.data_mut() {
+            *label = if random.one_in(9) { NO_LABEL.into() } else { *label };
+        }
+        maps
+    };
     on_maps(Stage::LeftRightCheck, 20, |_, _| (), input, twin::left_right_check::left_right_check);
 }

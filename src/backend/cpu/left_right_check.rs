@@ -1,6 +1,7 @@
 //! What the right view says of each pixel: see [`crate::backend::Stage::LeftRightCheck`].
 
 use super::finest::Finest;
+use crate::backend::volume::NO_LABEL;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::options::LeftRightCheck;
@@ -16,6 +17,8 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, left: &Image) {
             let xr = x as i64 - min - i64::from(label);
             *flags = if left.masked[(x, y)] {
                 flag::MASKED
+            } else if label == NO_LABEL {
+                flag::OUTSIDE
             } else if plan.method.refinement.left_right_check == LeftRightCheck::Off {
                 0
             } else if xr < 0 || xr >= width as i64 {

@@ -3,6 +3,7 @@
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
+use crate::backend::volume::NO_LABEL;
 use crate::error::Result;
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
@@ -12,7 +13,8 @@ const SHADER: &str = include_str!("../../../shaders/left_right_check.wgsl");
 uniform! { is_on: u32 }
 
 pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
-    vec![Job::new::<Uniform>(Kernel::new("left_right_check", "main", SHADER), 0)]
+    let kernel = Kernel::new("left_right_check", "main", SHADER).with("NO_LABEL", u32::from(NO_LABEL));
+    vec![Job::new::<Uniform>(kernel, 0)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {

@@ -1,5 +1,6 @@
 use super::Finest;
 use mrfgs::image::Pair;
+use mrfgs::low_level::backend::NO_LABEL;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::LeftRightCheck;
@@ -14,6 +15,8 @@ pub fn left_right_check(plan: &Plan, pair: &Pair, maps: &mut Finest) {
             let inside = right >= 0 && right < width as i64;
             let reason = if pair.left().masked[(x, y)] {
                 flag::MASKED
+            } else if maps.label[(x, y)] == i32::from(NO_LABEL) {
+                flag::OUTSIDE
             } else if plan.method.refinement.left_right_check == LeftRightCheck::Off {
                 0
             } else if !inside {
