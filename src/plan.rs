@@ -10,7 +10,7 @@
 
 use crate::error::Result;
 use crate::options::{
-    Agreement, DisparityRange, Illumination, MatchingCost, Method, Order, Potential, Pyramid,
+    Agreement, DisparityRange, Illumination, LeftRightCheck, MatchingCost, Method, Order, Potential, Pyramid,
 };
 use std::ops::Range;
 
@@ -345,6 +345,17 @@ impl Plan {
     #[must_use]
     pub fn limits_labels(&self) -> bool {
         self.method.front.zone_sigmas > 0.0
+    }
+
+    /// Whether the labels of the right view are read off the beliefs.
+    #[must_use]
+    pub fn reads_right_view(&self) -> bool {
+        let refinement = &self.method.refinement;
+        match refinement.left_right_check {
+            LeftRightCheck::Off => refinement.right_map,
+            LeftRightCheck::RightView => true,
+            LeftRightCheck::SecondMatch => false,
+        }
     }
 
     /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.

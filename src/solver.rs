@@ -5,7 +5,7 @@
 use crate::backend::{Backend, Stage};
 use crate::error::Result;
 use crate::front::Prepared;
-use crate::options::{Fill, LeftRightCheck, Median, Method, Order};
+use crate::options::{Fill, Median, Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::watch::Watch;
 use std::iter;
@@ -64,7 +64,7 @@ pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run:
         run.stage(backend, plan, stage)?;
     }
     let iterations = flood(backend, plan, run)?;
-    for stage in read_out(&plan.method) {
+    for stage in read_out(plan) {
         run.stage(backend, plan, stage)?;
     }
     Ok(iterations)
@@ -128,8 +128,8 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
 }
 
 /// What follows the labels and looks at volumes.
-fn read_out(method: &Method) -> Vec<Stage> {
-    let right = (method.refinement.left_right_check == LeftRightCheck::RightView).then_some(Stage::RightView);
+fn read_out(plan: &Plan) -> Vec<Stage> {
+    let right = plan.reads_right_view().then_some(Stage::RightView);
     iter::once(Stage::WinnerTakesAll).chain(right).chain([Stage::SubPixel]).collect()
 }
 
@@ -162,6 +162,13 @@ fn work_of(plan: &Plan, stage: Stage) -> f64 {
         Stage::Pyramid(z) | Stage::Flood(z) => cells(plan, z),
         _ => 0.0,
     }
+}
+
+/// The stages that place the disparities of the right view between its labels, once the left view's maps have been asked for, in
+/// order. They look at volumes.
+#[must_use]
+pub fn right_view() -> [Stage; 3] {
+    [Stage::SwapViews, Stage::Cost, Stage::SubPixel]
 }
 
 /// The work of a match by `plan`, in cells (pixels times labels) of dependency messages, which take nearly all the time.

@@ -84,6 +84,13 @@ macro_rules! for_every_stage {
                 /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0 or at an end of the range. (The cost and
                 /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
                 SubPixel sub_pixel;
+                /// The views exchange roles, both mirrored, so that the right view becomes the left one and its matches lie to the
+                /// left again. Each image takes the place of the other, and with x counted from the other side
+                /// [`Map::Label`](super::Map::Label) and [`Map::Best`](super::Map::Best) those of
+                /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest).
+                /// [`Map::RunnerUp`](super::Map::RunnerUp) becomes the new best, since no runner-up of the right view is known.
+                /// [`Stage::Cost`], [`Stage::SubPixel`] and the stages of maps then work on the right view.
+                SwapViews swap_views;
             }
             maps {
                 /// [`Map::Validity`](super::Map::Validity): [`flag::MASKED`] alone on pixels masked in the left image, [`flag::OUTSIDE`] on others

@@ -59,6 +59,8 @@ options! {
         median_sigma_space: f64 = 5.0, takes real(0.1..=100.0), unit "pixels", source "open";
         /// Range parameter of the median's weights, for intensities from 0 to 1.
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
+        /// Also make the disparity map of the right view, refined like that of the left one.
+        right_map: bool = false, takes Takes::Switch, source "not in the paper";
         /// Pixels with less confidence than this get the validity flag for low confidence.
         confidence_floor: u32 = 16, takes whole(0..=255), unit "1/8 nat", source "not in the paper";
     }

@@ -1,0 +1,40 @@
+// The right view in place of the left one, both mirrored. One invocation a pixel of the left half and its mirror image.
+
+#import band
+
+struct Params {
+    level: Level,
+    @align(16) band: Band,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read_write> left: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read_write> right: array<vec4<u32>>;
+// label | best << 16, runner-up.
+@group(0) @binding(3) var<storage, read_write> optima: array<vec2<u32>>;
+// label | best << 16.
+@group(0) @binding(4) var<storage, read_write> right_labels: array<u32>;
+
+@compute @workgroup_size(GROUP)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    let width = params.level.width;
+    if id.x >= (width + 1u) / 2u || id.y >= params.band.rows {
+        return;
+    }
+    let row = id.y * params.level.pixel_pitch;
+    let a = row + id.x;
+    let b = row + width - 1u - id.x;
+    let lefts = array(left[a], left[b]);
+    left[a] = right[b];
+    left[b] = right[a];
+    right[a] = lefts[1];
+    right[b] = lefts[0];
+    let labels = vec2(optima[a].x, optima[b].x);
+    let right_a = right_labels[a];
+    let right_b = right_labels[b];
+    optima[a] = vec2(right_b, right_b >> 16u);
+    optima[b] = vec2(right_a, right_a >> 16u);
+    right_labels[a] = labels.y;
+    right_labels[b] = labels.x;
+}

@@ -1,0 +1,17 @@
+use super::Finest;
+
+/// The labels of the two views in each other's place, mirrored.
+pub fn swap_views(maps: &mut Finest) {
+    let old = maps.clone();
+    let (width, height) = old.label.size();
+    for y in 0..height {
+        for x in 0..width {
+            let from = (width - 1 - x, y);
+            maps.label[(x, y)] = old.right_label[from];
+            maps.best[(x, y)] = old.right_best[from];
+            maps.runner_up[(x, y)] = old.right_best[from];
+            maps.right_label[(x, y)] = old.label[from];
+            maps.right_best[(x, y)] = old.best[from];
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The right view in place of the left one.
+
+use crate::common::compare::compare_finest;
+use crate::common::{random, twin};
+use crate::{on_all, same};
+use mrfgs::low_level::backend::{Stage, Volume};
+
+#[test]
+fn swap_views() {
+    on_all(|case, backend, random| {
+        let mut maps = random::finest(random, &case.plan, false);
+        maps.write(backend);
+        backend.run(Stage::SwapViews).unwrap();
+        twin::swap_views::swap_views(&mut maps);
+        compare_finest(backend, &maps)?;
+        // What looks at the images sees them swapped.
+        backend.run(Stage::Cost).unwrap();
+        same(&case.plan, backend, Volume::Cost(0), &twin::cost::cost(&case.plan, &case.pair.mirrored()))?;
+        // Twice is not at all, but for what is not known of the right view.
+        backend.run(Stage::SwapViews).unwrap();
+        twin::swap_views::swap_views(&mut maps);
+        compare_finest(backend, &maps)
+    });
+}
+
+/// Control: labels that stay where they are, or mirror without a swap, are noticed.
+#[test]
+fn control_a_missing_swap_is_found() {
+    let noticed = std::cell::Cell::new(0);
+    on_all(|case, backend, random| {
+        let maps = random::finest(random, &case.plan, false);
+        maps.write(backend);
+        backend.run(Stage::SwapViews).unwrap();
+        let mut mirrored = maps.clone();
+        (mirrored.label, mirrored.right_label) = (maps.label.mirrored(), maps.right_label.mirrored());
+        let both = [maps, mirrored].map(|wrong| compare_finest(backend, &wrong).is_err());
+        noticed.set(noticed.get() + usize::from(both == [true, true]));
+        Ok(())
+    });
+    assert!(noticed.get() > 200, "{}", noticed.get());
+}
