@@ -136,6 +136,7 @@ mod tests {
             raw: Plane::filled(6, 1, 0),
             confidence: Plane::new(6, 1, vec![200, 3, 0, 0, 70, 255]),
             validity: Plane::new(6, 1, validity),
+            right: None,
         };
         let left = Image::from_rgb8(&Plane::from_fn(6, 1, |x, _| [x as u8, 10, 20]));
         let points = rig.points(&maps, &left);

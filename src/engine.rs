@@ -1,10 +1,10 @@
 //! A pair through a backend: in one piece, or tile by tile.
 
 use crate::backend::{Backend, Map, Stage, Ticket, Traffic};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::front;
 use crate::image::Pair;
-use crate::maps::Maps;
+use crate::maps::{Maps, RightMap, flag};
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
 use crate::solver::{self, Inspector, Run};
@@ -49,17 +49,16 @@ pub fn inspect(
     inspector: Option<Inspector>,
 ) -> Result<Solution> {
     let mut run = Run { watch: watch(plan, observer), inspector };
-    let iterations = whole(backend, plan, pair, &mut run)?;
+    let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
     backend.wait()?;
-    let collect = || backend.request_maps().and_then(|ticket| backend.maps(ticket));
-    let maps = run.watch.host("download", collect)?;
+    let maps = run.watch.host("download", || tickets.collect(backend))?;
     let (traffic, host_times) = (backend.traffic(), run.watch.into_times());
     Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic })
 }
 
 /// A match whose stages may still run, or whose maps are on their way.
 pub struct Started {
-    ticket: Ticket,
+    tickets: Tickets,
     iterations: u32,
     host_times: Vec<(&'static str, Duration)>,
     traffic: Traffic,
@@ -71,9 +70,8 @@ pub struct Started {
 /// Those of [`solve`].
 pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Started> {
     let mut run = Run { watch: watch(plan, observer), inspector: None };
-    let iterations = whole(backend, plan, pair, &mut run)?;
-    let ticket = backend.request_maps()?;
-    Ok(Started { ticket, iterations, host_times: run.watch.into_times(), traffic: backend.traffic() })
+    let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
+    Ok(Started { tickets, iterations, host_times: run.watch.into_times(), traffic: backend.traffic() })
 }
 
 /// Ends a match that was started on `backend`.
@@ -81,8 +79,8 @@ pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
 /// # Errors
 /// Whatever the backend reports.
 pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
-    let Started { ticket, iterations, host_times, traffic } = started;
-    let maps = backend.maps(ticket)?;
+    let Started { tickets, iterations, host_times, traffic } = started;
+    let maps = tickets.collect(backend)?;
     Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic })
 }
 
@@ -95,8 +93,34 @@ fn watch<'a>(plan: &Plan, observer: Observer<'a>) -> Watch<'a> {
     Watch::new(observer, matchings(plan) as f64 * solver::work(plan))
 }
 
-/// All stages of a match in one piece; the number of iterations.
-fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<u32> {
+/// The maps of both views, asked for.
+struct Tickets {
+    left: Ticket,
+    /// Of the right view, which is mirrored.
+    right: Option<Ticket>,
+}
+
+impl Tickets {
+    fn collect(self, backend: &mut dyn Backend) -> Result<Maps> {
+        let mut maps = backend.maps(self.left)?;
+        if let Some(right) = self.right {
+            maps.right = Some(right_map(backend.maps(right)?));
+        }
+        Ok(maps)
+    }
+}
+
+/// The map of the right view, from maps of what is mirrored.
+fn right_map(maps: Maps) -> RightMap {
+    RightMap {
+        disparity: maps.disparity.mirrored(),
+        // How far a runner-up is behind is not known.
+        validity: maps.validity.mirrored().map(|validity| validity & !flag::LOW_CONFIDENCE),
+    }
+}
+
+/// All stages of a match in one piece; the number of iterations, and its maps.
+fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<(u32, Tickets)> {
     let mut right_labels = None;
     if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
@@ -114,7 +138,14 @@ fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> 
     for stage in solver::post_processing(&plan.method) {
         run.stage(backend, plan, stage)?;
     }
-    Ok(iterations)
+    let mut tickets = Tickets { left: backend.request_maps()?, right: None };
+    if plan.method.refinement.right_map {
+        for stage in solver::right_view().into_iter().chain(solver::post_processing(&plan.method)) {
+            run.stage(backend, plan, stage)?;
+        }
+        tickets.right = Some(backend.request_maps()?);
+    }
+    Ok((iterations, tickets))
 }
 
 /// Matches `pair` tile by tile on `backend`, and finishes the maps of all tiles together on the CPU path; `observer` hears
@@ -134,6 +165,7 @@ pub fn solve_tiles(
     let mut run = Run { watch: watch.in_tiles(matchings(whole) * tiles.count()), inspector: None };
     let mut mosaic = Mosaic::new(whole, pair)?;
     let (mut iterations, mut traffic) = (0, Traffic::default());
+    let right_map_wanted = whole.method.refinement.right_map;
     if matchings(whole) == 2 {
         for tile in tiles.list() {
             run.watch.next_tile();
@@ -151,17 +183,32 @@ pub fn solve_tiles(
         let matched = prepared.pair.clone();
         iterations = iterations.max(solver::estimate(backend, &tile.plan, prepared, &mut run)?);
         backend.wait()?;
-        run.watch.host("download", || mosaic.place(tile, &matched, backend))?;
+        let seen = run.watch.host("download", || mosaic.place(tile, &matched, backend))?;
+        if right_map_wanted && matchings(whole) == 1 {
+            for stage in solver::right_view() {
+                run.stage(backend, &tile.plan, stage)?;
+            }
+            backend.wait()?;
+            run.watch.host("download", || mosaic.place_right(tile, &seen, backend))?;
+        }
         traffic += backend.traffic();
     }
     run.watch.end_tiles();
     let mut mosaic_times = Vec::new();
-    for stage in solver::post_processing(&whole.method) {
-        run.watch.begin(stage.name(), 0.0)?;
-        let clock = Instant::now();
-        mosaic.run(stage);
-        mosaic_times.push((stage, clock.elapsed()));
+    let mut finish = |mosaic: &mut Mosaic| {
+        for stage in solver::post_processing(&whole.method) {
+            run.watch.begin(stage.name(), 0.0)?;
+            let clock = Instant::now();
+            mosaic.run(stage);
+            mosaic_times.push((stage, clock.elapsed()));
+        }
+        Ok::<_, Error>(mosaic.take_maps())
+    };
+    let mut maps = finish(&mut mosaic)?;
+    if right_map_wanted {
+        mosaic.swap_views();
+        maps.right = Some(right_map(finish(&mut mosaic)?));
     }
     let host_times = run.watch.into_times();
-    Ok(Solution { maps: mosaic.into_maps(), iterations, host_times, mosaic_times, traffic })
+    Ok(Solution { maps, iterations, host_times, mosaic_times, traffic })
 }

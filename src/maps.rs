@@ -34,6 +34,18 @@ pub struct Maps {
     pub confidence: Plane<u8>,
     /// Bits of [`flag`].
     pub validity: Plane<u8>,
+    /// The map of the right view; `None` unless
+    /// [`RefinementOptions::right_map`](crate::options::RefinementOptions::right_map) asks for it.
+    pub right: Option<RightMap>,
+}
+
+/// The disparity map of the right view: right (x, y) with disparity d is seen at left (x + d, y).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RightMap {
+    /// The disparity in 1/256 px; meaningless where [`has_disparity`] says no.
+    pub disparity: Plane<i32>,
+    /// Bits of [`flag`], the views in each other's place; no bit for low confidence.
+    pub validity: Plane<u8>,
 }
 
 /// Whether a pixel with these validity bits has a disparity.
@@ -46,19 +58,26 @@ impl Maps {
     /// The final map in pixels, `+inf` where there is none.
     #[must_use]
     pub fn final_map(&self) -> Plane<f32> {
-        self.pixels(&self.disparity, has_disparity)
+        pixels(&self.disparity, &self.validity, has_disparity)
+    }
+
+    /// The final map of the right view in pixels, `+inf` where there is none; `None` unless it was asked for.
+    #[must_use]
+    pub fn right_map(&self) -> Option<Plane<f32>> {
+        self.right.as_ref().map(|right| pixels(&right.disparity, &right.validity, has_disparity))
     }
 
     /// The map before post-processing in pixels, `+inf` on masked pixels.
     #[must_use]
     pub fn raw_map(&self) -> Plane<f32> {
-        self.pixels(&self.raw, |validity| validity & flag::MASKED == 0)
+        pixels(&self.raw, &self.validity, |validity| validity & flag::MASKED == 0)
     }
+}
 
-    fn pixels(&self, fixed: &Plane<i32>, known: impl Fn(u8) -> bool) -> Plane<f32> {
-        let (width, height) = fixed.size();
-        Plane::from_fn(width, height, |x, y| {
-            if known(self.validity[(x, y)]) { fixed[(x, y)] as f32 / FRACTION as f32 } else { f32::INFINITY }
-        })
-    }
+/// A map in pixels, `+inf` where its validity is not `known`.
+fn pixels(fixed: &Plane<i32>, validity: &Plane<u8>, known: impl Fn(u8) -> bool) -> Plane<f32> {
+    let (width, height) = fixed.size();
+    Plane::from_fn(width, height, |x, y| {
+        if known(validity[(x, y)]) { fixed[(x, y)] as f32 / FRACTION as f32 } else { f32::INFINITY }
+    })
 }

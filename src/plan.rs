@@ -408,7 +408,9 @@ impl Plan {
     /// Bytes that the images and all maps take, at most.
     #[must_use]
     pub fn map_bytes(&self) -> u64 {
-        100 * self.levels[0].pixels() as u64
+        // The maps of the left view, and both views mirrored, while those of the right view are made.
+        let right = if self.method.refinement.right_map { 10 + 2 * 9 } else { 0 };
+        (100 + right) * self.levels[0].pixels() as u64
     }
 
     /// Bytes that the host takes beside the pair, at most, before it hands the graphs to a backend: for a pixel 14 of guides
@@ -435,7 +437,9 @@ impl Plan {
     #[must_use]
     pub fn mosaic_bytes(&self) -> u64 {
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
-        (20 + 12 + corrected) * self.levels[0].pixels() as u64
+        // Disparities of the right view, its image and its maps.
+        let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
+        (20 + 12 + corrected + right) * self.levels[0].pixels() as u64
     }
 
     /// Bytes that all volumes, graphs and maps take together.

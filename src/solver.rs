@@ -164,8 +164,8 @@ fn work_of(plan: &Plan, stage: Stage) -> f64 {
     }
 }
 
-/// The stages that place the disparities of the right view between its labels, once the left view's maps have been asked for, in
-/// order. They look at volumes.
+/// The stages that make the right view the left one, between its labels, once the left view's maps have been asked for, in
+/// order. They look at volumes, and [`post_processing`] follows.
 #[must_use]
 pub fn right_view() -> [Stage; 3] {
     [Stage::SwapViews, Stage::Cost, Stage::SubPixel]

@@ -18,7 +18,7 @@ use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::tiles::Tiles;
-use mrfgs::maps::{Maps, flag};
+use mrfgs::maps::{Maps, RightMap, flag};
 use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential};
 use std::ops::ControlFlow;
 
@@ -32,7 +32,23 @@ fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
         raw: finest.raw.clone(),
         confidence: bytes(&finest.confidence),
         validity: bytes(&finest.validity),
+        right: None,
     }
+}
+
+/// The disparities of the right view before post-processing, mirrored, by the twins.
+fn right_raw(finest: &Finest, plan: &Plan, pair: &Pair) -> Finest {
+    let mut right = finest.clone();
+    twin::swap_views::swap_views(&mut right);
+    twin::sub_pixel::sub_pixel(plan, &twin::cost::cost(plan, &mirrored(pair)), &mut right);
+    right
+}
+
+/// The map of the right view that the twins make of its mirrored disparities.
+fn right_map(right: &mut Finest, plan: &Plan, pair: &Pair) -> RightMap {
+    let maps = finished(right, plan, &mirrored(pair));
+    let validity = maps.validity.map(|validity| validity & !flag::LOW_CONFIDENCE);
+    RightMap { disparity: maps.disparity.mirrored(), validity: validity.mirrored() }
 }
 
 /// The maps by the twins, from the estimate on, in the order in which the stages are described.
@@ -54,7 +70,15 @@ fn compare_all(actual: &Maps, expected: &Maps) -> Result<(), String> {
     compare_maps("raw", &actual.raw, &expected.raw)?;
     compare_maps("validity", &actual.validity, &expected.validity)?;
     compare_maps("confidence", &actual.confidence, &expected.confidence)?;
-    compare_maps("disparity", &actual.disparity, &expected.disparity)
+    compare_maps("disparity", &actual.disparity, &expected.disparity)?;
+    match (&actual.right, &expected.right) {
+        (Some(actual), Some(expected)) => {
+            compare_maps("right validity", &actual.validity, &expected.validity)?;
+            compare_maps("right disparity", &actual.disparity, &expected.disparity)
+        }
+        (actual, expected) if actual.is_some() != expected.is_some() => Err("one right map".into()),
+        _ => Ok(()),
+    }
 }
 
 /// The maps of every backend.
@@ -76,6 +100,7 @@ fn matched(pair: &Pair, plan: &Plan, threads: usize) -> Maps {
 
 #[test]
 fn the_stages_run_in_order() {
+    let mut rights = 0;
     for seed in 0..60 {
         let mut random = Random::new(seed);
         let size = random.pick(&[(1, 1), (1, 12), (15, 1), (23, 14), (30, 22)]);
@@ -96,13 +121,38 @@ fn the_stages_run_in_order() {
                 _ => backend.map(Map::RightLabel).unwrap(),
             };
             finest.raw = backend.map(Map::Raw).unwrap();
-            let expected = finished(&mut finest, &plan, &pair);
+            let mut expected = finished(&mut finest, &plan, &pair);
+            if plan.method.refinement.right_map {
+                let mut right = right_raw(&finest, &plan, &pair);
+                expected.right = Some(right_map(&mut right, &plan, &pair));
+                rights += 1;
+            }
             for (solver, actual) in solve(&pair, &plan) {
                 if let Err(e) = compare_all(&actual.maps, &expected) {
                     panic!("{solver} against twins after {name}, seed {seed}: {e}\n{:?}", plan.method);
                 }
                 assert_eq!(actual.iterations, iterations);
             }
+        }
+    }
+    assert!(rights > 10, "{rights} maps of the right view");
+}
+
+/// By a second matching, the map of the right view is the map of the mirrored pair, bit for bit.
+#[test]
+fn the_right_map_is_the_map_of_the_mirrored_pair() {
+    let mut method = Method::default();
+    method.refinement.left_right_check = LeftRightCheck::SecondMatch;
+    (method.refinement.right_map, method.refinement.speckle_size) = (true, 9);
+    let mut random = Random::new(12);
+    let plan = random::plan((41, 30), -3, 17, &method);
+    for _ in 0..4 {
+        let pair = random::pair(&mut random, 41, 30);
+        for ((name, a), (_, b)) in solve(&pair, &plan).into_iter().zip(solve(&mirrored(&pair), &plan)) {
+            let right = a.maps.right.unwrap();
+            assert!(right.disparity == b.maps.disparity.mirrored(), "{name}");
+            // Control: it is not that of the left view.
+            assert!(right.disparity != a.maps.disparity, "{name}");
         }
     }
 }
@@ -126,6 +176,8 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         let mut finest = Finest::zero((width, height));
         finest.right_label = Plane::filled(width, height, NO_LABEL.into());
         finest.right_best = Plane::filled(width, height, 65_535);
+        // Disparities of the right view, mirrored.
+        let mut rights = Plane::filled(width, height, 0);
         let mut iterations = 0;
         for tile in tiles.list() {
             let (core, crop) = (&tile.core, &tile.crop);
@@ -143,9 +195,11 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
             let mut cpu = Cpu::default();
             if method.refinement.left_right_check == LeftRightCheck::SecondMatch {
                 estimated(&mut cpu, &part(&mirrored(&pair)), &tile.plan);
-                let labels = cpu.map(Map::Label).unwrap();
+                let [labels, raw] = [Map::Label, Map::Raw].map(|map| cpu.map(map).unwrap());
                 for (x, y) in places(core) {
-                    finest.right_label[(width - 1 - x, y)] = labels[(x - crop.x.start, y - crop.y.start)];
+                    let at = (x - crop.x.start, y - crop.y.start);
+                    finest.right_label[(width - 1 - x, y)] = labels[at];
+                    rights[(x, y)] = raw[at];
                 }
             }
             iterations = iterations.max(estimated(&mut cpu, &part(&pair), &tile.plan));
@@ -157,16 +211,27 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
                 (finest.runner_up[(x, y)], finest.raw[(x, y)]) = (maps[2][at], maps[3][at]);
             }
             if method.refinement.left_right_check != LeftRightCheck::SecondMatch {
+                let mut here = Finest::zero((crop.x.len(), crop.y.len()));
+                [here.label, here.best, here.runner_up, here.raw, here.right_label, here.right_best] =
+                    maps.clone();
+                let raw = right_raw(&here, &tile.plan, &part(&pair)).raw;
                 for (x, y) in places(&Rect { x: crop.x.clone(), y: core.y.clone() }) {
                     let at = (x - crop.x.start, y - crop.y.start);
                     let (label, best) = (&mut finest.right_label[(x, y)], &mut finest.right_best[(x, y)]);
                     if maps[5][at] < *best || maps[5][at] == *best && maps[4][at] < *label {
                         (*label, *best) = (maps[4][at], maps[5][at]);
+                        rights[(width - 1 - x, y)] = raw[(crop.x.len() - 1 - at.0, at.1)];
                     }
                 }
             }
         }
-        let expected = finished(&mut finest, &plan, &pair);
+        let mut expected = finished(&mut finest, &plan, &pair);
+        if method.refinement.right_map {
+            let mut right = finest.clone();
+            twin::swap_views::swap_views(&mut right);
+            right.raw = rights;
+            expected.right = Some(right_map(&mut right, &plan, &pair));
+        }
         for (name, mut backend) in backends() {
             let observer = &mut |_| ControlFlow::Continue(());
             let actual = engine::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();

@@ -23,11 +23,15 @@ class Matched:
         """Disparity before post-processing in pixels, +inf where the left image is masked."""
     @property
     def confidence(self) -> npt.NDArray[np.uint8]:
-        """How far the best rival is behind, in 1/8 nat; 0 where there is no measurement."""
+        """How far the best runner-up is behind, in 1/8 nat; 0 where there is no measurement."""
     @property
     def validity(self) -> npt.NDArray[np.uint8]:
         """Why each pixel is what it is: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
         confidence, 16 filled, 32 masked; 0 is measured and trusted."""
+    @property
+    def right(self) -> npt.NDArray[np.float32] | None:
+        """Disparity of the right view in pixels, +inf where there is none: right (x, y) with disparity d is seen at left
+        (x + d, y). None unless the option "right-map" asks for it."""
     @property
     def min_disparity(self) -> int:
         """Smallest disparity that was searched, in pixels."""

@@ -4,7 +4,6 @@ mod arrays;
 mod words;
 
 use std::ffi::CString;
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, PoisonError};
@@ -14,7 +13,6 @@ use std::time::Duration;
 use mrfgs::check::{self, Warning};
 use mrfgs::error::RangeError;
 use mrfgs::image::{Pair, Plane, raster};
-use mrfgs::low_level::solver::Observer;
 use mrfgs::options::{DisparityRange, Execution, GROUPS, Key, Method, PRESETS, Takes};
 use mrfgs::{Error, Matched, Matcher};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -92,6 +90,9 @@ struct PyMatched {
     /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
     /// confidence, 16 filled, 32 masked; 0 is measured and trusted.
     validity: Py<PyArray2<u8>>,
+    /// Disparity of the right view in pixels, float32, +inf where there is none: right (x, y) with disparity d is seen at left
+    /// (x + d, y). None unless the option "right-map" asks for it.
+    right: Option<Py<PyArray2<f32>>>,
     /// Smallest disparity that was searched, in pixels.
     min_disparity: i32,
     /// Largest disparity that was searched, in pixels.
@@ -113,7 +114,9 @@ impl PyMatched {
             Ok(plane.into_data().into_pyarray(py).reshape(shape)?.unbind())
         }
         let range = matched.plan.range;
+        let right = matched.maps.right_map().map(|map| array(py, map)).transpose()?;
         Ok(Self {
+            right,
             disparity: array(py, matched.maps.final_map())?,
             raw: array(py, matched.maps.raw_map())?,
             confidence: array(py, matched.maps.confidence)?,
@@ -123,7 +126,7 @@ impl PyMatched {
             iterations: matched.iterations,
             tiles: matched.tiles.count(),
             ran_on: matched.ran_on,
-            note: matched.note,
+            note: matched.note.as_ref().map(words::error),
         })
     }
 }
@@ -137,6 +140,7 @@ impl PyMatched {
         raw: Py<PyArray2<f32>>,
         confidence: Py<PyArray2<u8>>,
         validity: Py<PyArray2<u8>>,
+        right: Option<Py<PyArray2<f32>>>,
         min_disparity: i32,
         max_disparity: i32,
         iterations: u32,
@@ -149,6 +153,7 @@ impl PyMatched {
             raw,
             confidence,
             validity,
+            right,
             min_disparity,
             max_disparity,
             iterations,
@@ -164,7 +169,9 @@ impl PyMatched {
             (self.disparity.bind(py), self.raw.bind(py), self.confidence.bind(py), self.validity.bind(py));
         let (d, r, c, v) = maps;
         let Self { min_disparity, max_disparity, iterations, tiles, ran_on, note, .. } = self;
-        let all = (d, r, c, v, min_disparity, max_disparity, iterations, tiles, ran_on, note.as_deref());
+        let right = self.right.as_ref().map(|right| right.bind(py));
+        let all =
+            (d, r, c, v, right, min_disparity, max_disparity, iterations, tiles, ran_on, note.as_deref());
         Ok((py.get_type::<Self>(), all.into_pyobject(py)?))
     }
 
@@ -193,7 +200,7 @@ impl PyMatcher {
     #[pyo3(signature = (*, device="auto", threads=None))]
     fn new(py: Python, device: &str, threads: Option<usize>) -> PyResult<Self> {
         let execution = execution(device, threads);
-        let matcher = py.detach(|| Matcher::new(&execution)).map_err(exception)?;
+        let matcher = py.detach(|| Matcher::builder().execution(execution).build()).map_err(exception)?;
         Ok(Self(Mutex::new(matcher)))
     }
 
@@ -255,9 +262,9 @@ impl PyMatcher {
             self::warn(py, py.detach(|| check::warnings(&pair, given)))?;
         }
         let matched = py.detach(|| {
-            interruptible(|observer| {
+            interruptible(|stop| {
                 let mut matcher = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-                matcher.run(&pair, range, &method, observer)
+                matcher.job(&pair, range).method(&method).cancel(stop).run()
             })
         })?;
         if warn {
@@ -343,18 +350,15 @@ fn option<'py>(py: Python<'py>, group: &str, key: &Key) -> PyResult<Bound<'py, P
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Does `run` on a thread of its own, while this one, to which alone Python tells of Ctrl-C, looks for that.
-fn interruptible(run: impl FnOnce(Observer) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
+fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
     let stop = AtomicBool::new(false);
     let (sender, receiver) = mpsc::channel();
     thread::scope(|scope| {
         let stop = &stop;
         // The sender goes with the thread, however that ends.
         scope.spawn(move || {
-            let mut observer = |_| {
-                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            };
             // Somebody waits for it until it is here.
-            let _ = sender.send(run(&mut observer));
+            let _ = sender.send(run(stop));
         });
         let mut signal = Ok(());
         loop {

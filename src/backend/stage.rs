@@ -81,7 +81,7 @@ macro_rules! for_every_stage {
                 /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
                 /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 3 x 3
                 /// neighbourhood, as far as it is inside, whose own label is at most one away. With s = max(a, c) - b it is
-                /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0 or at an end of the range. (The cost and
+                /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0, at an end of the range, or without a label. (The cost and
                 /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
                 SubPixel sub_pixel;
                 /// The views exchange roles, both mirrored, so that the right view becomes the left one and its matches lie to the

@@ -297,6 +297,11 @@ impl Pair {
         Arc::clone(&self.left)
     }
 
+    /// The other view, to share.
+    pub(crate) fn shared_right(&self) -> Arc<Image> {
+        Arc::clone(&self.right)
+    }
+
     /// The other view.
     #[must_use]
     pub fn right(&self) -> &Image {

@@ -151,6 +151,7 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     m.refinement.median_sigma_space = random.log_within(0.3, 30.0);
     m.refinement.median_sigma_range = random.log_within(0.01, 3.0);
     m.refinement.confidence_floor = random.pick(&[0, 16, 255]);
+    m.refinement.right_map = random.one_in(3);
     m
 }
 

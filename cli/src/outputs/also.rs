@@ -8,7 +8,7 @@ use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
 use mrfgs::image::{Image, Plane, ply, write};
 use mrfgs::maps::Maps;
-use mrfgs::options::DisparityRange;
+use mrfgs::options::{DisparityRange, Method};
 
 use crate::args::sign::Sign;
 use crate::failure::{Failure, Result};
@@ -21,13 +21,15 @@ pub(crate) struct Also {
     pub(crate) word: &'static str,
     help: &'static str,
     kind: Kind,
+    /// The key of the method that makes it.
+    key: Option<&'static str>,
 }
 
 /// What an output shows, and thereby the format of its file.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     /// A map of disparities, in the format of the disparity map.
-    Disparity(fn(&Maps) -> Plane<f32>),
+    Disparity(fn(&Maps) -> Option<Plane<f32>>),
     /// A map of bytes, as 8-bit PNG.
     Bytes(fn(&Maps) -> &Plane<u8>),
     /// The depth of every disparity, as float PFM, or TIFF where the disparity map is one.
@@ -39,44 +41,58 @@ enum Kind {
 }
 
 /// All outputs, in the order in which they are written. One more is one more row.
-static ALL: [Also; 7] = [
+static ALL: [Also; 8] = [
     Also {
         word: "raw",
         help: "The disparity map before post-processing, in the format of the disparity map",
-        kind: Kind::Disparity(Maps::raw_map),
+        kind: Kind::Disparity(|maps| Some(maps.raw_map())),
+        key: None,
+    },
+    Also {
+        word: "right",
+        help: "The disparity map of the right view, refined like that of the left one, in the format of the disparity \
+               map: right (x, y) with disparity d is seen at left (x + d, y)",
+        kind: Kind::Disparity(Maps::right_map),
+        key: Some("right-map"),
     },
     Also {
         word: "depth",
         help: "The depth of every pixel, as float: .pfm (+infinity where there is none), or .tif (NaN) if the disparity \
                map is TIFF",
         kind: Kind::Depth,
+        key: None,
     },
     Also {
         word: "points",
         help: "Points with the colours of LEFT and their confidence (`quality`): binary .ply, x to the right, y down, z \
                forward of the left camera. Invalid, filled and low-confidence pixels are left out",
         kind: Kind::Points,
+        key: None,
     },
     Also {
         word: "confidence",
         help: "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
         kind: Kind::Bytes(|maps| &maps.confidence),
+        key: None,
     },
     Also {
         word: "validity",
         help: "Why a pixel is what it is: 8-bit .png, the sum of 1 match outside the right image, 2 occluded, 4 in a \
                small region, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted",
         kind: Kind::Bytes(|maps| &maps.validity),
+        key: None,
     },
     Also {
         word: "preview",
         help: "The disparity map in colours, with a scale: .png",
         kind: Kind::Picture { beside: false },
+        key: None,
     },
     Also {
         word: "side-by-side",
         help: "LEFT and beside it the preview: .png",
         kind: Kind::Picture { beside: true },
+        key: None,
     },
 ];
 
@@ -147,6 +163,12 @@ impl AlsoArgs {
         Ok(())
     }
 
+    /// `method`, which makes every wanted output.
+    pub(crate) fn made_by(&self, mut method: Method) -> Result<Method> {
+        method.set_all(self.wanted().filter_map(|also| also.key).map(|key| (key, "true")))?;
+        Ok(method)
+    }
+
     /// The first wanted output that takes the cameras.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
         self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points))
@@ -161,7 +183,10 @@ impl AlsoArgs {
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
         let &Outcome { maps, range, sign, left, ref rig } = outcome;
         match also.kind {
-            Kind::Disparity(map) => write::disparity(path, &sign.map(map(maps)))?,
+            Kind::Disparity(map) => {
+                let Some(map) = map(maps) else { return Ok(None) };
+                write::disparity(path, &sign.map(map))?;
+            }
             Kind::Bytes(map) => write::grey8(path, map(maps))?,
             Kind::Depth => {
                 let Some(rig) = rig else { return Ok(None) };

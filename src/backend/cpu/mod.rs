@@ -136,6 +136,7 @@ impl Backend for Cpu {
             raw: raw.clone(),
             confidence: confidence.clone(),
             validity: validity.clone(),
+            right: None,
         };
         Ok(self.requests.add(maps))
     }

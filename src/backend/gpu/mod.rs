@@ -383,7 +383,7 @@ impl Backend for Gpu {
         let plane = |i: usize| Plane::from_fn(width, height, |x, y| words[i][y * pitch + x].cast_signed());
         let byte =
             |bit: u32| Plane::from_fn(width, height, |x, y| (words[2][y * pitch + x] >> bit & 0xff) as u8);
-        Ok(Maps { disparity: plane(0), raw: plane(1), confidence: byte(8), validity: byte(0) })
+        Ok(Maps { disparity: plane(0), raw: plane(1), confidence: byte(8), validity: byte(0), right: None })
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

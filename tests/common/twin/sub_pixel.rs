@@ -8,7 +8,7 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
     let (width, height, labels) = (level.width as i64, level.height as i64, level.labels as i64);
     let offset = |x: usize, y: usize| {
         let label = i64::from(maps.label[(x, y)]);
-        if label == 0 || label == labels - 1 {
+        if label == 0 || label >= labels - 1 {
             return 0;
         }
         let sum_at = |wanted: i64| {

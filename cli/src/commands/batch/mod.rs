@@ -159,7 +159,7 @@ struct Batch<'a> {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     args.maps.also.check()?;
-    let method = args.method.method()?;
+    let method = args.maps.also.made_by(args.method.method()?)?;
     let execution = args.execution.execution();
     let List { base, mut pairs } = List::read(&args.list)?;
     check_folder(args, &base, &pairs)?;

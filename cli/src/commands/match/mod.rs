@@ -84,7 +84,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     stop::listen();
-    let method = args.method.method()?;
+    let method = args.also.made_by(args.method.method()?)?;
     let execution = args.execution.execution();
     let cameras = args.also.take_cameras();
     let input = args.pair.read(args.sign, cameras.is_some())?;
