@@ -105,8 +105,8 @@ fn as_right(scene: &Scene, level: u8, [x, at]: [f64; 2], y: usize) -> f32 {
     scene.sensors[1].level(light, size, at, y) as f32
 }
 
-/// Mean absolute colour difference in grey levels between what is visible at the left and the right view `d`
-/// further left, the left view first sent through `expose` (level, columns of both views, row).
+/// Mean absolute colour difference in grey levels between the visible pixels and the right view `d` further
+/// left, with `expose` (level, columns of both views, row) applied to the left view first.
 fn difference(
     scene: &Scene,
     d: impl Fn(usize, usize) -> f32,

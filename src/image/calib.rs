@@ -103,12 +103,12 @@ fn number(text: &str) -> std::result::Result<f64, String> {
 
 /// A whole number of at least 1.
 fn count(text: &str) -> std::result::Result<u32, String> {
-    text.parse().ok().filter(|&v| v > 0).ok_or_else(|| format!("{} is no whole number from 1", quoted(text)))
+    text.parse().ok().filter(|&v| v > 0).ok_or_else(|| format!("{} is no whole number above 0", quoted(text)))
 }
 
 /// A camera matrix `[fx 0 cx; 0 fy cy; 0 0 1]`.
 fn camera(text: &str) -> std::result::Result<Camera, String> {
-    let wrong = || format!("{} is no camera matrix like [f 0 cx; 0 f cy; 0 0 1]", quoted(text));
+    let wrong = || format!("{} is not a camera matrix like [f 0 cx; 0 f cy; 0 0 1]", quoted(text));
     let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).ok_or_else(wrong)?;
     let mut entries = Vec::new();
     for row in inner.split(';') {

@@ -22,7 +22,7 @@ const BYTES_BESIDE: u64 = 10;
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     // The decoder takes the end of the file for the end of the pixels.
     if !is_whole(bytes) {
-        return Err(damaged("the JPEG data has no end"));
+        return Err(damaged("the JPEG data ends too early"));
     }
     let options =
         DecoderOptions::default().set_strict_mode(true).set_max_width(usize::MAX).set_max_height(usize::MAX);

@@ -116,7 +116,7 @@ fn dimension(bytes: &[u8], at: &mut usize, name: &str) -> Result<usize, String> 
     let word = token(bytes, at).ok_or_else(|| format!("the PFM header ends before the {name}"))?;
     match word.parse::<u32>() {
         Ok(n) => Ok(n as usize),
-        Err(_) => Err(format!("the PFM header has the {name} {word:?}, which is no number of pixels")),
+        Err(_) => Err(format!("the PFM header has the {name} {word:?}, which is not a number of pixels")),
     }
 }
 

@@ -69,7 +69,7 @@ impl Reader {
         let [l, r] = &images;
         if l.size() != r.size() {
             return Err(Error::Mismatch(format!(
-                "{} is {} x {} and {} is {} x {}: a rectified pair has one size",
+                "{} is {} x {} and {} is {} x {}: both views of a rectified pair have one size",
                 left.display(),
                 l.width,
                 l.height,
