@@ -107,7 +107,7 @@ fn checksum(map: &Plane<i32>) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The `paper` preset gives the same maps, floating-point front end included, on every machine.
+/// The presets of the paper always give the same maps, floating-point front end included, on every machine.
 #[test]
 fn the_presets_of_the_paper_are_pinned() {
     let pins = [

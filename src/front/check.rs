@@ -30,7 +30,8 @@ const PLAIN_LEVELS: usize = 4;
 /// bad pixels grows by a factor of 1.3 in the median of 18 pairs, and by 2.9 at most, on plain surfaces,
 /// whose texture falls between the levels. The original pairs have 72 to 100 %.
 const CONTRAST_PERCENT: usize = 25;
-/// Largest difference between the views in their percentage of black or white pixels (open). In the median of
+/// Difference between the views in their percentage of black or white pixels from which on the exposures count
+/// as far apart (open). In the median of
 /// 18 pairs made brighter or darker, a difference of 10 to 15 multiplies the share of bad pixels by 1.5, and
 /// by 2.4 at most; 15 to 30 by 1.8 and 3.5; below 5 by 1.2 and 1.7. The original pairs differ by 0.5 at most.
 const SATURATED_PERCENT: usize = 10;
