@@ -1,20 +1,21 @@
-// Beliefs: evidence plus all messages. One invocation a pixel and block of 16 labels.
+// Beliefs: evidence plus all messages. One invocation per pixel and block of 16 labels.
 
 #import band volume messages
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // Largest belief: a larger sum counts as this one.
+    // Largest belief; larger sums saturate at it.
     most: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> evidence: array<u32>;
 @group(0) @binding(2) var<storage, read> dependency: array<Quad>;
-// Where each pixel's entries start in the transposed table, and one more a row.
+// Start of each pixel's entries in the transposed table, with one more per row.
 @group(0) @binding(3) var<storage, read> starts: array<u32>;
-// The slots that hold a pixel: dx + 3 | (dy + 3) << 3 | slot << 6 of the factor at (dx, dy) from it.
+// The slots that hold a pixel: dx + 3 | (dy + 3) << 3 | slot << 6, with the factor at (dx, dy) from the
+// pixel.
 @group(0) @binding(4) var<storage, read> incoming: array<u32>;
 @group(0) @binding(5) var<storage, read> down: array<Quad>;
 @group(0) @binding(6) var<storage, read> up: array<Quad>;
@@ -47,7 +48,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let y = params.band.first_row + id.y;
     let top = halo_start(RADIUS);
     let start = id.y * params.level.starts_pitch + x;
-    // The bound entries are those of the bound rows.
+    // Only the entries of the bound rows are bound.
     let end = starts[start + 1u] - starts[0];
     for (var e = starts[start] - starts[0]; e < end; e++) {
         let entry = incoming[e];

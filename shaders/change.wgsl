@@ -1,4 +1,4 @@
-// The label map of level 0 and how much it changed: `labels`, then `sums`.
+// The label map of level 0 and its change: `labels`, then `sums`.
 
 #import band volume messages
 
@@ -15,7 +15,7 @@ struct Params {
 // Lower and upper half.
 @group(0) @binding(4) var<storage, read_write> row_sums: array<vec2<u32>>;
 
-// The label map, and per pixel the squared difference from the one before. One invocation a pixel.
+// The label map, and each pixel's squared difference from the previous one. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn labels(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -25,7 +25,7 @@ fn labels(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let first = id.y * params.level.pitch;
     var least = vec4(0xffffffffu);
     for (var quad = 0u; quad < params.level.quads; quad++) {
-        // Belief and label in one key; padding's beliefs are above all others.
+        // Belief and label in one key; the beliefs of padding are above all others.
         least = min(least, (unpack(belief[first + place_of(quad, id.x)]) << vec4(16u)) | labels_of(quad));
     }
     let label = smallest(least) & 0xffffu;
@@ -35,7 +35,7 @@ fn labels(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     squares[pixel] = u32(difference * difference);
 }
 
-// Sums the squared differences of each row, in 64 bits. One invocation a row.
+// Sums the squared differences of each row, in 64 bits. One invocation per row.
 @compute @workgroup_size(GROUP)
 fn sums(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

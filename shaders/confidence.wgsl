@@ -1,4 +1,4 @@
-// How far the best runner-up of every pixel is behind. One invocation a pixel.
+// Confidence: the margin between every pixel's optimum and its runner-up. One invocation per pixel.
 
 #import band maps
 

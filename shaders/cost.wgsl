@@ -6,7 +6,7 @@ struct Params {
     level: Level,
     @align(16) band: Band,
     outside_cost: u32,
-    // Cost of the largest colour difference that counts, and the variance from which on it counts in full.
+    // Cost of the largest colour difference, and the variance from which on colour has its full weight.
     colour_weight: u32,
     colour_variance: u32,
     sad_radius: i32,
@@ -18,15 +18,15 @@ struct Params {
 @group(0) @binding(3) var<storage, read_write> cost: array<u32>;
 @group(0) @binding(4) var<storage, read> left_census: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> right_census: array<vec2<u32>>;
-// How much colour counts at each pixel.
+// Weight of colour at each pixel.
 @group(0) @binding(6) var<storage, read> weight: array<u32>;
-// Either image, its census, and its contrast as a weight of colour.
+// Either image, its census, and the weight of colour from its contrast.
 @group(0) @binding(7) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(8) var<storage, read_write> image_census: array<vec2<u32>>;
 @group(0) @binding(9) var<storage, read_write> image_weight: array<u32>;
 
-// Matching cost of level 0 by the mean colour difference over a window. One invocation for RUN pixels of a row and a
-// quad of labels: a column of the window serves all of them.
+// Matching cost of level 0 by the mean colour difference over a window. One invocation per RUN pixels of a
+// row and quad of labels: it computes each column of the window once for all of them.
 @compute @workgroup_size(GROUP)
 fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -91,8 +91,8 @@ fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
     }
 }
 
-// Census of every pixel of one image: a bit for each other place of a 9 x 7 window in raster order, set where its
-// grey is below the centre's. One invocation a pixel.
+// Census of every pixel of one image: a bit for each other pixel of a 9 x 7 window in raster order, set where
+// its grey is below the centre's. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -119,8 +119,8 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     image_census[id.y * pitch + id.x] = bits;
 }
 
-// How much colour counts at every pixel of the left image: by the variance of grey in the window of the census. One
-// invocation a pixel.
+// Weight of colour at every pixel of the left image, from the variance of grey in the window of the census.
+// One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn contrast(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -152,7 +152,7 @@ fn contrast(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
     image_weight[id.y * pitch + id.x] = w;
 }
 
-// Matching cost of level 0 by census and colour difference. One invocation a pixel and quad of labels.
+// Matching cost of level 0 by census and colour difference. One invocation per pixel and quad of labels.
 @compute @workgroup_size(GROUP)
 fn ad_census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

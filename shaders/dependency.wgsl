@@ -1,24 +1,25 @@
-// Messages of the dependency factors. One invocation a factor. It reads old beliefs and its own old messages and
-// writes its own messages only, so flooding is exact in place.
+// Messages of the dependency factors. One invocation per factor. A factor reads old beliefs and its own old
+// messages and writes only its own messages, so flooding in place is exact.
 
 #import band volume messages
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // What disagreement costs.
+    // Cost of disagreement.
     tau: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// Codes of the neighbours, four a word.
+// Codes of the neighbours, four per word.
 @group(0) @binding(1) var<storage, read> members: array<u32>;
 @group(0) @binding(2) var<storage, read> belief: array<Quad>;
 @group(0) @binding(3) var<storage, read_write> messages: array<Quad>;
 
 const ABSENT: u32 = 0xffffffffu;
 
-// A member's message to the factor: its belief less the factor's old message, less its minimum where the cut wants that.
+// A member's message to the factor: its belief minus the factor's old message, and minus its own minimum
+// where truncation is absolute.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
     let q = unpack(belief[member]) - unpack(messages[message]);
     if ABSOLUTE {
@@ -57,7 +58,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
 
-    // Where the cut is absolute, each member's message to the factor is less its minimum.
+    // Where truncation is absolute, the minimum of each member's message to the factor is subtracted from it.
     var floors: array<u32, SLOTS>;
     if ABSOLUTE {
         for (var slot = 0u; slot < SLOTS; slot++) {

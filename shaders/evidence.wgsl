@@ -1,4 +1,4 @@
-// Evidence from cost, and beliefs that start from it. One invocation a pixel.
+// Evidence from cost, and the initial beliefs. One invocation per pixel.
 
 #import band volume messages
 
@@ -18,7 +18,7 @@ struct Params {
 @group(0) @binding(2) var<storage, read_write> evidence: array<u32>;
 @group(0) @binding(3) var<storage, read_write> belief: array<Quad>;
 
-// Costs of a quad in 1/256 cost units; padding is above every cost.
+// Costs of a quad in 1/256 cost units; the cost of padding is above every other cost.
 fn load_cost(row: u32, index: u32, quad: u32) -> vec4<u32> {
     var c: vec4<u32>;
     if FINE_NARROW {

@@ -1,5 +1,5 @@
-// Fills what is invalid from the nearest valid pixels: `rows` finds the rows that have one, `sources` the row that each row
-// takes its values from, and `fill` fills.
+// Fills invalid pixels from the nearest valid ones: `rows` finds the rows that have a valid pixel, `sources`
+// the row that each row takes its values from, and `fill` fills.
 
 #import band maps
 
@@ -19,11 +19,11 @@ struct Params {
 @group(0) @binding(4) var<storage, read> source_flags: array<u32>;
 @group(0) @binding(5) var<storage, read_write> filled_disparity: array<i32>;
 @group(0) @binding(6) var<storage, read_write> filled_flags: array<u32>;
-// Of every row: whether it holds a valid pixel, 1 or 0, and the row that it takes its values from.
+// For every row: 1 if it holds a valid pixel, else 0; and the row that it takes its values from.
 @group(0) @binding(7) var<storage, read_write> is_known: array<u32>;
 @group(0) @binding(8) var<storage, read_write> source_of: array<u32>;
 
-// Whether each row holds any valid pixel. One invocation a row.
+// Whether each row holds a valid pixel. One invocation per row.
 @compute @workgroup_size(GROUP)
 fn rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -37,8 +37,8 @@ fn rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     is_known[params.band.first_row + id.x] = u32(x < params.level.width);
 }
 
-// The row that each row takes its values from: the nearest that holds a valid pixel, the upper of two; itself where
-// none does. One invocation a row.
+// The row that each row takes its values from: the nearest that holds a valid pixel, the upper one of two;
+// the row itself where there is none. One invocation per row.
 @compute @workgroup_size(GROUP)
 fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -61,8 +61,8 @@ fn sources(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     source_of[y] = source;
 }
 
-// The farther of the two nearest valid disparities for what is invalid. One invocation a pixel; those whose row takes its
-// values from outside the source rows have another dispatch.
+// Fills invalid pixels with the farther of the two nearest valid disparities. One invocation per pixel.
+// Pixels whose row takes its values from outside the source rows are filled by another dispatch.
 @compute @workgroup_size(GROUP)
 fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -78,7 +78,7 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var validity = flags[at];
     if !is_valid(validity) && (validity & MASKED) == 0u {
         let row = (source - params.source_first_row) * params.level.pixel_pitch;
-        // One beyond the nearest valid pixel to the left, and the nearest to the right.
+        // The column after the nearest valid pixel to the left, and the nearest valid column to the right.
         var left = id.x + 1u;
         while left > 0u && !is_valid(source_flags[row + left - 1u]) {
             left--;

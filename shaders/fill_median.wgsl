@@ -1,4 +1,4 @@
-// Weighted median over a window that is stretched, for the pixels that were filled. One invocation a pixel.
+// Weighted median over a stretched window, for the filled pixels. One invocation per pixel.
 
 #import band weighted_median
 

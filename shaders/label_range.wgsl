@@ -1,4 +1,5 @@
-// Costs outside the label range of their pixel become the highest there is. One invocation a pixel and quad of labels.
+// Sets the costs outside a pixel's label range to the largest cost. One invocation per pixel and quad of
+// labels.
 
 #import band volume
 

@@ -1,11 +1,11 @@
-// What the right view says of every pixel. One invocation a pixel.
+// The left-right check. One invocation per pixel.
 
 #import band maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // 1, or 0 to flag masked pixels alone.
+    // 1, or 0 to flag only masked pixels.
     is_on: u32,
 }
 

@@ -1,4 +1,4 @@
-// Weighted median of the disparities around every pixel. One invocation a pixel.
+// Weighted median of the disparities around every pixel. One invocation per pixel.
 
 #import band weighted_median
 

@@ -1,5 +1,5 @@
-// Cost of a level from the next finer one: low-pass in x and y, then low-pass or minimum in d. One invocation a
-// coarse pixel and pair of coarse labels, which share the fine labels between them.
+// Cost of a level from the next finer one: a low-pass in x and y, then a low-pass or minimum in d. One
+// invocation per coarse pixel and pair of coarse labels, which share the fine labels between them.
 
 #import band volume
 
@@ -7,7 +7,7 @@ struct Params {
     level: Level,
     @align(16) band: Band,
     @align(16) fine: Level,
-    // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
+    // Twice the smallest label of the level minus the finer level's smallest label: 0 or -1.
     @align(16) label_offset: i32,
 }
 
@@ -16,7 +16,8 @@ struct Params {
 @group(0) @binding(1) var<storage, read> fine_cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> cost: array<u32>;
 
-// The binomial mean over x and y around twice (x, y) of the fine cost of the label with this index, clamped.
+// The binomial mean over x and y of the fine cost around twice (x, y), at the fine label with this index,
+// clamped.
 fn smooth_cost(x: i32, y: i32, index: i32) -> u32 {
     let label = u32(clamp(index, 0, i32(params.fine.labels) - 1));
     let top = max(2 * params.band.first_row, 2u) - 2u;

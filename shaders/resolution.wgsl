@@ -1,6 +1,6 @@
-// Messages of the resolution factors between a level and the next finer one, in both directions. One invocation a
-// coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster order.
-// Where no label agrees, sums are infinite: the largest value, at which they saturate.
+// Messages of the resolution factors between a level and the next finer one, in both directions. One
+// invocation per coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster
+// order. Where no label agrees, sums are infinite: the largest value, at which they saturate.
 
 #import band volume messages
 
@@ -8,9 +8,9 @@ struct Params {
     level: Level,
     @align(16) band: Band,
     @align(16) fine: Level,
-    // Twice the smallest label of the level less the finer level's smallest label: 0 or -1.
+    // Twice the smallest label of the level minus the finer level's smallest label: 0 or -1.
     @align(16) label_offset: i32,
-    // What disagreement costs.
+    // Cost of disagreement.
     tau: u32,
 }
 
@@ -20,11 +20,11 @@ struct Params {
 @group(0) @binding(3) var<storage, read_write> down: array<u32>;
 @group(0) @binding(4) var<storage, read_write> up: array<u32>;
 
-// First word of each child; those outside the image share the first one's.
+// First word of each child; children outside the image share the first child's.
 var<private> children_at: vec4<u32>;
 var<private> exists: vec4<bool>;
 var<private> parent_at: u32;
-// Where the cut is absolute, the minimum of each message to the factor.
+// Where truncation is absolute, the minimum of each message to the factor.
 var<private> child_floor: vec4<u32>;
 var<private> parent_floor: u32;
 
@@ -71,7 +71,7 @@ fn advance(z: u32) -> Sums {
     return Sums(min(sum, MOST), min(vec4(q + sum) - best, vec4(MOST)));
 }
 
-// The cut of a sum whose smallest is `least`.
+// The message for a sum, truncated; `least` is the smallest sum.
 fn cut_message(sum: u32, least: u32) -> u32 {
     if ABSOLUTE {
         return min(sum, params.tau) - min(least, params.tau);
@@ -104,7 +104,7 @@ fn emit_down(index: i32, sums: vec4<u32>, least: vec4<u32>) {
     down_words |= message << vec4(BITS * (label % PER_WORD));
     if label % PER_WORD == PER_WORD - 1u {
         let at = children_at + vec4(word_of(label, params.fine.width));
-        // The first child last: those outside the image wrote to its place.
+        // The first child is written last, because children outside the image share its position.
         if exists.w {
             down[at.w] = down_words.w;
         }
@@ -153,7 +153,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         parent_floor = parent;
     }
 
-    // The smallest sums over the labels that agree with any.
+    // The smallest sums over the labels that agree with at least one other.
     var least_up = MOST;
     var least_down = vec4(MOST);
     between = from_children(params.label_offset - 1);
@@ -170,7 +170,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     down_words = vec4<u32>();
     between = from_children(params.label_offset - 1);
     var last = vec4(MOST);
-    // Two fine labels a coarse one, until the padding of both is written.
+    // Two fine labels per coarse label, until the padding of both levels is written.
     let steps = max(4u * params.level.quads, 2u * fine.quads + 1u);
     for (var z = 0u; z < steps; z++) {
         var sums = Sums(MOST, vec4(MOST));

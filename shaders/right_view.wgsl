@@ -1,18 +1,19 @@
-// The map of the right view, read off the same beliefs of the columns that count. One invocation a right pixel.
+// The label map of the right view, read from the same beliefs in the given columns. One invocation per right
+// pixel.
 
 #import band volume messages
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // The columns of the left view that count.
+    // The columns of the left view to use.
     first_column: u32,
     columns: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> belief: array<u32>;
-// label | belief << 16, all bits set where no left pixel projects.
+// label | belief << 16; all bits are set where no left pixel projects.
 @group(0) @binding(2) var<storage, read_write> labels: array<u32>;
 
 @compute @workgroup_size(GROUP)
@@ -22,7 +23,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let row = id.y * params.level.pitch * QUAD_WORDS;
-    // Label j is seen from left pixel x + low + j.
+    // Left pixel x + low + j sees this pixel at label j.
     let shift = i32(id.x) + params.level.low;
     let first = i32(params.first_column);
     let start = max(first - shift, 0);

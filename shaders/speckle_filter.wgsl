@@ -1,13 +1,13 @@
-// Flags the pixels of small regions: `runs`, then `join` and `flatten` in turns, then `count` and `flag`.
+// Flags the pixels of small regions: `runs`, then `join` and `flatten` alternately, then `count` and `flag`.
 //
-// Regions are found by union-find (after Playne and Hawick 2018): every pixel of a region points at a smaller place of it
-// until it points at the root, which points at itself. First each row's segments get their runs, then the segments of
-// a row are joined, then ever higher blocks of rows; in between all pointers are made to lead straight to their
-// roots. What is joined in one go are two blocks along one border, so a chain never gets longer than that border has
-// pixels on its two sides: this bounds the loops.
+// Regions are found by union-find (after Playne and Hawick 2018). Every pixel of a region points at a smaller
+// position in it, down to the root, which points at itself. First the segments of each row get their runs.
+// Then the segments of a row are joined, and then ever larger blocks of rows. Between these steps all
+// pointers are flattened, so that they point at their roots directly. One step joins two blocks along one
+// border, so a chain never gets longer than that border has pixels on its two sides. This bounds the loops.
 //
-// Places count from the first row of the rows seen, the band and as many rows around it as a region may be high
-// before it is large enough.
+// Positions count from the first row that the stage sees: the band, and around it as many rows as the height
+// at which a region is certainly large enough.
 
 #import band maps
 
@@ -16,7 +16,8 @@ struct Params {
     @align(16) band: Band,
     // Rows around the band that the stage sees.
     halo: u32,
-    // Rows of the blocks that are joined, 0 to join the segments of each row, and the columns to join them in.
+    // Rows of the blocks that are joined, or 0 to join the segments of each row; and the columns to join them
+    // in.
     span: u32,
     first_column: u32,
     columns: u32,
@@ -30,13 +31,13 @@ struct Params {
 @group(0) @binding(1) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> parents: array<atomic<u32>>;
-// At the first pixel of a run its length, elsewhere 0; in the end at each root the pixels of its region.
+// The length of a run at its first pixel, elsewhere 0; at the end, at each root, the pixels of its region.
 @group(0) @binding(4) var<storage, read_write> sizes: array<atomic<u32>>;
 
 // A pixel that is in no region.
 const NOWHERE: u32 = 0xffffffffu;
 
-// Runs of connected pixels within segments of a row. One invocation a segment.
+// Runs of connected pixels within segments of a row. One invocation per segment.
 @compute @workgroup_size(GROUP)
 fn runs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -78,7 +79,7 @@ fn root(start: u32) -> u32 {
     return here;
 }
 
-// Whether two neighbours are in a region, and in the same one.
+// Whether two neighbours belong to the same region.
 fn connected(a: u32, b: u32) -> bool {
     if atomicLoad(&parents[a]) == NOWHERE || atomicLoad(&parents[b]) == NOWHERE {
         return false;
@@ -86,8 +87,8 @@ fn connected(a: u32, b: u32) -> bool {
     return abs(i32(optima[a].x & 0xffffu) - i32(optima[b].x & 0xffffu)) <= 1;
 }
 
-// Joins the regions on the two sides of borders: between the segments of a row, or between blocks of rows. One invocation
-// a pixel at such a border.
+// Joins the regions on the two sides of borders: between the segments of a row, or between blocks of rows.
+// One invocation per pixel at such a border.
 @compute @workgroup_size(GROUP)
 fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -102,7 +103,7 @@ fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if !connected(here, other) {
         return;
     }
-    // Where the pixels before are joined in the same way, they see to it.
+    // Where the previous pixels are joined in the same way, their invocation joins these too.
     if !across && id.x > 0u
         && atomicLoad(&parents[here - 1u]) == atomicLoad(&parents[here])
         && atomicLoad(&parents[other - 1u]) == atomicLoad(&parents[other])
@@ -118,13 +119,13 @@ fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         if before == larger {
             return;
         }
-        // Somebody else had given it a parent: those two belong together as well.
+        // Another invocation has set a parent meanwhile: these two belong together as well.
         a = root(before);
         b = root(smaller);
     }
 }
 
-// Makes every pixel point at its root. One invocation a pixel.
+// Makes every pixel point at its root. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn flatten(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -134,12 +135,13 @@ fn flatten(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let start = id.y * params.level.pixel_pitch + id.x;
     let parent = atomicLoad(&parents[start]);
     if parent != NOWHERE {
-        // Roots stay roots meanwhile, so a pointer that others follow leads there whether they see it old or new.
+        // Roots stay roots meanwhile, so another invocation reaches the root through the old pointer or the
+        // new one.
         atomicStore(&parents[start], root(parent));
     }
 }
 
-// Adds the lengths of all runs to the sizes at their roots. One invocation a pixel.
+// Adds the lengths of all runs to the sizes at their roots. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -148,7 +150,7 @@ fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
     let here = id.y * params.level.pixel_pitch + id.x;
     let to = atomicLoad(&parents[here]);
-    // Roots begin a run and have its length already; only they are added to.
+    // Roots begin a run and already have its length; other runs are added to them.
     if to != NOWHERE && to != here {
         let length = atomicLoad(&sizes[here]);
         if length > 0u {
@@ -157,7 +159,7 @@ fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
 }
 
-// Flags the pixels of small regions. One invocation a pixel of the band.
+// Flags the pixels of small regions. One invocation per pixel of the band.
 @compute @workgroup_size(GROUP)
 fn flag(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);

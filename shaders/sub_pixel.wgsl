@@ -1,5 +1,5 @@
-// Every pixel's disparity: its label, and how far it is above that by the matching cost around it. One invocation a
-// pixel.
+// Every pixel's disparity: its label, and the sub-pixel offset from the matching costs around it. One
+// invocation per pixel.
 
 #import band volume maps
 
@@ -44,7 +44,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         let slope = max(sums.x, sums.z) - sums.y;
         if slope > 0 {
-            // Raised by half a pixel, the dividend is not negative and the quotient rounds towards minus infinity.
+            // Half a pixel is added first, so the dividend is not negative and the quotient rounds towards
+            // minus infinity.
             let difference = clamp(sums.x - sums.z, -slope, slope);
             offset = (FRACTION * (difference + slope) + slope) / (2 * slope) - FRACTION / 2;
         }

@@ -1,4 +1,4 @@
-// The optimum of every pixel and its best runner-up. One invocation a pixel.
+// Winner takes all: the optimum of every pixel and its runner-up. One invocation per pixel.
 
 #import band volume messages
 

@@ -1,4 +1,4 @@
-//! Maps for the eye.
+//! Maps as pictures.
 
 use crate::image::Plane;
 use crate::maps::{flag, has_disparity};
@@ -9,22 +9,22 @@ const BLACK: Rgb = [0, 0, 0];
 const WHITE: Rgb = [255, 255, 255];
 const GREY: Rgb = [128, 128, 128];
 
-/// The colours of a map from far to near. None is as dark as the black of invalid pixels.
+/// The colours of a map, from far to near. None is as dark as the black of invalid pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColourMap {
-    /// From cold to warm, with lightness rising to the middle and falling after it: Google's Turbo (Mikhailov 2019), with
-    /// lighter ends.
+    /// From cold to warm, with lightness rising to the middle and falling after it: Google's Turbo (Mikhailov
+    /// 2019), with lighter ends.
     #[default]
     Turbo,
-    /// From violet to yellow, with even steps of lightness, for the colour-blind and for grey print: that of Matplotlib
-    /// (Smith and van der Walt 2015).
+    /// From violet to yellow, in even steps of lightness, for the colour-blind and for print in grey:
+    /// Matplotlib's (Smith and van der Walt 2015).
     Viridis,
     /// From dark to bright.
     Grey,
 }
 
 impl ColourMap {
-    /// Its colours at equal steps, far to near.
+    /// Its colours in equal steps, from far to near.
     fn stops(self) -> &'static [Rgb] {
         match self {
             Self::Turbo => &[
@@ -54,8 +54,8 @@ impl ColourMap {
     }
 }
 
-/// Stops of the colours of a signed error at equal steps: as dark on either side, and never as grey or as black as
-/// what has no error.
+/// Colours of a signed error in equal steps: both sides are equally dark, and no colour is close to the grey
+/// or black of pixels without an error.
 const SIGNED: [Rgb; 7] = [
     [16, 48, 120],
     [48, 112, 196],
@@ -84,9 +84,9 @@ const GLYPHS: [[u8; 5]; 12] = [
 
 /// A disparity map in `colours`, with a scale bar below it.
 ///
-/// They run from `min` to `max` (pixels of disparity); values beyond take the colour of the nearer end, and
-/// what is not finite is black. The result is as wide as the map, and higher by the bar: 16 rows, or more for
-/// maps from 400 pixels wide.
+/// The colours run from `min` to `max` (pixels of disparity). Values outside take the colour of the nearer
+/// end, and values that are not finite are black. The picture is as wide as the map, and higher by the bar:
+/// 16 rows, or more for maps at least 400 pixels wide.
 #[must_use]
 pub fn preview(map: &Plane<f32>, min: f32, max: f32, colours: ColourMap) -> Plane<[u8; 3]> {
     let (min, max) = (min as f64, max as f64);
@@ -98,7 +98,7 @@ pub fn preview(map: &Plane<f32>, min: f32, max: f32, colours: ColourMap) -> Plan
     with_scale(map.size(), pixel, min, max, colour)
 }
 
-/// Two pictures side by side from the top; black where one ends above the other.
+/// Two pictures side by side, aligned at the top; black below the shorter one.
 #[must_use]
 pub fn side_by_side(left: &Plane<[u8; 3]>, right: &Plane<[u8; 3]>) -> Plane<[u8; 3]> {
     let (width, height) = (left.width() + right.width(), left.height().max(right.height()));
@@ -108,11 +108,12 @@ pub fn side_by_side(left: &Plane<[u8; 3]>, right: &Plane<[u8; 3]>) -> Plane<[u8;
     })
 }
 
-/// The signed error `estimate` - `truth` in colours, with a scale bar below it as in [`preview`]: blue where the estimate
-/// is too small (too far), white where it is right, red where it is too large (too near).
+/// The signed error `estimate` - `truth` in colours, with a scale bar below it as in [`preview`]: blue where
+/// the estimate is too small (too far), white where it is right, red where it is too large (too near).
 ///
-/// Colours run from -`limit` to `limit` (pixels of disparity), and errors beyond take the colour of the nearer end. Black
-/// is a pixel with known truth and no estimate, grey one whose truth is not known. (Not finite is none in both maps.)
+/// The colours run from -`limit` to `limit` (pixels of disparity), and larger errors take the colour of the
+/// nearer end. A pixel with known truth and no estimate is black; a pixel without known truth is grey. In
+/// both maps, a value that is not finite counts as missing.
 ///
 /// # Panics
 /// When the maps differ in size.
@@ -128,22 +129,23 @@ pub fn error(estimate: &Plane<f32>, truth: &Plane<f32>, limit: f32) -> Plane<[u8
     with_scale(truth.size(), pixel, -limit, limit, |t| between(&SIGNED, t))
 }
 
-/// Levels of 0 ..= 255 in grey, with a scale bar below them as in [`preview`].
+/// Grey levels 0 ..= 255, with a scale bar below them as in [`preview`].
 #[must_use]
 pub fn grey(levels: &Plane<u8>) -> Plane<[u8; 3]> {
     let ramp = |t: f64| [(255.0 * t).round() as u8; 3];
     with_scale(levels.size(), |x, y| [levels[(x, y)]; 3], 0.0, 255.0, ramp)
 }
 
-/// A colour for texture zone `zone`, far from those of the next ones.
+/// A colour for texture zone `zone`, far from the colours of the next zones.
 #[must_use]
 pub fn zone(zone: u8) -> [u8; 3] {
     let hash = (u32::from(zone) + 1).wrapping_mul(0x9e37_79b9);
     [hash >> 24, hash >> 16 & 0xff, hash >> 8 & 0xff].map(|v| v as u8)
 }
 
-/// Classes in the colours of `palette`, which holds the number and the colour of each, with these numbers beside their
-/// colours below it, in as many lines as it takes. `class` gives the place in the palette; what is not in it is black.
+/// Classes in the colours of `palette`, which holds the number and the colour of each. The legend below shows
+/// the numbers beside their colours, in as many lines as it needs. `class` gives the index into the palette;
+/// other indices are black.
 #[must_use]
 pub fn classes(class: &Plane<usize>, palette: &[(u32, [u8; 3])]) -> Plane<[u8; 3]> {
     let (w, h) = class.size();
@@ -159,7 +161,7 @@ pub fn classes(class: &Plane<usize>, palette: &[(u32, [u8; 3])]) -> Plane<[u8; 3
     }
     for (i, (text, colour)) in entries.iter().enumerate() {
         let (left, top) = (i % columns * widest + 2 * s, h + (2 + i / columns * 7) * s);
-        // Framed, or black is no swatch on black.
+        // The swatch is framed, because black on black would be invisible.
         fill(&mut picture, left, top, 5 * s, 5 * s, |_| GREY);
         fill(&mut picture, left + 1, top + 1, 5 * s - 2, 5 * s - 2, |_| *colour);
         write(&mut picture, left + 7 * s, top, text, s);
@@ -167,7 +169,7 @@ pub fn classes(class: &Plane<usize>, palette: &[(u32, [u8; 3])]) -> Plane<[u8; 3
     picture
 }
 
-/// The colours of [`validity`]: the bit that decides, and its colour. They stay apart for the colour-blind.
+/// The colours of [`validity`]: the bit that decides, and its colour. The colour-blind can tell them apart.
 pub const VALIDITY: [(u32, [u8; 3]); 6] = [
     (0, [226, 226, 226]),
     (flag::OUTSIDE as u32, [0, 114, 178]),
@@ -177,8 +179,9 @@ pub const VALIDITY: [(u32, [u8; 3]); 6] = [
     (flag::MASKED as u32, [0, 0, 0]),
 ];
 
-/// The validity map in the colours of [`VALIDITY`], with the bits' numbers below it: of a pixel's reasons not to be
-/// trusted, the one that it was given up for first. A pixel without a disparity in the end is half as bright.
+/// The validity map in the colours of [`VALIDITY`], with the numbers of the bits below it. If a pixel has
+/// several flags, the first reason for which it was rejected decides. A pixel that has no disparity in the
+/// end is half as bright.
 #[must_use]
 pub fn validity(map: &Plane<u8>) -> Plane<[u8; 3]> {
     const FIRST: [u8; 5] = [flag::MASKED, flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::LOW_CONFIDENCE];
@@ -195,7 +198,8 @@ pub fn validity(map: &Plane<u8>) -> Plane<[u8; 3]> {
     picture
 }
 
-/// A picture of one colour a pixel, and below it the colours from `min` to `max` by their position from 0 to 1.
+/// A picture with one colour per pixel, and below it the colours from `min` to `max` by their position from 0
+/// to 1.
 fn with_scale(
     (w, h): (usize, usize),
     pixel: impl Fn(usize, usize) -> Rgb,
@@ -226,14 +230,14 @@ fn with_scale(
     picture
 }
 
-/// The size of what is drawn below a picture of width `w`: it grows with it, or it vanishes when the picture is
-/// scaled down.
+/// Size of the elements drawn below a picture of width `w`. It grows with the picture; otherwise they would
+/// vanish when it is scaled down.
 fn unit(w: usize) -> usize {
     (w / 200).clamp(1, 16)
 }
 
-/// Colour of the position `t` from 0 to 1 between `stops` at equal steps; anything else goes to the nearer end, and
-/// what is no number (an empty range) to the middle.
+/// The colour at position `t` from 0 to 1 between `stops` in equal steps. A `t` outside takes the nearer end,
+/// and NaN (an empty range) the middle.
 fn between(stops: &[Rgb], t: f64) -> Rgb {
     let t = if t.is_nan() { 0.5 } else { t.clamp(0.0, 1.0) } * (stops.len() - 1) as f64;
     let i = (t as usize).min(stops.len() - 2);
@@ -241,7 +245,7 @@ fn between(stops: &[Rgb], t: f64) -> Rgb {
     [0, 1, 2].map(|c| (stops[i][c] as f64 * (1.0 - part) + stops[i + 1][c] as f64 * part).round() as u8)
 }
 
-/// Values to mark on the scale and their numbers: as many round ones as fit without touching.
+/// The values to mark on the scale, with their texts: as many round numbers as fit without touching.
 fn ticks(min: f64, max: f64, width: usize, s: usize) -> Vec<(f64, String)> {
     let range = max - min;
     if !(range.is_finite() && range > 0.0) {
@@ -265,7 +269,8 @@ fn ticks(min: f64, max: f64, width: usize, s: usize) -> Vec<(f64, String)> {
     Vec::new()
 }
 
-/// The least of 1, 2 and 5 times a power of ten that is not below `least`, and the decimals it needs.
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`, and the number of decimals that
+/// it needs.
 fn round_step(least: f64) -> (f64, usize) {
     let (mut power, mut decimals) = (1.0, 0);
     while power * 10.0 <= least {

@@ -1,7 +1,8 @@
 //! From disparities to depths and points, where the cameras are known.
 //!
-//! Two parallel cameras see a point at depth Z with a disparity d of d + doffs = baseline * f / Z: f is the focal length
-//! in pixels, doffs the distance of the principal points along the row (cx1 - cx0). Depth has the unit of the baseline.
+//! A rectified pair of cameras sees a point at depth Z with a disparity d such that d + doffs = baseline * f
+//! / Z, where f is the focal length in pixels and doffs the distance of the principal points along the row
+//! (cx1 - cx0). Depth has the unit of the baseline.
 
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera};
@@ -21,8 +22,8 @@ impl Rig {
     /// The rig that a calibration file describes.
     ///
     /// # Errors
-    /// [`Error::Calibration`] that names what the file lacks of `cam0`, `doffs` and `baseline`, or a baseline that is not
-    /// above 0.
+    /// [`Error::Calibration`] when the file lacks `cam0`, `doffs` or `baseline` (the error names which), or
+    /// the baseline is not above 0.
     pub fn new(calibration: &Calibration) -> Result<Self> {
         let error = |reason: String| Err(Error::Calibration(reason));
         let &Calibration { camera, doffs, baseline, .. } = calibration;
@@ -41,8 +42,8 @@ impl Rig {
         Ok(Self { camera, doffs, baseline })
     }
 
-    /// The depth of disparity `d` (pixels), along the optical axis and in the unit of the baseline. `None` where `d` is
-    /// not finite, and where d + doffs is not above 0: such a point is no nearer than infinity.
+    /// The depth at disparity `d` (pixels), along the optical axis and in the unit of the baseline. `None`
+    /// where `d` is not finite or d + doffs is not above 0: such a point is at infinity or beyond.
     #[must_use]
     pub fn depth(&self, d: f64) -> Option<f64> {
         let apart = d + self.doffs;
@@ -50,22 +51,23 @@ impl Rig {
         (apart > 0.0 && d.is_finite() && depth.is_finite()).then_some(depth)
     }
 
-    /// The point that the left pixel (x, y) shows at disparity `d`, in the frame of the left camera: x to the right, y
-    /// down, z forward, in the unit of the baseline. `None` where [`Rig::depth`] has none.
+    /// The point that the left pixel (x, y) shows at disparity `d`, in the frame of the left camera: x to the
+    /// right, y down, z forward, in the unit of the baseline. `None` where [`Rig::depth`] is `None`.
     #[must_use]
     pub fn point(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
         self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])
     }
 
-    /// The depths of a map of disparities in pixels, +infinity where there is none.
+    /// The depths of a map of disparities in pixels; +infinity where there is no depth.
     #[must_use]
     pub fn depths(&self, disparities: &Plane<f32>) -> Plane<f32> {
         disparities.map(|&d| self.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32))
     }
 
-    /// The points that were measured and are trusted (a validity of 0), row by row, with the colours of the `left` image.
-    /// What is filled in, or of low confidence, is a guess from its surroundings and no point.
+    /// The points that were measured and are trusted (validity 0), row by row, with the colours of the `left`
+    /// image. Filled pixels and pixels of low confidence are guesses from their surroundings, and give no
+    /// points.
     ///
     /// # Panics
     /// When maps and image differ in size.
@@ -111,7 +113,7 @@ mod tests {
         for (d, depth) in [(60.0, 2000.0), (-4.0, 10_000.0), (12.0, 5000.0)] {
             assert_eq!(rig.depth(d), Some(depth));
         }
-        // A disparity of -doffs is that of infinity, and beyond it there is nothing.
+        // At a disparity of -doffs a point is at infinity, and below it there is none.
         for d in [-20.0, -20.5, -1e9, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert_eq!(rig.depth(d), None, "{d}");
         }

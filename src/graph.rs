@@ -1,10 +1,11 @@
-//! Who depends on whom: the dependency factors S of one level (sections 2.1 and 3.1).
+//! The graph: the dependency factors S of one level (sections 2.1 and 3.1).
 //!
-//! There is one factor a pixel. Its members are the pixel and those neighbours in a 7 x 7 window whose bilateral
-//! coefficient `exp(-(dx^2 + dy^2) / 2 sigma_d^2 - |colour difference|^2 / 2 sigma_r^2)` reaches the percentile.
-//! Only the order of the coefficients matters, so their exponents are compared, in integers, ties by distance and
-//! then in raster order: every machine picks the same graph. The centre's own coefficient is always the
-//! largest; the percentile is taken over the 48 others (open in the paper).
+//! There is one factor per pixel. Its members are the pixel and those neighbours in a 7 x 7 window whose
+//! bilateral coefficient `exp(-(dx^2 + dy^2) / 2 sigma_d^2 - |colour difference|^2 / 2 sigma_r^2)` reaches
+//! the percentile. Only the order of the coefficients matters, so their exponents are compared, as integers.
+//! Ties are broken by distance and then by raster order, so every machine picks the same graph. The centre's
+//! own coefficient is always the largest; the percentile is taken over the 48 others (the paper leaves this
+//! open).
 
 use crate::image::{Image, Plane};
 use crate::plan::{GRAPH_WINDOW, Plan};
@@ -12,10 +13,10 @@ use rayon::prelude::*;
 use std::iter;
 use std::ops::Range;
 
-/// The code of a slot that no pixel fills: a neighbour outside the image, masked, or simply not there.
+/// The code of a slot that holds no pixel, because the neighbour is outside the image, masked, or missing.
 pub const NO_MEMBER: u8 = u8::MAX;
 const RADIUS: i32 = GRAPH_WINDOW as i32 / 2;
-/// Rows of pixels whose factors are gathered together.
+/// Rows of pixels whose factors are collected together.
 const BAND: usize = 64;
 
 /// The dependency factors of one level.
@@ -25,36 +26,36 @@ pub struct LevelGraph {
     height: usize,
     neighbours: usize,
     codes: Vec<u8>,
-    /// How far a member is from its factor, in raster indices, by code.
+    /// Offset of a member from its factor, in raster indices, by code.
     steps: Vec<isize>,
     starts: Vec<u32>,
     incoming: Vec<u32>,
 }
 
-/// (dx, dy) of a member `code`: its place in the window, in raster order.
+/// (dx, dy) of the member with this `code`: its position in the window, in raster order.
 #[must_use]
 pub fn offset(code: u8) -> (i32, i32) {
     let code = i32::from(code);
     (code % GRAPH_WINDOW as i32 - RADIUS, code / GRAPH_WINDOW as i32 - RADIUS)
 }
 
-/// (dx, dy) of every code.
+/// (dx, dy) of all codes.
 fn offsets() -> impl Iterator<Item = (i32, i32)> {
     (0..(GRAPH_WINDOW * GRAPH_WINDOW) as u8).map(offset)
 }
 
-/// The code of the member at (dx, dy), each -3 ..= 3.
+/// The code of the member at (dx, dy), each in -3 ..= 3.
 #[must_use]
 pub fn code(dx: i32, dy: i32) -> u8 {
     ((dy + RADIUS) * GRAPH_WINDOW as i32 + dx + RADIUS) as u8
 }
 
 impl LevelGraph {
-    /// A graph from the codes of each factor's neighbours: `neighbours` a pixel, pixels in raster order. Slot 0
-    /// of every factor is its own pixel and has no code.
+    /// Builds a graph from the codes of each factor's neighbours: `neighbours` per pixel, pixels in raster
+    /// order. Slot 0 of every factor is its own pixel and has no code.
     ///
     /// # Panics
-    /// When a code leads out of the image or the window, or the number of codes is not `width * height *
+    /// When a code points outside the image or the window, or the number of codes is not `width * height *
     /// neighbours`.
     #[must_use]
     pub fn new(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
@@ -73,7 +74,7 @@ impl LevelGraph {
         graph
     }
 
-    /// Panics when a code leads out of the image or the window.
+    /// Panics when a code points outside the image.
     fn check(&self) {
         if self.neighbours == 0 {
             return;
@@ -93,7 +94,8 @@ impl LevelGraph {
         });
     }
 
-    /// Where the entries of each pixel start, and the entries: [`Self::starts`] and [`Self::incoming`].
+    /// The transposed table: where the entries of each pixel start ([`Self::starts`]), and the entries
+    /// ([`Self::incoming`]).
     fn transposed(&self) -> (Vec<u32>, Vec<u32>) {
         let (pixels, band) = (self.width * self.height, BAND * self.width);
         let of_band = |i: usize| i * band..((i + 1) * band).min(pixels);
@@ -123,7 +125,8 @@ impl LevelGraph {
         (starts, incoming)
     }
 
-    /// Calls `with` for every slot that holds one of `pixels`: which of them, and factor * slots + slot.
+    /// Calls `with` for every slot that holds one of `pixels`, with the index of the pixel among them and
+    /// factor * slots + slot.
     #[inline(always)]
     fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, u32)) {
         let reach = RADIUS as usize * self.width;
@@ -142,7 +145,7 @@ impl LevelGraph {
         }
     }
 
-    /// The member `code` of `factor`, both as raster indices.
+    /// The pixel of the member `code` of `factor`, both as raster indices.
     #[inline]
     fn pixel(&self, factor: usize, code: u8) -> Option<usize> {
         self.steps.get(usize::from(code)).map(|&step| factor.wrapping_add_signed(step))
@@ -160,13 +163,13 @@ impl LevelGraph {
         self.height
     }
 
-    /// Members of a factor, filled or not: its pixel and its neighbours.
+    /// Members of a factor, missing ones included: its pixel and its neighbours.
     #[must_use]
     pub fn slots(&self) -> usize {
         self.neighbours + 1
     }
 
-    /// The pixel in `slot` of `factor`, both pixels as raster indices; `None` where no pixel fills it.
+    /// The pixel in `slot` of `factor`, both as raster indices; `None` where the slot is empty.
     #[must_use]
     pub fn member(&self, factor: usize, slot: usize) -> Option<usize> {
         match slot {
@@ -182,19 +185,20 @@ impl LevelGraph {
         &self.codes[(y * self.width + x) * self.neighbours..][..self.neighbours]
     }
 
-    /// Codes of all factors' neighbours, `slots() - 1` a pixel.
+    /// Codes of all factors' neighbours, `slots() - 1` per pixel.
     #[must_use]
     pub fn codes(&self) -> &[u8] {
         &self.codes
     }
 
-    /// Where each pixel's entries start in [`Self::incoming`]; one more entry than pixels.
+    /// Where each pixel's entries start in [`Self::incoming`]; one entry more than there are pixels.
     #[must_use]
     pub fn starts(&self) -> &[u32] {
         &self.starts
     }
 
-    /// The transposed table: for each pixel the slots that hold it, as factor * slots + slot, ascending.
+    /// The transposed table: for each pixel the slots that hold it, as factor * slots + slot, in ascending
+    /// order.
     #[must_use]
     pub fn incoming(&self) -> &[u32] {
         &self.incoming
@@ -207,7 +211,7 @@ impl LevelGraph {
     }
 }
 
-/// The graphs of all levels of `plan`, from the reference image.
+/// The graphs of all levels of `plan`, built from the reference image.
 #[must_use]
 pub fn build(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
     let weight = spatial_weight(plan.method.graph.sigma_space, plan.method.graph.sigma_range);
@@ -219,21 +223,21 @@ pub fn build(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
     levels.into_par_iter().map(|level| level_graph(level, plan.neighbours, weight)).collect()
 }
 
-/// What a squared pixel of distance weighs against a squared quarter level of colour difference.
+/// Weight of a squared pixel of distance relative to a squared quarter level of colour difference.
 fn spatial_weight(sigma_space: f64, sigma_range: f64) -> u32 {
     // Intensities 0 ..= 1 are 0 ..= 1020 quarters of an 8-bit level.
     let ratio = sigma_range * 1020.0 / sigma_space;
     (ratio * ratio + 0.5).floor().min(f64::from(1u32 << 20)) as u32
 }
 
-/// Bits of a key that hold the neighbour's rank; the rest is its distance, below 2^25.
+/// Bits of a key that hold the neighbour's rank; the other bits hold its distance, below 2^25.
 const RANK_BITS: u32 = 6;
-/// The key of what is no neighbour; every other one is below it.
+/// The key of a pixel that cannot be a neighbour; all other keys are smaller.
 const NO_KEY: i32 = i32::MAX;
 
 fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let (width, height) = image.pixels.size();
-    // By distance, then in raster order: the rank that breaks ties as promised.
+    // By distance, then in raster order: this rank breaks ties.
     let mut window: Vec<(i32, i32)> = offsets().filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
     let guide = Guide {
@@ -270,18 +274,19 @@ fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     LevelGraph::new(width, height, neighbours, codes)
 }
 
-/// What neighbours are chosen by: channel by channel and row by row, for a row at once is a vector.
+/// The data that neighbours are chosen by, as planes per channel, so that a whole row is processed with
+/// vectors.
 struct Guide {
-    /// The places around a pixel, nearest first.
+    /// The offsets of the window, nearest first.
     window: Vec<(i32, i32)>,
-    /// What a squared pixel of distance weighs.
+    /// Weight of a squared pixel of distance.
     weight: u32,
     channels: [Plane<u16>; 3],
     /// [`NO_KEY`] where masked, else 0.
     masked: Plane<i32>,
 }
 
-/// Offers every place of the window to the pixels of row `y`; the smallest keys stay in `chosen`, by slot.
+/// Offers every offset of the window to the pixels of row `y`; the smallest keys stay in `chosen`, by slot.
 #[pulp::with_simd(choose_row = pulp::Arch::new())]
 #[inline(always)]
 fn choose_row_on<'a, S: pulp::Simd>(
@@ -314,7 +319,7 @@ fn choose_row_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The keys of a neighbour of all pixels of a row: `base`, with the squared colour difference on top.
+/// The keys of one neighbour for all pixels of a row: `base` plus the squared colour difference.
 #[inline(always)]
 fn offer(base: i32, here: [&[u16]; 3], others: [&[u16]; 3], masked: &[i32], keys: &mut [i32]) {
     let (here, others) = (here.map(|c| &c[..keys.len()]), others.map(|c| &c[..keys.len()]));
@@ -327,7 +332,7 @@ fn offer(base: i32, here: [&[u16]; 3], others: [&[u16]; 3], masked: &[i32], keys
     }
 }
 
-/// Keeps the smaller of each two in `chosen` and the larger in `keys`.
+/// Keeps the smaller of each pair in `chosen` and the larger in `keys`.
 #[inline(always)]
 fn keep_smaller(chosen: &mut [i32], keys: &mut [i32]) {
     for (chosen, key) in chosen.iter_mut().zip(keys) {
@@ -335,8 +340,8 @@ fn keep_smaller(chosen: &mut [i32], keys: &mut [i32]) {
     }
 }
 
-/// The next coarser image: 5 x 5 binomial low-pass over the unmasked pixels, every second pixel. A coarse pixel
-/// is masked when its up to 2 x 2 children all are.
+/// The next coarser image: a 5 x 5 binomial low-pass over the unmasked pixels, taken at every second pixel. A
+/// coarse pixel is masked when all of its up to 2 x 2 children are.
 #[must_use]
 pub fn downsample(image: &Image) -> Image {
     const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
@@ -348,7 +353,7 @@ pub fn downsample(image: &Image) -> Image {
     });
     let mut pixels = vec![[0; 4]; w * h];
     pixels.par_chunks_mut(w).enumerate().for_each_init(
-        // Sums over y of each column, and of the weights in it.
+        // Vertical sums of each column, and the sums of their weights.
         || vec![([0u32; 4], 0u32); width],
         |columns, (y, row)| {
             columns.fill(([0; 4], 0));

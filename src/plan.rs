@@ -1,12 +1,13 @@
-//! What a match will do, worked out before it does anything: levels, integer parameters, bounds, memory.
+//! Everything about a match that is known before it runs: levels, integer parameters, bounds, memory.
 //!
-//! Pure: a plan depends on the image size, the disparity range and the [`Method`] alone, so it is the same on
-//! every machine, can be tested without a device, and is what `--dry-run` prints.
+//! A plan is pure: it depends on the image size, the disparity range and the [`Method`] alone. It is
+//! therefore the same on every machine, can be tested without a device, and is what `--dry-run` prints.
 //!
 //! # Units
-//! Messages, evidence and beliefs are costs, -log of the paper's probabilities, in [`UNITS_PER_NAT`] units a nat.
-//! All are non-negative integers; every message has minimum 0 over the labels. They and their sums are stored in 8 bits,
-//! or 16 where the method needs them ([`VolumeWidth`]), and saturate: what is that dear is no candidate, whatever it costs.
+//! Messages, evidence and beliefs are costs, the -log of the paper's probabilities, in [`UNITS_PER_NAT`]
+//! units per nat. All are non-negative integers, and the minimum of every message over the labels is 0. They
+//! and their sums are stored in 8 bits, or in 16 where the method needs them ([`VolumeWidth`]). Sums
+//! saturate; a label whose cost saturates is no longer a candidate, so its exact cost does not matter.
 
 use crate::error::Result;
 use crate::options::{
@@ -16,26 +17,27 @@ use std::ops::Range;
 
 /// Units of cost in one nat.
 pub const UNITS_PER_NAT: f64 = 4.0;
-/// Cap of a hard potential's messages, in units: the largest for which no belief saturates in 16 bits even where a
-/// pixel is a member of all 49 factors of its window, at two resolution messages and the largest evidence.
+/// Truncation of a hard potential's messages, in units. It is the largest for which no belief saturates in 16
+/// bits, even for a pixel that is a member of all 49 factors of its window, with two resolution messages and
+/// the largest evidence.
 pub const HARD_CAP: u16 = 1023;
 /// Largest matching cost at level 0, in cost units.
 pub const COST_MAX: u8 = 254;
-/// Cost units of 1 where the cost is by census.
+/// Cost units that stand for a matching cost of 1 where the cost uses the census.
 pub const CENSUS_UNITS: f64 = 128.0;
-/// Cost units of a census bit that differs.
+/// Cost units of each census bit that differs.
 pub const CENSUS_BIT_COST: u32 = 4;
-/// Census bits that count, at most.
+/// Largest number of differing census bits that counts.
 pub const CENSUS_BITS: u32 = 40;
-/// Cost units of the largest colour difference that counts, where colour counts in full.
+/// Cost units of the largest colour difference, where colour has its full weight.
 pub const COLOUR_WEIGHT: u32 = 48;
-/// The largest colour difference that counts, in 8-bit levels summed over the channels.
+/// Truncation of the colour difference, in 8-bit levels summed over the channels.
 pub const COLOUR_MOST: u32 = 64;
-/// How far the window of census and contrast, 9 x 7, reaches to either side.
+/// Horizontal radius of the window of census and contrast, which is 9 x 7.
 pub const CENSUS_RADIUS_X: u32 = 4;
-/// How far it reaches up and down.
+/// Vertical radius of that window.
 pub const CENSUS_RADIUS_Y: u32 = 3;
-/// Places of that window.
+/// Number of pixels in that window.
 pub const CENSUS_PLACES: u32 = (2 * CENSUS_RADIUS_X + 1) * (2 * CENSUS_RADIUS_Y + 1);
 /// Fractional bits of the costs of level 1 and coarser.
 pub const COST_FRACTION_BITS: u32 = 8;
@@ -44,7 +46,7 @@ pub const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
 pub const LABEL_BLOCK: usize = 16;
 
-// The largest costs of a label are those that the options promise.
+// The largest costs of a label match what the options state.
 const _: () = assert!(MatchingCost::Sad.most() as u32 == COST_MAX as u32);
 const _: () = assert!(
     (MatchingCost::AdCensus.most() * CENSUS_UNITS) as u32 == CENSUS_BITS * CENSUS_BIT_COST + COLOUR_WEIGHT
@@ -64,7 +66,7 @@ pub struct LevelPlan {
     pub labels: usize,
     /// Labels with padding: `labels` rounded up to whole blocks of [`LABEL_BLOCK`].
     pub stride: usize,
-    /// From cost to evidence at this level.
+    /// Conversion from cost to evidence at this level.
     pub evidence: EvidenceScale,
 }
 
@@ -75,7 +77,7 @@ impl LevelPlan {
         self.width * self.height
     }
 
-    /// Blocks of four labels, with padding.
+    /// Groups of four labels, padding included.
     #[must_use]
     pub fn quads(&self) -> usize {
         self.stride / 4
@@ -88,13 +90,13 @@ impl LevelPlan {
     }
 }
 
-/// From cost to evidence, in 16-bit steps. With c in 1/256 cost units and D = min(c(d) - min c, `limit`),
-/// e(d) = min(((D << `up`) * `multiplier` >> 16) + (1 << `down` >> 1) >> `down`, `cap`).
+/// Conversion from cost to evidence in 16-bit steps. With c in 1/256 cost units and D = min(c(d) - min c,
+/// `limit`), e(d) = min(((D << `up`) * `multiplier` >> 16) + (1 << `down` >> 1) >> `down`, `cap`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EvidenceScale {
     /// Evidence units per 1/256 cost unit, times 2^(16 + `down` - `up`); below 2^15.
     pub multiplier: u16,
-    /// The smallest difference of costs that gives the cap; differences beyond it count as this one.
+    /// The smallest cost difference that reaches the cap; larger differences are clamped to it.
     pub limit: u16,
     /// The largest shift that keeps `limit` in 16 bits.
     pub up: u32,
@@ -111,7 +113,7 @@ impl EvidenceScale {
         let limit = (cap / per_cost).ceil().clamp(1.0, u16::MAX.into()) as u16;
         let up = limit.leading_zeros();
         let unshifted = per_cost * 65536.0 / f64::from(1u32 << up);
-        // All of 15 bits for the multiplier, so that product and rounding fit 16.
+        // The multiplier uses all of 15 bits, so that product and rounding fit in 16.
         let mut down = 0;
         while down < 15 && unshifted * f64::from(2u32 << down) < 32767.0 {
             down += 1;
@@ -125,13 +127,13 @@ impl EvidenceScale {
     #[inline]
     pub fn apply(self, difference: u16) -> u8 {
         let product = (u32::from(difference.min(self.limit) << self.up) * u32::from(self.multiplier)) >> 16;
-        // Both fit 15 bits.
+        // Both fit in 15 bits.
         let e = (product as u16 + (1 << self.down >> 1)) >> self.down;
         e.min(self.cap.into()) as u8
     }
 }
 
-/// Storage width of messages and beliefs, and where their sums saturate.
+/// Storage width of messages and beliefs, which is also where their sums saturate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VolumeWidth {
     /// 8 bits.
@@ -141,7 +143,7 @@ pub enum VolumeWidth {
 }
 
 impl VolumeWidth {
-    /// Bytes of a value.
+    /// Bytes per value.
     #[must_use]
     pub fn bytes(self) -> usize {
         match self {
@@ -150,7 +152,7 @@ impl VolumeWidth {
         }
     }
 
-    /// The largest value there is: stands for infinity.
+    /// The largest value, which stands for infinity.
     #[must_use]
     pub fn most(self) -> u16 {
         match self {
@@ -160,21 +162,21 @@ impl VolumeWidth {
     }
 }
 
-/// How a sum of messages s becomes a message m(d) = min(s(d), high) - low.
+/// Truncation of a sum of messages s to a message m(d) = min(s(d), high) - low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Truncation {
-    /// What disagreement costs, in units.
+    /// Cost of disagreement, in units.
     pub tau: u16,
-    /// Where to cut.
+    /// Where the sum is truncated.
     pub rule: TruncationRule,
 }
 
-/// Where a message is cut.
+/// Where a message is truncated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TruncationRule {
     /// At tau above the smallest sum: high = min s + tau, low = min s.
     Relative,
-    /// At tau, the members' messages having minimum 0: high = tau, low = min(min s, tau).
+    /// At tau, given that the members' messages have minimum 0: high = tau, low = min(min s, tau).
     Absolute,
 }
 
@@ -195,18 +197,18 @@ impl Truncation {
 pub struct Phase {
     /// The finest level that takes part; all coarser ones do too.
     pub finest: usize,
-    /// Iterations, at most.
+    /// Largest number of iterations.
     pub iterations: u32,
 }
 
-/// What a match will do.
+/// Everything about a match that is known before it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// The method that it follows.
+    /// The method.
     pub method: Method,
-    /// The disparities searched.
+    /// The disparities to search.
     pub range: DisparityRange,
-    /// Every level, the finest first.
+    /// All levels, finest first.
     pub levels: Vec<LevelPlan>,
     /// Neighbours of a dependency factor besides its centre.
     pub neighbours: usize,
@@ -218,10 +220,10 @@ pub struct Plan {
     pub resolution: Truncation,
     /// Storage width of messages of both kinds, and of beliefs.
     pub volume_width: VolumeWidth,
-    /// The flooding, in order.
+    /// The phases of message passing, in order.
     pub phases: Vec<Phase>,
-    /// Columns of the left view that [`Stage::RightView`](crate::backend::Stage::RightView) takes in: all of them, but for
-    /// a tile, whose core alone counts.
+    /// Columns of the left view from which [`Stage::RightView`](crate::backend::Stage::RightView) is
+    /// computed: all of them, or in a tile those of its core.
     pub core: Range<usize>,
 }
 
@@ -229,7 +231,7 @@ impl Plan {
     /// The plan for images of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`crate::Error::Option`] when the method is out of its ranges.
+    /// [`crate::Error::Option`] when an option of the method is out of range.
     pub fn new(width: usize, height: usize, range: DisparityRange, method: &Method) -> Result<Self> {
         let method = method.clone().validated()?;
         let cost_units = match method.cost.matching {
@@ -258,7 +260,7 @@ impl Plan {
         }
 
         let window = GRAPH_WINDOW * GRAPH_WINDOW;
-        // The tolerance keeps 48 (1 - 75 / 100) = 12 at 12 whatever the last bit of the product.
+        // The tolerance makes sure that 48 (1 - 75 / 100) is 12, whatever the last bit of the product.
         let neighbours = (((window - 1) as f64 * (100.0 - method.graph.percentile) / 100.0) - 1e-9)
             .ceil()
             .max(0.0) as usize;
@@ -269,7 +271,8 @@ impl Plan {
         };
         let (dependency, resolution) =
             (cut(method.messages.dependency_truncation), cut(method.messages.resolution_truncation));
-        // Where a pixel is in as many factors as a factor has members, as pixels are on average, nothing saturates.
+        // A pixel is, on average, in as many factors as a factor has members. For such a pixel nothing may
+        // saturate.
         let usual = u32::from(levels[0].evidence.cap)
             + (neighbours + 1) as u32 * u32::from(dependency.tau)
             + 2 * u32::from(resolution.tau);
@@ -305,7 +308,7 @@ impl Plan {
         })
     }
 
-    /// The plan of the same range and method for another size, with as many levels.
+    /// This plan for another image size: same range, method and number of levels.
     pub(crate) fn resized(&self, width: usize, height: usize) -> Self {
         let mut plan = Self { core: 0..width, ..self.clone() };
         let mut size = (width, height);
@@ -316,7 +319,7 @@ impl Plan {
         plan
     }
 
-    /// Whether a match by this plan goes into the buffers of `other`: they differ in [`Plan::core`] at most.
+    /// Whether a match by this plan fits the buffers of `other`: the two may differ in [`Plan::core`] only.
     #[must_use]
     pub fn fits(&self, other: &Self) -> bool {
         *self == Self { core: self.core.clone(), ..other.clone() }
@@ -334,8 +337,8 @@ impl Plan {
         self.neighbours + 1
     }
 
-    /// The largest belief, where their sums saturate: a message less than the largest value, so that whatever belongs to no
-    /// label stays above every label's belief when a message is taken off it.
+    /// The largest belief, at which sums saturate. It is one message below the largest value, so that a
+    /// padding label stays above the belief of every real label even after a message has been subtracted.
     #[must_use]
     pub fn belief_most(&self) -> u16 {
         self.volume_width.most() - self.dependency.tau.max(self.resolution.tau)
@@ -347,6 +350,7 @@ impl Plan {
         self.method.front.zone_sigmas > 0.0
     }
 
+<<<<<<< HEAD
     /// Whether the labels of the right view are read off the beliefs.
     #[must_use]
     pub fn reads_right_view(&self) -> bool {
@@ -359,25 +363,29 @@ impl Plan {
     }
 
     /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
+=======
+    /// Cost units of the largest colour difference at full weight: [`COLOUR_WEIGHT`], or 0 without colour.
+>>>>>>> house-words
     #[must_use]
     pub fn colour_weight(&self) -> u32 {
         if self.method.cost.matching == MatchingCost::AdCensus { COLOUR_WEIGHT } else { 0 }
     }
 
-    /// Squared [`CENSUS_PLACES`] times the variance of grey, in squared 8-bit levels, from which on colour counts in full.
+    /// The variance of grey (in squared 8-bit levels, times [`CENSUS_PLACES`] squared) from which on colour
+    /// has its full weight.
     #[must_use]
     pub fn colour_variance(&self) -> u32 {
         let contrast = self.method.cost.colour_contrast;
         (f64::from(CENSUS_PLACES * CENSUS_PLACES) * (contrast * contrast) + 0.5).floor() as u32
     }
 
-    /// Whether the pyramid takes the minimum over d instead of the low-pass.
+    /// Whether the pyramid takes the minimum over d instead of a low-pass.
     #[must_use]
     pub fn minimum_over_d(&self) -> bool {
         self.method.cost.pyramid == Pyramid::Minimum
     }
 
-    /// Whether odd labels agree with both their coarse neighbours.
+    /// Whether odd labels agree with both of their coarse neighbours.
     #[must_use]
     pub fn interpolating(&self) -> bool {
         self.method.messages.agreement == Agreement::Interpolating
@@ -390,7 +398,7 @@ impl Plan {
         2 * self.levels[level].min - self.levels[level - 1].min
     }
 
-    /// Bytes that the volumes and the graph of `level` take.
+    /// Bytes taken by the volumes and the graph of `level`.
     #[must_use]
     pub fn level_bytes(&self, level: usize) -> u64 {
         let l = &self.levels[level];
@@ -405,7 +413,7 @@ impl Plan {
         cells * volumes as u64 + graph as u64
     }
 
-    /// Bytes that the images and all maps take, at most.
+    /// Largest number of bytes taken by the images and all maps.
     #[must_use]
     pub fn map_bytes(&self) -> u64 {
         // The maps of the left view, and both views mirrored, while those of the right view are made.
@@ -413,9 +421,10 @@ impl Plan {
         (100 + right) * self.levels[0].pixels() as u64
     }
 
-    /// Bytes that the host takes beside the pair, at most, before it hands the graphs to a backend: for a pixel 14 of guides
-    /// and 3 of coarser images while the graphs are built, and the graphs; or 48 while a view's illumination is corrected, and 18 of the
-    /// corrected pair; or 200 of spectrum and responses while texture zones are found.
+    /// Largest number of bytes that the host takes besides the pair before it hands the graphs to a backend. Per
+    /// pixel: 17 to build the graphs (14 of guides, 3 of coarser images), besides the graphs themselves; 66 to
+    /// correct the illumination (48 for one view, 18 for the corrected pair); and 200 to find texture zones
+    /// (spectrum and responses).
     #[must_use]
     pub fn front_bytes(&self) -> u64 {
         let graphs =
@@ -425,15 +434,16 @@ impl Plan {
         (17 + corrected + zones) * self.levels[0].pixels() as u64 + graphs as u64
     }
 
-    /// Bytes of the pair: 18 a pixel, two views of 8 and their masks.
+    /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks.
     #[must_use]
     pub fn pair_bytes(&self) -> u64 {
         18 * self.levels[0].pixels() as u64
     }
 
-    /// Bytes that the maps of an image take which is matched tile by tile, at most. A pixel has 20 in the maps that its tiles
-    /// leave and those that are made of them (label, best, runner-up, right label and its belief 2 each, raw and final disparity
-    /// 4 each, validity and confidence 1 each), and 12 while they are made; 9 more where the left view is corrected.
+    /// Largest number of bytes taken by the maps of an image that is matched tile by tile. A pixel takes 20
+    /// in the maps that the tiles write and those derived from them (label, best, runner-up, right label and
+    /// its belief 2 each, raw and final disparity 4 each, validity and confidence 1 each), and 12 while they
+    /// are made; 9 more where the left view is corrected.
     #[must_use]
     pub fn mosaic_bytes(&self) -> u64 {
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
@@ -442,14 +452,14 @@ impl Plan {
         (20 + 12 + corrected + right) * self.levels[0].pixels() as u64
     }
 
-    /// Bytes that all volumes, graphs and maps take together.
+    /// Bytes taken by all volumes, graphs and maps together.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.map_bytes() + (0..self.levels.len()).map(|z| self.level_bytes(z)).sum::<u64>()
     }
 }
 
-/// A cut in units, at least one.
+/// A truncation in units, at least 1.
 fn units(nats: f64) -> u16 {
     ((nats * UNITS_PER_NAT + 0.5).floor() as u16).clamp(1, HARD_CAP)
 }

@@ -1,18 +1,19 @@
-//! What the flooding costs at least, counted from the plan: the roof under which every machine computes it.
+//! A lower bound on the cost of message passing, counted from the plan: the memory roofline.
 //!
-//! The message stages, [`Stage::Flood`] with its parts and [`Stage::Resolution`], do little with every value that
-//! they touch, so memory bounds them. [`bytes`] is what one run of a stage must move where no cache outlives it: every
-//! volume that it reads is read once, every one that it writes is written once, in their widths as stored and padding
-//! included, for padding goes through the same arithmetic. The graph, a few bytes a pixel, is left out. Divided by
-//! the rate at which the machine copies, it is the shortest time that the stage can take; where the volumes of a level fit
+//! The message stages, [`Stage::Flood`] with its parts and [`Stage::Resolution`], do little arithmetic per
+//! value, so they are memory-bound. [`bytes`] is what one run of a stage must move if nothing stays in a
+//! cache from an earlier run: every volume that it reads is read once, and every volume that it writes is
+//! written once, in the stored width. Padding is included, because it goes through the same arithmetic. The
+//! graph, a few bytes per pixel, is left out. This number divided by the machine's copy rate is the shortest
+//! time that the stage can take. Where the volumes of a level fit in a cache, the stage can be faster.
 //! a cache, it can be beaten.
 
 use crate::backend::Stage;
 use crate::backend::volume::{Volume, volume_shape};
 use crate::plan::Plan;
 
-/// The stages of the flooding of `plan`, level by level: of [`Stage::Flood`] and the two that it consists of, a backend keeps
-/// the time of the one or of the others.
+/// The message stages of `plan`, level by level. A backend records the time either of [`Stage::Flood`] or of
+/// the two stages that it consists of.
 pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
     let levels = 0..plan.levels.len();
     levels.flat_map(|z| {
@@ -22,8 +23,8 @@ pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
     })
 }
 
-/// Label updates of one run of `stage`: the values of dependency messages that it computes, pixels times labels (without
-/// padding) times members of a factor. Those of all other stages count as none.
+/// Label updates of one run of `stage`: the number of dependency message values that it computes, which is
+/// pixels times labels (without padding) times members per factor. It is 0 for all other stages.
 #[must_use]
 pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
     let (Stage::Dependency(z) | Stage::Flood(z)) = stage else { return 0 };
@@ -31,7 +32,7 @@ pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
     rows as u64 * labels as u64
 }
 
-/// Bytes that one run of `stage` moves at least; 0 for what is no message stage.
+/// The smallest number of bytes that one run of `stage` moves; 0 for a stage that is no message stage.
 #[must_use]
 pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
     let stored = |volume: Volume| {
@@ -57,7 +58,7 @@ pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
             let summands = stored(Volume::Evidence(z)) + stored(Volume::Dependency(z)) + down + up;
             summands + stored(Volume::Belief(z))
         }
-        // The messages that are written are those that are summed up.
+        // The messages that are written are the same ones that are summed.
         Stage::Flood(z) => {
             bytes(plan, Stage::Dependency(z)) + bytes(plan, Stage::Belief(z)) - stored(Volume::Dependency(z))
         }

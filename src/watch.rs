@@ -1,46 +1,47 @@
-//! What a running match tells, and how it is stopped.
+//! Progress of a running match, its times on the host, and how it is interrupted.
 
 use crate::error::{Error, Result};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// How far a match is.
+/// Progress of a match.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// The stage about to run, or what the host does around the stages: "graph", "upload" and the like.
+    /// The stage about to run, or a step of the host between stages: "graph", "upload" and so on.
     pub stage: &'static str,
-    /// Share of the work that is done, 0 to 1.
+    /// Fraction of the work that is done, 0 to 1.
     pub done: f64,
-    /// The tile at hand, from 1 on, and how many there are: twice those of the image where it is matched twice.
+    /// The current tile, counted from 1, and the number of tiles: twice that of the image where it is matched
+    /// twice.
     pub tile: Option<(usize, usize)>,
 }
 
-/// Told how far a match is; answers whether to go on.
+/// Receives the progress of a match, and decides whether it continues.
 pub type Observer<'a> = &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send);
 
-/// Follows one match: its progress, and the time of what the host does around the stages.
+/// Follows one match: its progress, and the time of the host's steps between stages.
 pub struct Watch<'a> {
     observer: Observer<'a>,
     done: f64,
     total: f64,
-    /// The tile at hand, and how many there are.
+    /// The current tile, and the number of tiles.
     tile: Option<(usize, usize)>,
     times: Vec<(&'static str, Duration)>,
 }
 
 impl<'a> Watch<'a> {
-    /// Of a match whose work is `total`, in any unit.
+    /// Follows a match whose total work is `total`, in any unit.
     pub fn new(observer: Observer<'a>, total: f64) -> Self {
         Self { observer, done: 0.0, total, tile: None, times: Vec::new() }
     }
 
-    /// The same match in so many tiles.
+    /// The same for a match in this many tiles.
     #[must_use]
     pub fn in_tiles(self, count: usize) -> Self {
         Self { tile: Some((0, count)), ..self }
     }
 
-    /// The next tile begins.
+    /// Starts the next tile.
     pub fn next_tile(&mut self) {
         self.tile = self.tile.map(|(tile, all)| (tile + 1, all));
     }
@@ -50,7 +51,7 @@ impl<'a> Watch<'a> {
         self.tile = None;
     }
 
-    /// `stage` begins, which is so much of the work.
+    /// Starts `stage`, whose share of the work is `work`, in the unit of the total.
     ///
     /// # Errors
     /// [`Error::Interrupted`] when the observer breaks.
@@ -63,10 +64,10 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Does what the host does around the stages, and takes the time.
+    /// Runs a step of the host, and records its time.
     ///
     /// # Errors
-    /// [`Error::Interrupted`] when the observer breaks, and those of `job`.
+    /// [`Error::Interrupted`] when the observer breaks, and the errors of `job`.
     pub fn host<T>(&mut self, name: &'static str, job: impl FnOnce() -> Result<T>) -> Result<T> {
         self.begin(name, 0.0)?;
         let clock = Instant::now();
@@ -75,7 +76,7 @@ impl<'a> Watch<'a> {
         Ok(done)
     }
 
-    /// What the host did around the stages, and how long each took.
+    /// The steps of the host so far, and the time of each.
     #[must_use]
     pub fn into_times(self) -> Vec<(&'static str, Duration)> {
         self.times

@@ -1,5 +1,5 @@
-//! Exponentials, logarithms and integer tables of them: the transcendental functions of the method, the same on
-//! every machine because they are evaluated with IEEE additions, multiplications and divisions alone.
+//! Exponentials, logarithms and integer tables of them: the transcendental functions of the method. They use
+//! IEEE additions, multiplications and divisions only, so they are the same on every machine.
 
 use std::f64::consts::{LN_2, SQRT_2};
 
@@ -51,34 +51,38 @@ pub fn ln(x: f64) -> f64 {
 
 /// Weight of the centre of the median's window, the largest there is.
 pub const MEDIAN_WEIGHT: u8 = 127;
-/// What distance alone takes off it, at most.
+/// The largest part of it that distance alone subtracts.
 const MEDIAN_SPACE: f64 = 96.0;
-/// How far apart the rows of the window that sees every column are, in places and as a power of two: half of them do.
+/// Distance between the rows of the window, as a power of two: every second row is used, with all of its
+/// columns.
 const SPARSE_ROW_BITS: u32 = 1;
-/// How far apart the places of the stretched window are, as a power of two.
+/// Spacing of the samples of the stretched window in pixels, as a power of two.
 const STRETCH_BITS: u32 = 2;
-/// By how much the stretched window's range sigma is smaller.
+/// The range sigma of the stretched window is smaller by this factor.
 const STRETCH_SIGMA: f64 = 4.0;
 
-/// Bilateral weights of the median's window, in integers of 8 bits:
-/// max(0, [`MEDIAN_WEIGHT`] - colour - space), with space = round(96 (1 - exp(-(dx^2 + dy^2) / 2 `sigma_space`^2))) in places,
-/// and colour = the sum over r, g and b of the guides' differences times 2^`doublings`, a guide being the 16-bit channel
-/// times `scale` >> 16. `scale` / 256 times 2^`doublings` is 0.1 / `sigma_range`: colour costs all of the weight
-/// at a difference of 1270 `sigma_range` 8-bit levels, summed over the channels. (A straight line for the Gaussian, and a sum
-/// for the product: as accurate, and bytes all the way.)
+/// Bilateral weights of the median's window, as 8-bit integers: max(0, [`MEDIAN_WEIGHT`] - colour - space).
+///
+/// space = round(96 (1 - exp(-(dx^2 + dy^2) / 2 `sigma_space`^2))), with dx and dy in steps of the window.
+/// colour = the sum over r, g and b of the differences of the guides, times 2^`doublings`, where a guide is
+/// the 16-bit channel times `scale` >> 16. `scale` / 256 times 2^`doublings` is 0.1 / `sigma_range`: a
+/// difference of 1270 `sigma_range` 8-bit levels, summed over the channels, takes all of the weight.
+///
+/// A straight line stands for the Gaussian of colour, and a sum for the product of both: this is as accurate,
+/// and fits in bytes throughout.
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     radius: usize,
     step_bits: u32,
     row_bits: u32,
-    /// By |dy| and dx from -radius to radius, in places, \[dy\]\[dx\].
+    /// By |dy| and by dx from -radius to radius, in steps of the window, \[dy\]\[dx\].
     space: Vec<u8>,
     scale: u32,
     doublings: u32,
 }
 
 impl MedianWeights {
-    /// The weights that `method` asks for, in every second row of the window.
+    /// The weights of `method`, with every second row of the window.
     #[must_use]
     pub fn of(method: &Method) -> Self {
         let window = method.refinement.median_window as usize;
@@ -87,8 +91,8 @@ impl MedianWeights {
         Self { row_bits: SPARSE_ROW_BITS, ..weights }
     }
 
-    /// Those of the stretched window: all of its places, four pixels apart, each with what its distance in places costs, and a
-    /// quarter of the range sigma.
+    /// The weights of the stretched window: all of its samples, four pixels apart. Each loses weight by its
+    /// distance in steps, and the range sigma is a quarter.
     #[must_use]
     pub fn stretched(method: &Method) -> Self {
         let window = method.refinement.median_window as usize;
@@ -111,7 +115,7 @@ impl MedianWeights {
             .map(taken)
             .collect();
         let (mut slope, mut doublings) = (0.1 / sigma_range, 0);
-        // 7 of them take a difference of one level beyond the largest weight.
+        // Seven doublings turn a difference of one level into more than the largest weight.
         while slope > 1.0 && doublings < 7 {
             slope /= 2.0;
             doublings += 1;
@@ -120,44 +124,44 @@ impl MedianWeights {
         Self { radius, step_bits: 0, row_bits: 0, space, scale, doublings }
     }
 
-    /// Radius of the window in places.
+    /// Radius of the window, in steps.
     #[must_use]
     pub fn radius(&self) -> usize {
         self.radius
     }
 
-    /// How far apart its places are: 2 to this many pixels.
+    /// Spacing of the window's samples: 2 to this many pixels.
     #[must_use]
     pub fn step_bits(&self) -> u32 {
         self.step_bits
     }
 
-    /// How far apart its rows are: 2 to this many places, of which the centre's row is one.
+    /// Spacing of the window's rows: 2 to this many steps, with the centre's row among them.
     #[must_use]
     pub fn row_bits(&self) -> u32 {
         self.row_bits
     }
 
-    /// What a 16-bit channel is multiplied by, 1 ..= 256, before the upper 16 bits are its guide.
+    /// Factor of a 16-bit channel, 1 ..= 256; the upper 16 bits of the product are its guide.
     #[must_use]
     pub fn scale(&self) -> u32 {
         self.scale
     }
 
-    /// How often a sum of differences of guides is doubled, 0 ..= 7.
+    /// Number of times that a sum of guide differences is doubled, 0 ..= 7.
     #[must_use]
     pub fn doublings(&self) -> u32 {
         self.doublings
     }
 
-    /// What distance takes off, by |dy| and |dx|, as the shader takes it.
+    /// The weight that distance subtracts, by |dy| and |dx|, as the shader reads it.
     #[must_use]
     pub fn words(&self) -> Vec<u32> {
         let rows = self.space.chunks_exact(2 * self.radius + 1).flat_map(|row| &row[self.radius..]);
         rows.map(|&taken| taken.into()).collect()
     }
 
-    /// What distance takes off in the row |dy| places away, for dx from -radius to radius.
+    /// The weight that distance subtracts in the row |dy| steps away, for dx from -radius to radius.
     #[must_use]
     pub fn space_row(&self, dy: usize) -> &[u8] {
         let side = 2 * self.radius + 1;

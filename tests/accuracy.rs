@@ -1,6 +1,6 @@
-//! What the default preset reaches, as floors: on rendered scenes always, on real pairs where `MRFGS_MIDDLEBURY` names
-//! their folder. The maps are integers, so the figures are the same on every machine; the floors leave a little room
-//! for changes that trade.
+//! Accuracy floors of the default preset: always on rendered scenes, and on real pairs where
+//! `MRFGS_MIDDLEBURY` names their folder. The maps are integers, so the figures are the same on every
+//! machine. The floors leave a little room for changes that trade one figure for another.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -29,7 +29,7 @@ fn report(folder: &Path, map: &Plane<f32>) -> Report {
     evaluate(map, &truth, Some(&mask)).unwrap()
 }
 
-/// A map and itself in whole pixels.
+/// A map, and the same map in whole pixels.
 fn rounded(matched: &Matched) -> Plane<f32> {
     let map = &matched.maps.disparity;
     map.map(|&d| (d + FRACTION / 2).div_euclid(FRACTION) as f32)
@@ -37,7 +37,7 @@ fn rounded(matched: &Matched) -> Plane<f32> {
 
 #[test]
 fn rendered_scenes() {
-    // Average error in pixels, bad2.0 and bad0.5 in percent. The plain wall is what the method is worst at.
+    // Average error in pixels, bad2.0 and bad0.5 in percent. The method is worst at the plain wall.
     let floors = [
         ("slanted", 0.20, 0.9, 8.3),
         ("thin", 0.62, 7.8, 18.5),
@@ -60,7 +60,7 @@ fn rendered_scenes() {
     }
 }
 
-/// On a plain wall in uneven light, colour misleads unless it counts by contrast.
+/// On a plain wall in uneven light, colour misleads unless it is weighted by contrast.
 #[test]
 fn colour_counts_where_there_is_contrast() {
     let folder = Path::new("testdata/light");
@@ -79,8 +79,8 @@ fn real_pairs() {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
         return;
     };
-    // Final: average error in pixels, bad2.0 in percent: what the best of the fast matchers reach (AD-Census, MGM, SGBM)
-    // on each. Raw: the paper's table 1, average error and bad2.0.
+    // Final: average error in pixels and bad2.0 in percent, at the level of the best fast matchers
+    // (AD-Census, MGM, SGBM) on each pair. Raw: average error and bad2.0 of the paper's table 1.
     let floors = [
         ("Teddy", (0.72, 6.62), (2.09, 13.90)),
         ("Cones", (0.78, 7.44), (2.29, 16.52)),
@@ -107,7 +107,7 @@ fn checksum(map: &Plane<i32>) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// What stands for the paper stays what it is, floating-point front end included, on every machine.
+/// The presets of the paper always give the same maps, floating-point front end included, on every machine.
 #[test]
 fn the_presets_of_the_paper_are_pinned() {
     let pins = [
@@ -125,7 +125,7 @@ fn the_presets_of_the_paper_are_pinned() {
         (preset, scene, checksum(&matched(&Path::new("testdata").join(scene), &method).maps.disparity))
     });
     assert_eq!(found, pins);
-    // Control: the default gives other maps.
+    // Control: the default preset gives different maps.
     let default = matched(Path::new("testdata/slanted"), &Method::default());
     assert_ne!(checksum(&default.maps.disparity), found[0].2);
 }

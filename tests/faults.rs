@@ -1,5 +1,6 @@
-//! Devices that fail, in every way that can be brought about without one that does: each failure is said in one clear
-//! line, and where falling back is allowed the maps come from the CPU path, bit for bit.
+//! Failing devices, in every way that can be provoked without a device that really fails. Each failure is
+//! reported in one clear line, and where falling back is allowed the maps come from the CPU path, bit for
+//! bit.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -50,7 +51,7 @@ fn run(matcher: &mut Matcher, pair: &Pair, range: DisparityRange) -> Result<Matc
     matcher.run(pair, range)
 }
 
-/// One line that names no flag: what to do about it is up to the front end.
+/// Whether a message is one line that names no flag: the remedy is up to the front end.
 fn is_clear(message: impl ToString) -> bool {
     let message = message.to_string();
     !message.contains("--") && !message.contains('\n')
@@ -60,7 +61,7 @@ fn says(cause: &impl ToString, words: &str) -> bool {
     cause.to_string().contains(words) && is_clear(cause.to_string())
 }
 
-/// What falling back gives: the maps of the CPU path, and a note with the reason.
+/// The result of falling back: the maps of the CPU path, and a note with the reason.
 fn assert_falls_back(gpu: Result<Gpu>, says: &str) {
     let (pair, range) = scene();
     let mut matcher = Matcher::on(gpu, true, &Execution::default()).unwrap();
@@ -83,7 +84,7 @@ fn a_good_device_is_used() {
     assert!(matched.note.is_none() && !matched.ran_on.contains("CPU path"), "{}", matched.ran_on);
 }
 
-/// A device that is lost before the first stage, at any later one, or when the maps come down.
+/// A device that is lost before the first stage, at any later one, or while the maps are read back.
 #[test]
 fn lost() {
     let (pair, range) = scene();
@@ -101,10 +102,10 @@ fn lost() {
                 lost += 1;
                 let said = cause.to_string();
                 assert!(said.contains("lost") && is_clear(cause), "after {lost_after}: {said}");
-                // And it stays lost.
+                // The device stays lost.
                 assert!(matches!(on(&mut gpu, &pair, range), Err(Error::Device(_))));
             }
-            // It was through by then.
+            // The match was done by then.
             Ok(solution) => assert!(lost_after > 150 && solution.maps == expected(&pair, range)),
             Err(e) => panic!("after {lost_after}: {e}"),
         }
@@ -118,7 +119,7 @@ fn lost() {
     }
 }
 
-/// Where falling back is not allowed, the failure is the answer.
+/// Where falling back is not allowed, the failure is returned.
 #[test]
 fn lost_without_a_way_back() {
     let Some(gpu) = device(FaultInjection { lost_after: Some(3), ..FaultInjection::default() }) else {
@@ -136,7 +137,7 @@ fn not_there() {
     assert_falls_back(missing(), "no Vulkan or Metal driver");
 }
 
-/// Too little memory for the plan is seen before any buffer is asked for, and a smaller pair still fits.
+/// Too little memory for the plan is detected before any buffer is allocated, and a smaller pair still fits.
 #[test]
 fn out_of_memory() {
     let (pair, range) = scene();
@@ -157,7 +158,7 @@ fn out_of_memory() {
     assert!(!matched.ran_on.contains("CPU path") && matched.note.is_none(), "{}", matched.ran_on);
 }
 
-/// Buffers and bindings too small for a single row.
+/// Buffers and bindings that are too small for a single row.
 #[test]
 fn too_small() {
     let (pair, range) = scene();
@@ -187,7 +188,7 @@ fn hangs() {
     assert_falls_back(Ok(gpu), "hangs");
 }
 
-/// A driver that does not take a shader: here for its workgroups.
+/// A driver that rejects a shader, here because of its workgroup size.
 #[test]
 fn refuses_a_shader() {
     let faults = FaultInjection { max_invocations: Some(32), ..FaultInjection::default() };
@@ -198,13 +199,13 @@ fn refuses_a_shader() {
     assert_falls_back(Ok(gpu), "workgroup");
 }
 
-/// A driver that takes everything and computes nothing, or something else: a small pair finds it out.
+/// A driver that accepts everything and computes nothing, or something wrong: a small pair reveals it.
 #[test]
 fn computes_nothing() {
     let faults = FaultInjection { noop: true, ..FaultInjection::default() };
     let gpu = || Gpu::with_faults(None, faults);
     let (pair, range) = scene();
-    // It does not even say so.
+    // It does not even report an error.
     assert!(on(&mut gpu().unwrap(), &pair, range).unwrap().maps != expected(&pair, range));
     assert_falls_back(gpu(), "test pair");
     let mut matcher = Matcher::on(gpu(), false, &Execution::default()).unwrap();
@@ -212,7 +213,7 @@ fn computes_nothing() {
     assert!(matches!(&error, Error::Device(e) if says(e, "test pair")), "{error}");
 }
 
-/// Times are kept with the device's clock and without, and add up to something.
+/// Times are recorded with and without timestamps on the device, and add up to more than 0.
 #[test]
 fn a_device_without_a_clock() {
     let (pair, range) = scene();

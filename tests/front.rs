@@ -1,4 +1,4 @@
-//! The front end on whole images: what it must not depend on, what it must find, and small and empty images.
+//! The front end on whole images: invariances, expected results, and small and empty images.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn scene(name: &str) -> Image {
     pair.expect("the scenes are there").left().clone()
 }
 
-/// An image of `colour(x, y)`, in 1/256 of an 8-bit level, nothing masked.
+/// An image of `colour(x, y)`, in 1/256 of an 8-bit level, without masked pixels.
 fn image(width: usize, height: usize, colour: impl Fn(usize, usize) -> [u16; 3]) -> Image {
     let pixels = Plane::from_fn(width, height, |x, y| {
         let [r, g, b] = colour(x, y);
@@ -24,7 +24,7 @@ fn image(width: usize, height: usize, colour: impl Fn(usize, usize) -> [u16; 3])
     Image { pixels, masked: Plane::filled(width, height, false) }
 }
 
-/// Some number below `n` for each pixel.
+/// A pseudo-random number below `n` for each pixel.
 fn noise(x: usize, y: usize, n: u64) -> u16 {
     let mut h =
         (x as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (y as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
@@ -52,7 +52,8 @@ fn with_threads<T: Send>(threads: usize, f: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(f)
 }
 
-/// Whether all zones of a map are used, numbered by their first pixels, and masked pixels and no others masked.
+/// Whether all zones of a map are used and numbered by their first pixels, and the masked pixels are exactly
+/// those of the image.
 fn assert_well_formed(zones: &Zones, image: &Image) {
     assert_eq!(zones.map.size(), image.pixels.size());
     let mut seen = 0;
@@ -127,14 +128,15 @@ fn what_is_masked_stays_and_has_no_influence() {
     assert_well_formed(&zones, &dark);
     assert_eq!(zones, segment(&bright, &Options::default()));
 
-    // Without the mask, the same values do matter.
+    // Control: without the mask, the same values do matter.
     let open = Plane::filled(90, 70, false);
     let [dark, bright] = [dark, bright].map(|image| Image { masked: open.clone(), ..image });
     assert_ne!(homomorphic(&dark).pixels[(30, 30)], homomorphic(&bright).pixels[(30, 30)]);
     assert_ne!(segment(&dark, &Options::default()), segment(&bright, &Options::default()));
 }
 
-/// Whether the zones are 0 to the left of `border` and 1 to the right, but for a band of 12 pixels to each side.
+/// Whether the zones are 0 to the left of `border` and 1 to the right, except for 12 pixels on each side of
+/// it.
 fn parts_at(zones: &Zones, border: usize) -> bool {
     let (width, height) = zones.map.size();
     let right = |x, y| {
@@ -148,7 +150,7 @@ fn parts_at(zones: &Zones, border: usize) -> bool {
 fn two_textures_are_two_zones() {
     let options = Options { zones: 2, ..Options::default() };
     let stripe = |number: usize| if number.is_multiple_of(2) { [40000; 3] } else { [20000; 3] };
-    // Same mean and contrast; only direction, or only wavelength, differs.
+    // Same mean and contrast; only the direction, or only the wavelength, differs.
     let upright = |x: usize, _: usize| stripe(x / 3);
     let lying = |_: usize, y: usize| stripe(y / 3);
     let coarse = |x: usize, _: usize| stripe(x / 8);
@@ -235,7 +237,7 @@ fn images_without_texture_have_zones_of_place() {
         assert_eq!(zones.count, 15);
         assert_eq!(zones, segment(&self::image(64, 48, |_, _| [7; 3]), &Options::default()));
     }
-    // With texture, places alone do not decide.
+    // Where there is texture, coordinates alone do not decide.
     let plain = image(64, 48, |_, _| [7; 3]);
     let textured = image(64, 48, speckle);
     assert_ne!(segment(&textured, &Options::default()), segment(&plain, &Options::default()));
@@ -255,7 +257,7 @@ fn images_without_light_or_pixels_come_back() {
     assert_eq!(homomorphic(&empty), empty);
     assert_eq!(segment(&empty, &Options::default()).count, 0);
 
-    // One pixel that no coarse grid meets.
+    // A single unmasked pixel that no coarse grid meets.
     let mut almost = Image { masked: Plane::filled(300, 200, true), ..image(300, 200, speckle) };
     almost.masked[(299, 1)] = false;
     let zones = segment(&almost, &Options::default());

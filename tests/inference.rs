@@ -1,5 +1,6 @@
-//! What the messages compute: on trees, the min-marginals of the joint distribution of equation (1), by enumeration;
-//! on graphs with cycles, what the sum-product of equations (3) and (4) computes in floating point.
+//! What message passing computes: on trees the min-marginals of the joint distribution of equation (1),
+//! checked by enumeration; on graphs with cycles the sum-product of equations (3) and (4), checked in
+//! floating point.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
@@ -15,14 +16,14 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{HARD_CAP, Plan};
 use mrfgs::options::{Agreement, Method, Order, Potential};
 
-/// Neighbours of a dependency factor in these graphs, most slots of which stay empty.
+/// Neighbours of a dependency factor in these graphs; most of the slots stay empty.
 const NEIGHBOURS: usize = 4;
-/// The cost of what a hard potential forbids, in the enumeration.
+/// The cost of forbidden labellings under a hard potential, in the enumeration.
 const FORBIDDEN: u64 = 1 << 40;
-/// Joint labellings that one enumeration may have.
+/// Largest number of joint labellings in one enumeration.
 const LABELLINGS: usize = 150_000;
 
-/// A factor graph without numbers in it: variables are pixels of all levels, the finest level first.
+/// The structure of a factor graph: variables are pixels of all levels, finest level first.
 struct Model {
     plan: Plan,
     graphs: Vec<LevelGraph>,
@@ -33,12 +34,12 @@ struct Model {
     factors: Vec<Factor>,
 }
 
-/// The variables that a factor joins.
+/// The variables that a factor connects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Factor {
     /// Equal labels agree.
     Dependency(Vec<usize>),
-    /// The parent first; its children agree with it where the fine label fits the coarse one.
+    /// The parent comes first; its children agree with it where the fine label fits the coarse one.
     Resolution(Vec<usize>),
 }
 
@@ -80,7 +81,7 @@ impl Model {
         self.plan.levels[self.level[variable]].labels
     }
 
-    /// Disparity that label index `label` of `variable` stands for, at its own level.
+    /// The disparity of label index `label` of `variable`, at its own level.
     fn disparity(&self, variable: usize, label: usize) -> i64 {
         i64::from(self.plan.levels[self.level[variable]].min) + label as i64
     }
@@ -106,7 +107,7 @@ impl Model {
         }
     }
 
-    /// The value of `variable` in volumes of one row a pixel.
+    /// The values of `variable` in volumes with one row per pixel.
     fn row<'a>(&self, volumes: &'a [Vec<u32>], variable: usize) -> &'a [u32] {
         let (z, labels) = (self.level[variable], self.labels(variable));
         let at = (variable - self.starts[z]) * labels;
@@ -132,7 +133,7 @@ impl Model {
             for (out, &d) in out.iter_mut().zip(&labels) {
                 out[d] = out[d].min(cost);
             }
-            // The next labelling, the first variable fastest.
+            // The next labelling; the first variable changes fastest.
             let Some(v) = (0..labels.len()).find(|&v| labels[v] + 1 < self.labels(v)) else { return out };
             labels[v] += 1;
             labels[..v].fill(0);
@@ -149,7 +150,7 @@ impl Model {
         State::fresh(&self.plan, evidence.to_vec()).write(backend);
     }
 
-    /// Beliefs of every variable after the flood of the plan.
+    /// Beliefs of all variables after the message passing of the plan.
     fn beliefs(&self, backend: &mut dyn Backend, evidence: &[Vec<u32>]) -> Vec<Vec<u32>> {
         self.backend_with(backend, evidence);
         common::flood(backend, &self.plan).unwrap();
@@ -165,7 +166,7 @@ fn blank(width: usize, height: usize) -> Pair {
     Pair::new(image.clone(), image).unwrap()
 }
 
-/// One factor for each pixel of level 1 and coarser, and its children.
+/// One factor for each pixel of level 1 and coarser, with its children.
 fn resolution_factors(plan: &Plan, starts: &[usize]) -> Vec<Factor> {
     let mut out = Vec::new();
     for z in 1..plan.levels.len() {
@@ -194,8 +195,8 @@ fn root(parents: &[usize], mut v: usize) -> usize {
     v
 }
 
-/// A random graph without cycles on the levels of `plan`: resolution factors join what they must, and each
-/// dependency factor takes up to `most` neighbours that nothing joins to it yet.
+/// A random graph without cycles on the levels of `plan`. Resolution factors connect their fixed pixels, and
+/// each dependency factor takes up to `most` neighbours that are not connected to it yet.
 fn tree(random: &mut Random, plan: Plan, most: u32) -> Model {
     let mut starts = vec![0];
     for level in &plan.levels {
@@ -249,8 +250,8 @@ fn method(potential: Potential, resolution: Agreement, levels: u32) -> Method {
     method
 }
 
-/// Where beliefs, up to a constant of each pixel, are not the min-marginals. What a hard potential forbids must be
-/// far behind instead of infinitely.
+/// Where beliefs, up to a constant per pixel, differ from the min-marginals. Labels forbidden by a hard
+/// potential must be far behind instead of infinitely far.
 fn wrong_beliefs(beliefs: &[Vec<u32>], marginals: &[Vec<u64>]) -> Option<String> {
     for (v, (b, m)) in beliefs.iter().zip(marginals).enumerate() {
         let (least_b, least_m) = (*b.iter().min().unwrap(), *m.iter().min().unwrap());
@@ -291,7 +292,7 @@ const SHAPES: &[((usize, usize), i32, usize, u32)] = &[
     ((3, 2), -2, 4, 3),
 ];
 
-/// Trees of every shape, with the evidence of each: dense, sparse, and with resolution factors alone.
+/// Trees of every shape, with evidence for each: dense, sparse, and with resolution factors only.
 fn trees(potential: Potential, resolution: Agreement, schedule: Order) -> Vec<(Model, Vec<Vec<u32>>)> {
     let mut out = Vec::new();
     for &(size, min, labels, levels) in SHAPES {
@@ -334,7 +335,8 @@ fn beliefs_on_trees_are_min_marginals() {
     }
 }
 
-/// The trees are worth something: joined across levels, with factors of three members and more, cut somewhere.
+/// The trees are a meaningful test: connected across levels, with factors of three and more members, and with
+/// truncation in effect somewhere.
 #[test]
 fn the_trees_cover_what_they_should() {
     let trees = trees(Potential::Exact, Agreement::Interpolating, Order::Together);
@@ -347,15 +349,15 @@ fn the_trees_cover_what_they_should() {
         );
         assert!(count(&|f| matches!(f, Factor::Resolution(v) if v.len() == members)) > 2 || members == 4);
     }
-    // A dependency factor joins two coarse pixels whose children it thereby joins.
+    // A dependency factor that connects two coarse pixels also connects their children.
     let coarse = trees.iter().any(|(tree, _)| {
         tree.factors.iter().any(|f| matches!(f, Factor::Dependency(v) if v[0] >= tree.starts[1]))
     });
     assert!(coarse);
 }
 
-/// Negative control: the default potential cuts after it normalises, which is another model: a factor whose members
-/// disagree still speaks.
+/// Negative control: the default potential truncates after it normalises, which is a different model: a
+/// factor still sends messages when its members disagree.
 #[test]
 fn control_the_normalised_cut_is_another_model() {
     let mut different = 0;
@@ -369,7 +371,7 @@ fn control_the_normalised_cut_is_another_model() {
     assert!(different > 5, "{different} trees differ");
 }
 
-/// Negative control: one unit of evidence more, one factor less, or the other kind of agreement is noticed.
+/// Negative control: one unit of evidence more, one factor less, or the other kind of agreement is detected.
 #[test]
 fn control_a_changed_model_is_found() {
     let (mut checked, mut noticed) = ([0; 3], [0; 3]);
@@ -391,7 +393,8 @@ fn control_a_changed_model_is_found() {
         tree.plan.method.messages.agreement = Agreement::Interpolating;
         check(2, &tree, &evidence);
     }
-    // A constant of a pixel does not count, a factor may matter to nobody, and one level has no resolution factor.
+    // A constant per pixel does not count, a factor may have no effect, and a single level has no resolution
+    // factor.
     for i in 0..3 {
         assert!(noticed[i] * 3 > checked[i], "change {i}: {} of {} noticed", noticed[i], checked[i]);
     }
@@ -400,9 +403,9 @@ fn control_a_changed_model_is_found() {
 /// Equations (3) and (4), in f64, literally: every sum runs over all labels of all other members.
 struct SumProduct<'a> {
     model: &'a Model,
-    /// Of each variable, exp(-evidence).
+    /// exp(-evidence) of each variable.
     prior: Vec<Vec<f64>>,
-    /// From each factor to each of its variables, in their order.
+    /// Messages from each factor to each of its variables, in their order.
     messages: Vec<Vec<Vec<f64>>>,
 }
 
@@ -415,7 +418,7 @@ impl<'a> SumProduct<'a> {
         Self { model, prior, messages: model.factors.iter().map(ones).collect() }
     }
 
-    /// The product of all that arrives at `variable`, but from factor `without`.
+    /// The product of all messages to `variable`, except the one from factor `without`.
     fn product(&self, variable: usize, without: Option<usize>) -> Vec<f64> {
         let mut out = self.prior[variable].clone();
         for (f, factor) in self.model.factors.iter().enumerate() {
@@ -456,7 +459,7 @@ impl<'a> SumProduct<'a> {
     }
 }
 
-/// Messages mean the same at any scale: the largest becomes 1.
+/// The scale of a message has no meaning: the largest value becomes 1.
 fn normalised(mut values: Vec<f64>) -> Vec<f64> {
     let most = values.iter().copied().fold(0.0, f64::max);
     assert!(most > 0.0);
@@ -466,8 +469,8 @@ fn normalised(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// Compares a probability vector with costs in units, minimum 0: exact where it is not 0, far behind where it is.
-/// Returns the largest cost that was compared exactly.
+/// Compares a probability vector with costs in units, minimum 0: exactly where it is not 0, and as far behind
+/// where it is 0. Returns the largest cost that was compared exactly.
 fn compare_costs(what: &str, costs: &[u32], probabilities: &[f64]) -> f64 {
     let least = *costs.iter().min().unwrap();
     let mut most = 0.0f64;
@@ -487,7 +490,7 @@ fn compare_costs(what: &str, costs: &[u32], probabilities: &[f64]) -> f64 {
     most
 }
 
-/// A random graph full of cycles, two or three levels, the hard potential.
+/// A random graph with many cycles, two or three levels, and the hard potential.
 fn loopy(seed: u64) -> (Model, Vec<Vec<u32>>) {
     let mut random = Random::new(seed);
     let levels = random.within(1, 3);
@@ -522,11 +525,11 @@ fn loopy(seed: u64) -> (Model, Vec<Vec<u32>>) {
     (Model::new(plan, graphs), evidence)
 }
 
-/// Under the hard potential, and with strict agreement between levels, one label of the receiver leaves the others a
-/// single choice: its own label for a dependency factor, twice or half of it for a resolution factor. So every sum
-/// of equation (4) has at most one term that is not 0; sum- and max-product are the same, products are sums of
-/// costs, and integers hold them exactly as long as no cap acts. (Interpolating agreement leaves several choices,
-/// there the two differ.)
+/// Under the hard potential, and with strict agreement between levels, one label of the receiver leaves the
+/// others a single choice: its own label for a dependency factor, twice or half of it for a resolution
+/// factor. So every sum of equation (4) has at most one term that is not 0. Sum-product and max-product are
+/// then the same, products are sums of costs, and integers represent them exactly as long as nothing is
+/// truncated. (Interpolating agreement leaves several choices; there the two differ.)
 #[test]
 fn hard_messages_are_those_of_the_sum_product() {
     let (mut compared, mut cycles) = (0, 0);
@@ -568,7 +571,7 @@ fn hard_messages_are_those_of_the_sum_product() {
                             Factor::Resolution(_) if i == 0 => model.row(&up, v[0]),
                             Factor::Resolution(_) => model.row(&down, v[i]),
                             Factor::Dependency(_) => {
-                                // A factor is its first member's; the others are in some slots of it.
+                                // A factor belongs to its first member; the others are in some slots of it.
                                 let z = model.level[v[0]];
                                 let centre = v[0] - model.starts[z];
                                 let slot = twin::members(&model.graphs[z], centre)
@@ -587,7 +590,7 @@ fn hard_messages_are_those_of_the_sum_product() {
                     check(format!("belief of {v}"), model.row(&belief, v), &sums.product(v, None));
                 }
                 compared += 1;
-                // Hard messages grow without bound: the comparison ends long before the cap acts.
+                // Hard messages grow without bound: the comparison ends long before truncation sets in.
                 if most > 60.0 {
                     assert!(iteration > 1, "graph {seed} says nothing: {most}");
                     break;
@@ -598,7 +601,7 @@ fn hard_messages_are_those_of_the_sum_product() {
     assert!(compared > 100 && cycles > 20, "{compared} iterations, {cycles} graphs with cycles");
 }
 
-/// Whether strict agreement leaves some pixel without any label: then equation (1) is 0 everywhere.
+/// Whether strict agreement leaves some pixel without any label; equation (1) is then 0 everywhere.
 fn infeasible(model: &Model) -> bool {
     let mut allowed: Vec<Vec<bool>> = (0..model.variables()).map(|v| vec![true; model.labels(v)]).collect();
     for _ in 0..model.variables() {
@@ -631,7 +634,7 @@ fn infeasible(model: &Model) -> bool {
     allowed.iter().any(|labels| !labels.contains(&true))
 }
 
-/// Negative control: the sum-product with one unit of evidence more is not what the backend computes.
+/// Negative control: the sum-product with one unit of evidence more differs from what the backend computes.
 #[test]
 fn control_other_evidence_is_found_by_the_sum_product() {
     let (model, evidence) =

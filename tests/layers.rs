@@ -1,5 +1,5 @@
-//! The layers that ARCHITECTURE.md states: no file imports from a higher layer, and no two files import from each other, straight
-//! or in a circle.
+//! The layers that ARCHITECTURE.md states: no file imports from a higher layer, and imports form no cycle,
+//! direct or indirect.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 /// The path of a module: `["backend", "cpu"]`.
 type Module = Vec<String>;
 
-/// The files of a crate, by module, without comments, texts and unit tests.
+/// The files of a crate, by module, without comments, strings and unit tests.
 struct Crate {
     files: BTreeMap<Module, String>,
-    /// What modules pass on: the name that users see, and where it comes from.
+    /// Re-exports of modules: the name that users see, and where it comes from.
     exports: BTreeMap<(Module, String), Vec<String>>,
 }
 
@@ -29,7 +29,7 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// The code of a file up to its unit tests, without comments and texts.
+/// The code of a file up to its unit tests, without comments and strings.
 fn code_of(text: &str) -> String {
     let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
     let lines = text.lines().map(|line| line.split("//").next().unwrap());
@@ -48,7 +48,7 @@ impl Crate {
             sources.into_iter().map(|(module, text)| (module, code_of(&text))).collect();
         let mut exports = BTreeMap::new();
         for (module, code) in &files {
-            // A macro for all has its place at the root, wherever it is.
+            // An exported macro belongs to the root, wherever it is defined.
             for macro_rules in code.split("#[macro_export]\nmacro_rules! ").skip(1) {
                 let path = ["crate".to_owned()].into_iter().chain(module.iter().cloned());
                 let name = macro_rules.split_whitespace().next().unwrap().to_owned();
@@ -79,7 +79,7 @@ impl Crate {
         }))
     }
 
-    /// The file that `path`, as `module` writes it, leads to; `None` where it leads out of the crate.
+    /// The file that `path`, as written in `module`, leads to; `None` where it leads out of the crate.
     fn file_of(&self, module: &Module, path: &[String]) -> Option<Module> {
         let mut at = module.clone();
         let mut rest = path;
@@ -133,7 +133,7 @@ impl Crate {
             }
             for (at, _) in code.match_indices("use ") {
                 for path in paths(&code[at + 4..]) {
-                    // What is passed on alone is no import.
+                    // A mere re-export is not an import.
                     let name = path.last().unwrap();
                     let uses =
                         code.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| word == name);
@@ -149,13 +149,13 @@ impl Crate {
     }
 }
 
-/// Whether the `use` at `start` passes names on to others, and takes none for its own module.
+/// Whether the `use` at `start` only re-exports names, and imports none for its own module.
 fn is_passed_on(code: &str, start: usize) -> bool {
     let before = code[..start].trim_end_matches(' ');
     before.ends_with("pub") || before.ends_with(')')
 }
 
-/// The paths at the start of `code`: one, or all that its braces hold.
+/// The paths at the start of `code`: one, or all those in its braces.
 fn paths(code: &str) -> Vec<Vec<String>> {
     let mut path: Vec<String> = Vec::new();
     let mut rest = code.trim_start();
@@ -184,7 +184,7 @@ fn paths(code: &str) -> Vec<Vec<String>> {
     if path.is_empty() { Vec::new() } else { vec![path] }
 }
 
-/// What the commas of a list separate, up to the brace that ends it.
+/// The items of a comma-separated list, up to its closing brace.
 fn parts(list: &str) -> Vec<&str> {
     let (mut depth, mut start, mut all) = (0, 0, Vec::new());
     for (i, c) in list.char_indices() {
@@ -204,7 +204,7 @@ fn parts(list: &str) -> Vec<&str> {
     all
 }
 
-/// A circle of imports, if there is any.
+/// A cycle of imports, if there is any.
 fn circle(imports: &BTreeMap<Module, BTreeSet<Module>>) -> Option<Vec<Module>> {
     fn visit(
         at: &Module,
@@ -227,7 +227,8 @@ fn circle(imports: &BTreeMap<Module, BTreeSet<Module>>) -> Option<Vec<Module>> {
     imports.keys().find_map(|module| visit(module, imports, &mut Vec::new(), &mut done))
 }
 
-/// The layers under a heading of ARCHITECTURE.md, the highest first: the words before two spaces in each line of its first block.
+/// The layers under a heading of ARCHITECTURE.md, highest first: the words before two spaces in each line of
+/// its first block.
 fn layers(heading: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let section = text.split(&format!("## {heading}\n")).nth(1).expect("the heading");
@@ -240,7 +241,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The first import from a higher layer, or a module that no layer names.
+/// The first import from a higher layer, or a module that belongs to no layer.
 fn upward(imports: &BTreeMap<Module, BTreeSet<Module>>, layers: &[Vec<String>]) -> Option<String> {
     let layer = |module: &Module| {
         let name = module.first()?;
@@ -270,7 +271,7 @@ fn imports_lead_down() {
     }
 }
 
-/// Controls: what the check is for is found.
+/// Controls: violations are found.
 #[test]
 fn circles_and_upward_imports_are_found() {
     let of = |files: &[(&str, &str)]| {
@@ -292,7 +293,7 @@ fn circles_and_upward_imports_are_found() {
     let round =
         of(&[("low", "pub use b::B;"), ("low::a", "use super::b::B;"), ("low::b", "use super::a::A;")]);
     assert_eq!(circle(&round).unwrap().len(), 2);
-    // What a module passes on belongs to the file that it comes from.
+    // A re-exported item belongs to the file that defines it.
     let passed = of(&[("low", "pub use b::B;"), ("low::b", "struct B;"), ("high", "use crate::low::B;")]);
     assert!(passed[&vec!["high".to_owned()]].contains(&vec!["low".to_owned(), "b".to_owned()]));
     assert!(upward(&of(&[("other", "use crate::low::A;"), ("low", "")]), &layers).unwrap().contains("other"));

@@ -1,5 +1,5 @@
-//! Whole matches: their maps are those of the naive twins in the order in which the stages are described, and what must hold of
-//! them whatever the method.
+//! Whole matches: their maps equal those of the naive twins, run in the order in which the stages are
+//! described. Also the properties that hold for every method.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 
@@ -22,7 +22,7 @@ use mrfgs::maps::{Maps, RightMap, flag};
 use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential};
 use std::ops::ControlFlow;
 
-/// The maps that the naive twins make of what a match leaves in `finest`.
+/// The maps that the naive twins compute from what a match leaves in `finest`.
 fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
     finest.disparity = finest.raw.clone();
     twin_maps(finest, plan, pair);
@@ -36,6 +36,7 @@ fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
     }
 }
 
+<<<<<<< HEAD
 /// The disparities of the right view before post-processing, mirrored, by the twins.
 fn right_raw(finest: &Finest, plan: &Plan, pair: &Pair) -> Finest {
     let mut right = finest.clone();
@@ -52,6 +53,9 @@ fn right_map(right: &mut Finest, plan: &Plan, pair: &Pair) -> RightMap {
 }
 
 /// The maps by the twins, from the estimate on, in the order in which the stages are described.
+=======
+/// The maps of the twins from the estimate on, in the order in which the stages are described.
+>>>>>>> house-words
 fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::left_right_check::left_right_check(plan, pair, maps);
     twin::speckle_filter::speckle_filter(plan, maps);
@@ -157,7 +161,8 @@ fn the_right_map_is_the_map_of_the_mirrored_pair() {
     }
 }
 
-/// A tiled match is a match of each crop, of which the core stays, and the stages after that on what stays of all.
+/// A tiled match is a match of each crop, of which the core is kept, followed by the remaining stages on all
+/// cores together.
 #[test]
 fn tiles_are_matched_by_themselves_and_finished_together() {
     let (mut tiled, mut twice, mut other) = (0, 0, 0);
@@ -242,7 +247,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         }
         tiled += 1;
         twice += usize::from(method.refinement.left_right_check == LeftRightCheck::SecondMatch);
-        // Control: one piece is something else.
+        // Control: a match in one piece gives different maps.
         other += usize::from(matched_whole(&pair, &plan) != expected);
     }
     assert!(
@@ -261,7 +266,7 @@ fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
     engine::solve(&mut Cpu::default(), plan, pair, observer).unwrap().maps
 }
 
-/// Runs all stages up to [`Stage::SubPixel`]; the number of iterations.
+/// Runs all stages up to [`Stage::SubPixel`]; returns the number of iterations.
 fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
     backend.prepare(plan, Prepared::new(pair, graph::build(pair.left(), plan))).unwrap();
     backend.run(Stage::Cost).unwrap();
@@ -278,7 +283,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
     iterations
 }
 
-/// Labels of the right view by a matching of its own: right x is left width - 1 - x of the mirrored pair.
+/// Labels of the right view from a separate match: right x is left width - 1 - x of the mirrored pair.
 fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     let mirrored = mirrored(pair);
     let mut method = plan.method.clone();
@@ -289,7 +294,7 @@ fn second_match(pair: &Pair, plan: &Plan) -> Plane<i32> {
     Plane::from_fn(width, height, |x, y| raw[(width - 1 - x, y)] / 256 - plan.range.min)
 }
 
-/// Both views exchanged, left and right too.
+/// The pair with both views exchanged and mirrored.
 fn mirrored(pair: &Pair) -> Pair {
     let mirror = |image: &Image| {
         let (width, height) = image.pixels.size();
@@ -329,10 +334,10 @@ fn identical_views_have_no_disparity() {
     }
 }
 
-/// When the right view moves by a whole pixel of the coarsest level, and the range with it, every level sees the same
-/// costs under other names, but where a border or what lies beyond it comes in. How far a border reaches: the
-/// window of the cost; the pyramid; in each iteration two radii of the graph at the coarsest level, and its
-/// resolution factors; the right view; the median.
+/// When the right view moves by a whole pixel of the coarsest level, and the range with it, every level sees
+/// the same costs at other labels, except near borders. A border reaches as far as: the window of the cost;
+/// the pyramid; in each iteration two radii of the graph at the coarsest level, and its resolution factors;
+/// the right view; the median.
 #[test]
 fn a_shift_of_view_and_range_changes_nothing_inside() {
     let (width, height, levels, labels) = (420, 9, 3u32, 8);
@@ -361,7 +366,7 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
         if cost == MatchingCost::Sad {
             (method.cost.outside_cost, method.messages.temperature) = (20.0, 8.0);
         }
-        // The region filter and the fill reach as far as they like.
+        // The speckle filter and the fill may reach any distance.
         (method.refinement.speckle_size, method.refinement.fill, method.refinement.median_window) =
             (0, Fill::None, 5);
         let iterations = 3;
@@ -393,7 +398,7 @@ fn a_shift_of_view_and_range_changes_nothing_inside() {
                 }
             }
             assert!(inside >= 500, "{inside} pixels inside");
-            // Control: borders do matter where they may, and the inside is no plain.
+            // Control: borders do matter where they may, and the interior is not uniform.
             assert!(
                 elsewhere > 0 && distinct.iter().filter(|&&d| d).count() > 5,
                 "{elsewhere}, {distinct:?}"
@@ -453,7 +458,7 @@ fn masked_values_are_never_looked_at() {
     assert!(masked_pixels > 1000);
 }
 
-/// Negative control: values that are not masked do count.
+/// Negative control: values that are not masked do matter.
 #[test]
 fn control_values_that_are_not_masked_are_looked_at() {
     let mut random = Random::new(2);
@@ -495,7 +500,8 @@ fn masks_and_single_pixels_pass_through() {
     }
 }
 
-/// Negative control for the right view: where nothing projects, there is no label, and that is no agreement.
+/// Negative control for the right view: where nothing projects there is no label, and this does not count as
+/// agreement.
 #[test]
 fn no_label_agrees_with_none() {
     let mut random = Random::new(1);

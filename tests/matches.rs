@@ -1,5 +1,5 @@
-//! Sparse matches and what follows from them, on rendered scenes always, on real pairs where `MRFGS_MIDDLEBURY` names
-//! their folder.
+//! Sparse matches and the results derived from them: always on rendered scenes, and on real pairs where
+//! `MRFGS_MIDDLEBURY` names their folder.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -42,7 +42,8 @@ impl Case {
         Self::load(&Path::new("testdata").join(name))
     }
 
-    /// Pixels per match, and in percent the matches that are off by more than 1.5 px, of those that both views see.
+    /// Pixels per match, and the percentage of matches that are wrong by more than 1.5 px, among those that
+    /// both views see.
     fn accuracy(&self, found: &[Match]) -> (usize, f64) {
         let errors: Vec<f32> = found
             .iter()
@@ -81,7 +82,7 @@ fn moved(image: &Image, from: impl Fn(i32, i32) -> (i32, i32)) -> Image {
     }
 }
 
-/// Zones of bands of five brightnesses in three columns of the image.
+/// Zones of five brightness bands in three columns of the image.
 fn crude_zones(image: &Image) -> Plane<u8> {
     let mut greys: Vec<u16> = image.pixels.data().iter().map(|p| p[3]).collect();
     greys.sort_unstable();
@@ -95,7 +96,7 @@ fn crude_zones(image: &Image) -> Plane<u8> {
 
 #[test]
 fn matches_of_rendered_scenes_are_right() {
-    // Most pixels per match, and most matches in percent off by more than 1.5 px.
+    // Largest number of pixels per match, and largest percentage of matches wrong by more than 1.5 px.
     let floors = [
         ("slanted", 90, 1.5),
         ("thin", 120, 4.0),
@@ -139,7 +140,7 @@ fn disparities_lie_between_the_pixels() {
     let whole = mean(|m| (m.disparity + FRACTION / 2).div_euclid(FRACTION) * FRACTION);
     let (exact, mirrored) = (
         mean(|m| m.disparity),
-        // The fraction on the wrong side.
+        // Control: the fraction with the wrong sign.
         mean(|m| 2 * ((m.disparity + FRACTION / 2).div_euclid(FRACTION) * FRACTION) - m.disparity),
     );
     assert!(
@@ -160,7 +161,7 @@ fn the_score_is_the_correlation_of_the_windows() {
     let found = matches::find(&case.pair, None, Some(case.range));
     assert!(found.len() > 100);
     for m in found {
-        // The window stands on whole pixels, within half a pixel of the match.
+        // The window is at whole pixels, within half a pixel of the match.
         let d = (m.disparity + FRACTION / 2).div_euclid(FRACTION);
         let left = window(case.pair.left(), m.x, m.y);
         let right = window(case.pair.right(), (m.x as i32 - d) as usize, m.y);
@@ -198,7 +199,7 @@ fn only_the_range_is_searched() {
     for m in found {
         assert!((12 * FRACTION - 128..=15 * FRACTION + 128).contains(&m.disparity), "{m:?}");
     }
-    // Seen from the other eye, all disparities are negative.
+    // With the views exchanged, all disparities are negative.
     let swapped = Pair::new(case.pair.right().clone(), case.pair.left().clone()).unwrap();
     let all = matches::find(&swapped, None, None);
     let negative = DisparityRange::new(-31, 0).unwrap();
@@ -267,10 +268,10 @@ fn there_is_nothing_to_match() {
         let said = check::warnings(&pair, None);
         assert!(said.iter().all(|w| matches!(w, Warning::Identical | Warning::Plain { .. })), "{said:?}");
     }
-    // The noise itself can be matched.
+    // Control: the noise itself can be matched.
     let pair = Pair::new(noise(60, 50), noise(60, 50)).unwrap();
     assert!(!matches::find(&pair, None, None).is_empty());
-    // Views of different things cannot.
+    // Views of different scenes cannot.
     let (left, right) = (Case::scene("slanted"), Case::scene("thin"));
     let strangers = Pair::new(left.pair.left().clone(), right.pair.right().clone()).unwrap();
     assert_eq!(check::range(&strangers).unwrap(), None);
@@ -285,7 +286,7 @@ fn matches_of(disparities: &[i32]) -> Vec<Match> {
 #[test]
 fn supports_are_mu_and_k_sigma() {
     let range = DisparityRange::new(-4, 20).unwrap();
-    // Ten matches of mean 5.5 px and sigma 1.5 px in zone 0, none in zone 1, and one pixel of no zone.
+    // Ten matches of mean 5.5 px and sigma 1.5 px in zone 0, none in zone 1, and one pixel without a zone.
     let found = matches_of(&[4, 7, 4, 7, 4, 7, 4, 7, 4, 7].map(|d| d * FRACTION));
     let zones = Plane::new(12, 1, vec![0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 7]);
     let interval = |k: f64, found: &[Match]| {
@@ -301,7 +302,7 @@ fn supports_are_mu_and_k_sigma() {
     assert_eq!(interval(5.0, &found), (-2, 13));
     assert_eq!(interval(100.0, &found), (-4, 20));
     assert_eq!(interval(1.0, &found[..MIN_MATCHES - 1]), (-4, 20));
-    // Nothing of the range in the interval.
+    // The interval does not meet the range.
     assert_eq!(interval(1.0, &matches_of(&[100 * FRACTION; 10])), (-4, 20));
 }
 
@@ -330,7 +331,7 @@ fn a_coarse_support_is_the_hull_of_its_childrens() {
     }
 }
 
-/// Shares of the true disparities inside the label range and of the labels left, in percent.
+/// Percentage of the true disparities inside the label range, and of the labels that remain.
 fn supported(case: &Case, k: f64) -> (f64, f64) {
     let zones = crude_zones(case.pair.left());
     let found = matches::find(&case.pair, Some((&zones, 15)), Some(case.range));
@@ -361,7 +362,7 @@ fn supports_hold_the_truth() {
 
 #[test]
 fn the_range_holds_the_truth() {
-    // The truth of real pairs has stray pixels: 36 of Cones and one of Dolls lie far below all others.
+    // The truth of real pairs has outliers: 36 pixels of Cones and one of Dolls lie far below all others.
     let scenes = SCENES.map(Case::scene).into_iter().map(|case| (case, 100.0, 3.0));
     for (case, share, most) in scenes.chain(real_pairs().into_iter().map(|case| (case, 99.95, 1.3))) {
         let range = check::range(&case.pair).unwrap().unwrap();
@@ -391,7 +392,7 @@ fn pairs_that_are_not_rectified_are_told() {
             };
             assert!(offset.abs_diff(rows.unsigned_abs() * 256) < 100, "{}, {rows} rows: {offset}", case.name);
         }
-        // A slight rotation: no common offset, and still on no common row.
+        // A slight rotation: there is no common offset, and the rows still do not match.
         let width = case.pair.size().0 as i32;
         let right = moved(case.pair.right(), |x, y| (x, y - (x - width / 2) * 12 / width));
         let pair = Pair::new(case.pair.left().clone(), right).unwrap();
@@ -416,7 +417,7 @@ fn views_that_are_turned_are_told() {
                 assert_eq!(check::warnings(&pair, range), [Warning::Turned { how }], "{}", case.name);
             }
         }
-        // Whichever view it is; and both together are a pair like any other.
+        // Either view; and both turned together are an ordinary pair.
         let pair = Pair::new(left.flipped(), right.clone()).unwrap();
         assert_eq!(check::warnings(&pair, None), [Warning::Turned { how: "upside down" }], "{}", case.name);
         let pair = Pair::new(left.flipped(), right.flipped()).unwrap();
@@ -432,7 +433,7 @@ fn swapped_views_are_told() {
             let warnings = check::warnings(&swapped, range);
             assert!(matches!(warnings[..], [Warning::Swapped { .. }]), "{}: {warnings:?}", case.name);
         }
-        // Who asks for negative disparities knows.
+        // A user who asks for negative disparities is not warned.
         let negative = DisparityRange::new(-31, 0).unwrap();
         assert_eq!(check::warnings(&swapped, Some(negative)), [], "{}", case.name);
     }
@@ -446,7 +447,7 @@ fn identical_images_are_told() {
     other.pixels[(9, 9)] = [1, 2, 3, 4];
     assert_eq!(check::warnings(&Pair::new(left.clone(), left.clone()).unwrap(), None), [Warning::Identical]);
     assert_eq!(check::warnings(&Pair::new(left.clone(), other.clone()).unwrap(), None), []);
-    // A difference that a mask hides is none.
+    // A difference at a masked pixel does not count.
     other.masked[(9, 9)] = true;
     assert_eq!(check::warnings(&Pair::new(left.clone(), other).unwrap(), None), [Warning::Identical]);
 }

@@ -1,5 +1,5 @@
-//! Whole matches: every output of the GPU path is the CPU path's, bit for bit, on rendered scenes and, where
-//! `MRFGS_MIDDLEBURY` names their folder, on real pairs; also on a device that shows a shader little at once.
+//! Whole matches: every output of the GPU path equals that of the CPU path, bit for bit. On rendered scenes
+//! and, where `MRFGS_MIDDLEBURY` names their folder, on real pairs; also on a device with small bindings.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -77,7 +77,7 @@ fn presets_on_rendered_scenes() {
 
 #[test]
 fn one_option_less_shows() {
-    // The comparison can fail: a method that differs in its last digit gives other maps.
+    // Control: a method that differs in its last digit gives different maps.
     let (pair, range) = load(Path::new("testdata/slanted"));
     let method = Method::default();
     let mut other = method.clone();
@@ -94,7 +94,7 @@ fn one_option_less_shows() {
     );
 }
 
-/// What the least device of WebGPU has.
+/// The limits of the weakest WebGPU device.
 fn minimum() -> FaultInjection {
     FaultInjection { max_binding: Some(128 << 20), max_buffer: Some(256 << 20), ..FaultInjection::default() }
 }
@@ -115,7 +115,7 @@ fn small_devices() {
                 ..FaultInjection::default()
             },
             minimum(),
-            // From a few bands to bands of a row or two.
+            // From a few bands to bands of one or two rows.
             binding(4 << 20),
             binding(1 << 20),
             binding(700_000),
@@ -123,10 +123,10 @@ fn small_devices() {
             buffer(16 << 20),
             buffer(5 << 20),
             buffer(2 << 20),
-            // Dispatches that fold.
+            // Dispatches that wrap around.
             FaultInjection { max_groups: Some(150), ..FaultInjection::default() },
         ];
-        // The first has it all; the others tell what it was.
+        // The first case has all limits at once; the others show which of them was the cause.
         let tried = if preset == "default" { handicaps.len() } else { 1 };
         for faults in handicaps.into_iter().take(tried) {
             let Some(mut gpu) = devices::open(faults) else { return };
@@ -140,7 +140,7 @@ fn small_devices() {
     }
 }
 
-/// Every buffer full of garbage: what is read was written before.
+/// All buffers are filled with garbage first: everything that is read was written before.
 #[test]
 fn poisoned_buffers() {
     for (preset, _) in PRESETS {
@@ -165,21 +165,21 @@ fn poisoned_buffers() {
                     differences(&actual, &expected)
                 );
             }
-            // Control: poison does arrive where results are.
+            // Control: the garbage does reach the buffers of the results.
             backend.probe().poison(0x5a).unwrap();
             assert!(differences(&matched_maps_only(backend.as_mut()), &expected).contains(&"disparity"));
         }
     }
 }
 
-/// The maps as they stand.
+/// The maps that the backend holds.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
     let (maps, traffic) = (backend.maps(requested).unwrap(), backend.traffic());
     Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic }
 }
 
-/// The image goes up once, the maps come down once, and nothing between.
+/// The pair is uploaded once, the maps are read back once, and nothing is transferred in between.
 #[test]
 fn nothing_leaves_the_device_in_between() {
     let Some(mut gpu) = devices::open(FaultInjection::default()) else { return };
@@ -189,7 +189,7 @@ fn nothing_leaves_the_device_in_between() {
     let traffic = gpu.traffic();
     // Disparity, raw disparity and flags of 240 x 180 pixels, rows of 256.
     assert_eq!(traffic.bytes_down, 3 * 4 * 256 * 180, "{traffic:?}");
-    // The sums of every row of each iteration, too, where they are asked for.
+    // With a tolerance, the sums of every row are read back in each iteration too.
     let mut tolerant = method.clone();
     tolerant.schedule.tolerance = 1e-6;
     let iterations = matched(&mut gpu, &pair, range, &tolerant).iterations;
@@ -214,7 +214,7 @@ fn a_device_that_shows_too_little_says_so() {
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     let result = solve(&mut gpu, &plan, &pair, &mut |_| ControlFlow::Continue(()));
     assert!(matches!(&result, Err(Error::Memory(MemoryError::Buffer { .. }))), "{result:?}");
-    // And goes on to serve what it can.
+    // The device still serves what fits.
     let small = Pair::new(cut(pair.left(), 20, 15), cut(pair.right(), 20, 15)).unwrap();
     let range = DisparityRange::new(0, 15).unwrap();
     let method = Method::default();
@@ -223,8 +223,8 @@ fn a_device_that_shows_too_little_says_so() {
     assert!(differences(&a, &b).is_empty());
 }
 
-/// Mesa 22 stops an invocation silently after some 65,000 iterations of its loops; the engine stays below half of
-/// that, or declines.
+/// Mesa 22 stops an invocation silently after about 65,000 iterations of its loops. The engine stays below
+/// half of that, or rejects the match.
 #[test]
 fn the_largest_label_counts() {
     let Some(mut gpu) = devices::gpu() else { return };
@@ -263,7 +263,7 @@ fn a_device_is_used_for_pair_after_pair() {
     assert!(differences(&first, &matched(&mut gpu, &pair, range, &method)).is_empty());
 }
 
-/// Folders with a pair in `MRFGS_MIDDLEBURY`; none, said on stderr, where that is not set.
+/// Folders with a pair in `MRFGS_MIDDLEBURY`; none, reported on stderr, where it is not set.
 fn real_pairs() -> Vec<PathBuf> {
     let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") else {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
@@ -294,8 +294,8 @@ fn volumes_of_a_real_pair() {
     assert!(costs[0] == costs[1]);
 }
 
-/// Real pairs, with all that the device has and with as little as WebGPU promises. Of the presets the default; both where
-/// `MRFGS_PARITY` is `all`.
+/// Real pairs, with all limits of the device and with the least that WebGPU promises. Only the default
+/// preset, or both presets where `MRFGS_PARITY` is `all`.
 #[test]
 fn maps_of_real_pairs() {
     let everything = std::env::var("MRFGS_PARITY").is_ok_and(|v| v == "all");

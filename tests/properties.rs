@@ -1,8 +1,9 @@
-//! What holds of every match, whatever the images, the range and the method: no panic, the same bits on every backend, and
-//! maps that keep their promises.
+//! Properties of every match, for any images, range and method: no panic, the same bits on every backend, and
+//! maps that satisfy their documented invariants.
 //!
-//! Every run draws new cases. A case that fails is made as small as it gets and printed whole, seeds included, so no file of
-//! regressions is kept; what it taught becomes a test of its own. `PROPTEST_CASES` sets how many there are.
+//! Every run draws new cases. A failing case is made as small as possible and printed completely, seeds
+//! included. No file of regressions is kept; each one becomes a test of its own. `PROPTEST_CASES` sets the
+//! number of cases.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -24,20 +25,21 @@ use proptest::test_runner::{Config, TestRunner};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
-/// What the images hold.
+/// The contents of the images.
 #[derive(Clone, Copy, Debug)]
 enum Content {
-    /// Noise, few values or one, related or not, with masks that cover nothing, something or everything.
+    /// Noise, few values or one value, related or not, with masks that cover nothing, something or
+    /// everything.
     Random,
     /// Both views the same.
     Identical,
-    /// Every pixel of both the same.
+    /// Every pixel of both views the same.
     Plain,
-    /// Nothing that is not masked in the left view.
+    /// All pixels of the left view masked.
     Masked,
 }
 
-/// All that determines a match, small where it is simple.
+/// Everything that determines a match, small where it is simple.
 #[derive(Clone, Debug)]
 struct Case {
     size: (usize, usize),
@@ -46,9 +48,10 @@ struct Case {
     content: Content,
     seed: u64,
     neighbours: usize,
-    /// Corrected illumination and zones that limit the labels.
+    /// Corrected illumination, and zones that limit the labels.
     front: bool,
-    /// In tiles, of which the memory is 1 MiB: without a overlap, else none would be smaller than such an image.
+    /// In tiles with a memory of 1 MiB and without an overlap; with one, no tile would be smaller than such
+    /// an image.
     tiled: bool,
 }
 
@@ -65,7 +68,7 @@ fn cases() -> impl Strategy<Value = Case> {
         |(size, min, labels, content, (seed, neighbours, front, tiled))| Case {
             size,
             min,
-            // More than fit into the memory of tiled ones.
+            // More than fit in the memory of tiled matches.
             labels: if tiled { labels + 60 } else { labels },
             content,
             seed,
@@ -128,14 +131,14 @@ fn maps_on(backend: &mut dyn Backend, case: &Case, tiles: &Tiles) -> mrfgs::Resu
     Ok(solution.maps)
 }
 
-/// What maps promise about themselves; the first promise that they break.
+/// The first documented invariant that the maps violate.
 fn broken(maps: &Maps, pair: &Pair, range: DisparityRange) -> Option<String> {
     const KNOWN: u8 = flag::INVALID | flag::LOW_CONFIDENCE | flag::FILLED;
     let sizes = [maps.disparity.size(), maps.raw.size(), maps.confidence.size(), maps.validity.size()];
     if sizes != [pair.size(); 4] {
         return Some(format!("sizes {sizes:?} of a pair of {:?}", pair.size()));
     }
-    // At the ends of the range there is no offset between the labels.
+    // At the ends of the range there is no sub-pixel offset.
     let within = |disparity: i32| (range.min * FRACTION..=range.max * FRACTION).contains(&disparity);
     let (width, height) = pair.size();
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).find_map(|at| {
@@ -201,7 +204,7 @@ fn every_match_keeps_its_promises_on_every_backend() {
     assert!(whole + tiled > refused, "most cases must be matches");
 }
 
-/// Control: every promise can be broken, and a broken one is noticed.
+/// Control: every invariant can be violated, and a violation is detected.
 #[test]
 fn broken_promises_are_noticed() {
     let case = Case {
@@ -244,7 +247,7 @@ fn broken_promises_are_noticed() {
     noticed("sizes", |maps| maps.confidence = Plane::filled(9, 6, 0));
 }
 
-/// Control: another method leaves other maps, so that maps that are equal say something.
+/// Control: a different method gives different maps, so equal maps are meaningful.
 #[test]
 fn another_method_leaves_other_maps() {
     let mut differ = 0;

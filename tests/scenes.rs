@@ -1,4 +1,4 @@
-//! The rendered scenes: what `testdata/` holds is what the renderer makes, and the truth is true.
+//! The rendered scenes: `testdata/` holds what the renderer makes, and the ground truth is right.
 
 #[path = "../testdata/scenes.rs"]
 mod scenes;
@@ -17,7 +17,7 @@ fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
 }
 
-/// What a little-endian, one-channel PFM of these values holds.
+/// The contents of a little-endian, one-channel PFM file with these values.
 fn pfm(plane: &Plane<f32>) -> Vec<u8> {
     let mut bytes = format!("Pf\n{} {}\n-1.0\n", plane.width(), plane.height()).into_bytes();
     for y in (0..plane.height()).rev() {
@@ -97,16 +97,16 @@ fn share(marks: impl Iterator<Item = bool>) -> f64 {
     f64::from(marked as u32) / f64::from(all)
 }
 
-/// The level that the right sensor makes of the light which is `level` in the left view at (x, y), if it sees the
-/// point at `at`.
+/// The level that the right sensor records where the left view at (x, y) has `level`, if the right view sees
+/// the point at `at`.
 fn as_right(scene: &Scene, level: u8, [x, at]: [f64; 2], y: usize) -> f32 {
     let (size, y) = (scene.left.size(), y as f64);
     let light = scene.sensors[0].light(f64::from(level), size, x, y);
     scene.sensors[1].level(light, size, at, y) as f32
 }
 
-/// Mean absolute colour difference in grey levels between what is visible at the left and the right view `d`
-/// further left, the left view first sent through `expose` (level, columns of both views, row).
+/// Mean absolute colour difference in grey levels between the visible pixels and the right view `d` further
+/// left, with `expose` (level, columns of both views, row) applied to the left view first.
 fn difference(
     scene: &Scene,
     d: impl Fn(usize, usize) -> f32,
@@ -135,12 +135,13 @@ fn visible_points_look_alike_in_both_views() {
         let exposure = |level, columns, y| as_right(scene, level, columns, y);
         let (width, height) = scene.left.size();
         let truth = difference(scene, |x, y| scene.truth[(x, y)], exposure);
-        // The controls: one and a half labels off, mirrored, and the other sign.
+        // The controls: one and a half labels off, mirrored, and with the opposite sign.
         let off = [-1.5, 1.5].map(|by| difference(scene, |x, y| scene.truth[(x, y)] + by, exposure));
         let mirrored = difference(scene, |x, y| scene.truth[(width - 1 - x, height - 1 - y)], exposure);
         let negated = difference(scene, |x, y| -scene.truth[(x, y)], exposure);
         println!("{}: {truth:.2}, off {off:.2?}, mirrored {mirrored:.2}, negated {negated:.2}", scene.name);
-        // Noise alone makes 1.4; the rest is linear interpolation, which is coarse at the edges of stripes and squares.
+        // Noise alone gives 1.4; the rest is linear interpolation, which is coarse at the edges of stripes
+        // and squares.
         assert!(truth < 4.0, "{}: {truth}", scene.name);
         assert!(off.iter().all(|&off| off > 1.5 * truth), "{}: {truth} and off {off:?}", scene.name);
         assert!(mirrored > 3.0 * truth && negated > 3.0 * truth, "{}: {truth}, {mirrored}", scene.name);
@@ -177,7 +178,8 @@ fn sensors_that_differ_leave_their_mark() {
     }
 }
 
-/// What `light` is for: points of the wall differ by some levels towards the sides, and by next to none between.
+/// The purpose of `light`: points of the wall differ by some levels near the sides, and hardly at all in
+/// between.
 #[test]
 fn the_fall_off_of_light_differs_by_some_levels() {
     let scene = SCENES.iter().find(|scene| scene.name == "light").unwrap();
@@ -195,8 +197,9 @@ fn the_fall_off_of_light_differs_by_some_levels() {
 #[test]
 fn the_mask_follows_from_the_truth_of_both_views() {
     for scene in SCENES.iter() {
-        // Seen from the right: at one of the two pixels next to x - d the right view has that disparity. This rule
-        // looks at pixel centres only, so that it errs along silhouettes where the mask does not.
+        // Visible in the right view: at one of the two pixels next to x - d the right view has that
+        // disparity. This rule looks at pixel centres only, so it is wrong along some silhouettes where the
+        // mask is right.
         let seen = |x: usize, y: usize| {
             let d = scene.truth[(x, y)];
             let at = x as f32 - d;

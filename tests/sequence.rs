@@ -1,4 +1,5 @@
-//! Pair after pair through one matcher: the same maps as one by one, in order, while a device is kept busy.
+//! Pairs in sequence through one matcher: the same maps as one by one, in order, while the device is kept
+//! busy.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -15,7 +16,7 @@ use std::cell::RefCell;
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-/// Pairs of several sizes and ranges; the same ones meet again, and one needs tiles under [`method`].
+/// Pairs of several sizes and ranges; some recur, and one needs tiles under [`method`].
 fn pairs() -> Vec<(Pair, DisparityRange)> {
     let mut random = Random::new(5);
     [(40, 24, 15), (40, 24, 15), (33, 50, 21), (300, 260, 40), (40, 24, 15), (33, 50, 21)]
@@ -43,12 +44,12 @@ fn one_by_one() -> Vec<Maps> {
     };
     let (maps, tiles): (Vec<_>, Vec<_>) = pairs().into_iter().map(&mut run).unzip();
     assert_eq!(tiles.iter().filter(|&&count| count > 1).count(), 1, "{tiles:?}");
-    // Control: were two of them confused, it would be seen.
+    // Control: confusing two of them would be detected.
     assert!((1..maps.len()).all(|i| maps[..i].iter().all(|other| *other != maps[i])));
     maps
 }
 
-/// What `matcher` makes of `pairs`, and the order in which they were asked for and handed out.
+/// The results of `matcher` for `pairs`, and the order in which they were requested and returned.
 fn all(
     matcher: &mut Matcher,
     pairs: Vec<(Pair, DisparityRange)>,
@@ -88,18 +89,18 @@ fn a_sequence_is_its_pairs() {
     let mut matcher = Matcher::on(Ok(gpu), false, &Execution::default()).unwrap();
     let (result, found, log) = all(&mut matcher, pairs(), usize::MAX);
     result.unwrap();
-    // A device is given the next pair before the last one's maps are awaited, but for the one in tiles.
+    // A device gets the next pair before it returns the last one's maps, except for the pair in tiles.
     let order = "ask 0, ask 1, take 0, ask 2, take 1, ask 3, take 2, take 3, ask 4, ask 5, take 4, take 5, ";
     assert_eq!(log, order);
     for matched in &found {
         assert!(!matched.ran_on.contains("CPU path") && matched.traffic.bytes_up > 0, "{}", matched.ran_on);
-        // Three maps of four bytes a pixel, and nothing of the pair after it.
+        // Three maps of four bytes per pixel, and nothing of the next pair.
         let (width, height) = matched.plan.size();
         let down = matched.traffic.bytes_down as usize;
         assert!(down >= 12 * width * height && (matched.tiles.count() > 1 || down < 60 * width * height));
     }
     assert_same(found, &expected);
-    // What was left in the air does not turn up in the next sequence.
+    // Unfinished work does not show up in the next sequence.
     let (result, found, log) = all(&mut matcher, pairs(), 2);
     result.unwrap();
     assert_eq!(log, "ask 0, ask 1, take 0, ask 2, take 1, ");
@@ -109,7 +110,7 @@ fn a_sequence_is_its_pairs() {
     assert_same(found, &expected);
 }
 
-/// Wherever in the sequence a device is lost, the CPU path takes over and no pair is lost or twice there.
+/// Wherever in the sequence a device is lost, the CPU path takes over, and no pair is lost or duplicated.
 #[test]
 fn a_device_lost_on_the_way_costs_no_pair() {
     let expected = one_by_one();
@@ -129,7 +130,7 @@ fn a_device_lost_on_the_way_costs_no_pair() {
     assert!(by_device && by_cpu);
 }
 
-/// A pair that cannot be matched ends the sequence, once those before it are handed out.
+/// A pair that cannot be matched ends the sequence, after those before it are returned.
 #[test]
 fn results_before_a_failure_are_handed_out() {
     let expected = one_by_one();

@@ -1,6 +1,6 @@
-//! Every shader, in every variant that a plan can ask for, without a device: it validates with no capability asked,
-//! its layouts are those of the Rust structs, it stays within the limits that every device has, and it translates to
-//! what the drivers of all platforms take.
+//! Every shader, in every variant that a plan can need, without a device: it validates without any
+//! capability, its layouts match the Rust structs, it stays within the limits of every device, and it
+//! translates to the shading languages of all platforms.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -12,7 +12,7 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use std::collections::HashSet;
 
-/// Methods that between them ask for every constant of the shaders.
+/// Methods that together use every constant of the shaders.
 fn methods() -> Vec<Method> {
     let paper = Method::preset("paper").unwrap();
     let mut all = vec![Method::default(), paper];
@@ -37,7 +37,7 @@ fn plans() -> Vec<Plan> {
     methods().iter().map(|m| Plan::new(101, 67, range, m).unwrap()).collect()
 }
 
-/// Every job that a plan has, each kernel once.
+/// Every job of the plans, each kernel once.
 fn all_jobs() -> Vec<Job> {
     let mut seen = HashSet::new();
     let plans = plans();
@@ -53,7 +53,7 @@ fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
     Ok((module, info))
 }
 
-/// Runs `check` on every kernel and reports all failures at once.
+/// Runs `check` on every kernel, and reports all failures at once.
 fn for_every_kernel(check: impl Fn(&Job, &Module, &ModuleInfo) -> Result<(), String>) {
     let jobs = all_jobs();
     let entries: HashSet<_> = jobs.iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
@@ -88,7 +88,7 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
     assert_eq!(kernels, stages.into_iter().map(str::to_owned).collect(), "the sweep alone has no shader");
 }
 
-/// Every entry point of a file runs somewhere.
+/// Every entry point of a file is used.
 #[test]
 fn every_entry_point_is_a_kernel() {
     let used: HashSet<(&str, &str)> =
@@ -109,14 +109,14 @@ fn validation_can_fail() {
     let source = jobs(Stage::Belief(0), &plans()[0])[0].kernel.source();
     assert!(validated(&source).is_ok());
     assert!(validated(&source.replace("pack_narrow(values)", "values")).is_err());
-    // 64-bit integers are a capability that was not asked for.
+    // 64-bit integers are a capability that was not requested.
     assert!(
         validated(&source.replace("let blocks = quads / QUADS;", "let blocks = u32(u64(quads)) / QUADS;"))
             .is_err()
     );
 }
 
-/// The struct called `name`: its fields with their offsets, and its bytes.
+/// The struct called `name`: its fields with their offsets, and its size in bytes.
 fn layout_of(module: &Module, name: &str) -> Result<(Vec<(String, usize)>, usize), String> {
     let found = module.types.iter().find_map(|(_, t)| match &t.inner {
         TypeInner::Struct { members, span } if t.name.as_deref() == Some(name) => {
@@ -146,7 +146,7 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
     });
 }
 
-/// Control: a field that moves is noticed.
+/// Control: a moved field is detected.
 #[test]
 fn a_uniform_of_another_layout_is_noticed() {
     let job = &jobs(Stage::Evidence(0), &plans()[0])[0];
@@ -161,7 +161,7 @@ fn a_uniform_of_another_layout_is_noticed() {
     )));
 }
 
-/// The place of the job's entry point.
+/// The index of the job's entry point.
 fn entry_point(job: &Job, module: &Module) -> usize {
     module.entry_points.iter().position(|e| e.name == job.kernel.entry()).expect("it compiles")
 }
@@ -202,7 +202,7 @@ fn loops_stay_below_what_drivers_run() {
     for plan in plans() {
         assert!(count(&plan) <= MAX_LOOP_ITERATIONS, "{} iterations", count(&plan));
     }
-    // And the count knows when it is too much.
+    // Control: too many iterations are detected.
     let mut method = Method::default();
     method.set("percentile", "0").unwrap();
     let plan = Plan::new(64, 64, DisparityRange::new(0, 9_999).unwrap(), &method).unwrap();

@@ -1,4 +1,4 @@
-//! Matches in tiles: how an image is cut, and what comes of it.
+//! Matches in tiles: how an image is split, and the effect on its maps.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -24,14 +24,14 @@ fn quiet(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// The plan of `method` with so many MiB.
+/// The plan of `method` with this many MiB of memory.
 fn plan((width, height): (usize, usize), range: DisparityRange, method: &Method, memory: u32) -> Plan {
     let mut method = method.clone();
     method.tiles.memory = memory;
     Plan::new(width, height, range, &method).unwrap()
 }
 
-/// Whether the tiles of `plan` are what they should be; they have a overlap of `overlap`.
+/// Checks the invariants of the tiles of `plan`, which have an overlap of `overlap`.
 fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
     let whole = tiles.whole();
     let ((width, height), range) = (whole.size(), whole.range);
@@ -48,7 +48,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         }
         ensure(crop.x.end <= width && crop.y.end <= height, "crops inside the image")?;
         ensure(crop.x.start % grid == 0 && crop.y.start % grid == 0, "crops on the pyramid's grid")?;
-        // As far as the image goes.
+        // As far as the image extends.
         let holds = |crop: &Range<usize>, core: &Range<usize>, before: i64, after: i64, length: usize| {
             let (first, last) = (core.start as i64 - before, core.end as i64 + after);
             crop.start as i64 <= first.max(0) && crop.end as i64 >= last.min(length as i64)
@@ -63,7 +63,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
             core: core.x.start - crop.x.start..core.x.end - crop.x.start,
             ..Plan::new(w, h, range, &whole.method).unwrap()
         };
-        // Without a overlap a crop may be too small for all levels.
+        // Without an overlap a crop may be too small for all levels.
         ensure(overlap == 0 || tile.plan == expected, "the plan of the crop")?;
     }
     ensure(covered.data().iter().all(|&n| n == 1), "every pixel in one core")?;
@@ -99,7 +99,7 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
             }
             Err(error) => {
                 refused += 1;
-                // What it asks for is enough, and the least that is.
+                // The memory that the error asks for is enough, and no less is.
                 let Error::Budget(BudgetError::NoTileFits { needed, .. }) = error else { panic!("{error}") };
                 let needed = u32::try_from(needed).unwrap();
                 assert!(needed > method.tiles.memory, "{error}");
@@ -116,7 +116,8 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
     );
 }
 
-/// Controls: the check sees a crop that lacks its overlap or its matches, and cores that overlap or are off the grid.
+/// Controls: the check detects a crop without its overlap or its matches, and cores that overlap or are off
+/// the grid.
 #[test]
 fn wrong_tiles_are_seen() {
     let range = DisparityRange::new(-20, 63).unwrap();
@@ -131,7 +132,8 @@ fn wrong_tiles_are_seen() {
 
 #[test]
 fn the_shape_with_the_fewest_cropped_pixels_is_taken() {
-    // No labels to speak of to the left: as square as the image allows. Many: full rows.
+    // With hardly any labels to the left, tiles are as square as the image allows; with many, they are full
+    // rows.
     for (max, rows) in [(0, false), (1500, true)] {
         let plan = plan((2000, 2000), DisparityRange::new(max - 15, max).unwrap(), &Method::default(), 400);
         let tiles = Tiles::new(&plan).unwrap();
@@ -150,7 +152,8 @@ fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {
     solve_tiles(backend, tiles, pair, &mut quiet).unwrap()
 }
 
-/// Share of the pixels that have a disparity in one map alone, or disparities more than a pixel apart, in percent.
+/// Percentage of pixels that have a disparity in only one of the maps, or disparities more than one pixel
+/// apart.
 fn difference(a: &Maps, b: &Maps) -> f64 {
     let pixels = a.disparity.data().iter().zip(b.disparity.data());
     let flags = a.validity.data().iter().zip(b.validity.data());
@@ -171,18 +174,18 @@ fn every_backend_leaves_the_same_maps() {
         let tiles = Tiles::new(&plan).unwrap();
         assert!(tiles.count() > 1, "{preset}");
         let expected = in_tiles(&mut Cpu::default(), &tiles, &pair);
-        // Twice: the second time into the buffers of the first.
+        // Twice, the second time in the buffers of the first.
         for _ in 0..2 {
             let actual = in_tiles(&mut gpu, &tiles, &pair);
             assert!(actual.maps == expected.maps && actual.iterations == expected.iterations, "{preset}");
         }
-        // Control: without a overlap there are other maps.
+        // Control: without an overlap the maps differ.
         let bare = Tiles::with_overlap(&plan, 0).unwrap();
         assert!(in_tiles(&mut Cpu::default(), &bare, &pair).maps != expected.maps, "{preset}");
     }
 }
 
-/// Scenes and real pairs in tiles: hardly anything shows, which without a overlap it does.
+/// Scenes and real pairs in tiles: hardly any pixel changes, while without an overlap some do.
 #[test]
 fn hardly_anything_differs_from_one_piece() {
     let mut folders: Vec<_> = std::fs::read_dir("testdata").unwrap().map(|e| e.unwrap().path()).collect();
@@ -197,7 +200,7 @@ fn hardly_anything_differs_from_one_piece() {
         let mut cpu = Cpu::default();
         let whole = plan(pair.size(), range, &Method::default(), 4096);
         let expected = solve(&mut cpu, &whole, &pair, &mut quiet).unwrap();
-        // A plain wall is found from its borders, wherever they are.
+        // A plain wall is estimated from its borders, however far they are.
         let most = if folder.ends_with("wall") { 0.5 } else { 0.01 };
         for (quarters, overlap) in [(3, OVERLAP), (2, OVERLAP), (2, 0)] {
             let memory = (whole.bytes() >> 20) as u32 * quarters / 4;
@@ -238,7 +241,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
         let mut named: Vec<_> = seen.iter().filter_map(|p| p.tile).collect();
         named.dedup();
         assert_eq!(named, (1..=count).map(|tile| (tile, count)).collect::<Vec<_>>());
-        // It stops wherever it is told to.
+        // It stops wherever the observer breaks.
         let stop = |p: Progress| if p.tile == Some((2, count)) { ControlFlow::Break(()) } else { quiet(p) };
         let stopped = solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop });
         assert!(matches!(stopped, Err(Error::Interrupted)));

@@ -1,5 +1,6 @@
-//! What is told of a pair or a match that is probably wrong, on rendered scenes always, on real pairs where
-//! `MRFGS_MIDDLEBURY` names their folder: nothing where nothing is wrong, and each defect once it is made.
+//! Warnings about a pair or a match that is probably wrong: always on rendered scenes, and on real pairs
+//! where `MRFGS_MIDDLEBURY` names their folder. A sound pair gets none, and each defect is detected once it
+//! is made.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -57,7 +58,7 @@ impl Case {
     }
 }
 
-/// All scenes, and all real pairs there are.
+/// All scenes, and all available real pairs.
 fn cases() -> Vec<Case> {
     let scenes = ["slanted", "thin", "wall", "repetitive", "exposure", "light", "steep", "mixed"];
     let mut folders: Vec<PathBuf> = scenes.iter().map(|scene| Path::new("testdata").join(scene)).collect();
@@ -110,7 +111,7 @@ fn a_view_of_one_colour_is_told() {
     assert_eq!(told(&plain, case.pair.right()), [left]);
     assert_eq!(told(case.pair.left(), &plain), [right]);
     assert_eq!(told(&plain, &plain), [left, right]);
-    // What a mask hides has no colour; where it hides all, there is nothing to say.
+    // Masked pixels have no colour; where all are masked, there is no warning.
     let mut mostly = case.pair.left().clone();
     for y in 0..height {
         for x in 0..width {
@@ -128,7 +129,7 @@ fn a_view_of_one_colour_is_told() {
 #[test]
 fn a_range_that_cuts_off_the_scene_is_told() {
     for case in cases() {
-        // A tenth of the truth is beyond the end, or a third; some surfaces end just there.
+        // A tenth or a third of the truth is beyond the end; some surfaces end just there.
         let told = |range: DisparityRange| check::clipped(&case.maps(range), range);
         let ends = |warnings: &[Warning], at_top: bool| {
             warnings.iter().any(|w| matches!(w, Warning::Clipped { upper, .. } if *upper == at_top))
@@ -142,7 +143,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
         });
         assert!(cut.iter().any(|warnings| ends(warnings, false)), "{}: {cut:?}", case.name);
     }
-    // 0 is the horizon and no end; of ranges that are all ends nothing is said.
+    // 0 is the horizon and not an end; ranges that consist only of ends get no warning.
     let case = Case::load(Path::new("testdata/mixed"));
     let mut maps = case.maps(case.range);
     maps.raw = Plane::filled(case.pair.size().0, case.pair.size().1, 0);

@@ -2,18 +2,19 @@
 
 #import volume
 
-// Of messages and beliefs: labels that a word holds, words of a quad of labels, and the largest value, which stands for
-// infinity.
+// For messages and beliefs: labels per word, words per quad of labels, and the largest value, which stands
+// for infinity.
 const PER_WORD: u32 = 32u / BITS;
 const QUAD_WORDS: u32 = 4u / PER_WORD;
 const MOST: u32 = 0xffffffffu >> (32u - BITS);
 
-// The value of a label in the word that holds it.
+// The value of a label, from the word that holds it.
 fn pick(word: u32, label: u32) -> u32 {
     return (word >> (BITS * (label % PER_WORD))) & MOST;
 }
 
-// How far the word of a label is from the first word of its pixel, in volumes of messages and beliefs of that width.
+// Offset of the word of a label from the first word of its pixel, in volumes of messages and beliefs of a
+// level of this width.
 fn word_of(label: u32, width: u32) -> u32 {
     return QUAD_WORDS * (label / 4u) * width + (label % 4u) / PER_WORD;
 }

@@ -1,6 +1,6 @@
-// Volumes: four labels of a pixel are a quad, in one word of 8-bit values or two of 16-bit ones.
+// Volumes: four labels of a pixel form a quad, in one word of 8-bit values or two words of 16-bit values.
 
-// Two 16-bit values a word, the lower first.
+// Two 16-bit values per word, the lower first.
 fn unpack_wide(words: vec2<u32>) -> vec4<u32> {
     return vec4(words.x & 0xffffu, words.x >> 16u, words.y & 0xffffu, words.y >> 16u);
 }
@@ -9,7 +9,7 @@ fn pack_wide(values: vec4<u32>) -> vec2<u32> {
     return vec2(values.x | (values.y << 16u), values.z | (values.w << 16u));
 }
 
-// Four 8-bit values a word, the lowest first.
+// Four 8-bit values per word, the lowest first.
 fn unpack_narrow(word: u32) -> vec4<u32> {
     return (vec4(word) >> vec4(0u, 8u, 16u, 24u)) & vec4(0xffu);
 }
@@ -18,13 +18,14 @@ fn pack_narrow(values: vec4<u32>) -> u32 {
     return values.x | (values.y << 8u) | (values.z << 16u) | (values.w << 24u);
 }
 
-// Which labels of a quad there are; the others are padding.
+// Which entries of a quad are labels; the others are padding.
 fn are_labels(quad: u32) -> vec4<bool> {
     return labels_of(quad) < vec4(params.level.labels);
 }
 
-// A row of a volume holds the first quad of all its pixels, then their second, and so on (and of dependency messages all
-// of one slot, then all of the next), so that neighbouring invocations touch neighbouring words. Where a pixel's quad is:
+// Position of a pixel's quad in a row. A row of a volume holds the first quad of all its pixels, then their
+// second, and so on; dependency messages hold all quads of one slot, then those of the next. So neighbouring
+// invocations access neighbouring words.
 fn place_of(quad: u32, x: u32) -> u32 {
     return quad * params.level.width + x;
 }

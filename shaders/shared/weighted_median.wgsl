@@ -1,22 +1,22 @@
-// Weighted median of the disparities around every pixel, at places some steps apart. One invocation a pixel.
+// Weighted median of the disparities around every pixel, sampled at regular steps. One invocation per pixel.
 //
-// The value sought is the smallest at which half of the weight is reached. An interval that holds it shrinks to an
-// eighth with every pass over the window, each of which takes the weights below eight thresholds at once: no list, no
-// sort, and no more than a few registers.
+// The result is the smallest value at which half of the weight is reached. An interval that contains it
+// shrinks to an eighth with every pass over the window, which sums the weights below eight thresholds at
+// once. This needs no list, no sort, and only a few registers.
 
 #import image maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // In places, which are 2 to `step_bits` pixels apart.
+    // In steps of 2 to `step_bits` pixels.
     radius: u32,
     step_bits: u32,
-    // Rows of places are 2 to this many places apart.
+    // Rows of samples are 2 to this many steps apart.
     row_bits: u32,
     scale: u32,
     doublings: u32,
-    // 1 for all pixels, 0 for those that were filled.
+    // 1 for all pixels, 0 for the filled ones only.
     all: u32,
 }
 
@@ -24,25 +24,25 @@ struct Params {
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> disparity: array<i32>;
 @group(0) @binding(3) var<storage, read> flags: array<u32>;
-// What distance takes off the weight, by |dy| and |dx|.
+// The weight that distance subtracts, by |dy| and |dx|.
 @group(0) @binding(4) var<storage, read> space: array<u32>;
 @group(0) @binding(5) var<storage, read_write> smoothed: array<i32>;
 
 const FIRST: vec4<u32> = vec4(1u, 2u, 3u, 4u);
 const SECOND: vec4<u32> = vec4(5u, 6u, 7u, 8u);
 
-// Of what colours differ in.
+// The guide: the scaled colour that weights compare.
 fn guide(at: u32) -> vec3<u32> {
     return (channels(left[at]) * params.scale) >> vec3(16u);
 }
 
-// Weight of the pixel at `at`, which is `away` places from the one whose guide is `centre`.
+// Weight of the pixel at `at`, `away` steps from the pixel whose guide is `centre`.
 fn weight(centre: vec3<u32>, at: u32, away: vec2<u32>) -> u32 {
     let colour = difference(centre, guide(at)) << params.doublings;
     return MEDIAN_WEIGHT - min(colour + space[away.y * (params.radius + 1u) + away.x], MEDIAN_WEIGHT);
 }
 
-// How many places away from `b` the pixel `a` is.
+// Distance between pixels `a` and `b`, in steps.
 fn places(a: vec2<u32>, b: vec2<u32>, step_bits: u32) -> vec2<u32> {
     return (max(a, b) - min(a, b)) >> vec2(step_bits);
 }
@@ -62,7 +62,7 @@ fn median(id: vec2<u32>) {
     var low = disparity[here];
     if has_disparity(flags_here) && (params.all == 1u || (flags_here & FILLED) != 0u) {
         let middle = vec2(id.x, y);
-        // The first place may not leave the image, nor the raster of places.
+        // The first sample lies in the image and on the grid of samples.
         let raster = vec2(bits, row_bits);
         let first = middle - min(reach, (middle >> raster) << raster);
         let last = min(middle + reach + vec2(1u), vec2(params.level.width, params.level.height));
@@ -82,7 +82,7 @@ fn median(id: vec2<u32>) {
         var width = u32(high - low) + 1u;
         while width > 1u {
             let share = (width + 7u) / 8u;
-            // Weight of values below low + k share, k = 1 to 8.
+            // Weight of the values below low + k share, k = 1 to 8.
             var below_first = vec4<u32>();
             var below_second = vec4<u32>();
             for (var v = first.y; v < last.y; v += step.y) {
@@ -97,7 +97,7 @@ fn median(id: vec2<u32>) {
                     }
                 }
             }
-            // The first threshold below which half of the weight lies ends the interval.
+            // The interval ends at the first threshold below which half of the weight lies.
             let short = vec4<u32>(2u * below_first < vec4(total));
             let short_second = vec4<u32>(2u * below_second < vec4(total));
             let skipped = short.x + short.y + short.z + short.w

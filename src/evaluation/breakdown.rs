@@ -1,4 +1,5 @@
-//! Where the errors of a map are: every pixel with known truth in one class, by what makes it hard to match.
+//! Where the errors of a map are: each pixel with known truth is in one class, by what makes it hard to
+//! match.
 
 use serde::Serialize;
 use serde::ser::Serializer;
@@ -7,24 +8,25 @@ use super::metrics::{Sum, VISIBLE, average, is_bad, nothing_known, percent, same
 use crate::error::Result;
 use crate::image::{Image, Plane};
 
-/// Pixels from the centre of a window to its side: 7 x 7, clipped to the image.
+/// Radius of a window in pixels: 7 x 7, clipped to the image.
 const RADIUS: usize = 3;
 
-/// Known truths in a window that span more than this, in pixels of disparity, are an edge.
+/// A window is an edge where its known truths span more than this, in pixels of disparity.
 const EDGE: f64 = 4.0;
 
-/// A standard deviation of grey in a window below this, in 1/256 of an 8-bit level, is plain: 4 levels.
+/// A window is plain where its grey has a standard deviation below this, in 1/256 of an 8-bit level: 4
+/// levels.
 const PLAIN: u64 = 4 * 256;
 
 /// A truth that changes by at least this, in pixels of disparity per pixel, is slanted.
 const SLANTED: f64 = 0.2;
 
-/// Why a pixel may be hard to match: the first of these that applies.
+/// What makes a pixel hard to match: the first class that applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Its match, x - truth, lies outside the right image, that is below 0 or above width - 1.
+    /// Its match, x - truth, lies outside the right image: below 0 or above width - 1.
     Border,
-    /// The mask says that one view does not see it (not 255); no pixel where there is no mask.
+    /// One view does not see it, by the mask (not 255). Without a mask the class is empty.
     Occluded,
     /// The known truths in the 7 x 7 window around it span more than 4 px.
     Edge,
@@ -42,7 +44,7 @@ impl Class {
     pub const ALL: [Self; 6] =
         [Self::Border, Self::Occluded, Self::Edge, Self::Plain, Self::Slanted, Self::Other];
 
-    /// Its name in JSON and tables.
+    /// Name of the class in JSON and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -59,14 +61,15 @@ impl Class {
 /// The errors of one class. A pixel is bad as in `bad2.0`: wrong by more than 2 px, or invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Part {
-    /// Share of all pixels with known truth, in percent; of all classes they add up to 100.
+    /// Share of all pixels with known truth, in percent; over all classes these add up to 100.
     pub share: f64,
     /// Share of the class's pixels that are bad, in percent; `None` when it has none.
     #[serde(rename = "bad2.0")]
     pub bad: Option<f64>,
     /// Mean absolute error of its valid pixels; `None` when there are none.
     pub avg: Option<f64>,
-    /// Its bad pixels in percent of all pixels with known truth; of all classes they add up to the map's `bad2.0`.
+    /// Bad pixels of the class in percent of all pixels with known truth; over all classes these add up to
+    /// the map's `bad2.0`.
     pub points: f64,
     /// Share of the map's bad pixels, in percent; `None` when it has none.
     pub of_bad: Option<f64>,
@@ -74,10 +77,10 @@ pub struct Part {
     pub of_squares: Option<f64>,
 }
 
-/// The errors of a map by class. In JSON an object by the names of the classes.
+/// The errors of a map by class. In JSON it is an object with the names of the classes as keys.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breakdown {
-    /// As [`Class::ALL`] has them.
+    /// In the order of [`Class::ALL`].
     pub parts: [Part; 6],
 }
 
@@ -93,11 +96,11 @@ impl Breakdown {
         Class::ALL.into_iter().zip(&self.parts)
     }
 
-    /// The average of each field over several pairs, every pair with the same weight; `None` of no pairs.
+    /// The average of each field over several pairs, every pair with the same weight; `None` for no pairs.
     ///
-    /// A class that a pair lacks has a share of 0 and 0 points there, so that the means still add up. What cannot be
-    /// told of one pair (the errors of a class that it lacks, shares of errors that it does not have) is `None` in the
-    /// mean, as in [`mean`](super::mean).
+    /// A class that a pair lacks counts with a share of 0 and 0 points, so that the means still add up. A
+    /// figure that is undefined for one pair (the errors of a class that it lacks, shares of errors that it
+    /// does not have) is `None` in the mean, as in [`mean`](super::mean).
     #[must_use]
     pub fn mean(all: &[&Self]) -> Option<Self> {
         if all.is_empty() {
@@ -118,7 +121,8 @@ impl Breakdown {
     }
 }
 
-/// The class of every pixel of the reference view, `reference` its image; `None` where `truth` is unknown (not finite).
+/// The class of every pixel of the reference view, whose image is `reference`; `None` where `truth` is
+/// unknown (not finite).
 ///
 /// # Errors
 /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
@@ -165,7 +169,7 @@ pub fn breakdown(
     mask: Option<&Plane<u8>>,
     reference: &Image,
 ) -> Result<Breakdown> {
-    /// What is counted of a class.
+    /// The counts of a class.
     #[derive(Clone, Copy, Default)]
     struct Tally {
         pixels: u64,
@@ -215,8 +219,8 @@ fn spread(truth: &Plane<f32>) -> Plane<f64> {
     ends.map(|&(min, max)| f64::from(max) - f64::from(min))
 }
 
-/// Where the window around a pixel has hardly any texture, by the variance of its grey times the square of its pixels,
-/// in exact integers. Masked pixels are none of the window's.
+/// Whether the window around a pixel has hardly any texture, by the variance of its grey times the square of
+/// its number of pixels, in exact integers. Masked pixels do not count.
 fn plain(image: &Image) -> Plane<bool> {
     let moments = Plane::from_fn(image.width(), image.height(), |x, y| {
         let grey = u64::from(image.pixels[(x, y)][3]);
@@ -239,7 +243,8 @@ fn slant(truth: &Plane<f32>, x: usize, y: usize) -> f64 {
     across.max(down)
 }
 
-/// All values of the window around each pixel joined, first along its rows: `empty` joins to nothing.
+/// All values of the window around each pixel, combined by `join`, along rows first; `empty` is its neutral
+/// element.
 fn windows<T: Copy>(values: &Plane<T>, empty: T, join: impl Fn(T, T) -> T) -> Plane<T> {
     let (width, height) = values.size();
     let around = |at: usize, size: usize| at.saturating_sub(RADIUS)..(at + RADIUS + 1).min(size);
@@ -256,7 +261,7 @@ mod tests {
 
     const INF: f32 = f32::INFINITY;
 
-    /// An image of chequered grey, 0 and `contrast` levels: its deviation is about half of it.
+    /// A checkerboard of grey, 0 and `contrast` levels: its standard deviation is about half of `contrast`.
     fn chequered(width: usize, height: usize, contrast: impl Fn(usize) -> u8) -> Image {
         Image::from_rgb8(&Plane::from_fn(width, height, |x, y| {
             if (x + y) % 2 == 0 { [0; 3] } else { [contrast(x); 3] }
@@ -309,9 +314,9 @@ mod tests {
         ] {
             assert_eq!(found[at], class, "{at:?}");
         }
-        // Beside the odd ones out the truths still span less than 4 px.
+        // Near the odd values the truths still span less than 4 px.
         assert_eq!(found[(1, 4)], Some(Class::Slanted));
-        // Without a mask what was occluded is what it is otherwise.
+        // Without a mask, an occluded pixel gets the next class that applies.
         let found = classes(&truth, None, &image).unwrap();
         assert_eq!((found[(15, 2)], found[(18, 2)]), (Some(Class::Other), Some(Class::Edge)));
         // Edge before plain, plain before slanted.
@@ -327,7 +332,7 @@ mod tests {
         // A span of 4 px is no edge; the central difference is 2.
         assert_eq!(one(half(4.0), &image), Some(Class::Slanted));
         assert_eq!(one(half(f32::from_bits(4.0_f32.to_bits() + 2)), &image), Some(Class::Edge));
-        // Exactly at the match 0 and width - 1 a pixel is inside.
+        // A match exactly at 0 or width - 1 is inside.
         assert_eq!(one(Plane::filled(9, 9, 4.0), &image), Some(Class::Other));
         assert_eq!(one(Plane::filled(9, 9, -4.0), &image), Some(Class::Other));
         assert_eq!(one(Plane::filled(9, 9, -4.001), &image), Some(Class::Border));
@@ -335,14 +340,14 @@ mod tests {
         let ramp = |slope: f32| Plane::from_fn(9, 9, move |_, y| 1.0 + slope * y as f32);
         assert_eq!(one(ramp(0.1875), &image), Some(Class::Other));
         assert_eq!(one(ramp(0.25), &image), Some(Class::Slanted));
-        // An unknown neighbour leaves nothing to tell.
+        // With an unknown neighbour the slope is unknown.
         let mut broken = ramp(0.25);
         broken[(4, 3)] = f32::NAN;
         assert_eq!(one(broken, &image), Some(Class::Other));
         // 24 of 49 pixels at c: the deviation is c sqrt(24 x 25) / 49, which is 4 at c = 8.0017.
         assert_eq!(one(Plane::filled(9, 9, 2.0), &chequered(9, 9, |_| 8)), Some(Class::Plain));
         assert_eq!(one(Plane::filled(9, 9, 2.0), &chequered(9, 9, |_| 9)), Some(Class::Other));
-        // A masked pixel does not speak for texture.
+        // A masked pixel does not count as texture.
         let mut spot = chequered(9, 9, |_| 0);
         spot.pixels[(5, 5)] = [65_280; 4];
         assert_eq!(one(Plane::filled(9, 9, 2.0), &spot), Some(Class::Other));
@@ -390,7 +395,7 @@ mod tests {
         close(occluded.of_bad, 200.0 / 3.0);
         close(occluded.of_squares, 1600.0 / 30.0);
         close(Some(plain.share), 300.0 / 7.0);
-        // At the threshold is not above it.
+        // An error at the threshold is not above it.
         close(plain.bad, 0.0);
         close(plain.avg, 1.0);
         close(plain.of_squares, 500.0 / 30.0);

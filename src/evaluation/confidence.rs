@@ -1,8 +1,8 @@
-//! What a confidence is worth: sparsification curves, after Hu and Mordohai 2012, *A Quantitative Evaluation of
-//! Confidence Measures for Stereo Vision*.
+//! The quality of a confidence map: sparsification curves, after Hu and Mordohai 2012, *A Quantitative
+//! Evaluation of Confidence Measures for Stereo Vision*.
 //!
-//! The pixels with known truth are ordered by confidence, the surest first. A good confidence puts the bad ones (wrong
-//! by more than 2 px, or invalid) last.
+//! The pixels with known truth are sorted by confidence, highest first. A good confidence puts the bad pixels
+//! (wrong by more than 2 px, or invalid) last.
 
 use serde::Serialize;
 
@@ -15,22 +15,23 @@ pub const POINTS: usize = 20;
 
 /// How well a confidence tells bad pixels from good ones; all in percent.
 ///
-/// Pixels of one confidence count by expectation: of a group of n pixels with b bad ones, the first k hold k b / n of
-/// them, so that the order of the pixels in the image does not matter.
+/// Pixels of equal confidence count by expectation: of a group of n pixels with b bad ones, the first k
+/// contain k b / n of them. So the order of the pixels in the image does not matter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sparsification {
-    /// Area under the curve: the mean over k = 1 ..= N of the share of bad pixels among the k surest of N.
+    /// Area under the curve: the mean over k = 1 ..= N of the share of bad pixels among the k most confident
+    /// of N.
     pub auc: f64,
-    /// The least that `auc` could be for this map: all bad pixels come last.
+    /// The smallest possible `auc` for this map, where all bad pixels come last.
     pub optimal: f64,
-    /// What `auc` is of a confidence that knows nothing: the share of bad pixels among all.
+    /// The `auc` of an uninformative confidence: the share of bad pixels among all.
     pub random: f64,
-    /// The share of bad pixels among the surest 5, 10, ... 100 %.
+    /// The share of bad pixels among the most confident 5, 10, ... 100 %.
     pub curve: [f64; POINTS],
 }
 
 impl Sparsification {
-    /// The average of each field over several pairs, every pair with the same weight; `None` of no pairs.
+    /// The average of each field over several pairs, every pair with the same weight; `None` for no pairs.
     #[must_use]
     pub fn mean(all: &[&Self]) -> Option<Self> {
         let every = |field: &dyn Fn(&Self) -> f64| average(all.iter().map(|s| Some(field(s))));
@@ -47,15 +48,15 @@ impl Sparsification {
     }
 }
 
-/// Pixels that nothing tells apart.
+/// Pixels of equal confidence.
 #[derive(Clone, Copy, Default)]
 struct Group {
     pixels: u64,
     bad: u64,
 }
 
-/// Holds `confidence` (0 ..= 255, larger is surer) against the errors of `estimate` (not finite = invalid) where `truth`
-/// is known (finite).
+/// Compares `confidence` (0 ..= 255, larger is more confident) with the errors of `estimate` (not finite =
+/// invalid) where `truth` is known (finite).
 ///
 /// # Errors
 /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ or no truth is known.
@@ -99,7 +100,7 @@ fn area(groups: &[Group]) -> f64 {
     100.0 * sum / before as f64
 }
 
-/// The share of bad pixels among the first `count`, which need not be whole, in percent.
+/// The share of bad pixels among the first `count`, which may be a fraction, in percent.
 fn share(groups: &[Group], count: f64) -> f64 {
     let (mut left, mut bad) = (count, 0.0);
     for group in groups.iter().filter(|group| group.pixels > 0) {
@@ -131,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_case_computed_by_hand() {
-        // By confidence: bad | good, bad | good. Invalid counts as bad, unknown truth not at all.
+        // By confidence: bad | good, bad | good. Invalid counts as bad; unknown truth does not count.
         let truth = row(&[4.0, 4.0, 4.0, 4.0, f32::INFINITY]);
         let estimate = row(&[6.0, f32::INFINITY, 9.0, 4.0, 4.0]);
         let found = sparsify(&estimate, &truth, &row(&[7, 200, 7, 0, 255])).unwrap();
@@ -158,7 +159,7 @@ mod tests {
         assert!(constant.curve.iter().all(|share| (share - constant.random).abs() < 1e-9));
         assert!(perfect.auc < constant.auc && constant.auc < inverted.auc);
         assert!((inverted.optimal, inverted.random) == (perfect.optimal, perfect.random));
-        // Nothing or everything bad.
+        // All pixels good, or all bad.
         let none = sparsified(&[false; 9], &[1, 2, 3, 4, 5, 6, 7, 8, 9]);
         assert_eq!((none.auc, none.optimal, none.random), (0.0, 0.0, 0.0));
         let all = sparsified(&[true; 3], &[1, 2, 2]);
@@ -185,7 +186,7 @@ mod tests {
             };
             let found = of(&all);
 
-            // A pixel is as bad as its equals are on average.
+            // Each pixel counts with the average of its group.
             let rate = |confidence: u8| {
                 let equals: Vec<bool> =
                     all.iter().filter(|(c, _)| *c == confidence).map(|(_, b)| *b).collect();

@@ -1,4 +1,4 @@
-//! What a map is compared with.
+//! The ground truth that a map is compared with.
 
 use super::breakdown::{Breakdown, breakdown};
 use super::confidence::{Sparsification, sparsify};
@@ -15,8 +15,8 @@ pub struct GroundTruth {
 }
 
 impl GroundTruth {
-    /// True disparities in pixels (not finite = unknown) and, where there is one, the mask that says what both views
-    /// see: 255 = both, anything else (128 occluded, 0 unknown) = not.
+    /// The true disparities in pixels (not finite = unknown) and, where there is one, the visibility mask:
+    /// 255 = both views see the pixel, anything else (128 occluded, 0 unknown) = not.
     ///
     /// # Errors
     /// [`Error::Mismatch`](crate::Error::Mismatch) when the two differ in size.
@@ -39,15 +39,16 @@ impl GroundTruth {
         self.mask.as_ref()
     }
 
-    /// The errors of `estimate` (not finite = invalid).
+    /// The error metrics of `estimate` (not finite = invalid).
     ///
     /// # Errors
-    /// [`Error::Mismatch`](crate::Error::Mismatch) when its size is another or no truth is known.
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ or no truth is known.
     pub fn evaluate(&self, estimate: &Plane<f32>) -> Result<Report> {
         evaluate(estimate, &self.truth, self.mask.as_ref())
     }
 
-    /// Where the errors of `estimate` (not finite = invalid) are; `reference` is the image of the reference view.
+    /// The errors of `estimate` (not finite = invalid) by class; `reference` is the image of the reference
+    /// view.
     ///
     /// # Errors
     /// As [`GroundTruth::evaluate`].
@@ -63,10 +64,11 @@ impl GroundTruth {
         sparsify(estimate, &self.truth, confidence)
     }
 
-    /// How well the flags of a `validity` map tell the pixels that one view does not see; `None` without a mask.
+    /// How well the flags of a `validity` map detect the pixels that one view does not see; `None` without a
+    /// mask.
     ///
     /// # Errors
-    /// [`Error::Mismatch`](crate::Error::Mismatch) when its size is another.
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
     pub fn detect(&self, validity: &Plane<u8>) -> Result<Option<Detection>> {
         self.mask.as_ref().map(|mask| detect(validity, &self.truth, mask)).transpose()
     }

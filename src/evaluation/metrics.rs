@@ -1,8 +1,8 @@
-//! The metrics themselves: pure functions of planes.
+//! The error metrics: pure functions of planes.
 //!
-//! The error of a pixel is |estimate - truth| in pixels, taken in `f64`. A pixel counts when its truth is known
-//! (finite) and it lies in the region asked for. An estimate that is infinite or NaN is *invalid*: it counts as bad
-//! at every threshold and is left out of everything that averages or ranks errors.
+//! The error of a pixel is |estimate - truth| in pixels, computed in `f64`. A pixel counts when its truth is
+//! known (finite) and it lies in the requested region. An estimate that is infinite or NaN is *invalid*: it
+//! counts as bad at every threshold and is left out of all averages and quantiles.
 
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
@@ -28,8 +28,8 @@ pub struct Metrics {
     pub avg: Option<f64>,
     /// Root of the mean squared error of the valid pixels; `None` when there are none.
     pub rms: Option<f64>,
-    /// 10 log10(255^2 / MSE) in dB, the MSE that of `rms`; `None` when no pixel is valid, and for a perfect map,
-    /// for which it is infinite.
+    /// 10 log10(255^2 / MSE) in dB, with the MSE of `rms`; `None` when no pixel is valid, and for a perfect
+    /// map, where it is infinite.
     pub psnr: Option<f64>,
     /// Share of `pixels` in percent whose error is above each of [`THRESHOLDS`], or whose estimate is invalid.
     pub bad: [f64; 4],
@@ -71,7 +71,8 @@ impl Serialize for Metrics {
 pub struct Report {
     /// Over every pixel whose truth is known.
     pub all: Metrics,
-    /// Over those of them that both views see (mask 255); `None` without a mask, or when it leaves no pixel.
+    /// Over those of these pixels that both views see (mask 255); `None` without a mask, or when no pixel is
+    /// left.
     pub nonocc: Option<Metrics>,
 }
 
@@ -146,11 +147,11 @@ pub fn measure(
     }))
 }
 
-/// The average of each field over several pairs, every pair with the same weight; `None` of no reports.
+/// The average of each field over several pairs, every pair with the same weight; `None` for no reports.
 ///
-/// A mean is over all the pairs or not at all: a field that one of them lacks (`nonocc` without a mask, the PSNR of
-/// a perfect map) is `None` in the mean, so that no figure silently stands for fewer pairs than its neighbour. The
-/// mean of `pixels` is rounded to the nearest integer, that of `density` is not rounded.
+/// A mean is over all the pairs or `None`: a field that one of them lacks (`nonocc` without a mask, the PSNR
+/// of a perfect map) is `None` in the mean. So no figure silently stands for fewer pairs than the figure next
+/// to it. The mean of `pixels` is rounded to the nearest integer, that of `density` is not rounded.
 pub fn mean<'a>(reports: impl IntoIterator<Item = &'a Report>) -> Option<Report> {
     let reports: Vec<&Report> = reports.into_iter().collect();
     let all = mean_metrics(&reports.iter().map(|r| &r.all).collect::<Vec<_>>())?;
@@ -195,7 +196,7 @@ pub(super) fn is_bad(estimate: f32, truth: f32) -> bool {
     !estimate.is_finite() || (f64::from(estimate) - f64::from(truth)).abs() > THRESHOLDS[2]
 }
 
-/// `part` of `whole` in percent; `None` of nothing.
+/// `part` of `whole` in percent; `None` where `whole` is 0.
 pub(super) fn percent(part: f64, whole: f64) -> Option<f64> {
     (whole > 0.0).then(|| 100.0 * part / whole)
 }
@@ -204,7 +205,7 @@ pub(super) fn nothing_known() -> Error {
     Error::Mismatch("the ground truth holds no known (finite) pixel: nothing to compare with".into())
 }
 
-/// The planes of one comparison have one size.
+/// Checks that all planes of a comparison have one size.
 pub(super) fn same_size(what: &str, got: (usize, usize), truth: (usize, usize)) -> Result<()> {
     if got == truth {
         return Ok(());
@@ -215,12 +216,12 @@ pub(super) fn same_size(what: &str, got: (usize, usize), truth: (usize, usize)) 
     )))
 }
 
-/// `value` to four decimals, by way of its exact decimal expansion (ties to even).
+/// `value` rounded to four decimals, through its exact decimal expansion (ties to even).
 fn four_decimals(value: f64) -> f64 {
     format!("{value:.4}").parse().unwrap_or(value)
 }
 
-/// The quantile `q` of ascending values, linearly interpolated; `None` of nothing.
+/// The quantile `q` of ascending values, linearly interpolated; `None` for no values.
 fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
     let last = ascending.len().checked_sub(1)?;
     let position = last as f64 * q;
@@ -230,7 +231,7 @@ fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
     Some(a + (b - a) * (position - below as f64))
 }
 
-/// A sum whose rounding errors are summed apart (Neumaier), so that it does not lose digits with length.
+/// A compensated sum (Neumaier): rounding errors are summed separately, so that long sums lose no digits.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sum {
     total: f64,

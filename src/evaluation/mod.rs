@@ -1,7 +1,7 @@
-//! How far a disparity map is from the ground truth: the metrics, the truth they are taken against, where the errors
-//! are, how good confidence and validity are, and the figures that the paper prints.
+//! Evaluation of disparity maps against the ground truth: error metrics, the ground truth itself, the error
+//! breakdown, the quality of confidence and validity, and the figures that the paper prints.
 //!
-//! Nothing here reads a file, prints, or knows how the map was made.
+//! Nothing here reads a file, prints, or depends on how the map was made.
 
 pub mod breakdown;
 pub mod confidence;

@@ -1,14 +1,14 @@
-//! The figures that the paper prints, to stand beside ours.
+//! The figures that the paper prints, for comparison with ours.
 
 use serde::Serialize;
 
 use super::Metrics;
 
-/// Where [`published`] has its figures from.
+/// The source of the figures in [`published`].
 pub const SOURCE: &str = "Shabanian and Balasubramanian, Multi-Resolution Factor Graph Based Stereo \
     Correspondence Algorithm, Tables 1 and 2";
 
-/// What the paper measures of a map, over all pixels with known truth, occluded ones included.
+/// The paper's metrics of a map, over all pixels with known truth, occluded ones included.
 ///
 /// In JSON the share of bad pixels carries its threshold: `bad2.0`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -17,7 +17,7 @@ pub struct Figures {
     pub avg: Option<f64>,
     /// PSNR against 255 in dB.
     pub psnr: Option<f64>,
-    /// Share of pixels that are wrong by more than 2 px, in percent.
+    /// Share of pixels whose error is above 2 px, in percent.
     #[serde(rename = "bad2.0")]
     pub bad2: f64,
 }
@@ -28,12 +28,12 @@ impl From<&Metrics> for Figures {
     }
 }
 
-/// What the paper prints of one map of a pair, by its two methods.
+/// The figures that the paper prints for one map of a pair, by its two methods.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Published {
-    /// FGS, the factor graph of one resolution.
+    /// FGS, the factor graph of a single resolution.
     pub fgs: Figures,
-    /// MR-FGS, that of many.
+    /// MR-FGS, the factor graph of several resolutions.
     #[serde(rename = "mr-fgs")]
     pub mr_fgs: Figures,
 }
@@ -50,7 +50,8 @@ const PRINTED: [(&str, [Printed; 2]); 5] = [
     ("Motorcycle", [[3.81, 29.45, 20.04, 3.40, 29.90, 19.53], [3.36, 30.02, 18.87, 3.09, 30.84, 18.25]]),
 ];
 
-/// What the paper prints of `pair`, in upper or lower case: of the raw map (Table 1) and of the final one (Table 2).
+/// The paper's figures for `pair`, in upper or lower case: of the raw map (Table 1) and of the final one
+/// (Table 2).
 #[must_use]
 pub fn published(pair: &str) -> Option<[Published; 2]> {
     let (_, tables) = PRINTED.iter().find(|(name, _)| name.eq_ignore_ascii_case(pair))?;

@@ -1,4 +1,4 @@
-//! What the validity map is worth: whether it finds the pixels that one view does not see.
+//! The quality of the validity map: whether it detects the pixels that one view does not see.
 
 use serde::Serialize;
 
@@ -7,10 +7,10 @@ use crate::error::Result;
 use crate::image::Plane;
 use crate::maps::flag;
 
-/// The flags that say that a pixel has no match of its own.
+/// The flags of pixels without a match of their own.
 const FLAGGED: u8 = flag::OUTSIDE | flag::OCCLUDED | flag::SPECKLE;
 
-/// How well the flags for pixels outside, occluded or in a small region find the pixels that one view does not see.
+/// How well the flags for outside, occluded and speckle pixels detect the pixels that one view does not see.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Detection {
     /// Share of the flagged pixels that one view does not see, in percent; `None` when none is flagged.
@@ -20,8 +20,8 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// The average of each field over several pairs, every pair with the same weight, as in [`mean`](super::mean);
-    /// `None` of no pairs.
+    /// The average of each field over several pairs, every pair with the same weight, as in
+    /// [`mean`](super::mean); `None` for no pairs.
     #[must_use]
     pub fn mean(all: &[&Self]) -> Option<Self> {
         (!all.is_empty()).then(|| Self {
@@ -31,8 +31,8 @@ impl Detection {
     }
 }
 
-/// Compares the flags of `validity` (bits of [`flag`]) with what `mask` says (not 255 = one view does not see it), over
-/// the pixels whose `truth` is known (finite).
+/// Compares the flags of `validity` (bits of [`flag`]) with `mask` (not 255 = one view does not see the
+/// pixel), over the pixels whose `truth` is known (finite).
 ///
 /// # Errors
 /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
@@ -71,7 +71,7 @@ mod tests {
         let mut truth = Plane::filled(8, 1, 3.0);
         truth[(7, 0)] = f32::INFINITY;
         let mask = Plane::new(8, 1, vec![128, 0, 255, 128, 255, 255, 128, 128]);
-        // Flagged: 0, 1, 2. Not seen: 0, 1, 3, 6.
+        // Flagged: 0, 1, 2. Not seen by one view: 0, 1, 3, 6.
         let found = detect(&Plane::new(8, 1, flags.to_vec()), &truth, &mask).unwrap();
         assert_eq!(found, Detection { precision: Some(200.0 / 3.0), recall: Some(50.0) });
 

@@ -1,5 +1,5 @@
-//! What is probably wrong, told before anyone blames the matcher: what the pixels and sparse matches say before a pair is
-//! matched, the range to search included, and what the maps say after.
+//! Warnings about probable mistakes. Before a pair is matched they come from its pixels and from sparse
+//! matches, which also suggest the range to search; after a match they come from its maps.
 
 use super::matches;
 use crate::error::Result;
@@ -8,47 +8,51 @@ use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
 use std::fmt;
 
-/// Fewer matches say nothing.
+/// Fewer matches than this give no statistics.
 const MIN_MATCHES: usize = 30;
-/// Matches at either end of the range that are passed over, as strays: one in this many of all, and one.
+/// Matches at either end of the range that are skipped as outliers: one, plus one in this many of all.
 const STRAYS: usize = 400;
-/// The image is divided into this many parts along each side, to see how much of it bears no match.
+/// The image is divided into this many parts along each side, to see how much of it has no match.
 const PARTS: usize = 8;
-/// Corners that [`warnings`] looks for, about: statistics need no more.
+/// Approximate number of corners that [`warnings`] looks for: its statistics need no more.
 const SAMPLE: usize = 300;
-/// Rows above and below its own on which [`warnings`] looks for a corner.
+/// Number of rows above and below its own on which [`warnings`] looks for a corner.
 const ROWS: usize = 8;
-/// Largest median of |dy| in a rectified pair, in 1/256 px (open): half a pixel. Of 60 pairs that are taken as rectified, indoors,
-/// from cars, from the air and rendered, none has more than 0.40 px; with one view a pixel lower all have 0.61 px or more.
+/// Largest median of |dy| in a rectified pair, in 1/256 px (open): half a pixel. Of 60 pairs that count as
+/// rectified (indoors, from cars, from the air, rendered), none has more than 0.40 px; with one view shifted
+/// down by one pixel, all have 0.61 px or more.
 const MAX_OFFSET: u32 = FRACTION as u32 / 2;
-/// Matches on the wrong side of 0 that betray swapped views, in percent of all.
+/// Percentage of matches with the wrong sign from which on the views count as swapped.
 const SWAPPED_PERCENT: usize = 90;
-/// Levels of 8 bits between which nearly all grey of a view lies that is all one colour, noise included.
+/// A view counts as plain when nearly all of its grey lies within this many 8-bit levels, noise included.
 const PLAIN_LEVELS: usize = 4;
-/// Least contrast of a view in percent of the other's (open). The share of bad pixels at a fifth of the contrast, over that
-/// of the pair as it is: 1.3 in the median of 18 pairs and 2.9 at most, on plain surfaces, whose texture falls between the
-/// levels. As they are, the pairs have 72 to 100 %.
+/// Smallest contrast of a view, in percent of the other's (open). At a fifth of the contrast, the share of
+/// bad pixels grows by a factor of 1.3 in the median of 18 pairs, and by 2.9 at most, on plain surfaces,
+/// whose texture falls between the levels. The original pairs have 72 to 100 %.
 const CONTRAST_PERCENT: usize = 25;
-/// How many percent more of a view may be black or white than of the other (open). The same share at 10 to 15: 1.5 in the
-/// median of 18 pairs made brighter or darker, and 2.4 at most; at 15 to 30, 1.8 and 3.5; below 5, 1.2 and 1.7. As they
-/// are, the pairs differ by 0.5 at most.
+/// Difference between the views in their percentage of black or white pixels from which on the exposures count
+/// as far apart (open). In the median of
+/// 18 pairs made brighter or darker, a difference of 10 to 15 multiplies the share of bad pixels by 1.5, and
+/// by 2.4 at most; 15 to 30 by 1.8 and 3.5; below 5 by 1.2 and 1.7. The original pairs differ by 0.5 at most.
 const SATURATED_PERCENT: usize = 10;
-/// Measured pixels at an end of the range that betray one too narrow, in percent of all (open). Of 76 ranges that cut off
-/// 4 % or more of the truth of 18 pairs, 75 have more. Of 55 that hold it, one has, which ends in the middle of a wall, within
-/// half a pixel of its truth; the others have 2.0 at most, and with the range of the calibration 0.13.
+/// Percentage of measured pixels at an end of the range from which on the range counts as too narrow (open).
+/// Of 76 ranges that cut off 4 % or more of the truth of 18 pairs, 75 have more. Of 55 ranges that hold the
+/// truth, one has more: it ends in the middle of a wall, within half a pixel of the truth. The others have
+/// 2.0 at most, and 0.13 with the range of the calibration.
 const CLIPPED_PERCENT: usize = 2;
-/// Ranges of fewer labels are nothing but ends.
+/// Ranges with fewer labels consist of nothing but ends.
 const MIN_LABELS: usize = 3;
 
-/// The range of disparities in `pair`, with a margin; `None` where there are too few matches to say.
+/// The range of disparities in `pair`, with a margin; `None` where there are too few matches to tell.
 ///
-/// The margin is lopsided. The farthest surface is mostly a background that faces the cameras and bears matches: a
-/// pixel and 1/24 of the matches' span are enough. The nearest ones are often grounds seen at grazing angles, which
-/// look different in the two views and bear none: three pixels and 1/4 of the span. (Open; both are set by five
-/// real pairs. Too many labels cost time, too few cost the foreground.)
+/// The margin is lopsided. The farthest surface is mostly a background that faces the cameras and has
+/// matches, so one pixel plus 1/24 of the matches' span is enough. The nearest surfaces are often grounds
+/// seen at grazing angles, which look different in the two views and have no matches: the margin is three
+/// pixels plus 1/4 of the span. (Open; both are set by five real pairs. Too many labels cost time, too few
+/// cost the foreground.)
 ///
-/// Where more than a quarter of the image bears no match, that may be a plain wall behind everything else: the range
-/// then reaches down to 0, the horizon of parallel cameras.
+/// Where more than a quarter of the image has no match, that part may be a plain wall behind everything else.
+/// The range then extends down to 0, the horizon of parallel cameras.
 ///
 /// # Errors
 /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
@@ -74,16 +78,16 @@ pub fn range(pair: &Pair) -> Result<Option<DisparityRange>> {
     Ok(DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION)).ok())
 }
 
-/// What is probably wrong with a pair. Each displays as one line with the cause, and with the remedy where that is no argument of
-/// the front end.
+/// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
+/// an argument of the front end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Warning {
     /// Both views hold the same pixels.
     Identical,
-    /// A view, by its name ("left", "right"), has next to no contrast anywhere.
+    /// A view has next to no contrast anywhere.
     Plain {
-        /// Which view.
+        /// Name of the view: "left" or "right".
         view: &'static str,
     },
     /// One view has far less contrast than the other.
@@ -91,14 +95,14 @@ pub enum Warning {
         /// Its contrast in percent of the other's.
         percent: usize,
     },
-    /// Far more of one view than of the other is black or white.
+    /// One view has far more black or white pixels than the other.
     Saturated {
         /// Black and white pixels of the left and the right view, in percent of all.
         percent: [usize; 2],
     },
-    /// One view is the other way round than the other.
+    /// One view is turned or mirrored relative to the other.
     Turned {
-        /// Which way: "upside down", "mirrored" or "turned by half a turn".
+        /// How: "upside down", "mirrored" or "turned by half a turn".
         how: &'static str,
     },
     /// Matches do not lie on the same row.
@@ -113,11 +117,11 @@ pub enum Warning {
     },
     /// Many disparities are at an end of the range.
     Clipped {
-        /// That end, in pixels.
+        /// The end, in pixels of disparity.
         end: i32,
-        /// Whether it is the upper one.
+        /// Whether it is the upper end.
         upper: bool,
-        /// Pixels there, in percent of all measured ones.
+        /// Pixels at that end, in percent of all measured ones.
         percent: usize,
     },
 }
@@ -170,21 +174,24 @@ impl fmt::Display for Warning {
     }
 }
 
-/// What is probably wrong with `pair`, the likeliest cause first; nothing where all seems well or there are too few
-/// matches to say. `range` is what the user asked to search, if anything.
+/// The probable mistakes in `pair`, the likeliest cause first. Empty where all seems well or there are too
+/// few matches to tell. `range` is the range that the user asked for, if any.
 ///
-/// Corners are looked for in both directions on the row, up to half the width, and up to 8 rows off it.
+/// Corners are searched in both directions along the row, up to half the width, and up to 8 rows away from
+/// it.
 ///
-/// - Plain: nearly all grey of a view is within 4 levels of 8 bits. Nothing else is then said.
-/// - Contrast, saturated: gain and offset between the views do no harm by themselves, as the matching cost is of a census; what
-///   falls between the levels or is cut off at either end is lost. Contrast is the span of the middle 90 % of grey.
+/// - Plain: nearly all grey of a view is within 4 levels of 8 bits. No other warning is given then.
+/// - Contrast, saturated: gain and offset between the views do no harm by themselves, because the matching
+///   cost uses a census. Detail that falls between the levels or is clipped at either end is lost. Contrast
+///   is the span of the middle 90 % of grey.
 /// - Turned: there are hardly any matches, and many once the right view is turned.
-/// - Not rectified: the median of |dy| exceeds half a pixel. So half of the matches must agree, whichever way they are off
-///   (a rotation moves both sides apart), and the odd false match is of no consequence.
-/// - Swapped: nine in ten matches lie more than a pixel on the negative side. Cameras that converge may do that
-///   too; who states a range with negative disparities knows, and is not warned.
+/// - Not rectified: the median of |dy| exceeds half a pixel. This needs half of the matches to be off, in
+///   whichever direction (a rotation moves the two sides in opposite directions), so a few false matches do
+///   not matter.
+/// - Swapped: nine in ten matches lie more than a pixel on the negative side. Converging cameras may cause
+///   that too; a user who gives a range with negative disparities knows, and is not warned.
 ///
-/// On a machine without memory for the search only the first three are looked for.
+/// On a machine without memory for the search only the first three checks are made.
 #[must_use]
 pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let tones = [("left", Tones::of(pair.left())), ("right", Tones::of(pair.right()))];
@@ -231,8 +238,9 @@ pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     out
 }
 
-/// What is probably wrong with a match over `range` that left `maps`: many disparities at an end of the range, so that it
-/// probably cuts off part of the scene. The lower end does not count where it is 0, the horizon of parallel cameras.
+/// The probable mistakes in a match over `range` that gave `maps`: many disparities at an end of the range,
+/// so that it probably cuts off part of the scene. The lower end does not count where it is 0, the horizon of
+/// parallel cameras.
 #[must_use]
 pub fn clipped(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
     let measured = maps.raw.data().iter().zip(maps.validity.data()).filter(|(_, v)| *v & flag::INVALID == 0);
@@ -250,7 +258,7 @@ pub fn clipped(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
         .collect()
 }
 
-/// How the grey of a view is spread, in levels of 8 bits.
+/// Statistics of the grey of a view, in 8-bit levels.
 struct Tones {
     /// Span of the middle 98 % of its pixels.
     nearly_all: usize,
@@ -261,7 +269,7 @@ struct Tones {
 }
 
 impl Tones {
-    /// Those of the pixels that are not masked; `None` where all are.
+    /// The statistics of the unmasked pixels; `None` where all are masked.
     fn of(image: &Image) -> Option<Self> {
         let mut counts = [0_usize; 256];
         for (pixel, _) in image.pixels.data().iter().zip(image.masked.data()).filter(|(_, masked)| !**masked)
@@ -269,7 +277,7 @@ impl Tones {
             counts[usize::from(pixel[3] >> 8)] += 1;
         }
         let all: usize = counts.iter().sum();
-        // The lowest level below or at which more than this many percent of the pixels are.
+        // The lowest level such that more than this many percent of the pixels are at or below it.
         let level = |percent: usize| {
             let mut below = 0;
             counts.iter().position(|count| {
@@ -283,7 +291,7 @@ impl Tones {
     }
 }
 
-/// Exposures so far apart that one view lacks what the other shows.
+/// Warns of exposures so different that one view lacks detail that the other shows.
 fn exposure(left: &Tones, right: &Tones) -> Vec<Warning> {
     let mut out = Vec::new();
     let (less, more) = (left.contrast.min(right.contrast), left.contrast.max(right.contrast));
@@ -296,7 +304,7 @@ fn exposure(left: &Tones, right: &Tones) -> Vec<Warning> {
     out
 }
 
-/// Whether all pixels are equal that neither mask hides, and there are any.
+/// Whether there are pixels unmasked in both views, and all of them are equal.
 fn identical(left: &Image, right: &Image) -> bool {
     let masks = left.masked.data().iter().zip(right.masked.data());
     let mut seen = left

@@ -1,38 +1,40 @@
-//! Homomorphic filtering: differences of illumination between the two images taken out (paper, section 3.1).
+//! Homomorphic filtering: removes differences of illumination between the two images (paper, section 3.1).
 //!
-//! A pixel's luminance is illumination times reflectance, and illumination changes slowly across the image. So the
-//! local geometric mean, the low-pass of the logarithm, stands for illumination, and dividing by it leaves
-//! reflectance. The paper gives the size of the filter, 21 x 21, and nothing else; the rest is decided here.
+//! A pixel's luminance is illumination times reflectance, and illumination changes slowly across the image.
+//! So the local geometric mean, which is the low-pass of the logarithm, stands for illumination, and dividing
+//! by it leaves reflectance. The paper gives only the size of the filter, 21 x 21; the rest is decided here.
 
 use rayon::prelude::*;
 
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::weights::{exp_neg, ln};
 
-/// Pixels to each side of the centre: 21 x 21 in all, as in the paper.
+/// Radius of the filter in pixels: 21 x 21 in all, as in the paper.
 const RADIUS: usize = 10;
-/// Of the low-pass, in pixels. The widest that still falls off, to exp(-2) at the sides of the window: what is taken
-/// out is illumination, and the narrower the low-pass, the more texture goes with it.
+/// Sigma of the low-pass, in pixels. It is the widest that still falls off, to exp(-2) at the sides of the
+/// window. The low-pass should remove illumination only; a narrower one removes more texture as well.
 const SIGMA: f64 = RADIUS as f64 / 2.0;
-/// Where a pixel as bright as its surroundings goes, in 1/256 of an 8-bit level. Higher leaves less room for what is
-/// brighter, lower less contrast: at 128 levels a channel saturates in 10 % of the pixels of Middlebury's Motorcycle,
-/// at 80 in 1.0 %, at 64 in 0.3 % (Dolls 0.2 % at 80, Teddy 0.03 %).
+/// Target for a pixel as bright as its surroundings, in 1/256 of an 8-bit level. A higher value leaves less
+/// room for brighter pixels, a lower one less contrast. At 128 levels a channel saturates in 10 % of the
+/// pixels of Middlebury's Motorcycle, at 80 in 1.0 %, at 64 in 0.3 % (Dolls 0.2 % at 80, Teddy 0.03 %).
 const MID_GREY: f64 = 80.0 * 256.0;
-/// The darkest luminance that the logarithm sees, as a part of the image's mean: about half a level of an 8-bit
-/// image, below which there are no differences. Relative, so that a gain changes nothing.
+/// The smallest luminance that enters the logarithm, as a fraction of the image's mean: about half a level of
+/// an 8-bit image, below which differences mean nothing. It is relative, so that a gain changes nothing.
 const DARKEST: f64 = 1.0 / 256.0;
 
 /// The image with its illumination evened out: log, minus low-pass, exp.
 ///
-/// The low-pass is a Gaussian (sigma 5 pixels) of 21 x 21 pixels over what is not masked, the image reflected at its
-/// borders. A pixel as bright as the geometric mean of its surroundings becomes 80 levels, one half as bright 40;
-/// what is more than 3.2 times as bright saturates at the top. This scale is fixed, so both images of a pair share
-/// it, and a gain of the whole image cancels but for rounding.
+/// The low-pass is a Gaussian (sigma 5 pixels) of 21 x 21 pixels over the unmasked pixels, with the image
+/// reflected at its borders. A pixel as bright as the geometric mean of its surroundings becomes 80 levels,
+/// and one half as bright becomes 40. A pixel more than 3.2 times as bright saturates. This scale is fixed,
+/// so both images of a pair share it, and a gain of the whole image cancels except for rounding.
 ///
-/// Each colour is corrected by the gain of the luminance. Channels filtered one by one would lose every large
-/// colour: a red wall and a green one would both become grey, and colour is half of what tells surfaces apart.
+/// Each colour is corrected by the gain of the luminance. Filtering the channels one by one would lose every
+/// large colour: a red wall and a green one would both become grey, and colour is half of what tells surfaces
+/// apart.
 ///
-/// Masked pixels stay masked and keep their values. An image without light, or all masked, comes back as it is.
+/// Masked pixels stay masked and keep their values. An image that is black or entirely masked is returned
+/// unchanged.
 #[must_use]
 pub fn homomorphic(image: &Image) -> Image {
     let (pixels, masked) = (image.pixels.data(), image.masked.data());
@@ -61,7 +63,7 @@ pub fn homomorphic(image: &Image) -> Image {
     Image { pixels: Plane::new(image.width(), image.height(), corrected), masked: image.masked.clone() }
 }
 
-/// Weights of a Gaussian with `sigma` pixels at -`radius` ..= `radius`, their sum 1.
+/// Weights of a Gaussian of `sigma` pixels at -`radius` ..= `radius`; they sum to 1.
 pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
     let weight = |i: usize| {
         let x = i.abs_diff(radius) as f64 / sigma;
@@ -72,14 +74,14 @@ pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
     weights.iter().map(|w| w / sum).collect()
 }
 
-/// Index `i` folded into 0 .. `n` by reflection: -1 is 0, n is n - 1.
+/// Index `i` reflected into 0 .. `n`: -1 becomes 0, n becomes n - 1.
 fn reflected(i: isize, n: usize) -> usize {
     let i = i.rem_euclid(2 * n as isize) as usize;
     i.min(2 * n - 1 - i)
 }
 
-/// A plane convolved across and down with symmetric kernels of odd length, borders by reflection. Rows in parallel;
-/// each sum is taken in one order, so the number of threads changes nothing.
+/// A plane convolved across and down with symmetric kernels of odd length, reflected at its borders. Rows run
+/// in parallel. Each sum is taken in one order, so the number of threads changes nothing.
 pub(super) fn smooth<const N: usize>(
     plane: &Plane<[f64; N]>,
     [across, down]: [&[f64]; 2],

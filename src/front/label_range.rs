@@ -1,7 +1,8 @@
-//! Which labels a pixel may take (section 2.4): those near the disparities of its zone's matches.
+//! The label range of each pixel (section 2.4): labels near the disparities of its zone's matches.
 //!
-//! The paper takes the matches of a zone as normally distributed, N(mu, sigma), and the labels in mu +- sigma for
-//! all its pixels. That leaves out many true disparities, so the multiple of sigma is a parameter here.
+//! The paper models the matches of a zone as normally distributed, N(mu, sigma), and allows the labels in mu
+//! +- sigma for all its pixels. That excludes many true disparities, so the multiple of sigma is a parameter
+//! here.
 
 use super::matches::Match;
 use super::zones::Zones;
@@ -10,11 +11,12 @@ use crate::maps::FRACTION;
 use crate::options::DisparityRange;
 use crate::plan::Plan;
 
-/// A zone with fewer matches keeps the full range: no spread can be told from a handful (open).
+/// A zone with fewer matches keeps the full range: so few give no reliable spread (the paper leaves this
+/// open).
 pub const MIN_MATCHES: usize = 10;
 
-/// An interval of labels for each pixel of one level. Labels are disparities in pixels of that level, not indices:
-/// subtract the level's smallest label for those.
+/// An interval of labels for each pixel of one level. Labels are disparities in pixels of that level, not
+/// indices: for an index, subtract the level's smallest label.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelRanges {
     /// Smallest label of each pixel.
@@ -23,19 +25,19 @@ pub struct LabelRanges {
     pub high: Plane<i32>,
 }
 
-/// The label range at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded outwards and
-/// clipped to `range`. `k` is not negative; the paper's is 1.
+/// The label range at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded
+/// outwards and clipped to `range`. `k` is not negative; the paper uses 1.
 ///
-/// `zones` is a map of zone indices and their number. The full range remains to a pixel whose index is out of range,
-/// and to zones with fewer than [`MIN_MATCHES`] matches or with none of `range` in their interval. Sigma is that of
-/// the matches themselves (divided by n).
+/// `zones` is a map of zone indices and their number. The full range remains for a pixel whose index is out
+/// of range, and for zones that have fewer than [`MIN_MATCHES`] matches or whose interval does not meet
+/// `range`. Sigma is that of the matches themselves (divided by n).
 ///
 /// # Panics
 /// When a match lies outside the map of zones.
 #[must_use]
 pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match], k: f64) -> LabelRanges {
     let (map, count) = zones;
-    // Number, sum and sum of squares: integers, so that their order is of no consequence.
+    // Number, sum and sum of squares: integers, so that their order does not matter.
     let mut sums = vec![(0_i64, 0_i64, 0_i64); count];
     for m in matches {
         if let Some((n, sum, squares)) = sums.get_mut(usize::from(map[(m.x, m.y)])) {
@@ -65,7 +67,7 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match
     LabelRanges { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
 }
 
-/// First and last label index of each pixel, at every level of `plan`, as backends take them.
+/// First and last label index of each pixel, at every level of `plan`, in the form that backends take.
 #[must_use]
 pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 2]>> {
     let mut label_range =
@@ -84,8 +86,8 @@ pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 
 }
 
 impl LabelRanges {
-    /// The label range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2 children, in coarse
-    /// labels (floor(low / 2) to ceil(high / 2)).
+    /// The label range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2
+    /// children, in coarse labels (floor(low / 2) to ceil(high / 2)).
     #[must_use]
     pub fn coarser(&self) -> Self {
         let (width, height) = self.low.size();
@@ -103,7 +105,7 @@ impl LabelRanges {
         }
     }
 
-    /// Labels of all pixels together.
+    /// Total number of allowed labels over all pixels.
     #[must_use]
     pub fn labels(&self) -> u64 {
         self.low.data().iter().zip(self.high.data()).map(|(low, high)| (high - low + 1) as u64).sum()

@@ -1,12 +1,13 @@
-//! Sparse, highly confident matches (section 2.4): the corners of the left view, found again in the right one.
+//! Sparse, highly confident matches (section 2.4): corners of the left view that are found again in the right
+//! view.
 //!
-//! Corners are those of Shi and Tomasi (*Good Features to Track*, 1994), which the paper names. It does not say how
-//! they are matched; here by zero-mean normalised cross-correlation (ZNCC), and whatever is in doubt is dropped: a
-//! match must score well, be clearly better than the next best place, be found from the right view too, and agree
-//! with matches around it.
+//! Corners are those of Shi and Tomasi (*Good Features to Track*, 1994), as in the paper. The paper does not
+//! say how they are matched; here it is done by zero-mean normalised cross-correlation (ZNCC), and every
+//! doubtful match is dropped. A match must score well, be clearly better than its runner-up, be found from
+//! the right view too, and agree with the matches around it.
 //!
-//! Sums are integers and the rest is + - * / and square roots in a fixed order, so every machine finds the same
-//! matches, whatever the number of threads.
+//! Sums are integers, and the rest uses + - * / and square roots in a fixed order. So every machine finds the
+//! same matches, with any number of threads.
 
 use crate::error::{Purpose, Result};
 use crate::image::{Image, Pair, Plane};
@@ -18,37 +19,41 @@ use std::array::from_fn;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-/// Pixels per corner, at least: dense enough for the statistics of a small zone.
+/// Smallest number of pixels per corner: dense enough for the statistics of a small zone.
 const SPACING: usize = 64;
 /// Side of the cells over which corners are spread evenly, in pixels, at a spacing of [`SPACING`].
 const CELL: usize = 32;
-/// Most corners, about, where there is no range to search: they are then for an overview, and each costs a whole row.
+/// Approximate maximum of corners where no range is given: they only serve an overview then, and each is
+/// searched in a whole row.
 const OVERVIEW: usize = 8192;
-/// Without a range, disparities up to this share of the width are searched, of either sign: one in `REACH`.
+/// Without a range, the search covers disparities up to 1 / `REACH` of the width, of either sign.
 const REACH: usize = 2;
 /// The structure tensor is a sum over 5 x 5 pixels.
 const TENSOR_RADIUS: usize = 2;
-/// A corner is the best within 5 x 5 pixels.
+/// A corner is the maximum of 5 x 5 pixels.
 const PEAK_RADIUS: usize = 2;
-/// The correlation window is 7 x 7 pixels: all that a corner's tensor saw, gradients included. (9 x 9 gave a
-/// fifth fewer matches on five real pairs; the share of false ones rose on three and fell on two.)
+/// The correlation window is 7 x 7 pixels: exactly the pixels that a corner's tensor depends on, gradients
+/// included. (9 x 9 gave a fifth fewer matches on five real pairs; the share of false ones rose on three and
+/// fell on two.)
 const RADIUS: usize = TENSOR_RADIUS + 1;
-/// Least ZNCC of a match.
+/// Smallest ZNCC of a match.
 const MIN_SCORE: f64 = 0.8;
-/// How far a match is from a perfect score, at most, as a share of how far its best runner-up is.
+/// Ratio test: a match's distance from a perfect score is at most this fraction of its runner-up's.
 const RATIO: f64 = 0.7;
-/// Places this close to the best, in pixels along both axes, belong to the same peak and are no runners-up.
+/// Positions this close to the best one, in pixels along both axes, belong to the same optimum and are no
+/// runners-up.
 const PEAK_REACH: usize = 2;
-/// A match is compared with this many of those around it.
+/// Each match is compared with this many matches around it.
 const NEIGHBOURS: usize = 8;
 /// This many of them must agree with it.
 const AGREEING: usize = 4;
-/// Matches agree where they differ by at most a pixel, and a pixel more for every so many between them (surfaces slant).
+/// Matches agree where they differ by at most one pixel, plus one pixel for every this many pixels between
+/// them, because surfaces slant.
 const SLOPE: i64 = 8;
 
 const WINDOW: usize = 2 * RADIUS + 1;
 const WINDOW_PIXELS: i64 = (WINDOW * WINDOW) as i64;
-/// Grey is taken in 1/16 of an 8-bit level: the most for which the sums over a window fit 32 bits.
+/// Grey is in 1/16 of an 8-bit level: the finest unit for which the sums over a window fit in 32 bits.
 const GREY_SHIFT: u32 = 4;
 const _: () = assert!(WINDOW_PIXELS * (0xffff >> GREY_SHIFT) * (0xffff >> GREY_SHIFT) <= i32::MAX as i64);
 
@@ -59,23 +64,24 @@ pub struct Match {
     pub x: usize,
     /// Row in the left view, in pixels.
     pub y: usize,
-    /// Disparity in 1/256 px: the left pixel is seen at x - disparity / 256 in the right view.
+    /// Disparity in 1/256 px: the left pixel appears at x - disparity / 256 in the right view.
     pub disparity: i32,
-    /// How much lower it is seen in the right view, in 1/256 px; 0 where only its row was searched.
+    /// Vertical offset in the right view, downwards, in 1/256 px; 0 where only the pixel's own row was
+    /// searched.
     pub dy: i32,
     /// Zero-mean normalised cross-correlation of the two windows, up to 1.
     pub score: f64,
 }
 
-/// The matches of `pair`, in raster order: at most about one in 64 pixels.
+/// The matches of `pair`, in raster order: at most about one per 64 pixels.
 ///
-/// `zones` is a map of zone indices and their number; each zone gives its own best corners, so that faint zones are
-/// not left without (pixels whose index is out of range give none). `range` is what to search; without it, all
-/// disparities of either sign up to half the width, for at most some 8000 corners. No masked pixel is ever part of a
-/// window.
+/// `zones` is a map of zone indices and their number. Each zone contributes its own best corners, so that
+/// zones of low contrast get some too; pixels whose index is out of range contribute none. `range` is the
+/// range to search. Without it, all disparities of either sign up to half the width are searched, for at most
+/// about 8000 corners. No window ever contains a masked pixel.
 ///
 /// # Panics
-/// When the map of zones has another size.
+/// When the map of zones differs in size from the images.
 #[must_use]
 pub fn find(pair: &Pair, zones: Option<(&Plane<u8>, usize)>, range: Option<DisparityRange>) -> Vec<Match> {
     let (width, height) = pair.size();
@@ -83,11 +89,11 @@ pub fn find(pair: &Pair, zones: Option<(&Plane<u8>, usize)>, range: Option<Dispa
     search(pair, zones, range, spacing, 0)
 }
 
-/// Bytes that a search takes for a pixel: the statistics of both views, and the eigenvalues of one; and twice one view's pixels
-/// and mask, where it is looked at in other ways.
+/// Bytes per pixel that a search takes: the statistics of both views, and the eigenvalues of one; and two
+/// copies of the pixels and mask of one view, for trying its other orientations.
 const BYTES: u64 = 2 * (2 + 4 + 8) + 8 + 2 * 9;
 
-/// Declines to search a pair that the machine has not enough memory for.
+/// Fails where the machine has not enough memory to search `pair`.
 ///
 /// # Errors
 /// [`Error::Memory`](crate::Error::Memory).
@@ -96,7 +102,8 @@ pub(super) fn check_memory(pair: &Pair) -> Result<()> {
     Ok(memory::check(BYTES * (width * height) as u64, Purpose::Image)?)
 }
 
-/// [`find`] with one corner in `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below its own.
+/// [`find`] with one corner per `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below
+/// its own.
 pub(super) fn search(
     pair: &Pair,
     zones: Option<(&Plane<u8>, usize)>,
@@ -126,18 +133,19 @@ pub(super) fn search(
     consistent(matches, cell(spacing))
 }
 
-/// Side of a cell, in pixels, that holds about the same number of corners at any spacing.
+/// Side of a cell in pixels, such that a cell holds about the same number of corners at any spacing.
 fn cell(spacing: usize) -> usize {
     CELL * (spacing / SPACING).isqrt().max(1)
 }
 
-/// A view with the statistics of the window around each pixel.
+/// A view, and the statistics of the window around each pixel.
 struct View {
     /// In 1/16 of an 8-bit level.
     grey: Plane<i16>,
     /// The sum over the window around each pixel.
     sum: Plane<i32>,
-    /// n sigma of the n values of each window; 0 where it is uniform, masked or beyond the border.
+    /// n sigma of the n values of each window; 0 where it is uniform, contains a masked pixel, or leaves the
+    /// image.
     norm: Plane<f64>,
 }
 
@@ -145,7 +153,7 @@ impl View {
     fn new(image: &Image) -> Self {
         let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
         let (width, height) = grey.size();
-        // One block each: freed rows of a large image may stay with the process.
+        // One allocation each: rows of a large image that are freed one by one may stay with the process.
         let (mut sums, mut norms) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0.0));
         let rows = sums.data_mut().par_chunks_mut(width).zip(norms.data_mut().par_chunks_mut(width));
         rows.enumerate().for_each(|(y, (sums, norms))| {
@@ -161,7 +169,8 @@ impl View {
         Self { grey, sum: sums, norm: norms }
     }
 
-    /// The smaller eigenvalue of the structure tensor at each pixel of row `y`; 0 where no window fits.
+    /// The smaller eigenvalue of the structure tensor at each pixel of row `y`; 0 where the window does not
+    /// fit.
     fn eigenvalues(&self, y: usize) -> Vec<f64> {
         let g = &self.grey;
         let gradient = |x: usize, y: usize| {
@@ -202,7 +211,8 @@ fn box_sums<T>(plane: &Plane<T>, y: usize, radius: usize, value: impl Fn(usize, 
     out
 }
 
-/// Corners of `view` in raster order: of each zone in each cell of the image the best, one in `spacing` pixels.
+/// Corners of `view` in raster order: the best of each zone in each cell of the image, one per `spacing`
+/// pixels.
 fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> Vec<(usize, usize)> {
     let (width, height) = view.grey.size();
     if let Some((map, _)) = zones {
@@ -211,7 +221,7 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
     let mut values = Plane::filled(width, height, 0.0);
     let rows = values.data_mut().par_chunks_mut(width).enumerate();
     rows.for_each(|(y, row)| row.copy_from_slice(&view.eigenvalues(y)));
-    // The earlier one in raster order wins a tie.
+    // On a tie, the earlier one in raster order wins.
     let is_peak = |x: usize, y: usize| {
         let value = values[(x, y)];
         value > 0.0
@@ -250,19 +260,20 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
     out
 }
 
-/// Where a window is found again.
+/// The position where a window is found again.
 struct Optimum {
     x: usize,
     y: usize,
-    /// How much further right the top of the peak lies, in 1/256 px.
+    /// Sub-pixel offset of the optimum to the right, in 1/256 px.
     right: i32,
-    /// How much lower.
+    /// Sub-pixel offset downwards, in 1/256 px.
     down: i32,
     score: f64,
 }
 
-/// The one place in `columns` and within `rows` of its own row where the window of `of` around (x, y) is found in
-/// `within`. `None` where the best one scores too low, has a runner-up, or is no peak along the row.
+/// The one position in `columns`, within `rows` of its own row, where the window of `of` around (x, y) is
+/// found in `within`. `None` where the best score is too low, has a runner-up, or is no optimum along the
+/// row.
 fn peak(
     of: &View,
     (x, y): (usize, usize),
@@ -271,7 +282,8 @@ fn peak(
     rows: usize,
 ) -> Option<Optimum> {
     let (width, height) = within.grey.size();
-    // As much again on either side: what repeats there is no sure match here, and a peak needs columns around it.
+    // As many columns again on either side: a pattern that repeats there gives no reliable match here, and an
+    // optimum needs columns around it.
     let aside = columns.end() - columns.start() + 1;
     let first = (columns.start() - aside).max(RADIUS as i32);
     let last = (columns.end() + aside).min(width as i32 - 1 - RADIUS as i32);
@@ -285,7 +297,7 @@ fn peak(
         (top..=bottom).map(|v| correlation(of, (x, y), within, v, first..=last)).collect();
 
     let places = || (0..scores.len()).flat_map(|v| (0..scores[v].len()).map(move |u| (u, v)));
-    // Of equal scores the last one; the runner-up settles that there is none.
+    // Of equal scores the last one; the runner-up test then rejects it.
     let (u, v) = places().max_by(|a, b| scores[a.1][a.0].total_cmp(&scores[b.1][b.0]))?;
     let score = scores[v][u];
     let runner_up = places()
@@ -303,7 +315,8 @@ fn peak(
     Some(Optimum { x: first + u, y: top + v, right, down, score })
 }
 
-/// ZNCC of the window of `of` around (x, y) with those of `within` on row `v`; 0 where there is no window.
+/// ZNCC of the window of `of` around (x, y) with those of `within` on row `v`; 0 where the window does not
+/// fit.
 fn correlation(
     of: &View,
     (x, y): (usize, usize),
@@ -325,7 +338,7 @@ fn correlation(
         .collect()
 }
 
-/// The sum of the products of `template` with the window that begins at each place of `lines`.
+/// The sum of the products of `template` with the window that begins at each position of `lines`.
 #[pulp::with_simd(products_along = pulp::Arch::new())]
 #[inline(always)]
 fn products_along_on<'a, S: pulp::Simd>(
@@ -344,7 +357,7 @@ fn products_along_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The same at `N` places from `first` on; sums of so few stay in registers.
+/// The same at `N` positions from `first` on; so few sums stay in registers.
 #[inline(always)]
 fn products_at<const N: usize>(
     template: &[[i16; WINDOW]; WINDOW],
@@ -363,13 +376,13 @@ fn products_at<const N: usize>(
     sums
 }
 
-/// Where the parabola through `(-1, before)`, `(0, peak)`, `(1, after)` has its vertex, in 1/256.
+/// The vertex of the parabola through `(-1, before)`, `(0, peak)`, `(1, after)`, in 1/256.
 fn vertex(before: f64, peak: f64, after: f64) -> i32 {
     let bend = before - 2.0 * peak + after;
     if bend < 0.0 { ((before - after) / (2.0 * bend) * f64::from(FRACTION) + 0.5).floor() as i32 } else { 0 }
 }
 
-/// The matches that agree with others around them, in the cells (of `side` pixels) next to theirs.
+/// The matches that agree with others around them, in their own and the adjacent cells (of `side` pixels).
 fn consistent(matches: Vec<Match>, side: usize) -> Vec<Match> {
     let mut cells = BTreeMap::<(usize, usize), Vec<&Match>>::new();
     for m in &matches {
@@ -418,7 +431,7 @@ mod tests {
         let (with, without) = (found(Some((&zones, 2))), found(None));
         assert!(with >= 40 && without <= 10, "{with} with zones, {without} without");
 
-        // The best, and none is next to a better one.
+        // The maximum is among them, and no corner is next to a better one.
         let all = corners(&view, None, 256);
         let values: Vec<Vec<f64>> = (0..128).map(|y| view.eigenvalues(y)).collect();
         for &(x, y) in &all {
@@ -429,7 +442,7 @@ mod tests {
 
     #[test]
     fn a_corner_has_two_large_eigenvalues() {
-        // A square on black: its corners, not its sides.
+        // A square on black: the corners are found, the sides are not.
         let image = Image::from_rgb8(&Plane::from_fn(40, 40, |x, y| {
             [if (10..30).contains(&x) && (10..30).contains(&y) { 200 } else { 0 }; 3]
         }));
@@ -450,7 +463,7 @@ mod tests {
             yy += dy * dy;
         }
         let value = view.eigenvalues(10)[10];
-        // Of [[xx, xy], [xy, yy]]: the determinant of the tensor less the value on its diagonal is 0.
+        // For [[xx, xy], [xy, yy]]: the determinant of the tensor minus the value on its diagonal is 0.
         let determinant = (xx - value) * (yy - value) - xy * xy;
         assert!(value > 0.0 && determinant.abs() < 1e-9 * xx * yy && 2.0 * value <= xx + yy);
     }

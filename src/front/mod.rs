@@ -1,4 +1,5 @@
-//! The front end (section 2.4): everything that a match needs and that follows from the images alone, before there are costs.
+//! The front end (section 2.4): everything that a match derives from the images alone, before any cost is
+//! computed.
 
 pub mod check;
 pub mod illumination;
@@ -17,27 +18,27 @@ use illumination::homomorphic;
 use matches::Match;
 use zones::Zones;
 
-/// What a backend needs for a match.
+/// Everything that a backend needs for a match.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    /// The pair as it is matched, its illumination corrected where the method asks for it.
+    /// The pair to match, its illumination corrected where the method asks for it.
     pub pair: Pair,
     /// The graph of every level.
     pub graphs: Vec<LevelGraph>,
     /// First and last label index of each pixel, by level; empty where every label is allowed.
     pub label_ranges: Vec<Plane<[u16; 2]>>,
-    /// What the label ranges follow from: texture zones and sparse matches.
+    /// The source of the label ranges: texture zones and sparse matches.
     pub zones: Option<(Zones, Vec<Match>)>,
 }
 
 impl Prepared {
-    /// A pair that needs no more than its graphs.
+    /// A pair that needs only its graphs.
     #[must_use]
     pub fn new(pair: &Pair, graphs: Vec<LevelGraph>) -> Self {
         Self { pair: pair.clone(), graphs, label_ranges: Vec::new(), zones: None }
     }
 
-    /// The same with these label ranges.
+    /// The same pair with these label ranges.
     #[must_use]
     pub fn within(self, label_ranges: Vec<Plane<[u16; 2]>>) -> Self {
         Self { label_ranges, ..self }

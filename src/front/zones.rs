@@ -1,12 +1,12 @@
 //! Texture zones by unsupervised segmentation with Gabor filters (paper, sections 2.4 and 3.1).
 //!
-//! The recipe is that of Jain and Farrokhnia, *Unsupervised texture segmentation using Gabor filters* (1991): the
-//! magnitudes of a bank of Gabor filters, each smoothed in proportion to its wavelength, and the pixel's coordinates
-//! are standardised and clustered. The paper gives orientations, wavelengths, and K-means with K = 15 in 5 replicates
-//! of up to 500 iterations.
+//! The recipe is that of Jain and Farrokhnia, *Unsupervised texture segmentation using Gabor filters* (1991).
+//! The features are the magnitudes of a bank of Gabor filters, each smoothed in proportion to its wavelength,
+//! and the pixel's coordinates. They are standardised and clustered. The paper gives orientations,
+//! wavelengths, and K-means with K = 15 in 5 replicates of up to 500 iterations.
 //!
-//! The filters run in single precision (see `gabor`). Their smoothed magnitudes are then rounded to integers, and
-//! everything after that is exact: interpolation, clustering, assignment.
+//! The filters run in single precision (see `gabor`). Their smoothed magnitudes are then rounded to integers,
+//! and everything after that is exact: interpolation, clustering, assignment.
 
 mod gabor;
 mod kmeans;
@@ -19,33 +19,34 @@ use gabor::Response;
 /// The zone of masked pixels. It is not counted.
 pub const MASKED: u8 = 255;
 
-/// Features are integers in this part of their standard deviation.
+/// Features are integers, in 1 / `UNITS` of their standard deviation.
 const UNITS: f64 = 64.0;
-/// Features end here, in standard deviations to each side of the mean: what is farther out is as odd as it gets, and
-/// a squared difference of two features stays below 2^20.
+/// Features are clamped to this many standard deviations from the mean. Larger deviations carry no more
+/// information, and a squared difference of two features stays below 2^20.
 const REACH: f64 = 8.0;
-/// Standard deviations below this part of an 8-bit level count as this much. There, a response is rounding, not
-/// texture, and must not be blown up to the size of the others.
+/// Smaller standard deviations are raised to this fraction of an 8-bit level. Below it, a response is
+/// rounding error, not texture, and must not be scaled up to the size of the others.
 const LEAST_DEVIATION: f64 = 1.0 / 64.0;
-/// About as many pixels are clustered, on a square grid: every sixth each way on Middlebury's Teddy, every ninth on
-/// Motorcycle. The paper clusters all; but neighbours have nearly the same smoothed features, and K-means needs their
-/// distribution only. All other pixels just look for the nearest centroid.
+/// Approximate number of pixels that are clustered, on a square grid: every sixth in x and y on Middlebury's
+/// Teddy, every ninth on Motorcycle. The paper clusters all pixels, but neighbours have nearly the same
+/// smoothed features, and K-means needs only their distribution. All other pixels are assigned to the nearest
+/// centroid.
 const SAMPLES: usize = 4096;
-/// Samples per zone at the least. Smaller images get fewer zones: one of a few pixels would say nothing.
+/// Smallest number of samples per zone. Smaller images get fewer zones: a zone of a few pixels is useless.
 const SAMPLES_PER_ZONE: usize = 16;
-/// Bits of the weights of interpolation, across and down.
+/// Bits of the interpolation weights, across and down.
 const WEIGHT_BITS: u32 = 8;
 
-/// What determines the zones, besides the image.
+/// The parameters of the segmentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Zones at the most, 1 ..= 255: the K of K-means.
+    /// Largest number of zones, 1 ..= 255: the K of K-means.
     pub zones: usize,
-    /// Clusterings from different starts, of which the tightest is taken.
+    /// Number of clusterings from different starts; the tightest is taken.
     pub replicates: usize,
-    /// Iterations of each clustering at the most; it ends when no sample changes its zone.
+    /// Largest number of iterations of each clustering; it ends when no sample changes its zone.
     pub iterations: usize,
-    /// Of the random starts.
+    /// Seed of the random starts.
     pub seed: u64,
 }
 
@@ -67,9 +68,9 @@ pub struct Zones {
 
 /// Segments an image by its texture.
 ///
-/// The grey value alone counts. Masked pixels are filled with the mean, take no part in the clustering and get the
-/// zone [`MASKED`]. Zones need not be connected. Images too small for `options.zones` get fewer: one for every 16
-/// samples (all pixels, up to some 4096).
+/// Only the grey value counts. Masked pixels are filled with the mean, take no part in the clustering and get
+/// the zone [`MASKED`]. Zones need not be connected. Images too small for `options.zones` get fewer: one for
+/// every 16 samples (all pixels, up to about 4096).
 ///
 /// The result is the same on every machine and for any number of threads.
 #[must_use]
@@ -107,7 +108,7 @@ pub fn segment(image: &Image, options: &Options) -> Zones {
     Zones { map, count }
 }
 
-/// Numbers zones in the order of their first pixels, and counts them.
+/// Renumbers zones in the order of their first pixels, and counts them.
 fn renumber(map: &mut Plane<u8>) -> usize {
     let mut numbers = [MASKED; 256];
     let mut count = 0;
@@ -122,8 +123,8 @@ fn renumber(map: &mut Plane<u8>) -> usize {
     count
 }
 
-/// Unmasked pixels (x, y) of a grid with about [`SAMPLES`] of them, row by row; of a finer grid where that meets
-/// none. Empty only if there is no unmasked pixel.
+/// The unmasked pixels (x, y) of a grid with about [`SAMPLES`] of them, row by row. Where all pixels of the
+/// grid are masked, a finer grid is taken. The result is empty only if every pixel is masked.
 fn samples(masked: &Plane<bool>) -> Vec<(usize, usize)> {
     let visible = masked.data().iter().filter(|m| !**m).count();
     let widest = (visible / SAMPLES).isqrt().max(1);
@@ -142,7 +143,7 @@ struct Features {
     coordinates: [Vec<i16>; 2],
 }
 
-/// One filter's smoothed magnitude at its nodes, and where the pixels lie among them.
+/// One filter's smoothed magnitude at its nodes, and the position of the pixels among them.
 struct Magnitude {
     nodes: Plane<i16>,
     across: Vec<Place>,
@@ -175,7 +176,7 @@ impl Features {
         Self { bank, coordinates: [along(x, image.width()), along(y, image.height())] }
     }
 
-    /// Features of a pixel.
+    /// Number of features per pixel.
     fn dimensions(&self) -> usize {
         self.bank.len() + 2
     }
@@ -212,14 +213,14 @@ impl Place {
         Self { node: numerator / denominator, weight: weight as i32 }
     }
 
-    /// The value here of a line of nodes times 256, rounded.
+    /// The value at this position, interpolated from a line of nodes times 256, rounded.
     fn between(self, line: &[i32]) -> i16 {
         let value = blend(line[self.node], line[self.node + 1], self.weight);
         ((value + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as i16
     }
 }
 
-/// From values to standard deviations from their mean.
+/// Maps values to standard deviations from their mean.
 #[derive(Clone, Copy)]
 struct Scale {
     mean: f64,
@@ -227,7 +228,7 @@ struct Scale {
 }
 
 impl Scale {
-    /// The scale of `values`, with a standard deviation of `least` or more.
+    /// The scale of `values`, with a standard deviation of at least `least`.
     fn new(values: impl Iterator<Item = f64> + Clone, least: f64) -> Self {
         let count = values.clone().count() as f64;
         let mean = values.clone().sum::<f64>() / count;

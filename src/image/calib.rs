@@ -6,10 +6,10 @@ use crate::error::{Error, Result};
 use crate::text;
 use crate::text::quoted;
 
-/// A calibration file is a dozen lines; no more than this is read of one.
+/// A calibration file is a dozen lines; no more than this is read.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// What `calib.txt` says about a pair. Every entry is optional, for the benchmarks leave out different ones.
+/// The contents of `calib.txt`. Every entry is optional, because the benchmarks leave out different ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Calibration {
@@ -31,12 +31,13 @@ pub struct Calibration {
     pub vmax: Option<f64>,
 }
 
-/// What the matrix `[fx 0 cx; 0 fy cy; 0 0 1]` of a rectified camera says, all in pixels.
+/// The matrix `[fx 0 cx; 0 fy cy; 0 0 1]` of a rectified camera, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Focal length across and down (fx, fy), above 0; of rectified images mostly the same.
+    /// Focal length across and down (fx, fy), above 0; usually equal in rectified images.
     pub focal_length: [f64; 2],
-    /// Principal point (cx, cy): where the optical axis meets the image, counted from the centre of the top left pixel.
+    /// Principal point (cx, cy): where the optical axis meets the image, relative to the centre of the top
+    /// left pixel.
     pub principal_point: [f64; 2],
 }
 
@@ -53,15 +54,16 @@ impl Calibration {
     /// Reads a calibration file.
     ///
     /// # Errors
-    /// [`Error::Read`] when the file cannot be read, or names the line and the key whose value makes no sense.
+    /// [`Error::Read`] when the file cannot be read, or a value is wrong; then the error names the line and
+    /// the key.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = text::read(path, MAX_BYTES, "calibration file")?;
         // Only the keys known here matter, and they are ASCII.
         Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::read(path, reason))
     }
 
-    /// Parses `key=value` lines. Keys that are not known, and lines without `=` that begin with none, are
-    /// skipped; the error names line and key.
+    /// Parses `key=value` lines. Unknown keys, and lines without `=` that do not begin with a known key, are
+    /// skipped. The error names line and key.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut calibration = Self::default();
         for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
@@ -99,14 +101,14 @@ fn number(text: &str) -> std::result::Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("{} is no number", quoted(text)))
 }
 
-/// A whole number from 1.
+/// A whole number of at least 1.
 fn count(text: &str) -> std::result::Result<u32, String> {
-    text.parse().ok().filter(|&v| v > 0).ok_or_else(|| format!("{} is no whole number from 1", quoted(text)))
+    text.parse().ok().filter(|&v| v > 0).ok_or_else(|| format!("{} is no whole number above 0", quoted(text)))
 }
 
 /// A camera matrix `[fx 0 cx; 0 fy cy; 0 0 1]`.
 fn camera(text: &str) -> std::result::Result<Camera, String> {
-    let wrong = || format!("{} is no camera matrix like [f 0 cx; 0 f cy; 0 0 1]", quoted(text));
+    let wrong = || format!("{} is not a camera matrix like [f 0 cx; 0 f cy; 0 0 1]", quoted(text));
     let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).ok_or_else(wrong)?;
     let mut entries = Vec::new();
     for row in inner.split(';') {
@@ -152,7 +154,7 @@ mod tests {
     #[test]
     fn reads_the_benchmarks_file() {
         assert_eq!(Calibration::parse(MOTORCYCLE).unwrap(), expected());
-        // As edited elsewhere.
+        // As other programs save it.
         let edited = format!("\u{feff}{}", MOTORCYCLE.replace('\n', "\r\n\r\n").replace('=', " = "));
         assert_eq!(Calibration::parse(&edited).unwrap(), expected());
     }

@@ -1,4 +1,4 @@
-//! Decoding image files: what they are by their first bytes, and their samples as they stand.
+//! Decoding image files: detecting their kind from their first bytes, and reading their samples as stored.
 
 use std::cell::Cell;
 use std::io::Cursor;
@@ -14,15 +14,15 @@ use crate::error::{Error, ReadError, Result};
 use crate::memory::Claim;
 use crate::text::one_line;
 
-/// The same for files that do not compress, whose smallest pixel is a bit.
+/// The same for uncompressed files, whose smallest pixel is one bit.
 const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;
 
-/// The bytes of a file that begins like an image and is not too large for one of `max_pixels` pixels.
+/// The bytes of a file that begins like an image and is not too large for an image of `max_pixels` pixels.
 pub(super) fn load(path: &Path, max_pixels: u64) -> Result<Vec<u8>> {
     file::load(path, max_pixels, |bytes| Kind::of(bytes).is_none().then(|| unknown(bytes)))
 }
 
-/// What a file is.
+/// The kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Pfm,
@@ -47,7 +47,7 @@ impl Kind {
     }
 }
 
-/// The message for a file that is none of the known kinds.
+/// The message for a file of an unknown kind.
 fn unknown(bytes: &[u8]) -> String {
     const REMEDY: &str = "give PNG, JPEG, PNM, TIFF or PFM";
     match image::guess_format(bytes) {
@@ -62,9 +62,9 @@ pub(super) fn decode_file(path: &Path, max_pixels: u64, no_data: Option<f64>) ->
     decode(&load(path, max_pixels)?, max_pixels, no_data).map_err(|cause| Error::read(path, cause))
 }
 
-/// Decodes a whole file; the error says in one line what is wrong with it. Memory for pixels is taken once the header
-/// is known to claim no more than `max_pixels`, and what the file can hold. Pixels whose every sample is `no_data` are marked;
-/// without it, a TIFF file may say what stands for no data.
+/// Decodes a whole file; the error is one line. Memory for pixels is allocated only once the header is known
+/// to claim no more than `max_pixels`, and no more than the file can hold. Pixels whose samples are all
+/// `no_data` are marked; without it, the no-data value of a TIFF file is used.
 pub(super) fn decode(
     bytes: &[u8],
     max_pixels: u64,
@@ -87,13 +87,14 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether this thread decodes an image. A panic is then caught and becomes an error, so that a panic hook need not speak of it.
+/// Whether this thread is decoding an image. A panic is then caught and becomes an error, so a panic hook may
+/// ignore it.
 #[must_use]
 pub fn is_guarded() -> bool {
     GUARDED.get()
 }
 
-/// Does what foreign decoders do, whose panics are errors of the file.
+/// Runs a foreign decoder, and turns its panics into errors of the file.
 fn guarded<T>(decode: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
     let before = GUARDED.replace(true);
     let decoded = catch_unwind(AssertUnwindSafe(decode));
@@ -121,7 +122,7 @@ fn coded_reason(e: ImageError) -> ReadError {
     if matches!(e, ImageError::Unsupported(_)) { unsupported(text) } else { damaged(text) }
 }
 
-/// The text of an error with the names of PNG chunks in place of the structures that the decoder prints for them.
+/// The text of an error, with the names of PNG chunks in place of the structures that the decoder prints.
 fn plain(text: &str) -> String {
     const BEGIN: &str = "ChunkType { type: ";
     let mut parts = text.split(BEGIN);
@@ -135,7 +136,7 @@ fn plain(text: &str) -> String {
 }
 
 fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Raster<'static>, ReadError> {
-    // What else is in a PNG file, compressed as well, is unpacked before the decoder tells the size.
+    // The decoder unpacks other compressed data of a PNG file before it reports the size.
     let claimed = if format == ImageFormat::Png {
         let (width, height) = png_size(bytes)?;
         check_size(width, height, max_pixels)?;
@@ -152,7 +153,7 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     let plain = format == ImageFormat::Pnm;
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
     check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
-    // The decoder holds rows and their filtered copies beside its pixels.
+    // The decoder holds rows and their filtered copies besides its pixels.
     let _claim = Claim::new(2 * decoder.total_bytes())?;
     let image = DynamicImage::from_decoder(decoder).map_err(coded_reason)?;
     let (channels, samples) = match image {
@@ -175,7 +176,7 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     Ok(Raster { width: width as usize, height: height as usize, channels, samples, no_data: None })
 }
 
-/// (width, height) that a PNG file claims, by the header that must come first.
+/// (width, height) that a PNG file claims, from the header that must come first.
 fn png_size(bytes: &[u8]) -> Result<(u64, u64), ReadError> {
     match bytes.get(8..24) {
         Some([0, 0, 0, 13, b'I', b'H', b'D', b'R', a, b, c, d, e, f, g, h]) => {

@@ -1,4 +1,4 @@
-//! Image files before they are decoded: their bytes, and what their headers may claim.
+//! Image files before they are decoded: their bytes, and the limits on the claims of their headers.
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -8,26 +8,27 @@ use crate::error::{Error, Purpose, ReadError, Result};
 use crate::memory;
 use crate::text::one_line;
 
-/// Most pixels of an image unless the caller says otherwise: as many as 16,384 x 16,384.
+/// Largest number of pixels of an image unless the caller gives another: as many as 16,384 x 16,384.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// No codec here packs more pixels than this into a byte; a header that claims more lies, and believing it would cost memory in
-/// vain.
+/// No codec here packs more pixels than this into a byte. A header that claims more is wrong, and memory
+/// would be allocated for nothing.
 pub(super) const MAX_PIXELS_PER_BYTE: u64 = 10_000;
 
-/// Bytes of a pixel at most: four channels of the widest kind.
+/// Largest number of bytes per pixel: four channels of the widest kind.
 const PIXEL_BYTES: u64 = 32;
 
-/// Bytes of a file that are no pixels, at most: headers, profiles, previews.
+/// Largest number of bytes of a file that are not pixels: headers, profiles, previews.
 const EXTRA_BYTES: u64 = 1 << 26;
 
-/// Bytes that `pixels` pixels take at most, in a file or decoded, and whatever comes with them.
+/// Largest number of bytes that `pixels` pixels take, in a file or decoded, with everything else in the file.
 pub(super) fn most_bytes(pixels: u64) -> u64 {
     pixels.saturating_mul(PIXEL_BYTES).saturating_add(EXTRA_BYTES)
 }
 
-/// The bytes of a file, unless it is too large for an image of `max_pixels` pixels. `refused` says why a file that begins with
-/// these bytes is not read, and spares reading a large one, or one without end.
+/// The bytes of a file, unless it is too large for an image of `max_pixels` pixels. `refused` gets the first
+/// bytes and returns the reason why such a file is not read. This avoids reading a file that is large or
+/// endless.
 pub(super) fn load(
     path: &Path,
     max_pixels: u64,
@@ -60,7 +61,7 @@ pub(super) fn load(
     Ok(bytes)
 }
 
-/// Errors when an image of this size will not be read: it has no pixel, or more than `max_pixels`.
+/// Fails when an image of this size will not be read: it has no pixel, or more than `max_pixels`.
 pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> Result<(), ReadError> {
     if width == 0 || height == 0 {
         return Err(format!("is {width} x {height} and holds no pixel").into());
@@ -71,7 +72,8 @@ pub(super) fn check_size(width: u64, height: u64, max_pixels: u64) -> Result<(),
     Ok(())
 }
 
-/// As [`check_size`], and errors when `bytes` bytes cannot hold so many pixels, of which at most `per_byte` fit into one.
+/// As [`check_size`], and fails when `bytes` bytes cannot hold this many pixels, with at most `per_byte`
+/// pixels per byte.
 pub(super) fn check_claim(
     (width, height): (u64, u64),
     max_pixels: u64,
@@ -88,13 +90,13 @@ pub(super) fn check_claim(
     Ok(())
 }
 
-/// What is wrong with a file that does not decode, and what to do about it.
+/// The error for a file that does not decode, with the remedy.
 pub(super) fn damaged(e: impl std::fmt::Display) -> ReadError {
     let reason = one_line(&e.to_string());
     format!("{reason}; truncated or damaged? get the file again, or convert it to PNG").into()
 }
 
-/// What a decoder does not know, and what to do about it.
+/// The error for a file that a decoder does not support, with the remedy.
 pub(super) fn unsupported(e: impl std::fmt::Display) -> ReadError {
     format!("{}; convert it to PNG", one_line(&e.to_string())).into()
 }

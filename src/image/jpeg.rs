@@ -1,5 +1,5 @@
-//! JPEG files, with a decoder that is told to be strict: by default it fills up what is missing or damaged with grey, and says
-//! nothing.
+//! JPEG files. The decoder runs in strict mode: by default it silently replaces missing or damaged parts with
+//! grey.
 
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -11,8 +11,8 @@ use super::raster::{Raster, Samples};
 use crate::error::ReadError;
 use crate::memory::{self, Claim};
 
-/// Bytes that the decoder takes for a pixel beside its samples, at most: the coefficients of a progressive image, and rows in
-/// between.
+/// Largest number of bytes per pixel that the decoder takes besides the samples: the coefficients of a
+/// progressive image, and intermediate rows.
 const BYTES_BESIDE: u64 = 10;
 
 /// Decodes a file of at most `max_pixels` pixels.
@@ -22,7 +22,7 @@ const BYTES_BESIDE: u64 = 10;
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
     // The decoder takes the end of the file for the end of the pixels.
     if !is_whole(bytes) {
-        return Err(damaged("the JPEG data has no end"));
+        return Err(damaged("the JPEG data ends too early"));
     }
     let options =
         DecoderOptions::default().set_strict_mode(true).set_max_width(usize::MAX).set_max_height(usize::MAX);
@@ -43,12 +43,12 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     Ok(Raster { width: size.0, height: size.1, channels, samples, no_data: None })
 }
 
-/// The error of the decoder, which prints some texts as Rust has them.
+/// The error of the decoder, which prints some values in Rust's debug format.
 fn reason(e: impl std::fmt::Display) -> ReadError {
     damaged(e.to_string().trim_matches('"').trim_start_matches("[strict-mode]: "))
 }
 
-/// Whether the last scan is followed by an end mark. Within a scan, 0xff 0xd9 cannot occur.
+/// Whether the last scan is followed by an end marker. Within a scan, 0xff 0xd9 cannot occur.
 fn is_whole(bytes: &[u8]) -> bool {
     let last = |mark: u8| bytes.windows(2).rposition(|w| w == [0xff, mark]);
     matches!((last(0xda), last(0xd9)), (Some(scan), Some(end)) if end > scan)

@@ -1,4 +1,4 @@
-//! Planes of pixels, and the pair that everything starts from.
+//! Planes of pixels, and the stereo pair.
 
 pub mod calib;
 mod decode;
@@ -27,7 +27,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// All of an image of this (width, height).
+    /// The whole of an image with this (width, height).
     #[must_use]
     pub fn whole((width, height): (usize, usize)) -> Self {
         Self { x: 0..width, y: 0..height }
@@ -39,14 +39,14 @@ impl Rect {
         (self.x.len(), self.y.len())
     }
 
-    /// The same pixels, counted from the first column and row of `outer`, which holds them.
+    /// The same pixels, relative to the first column and row of `outer`, which contains them.
     #[must_use]
     pub fn within(&self, outer: &Self) -> Self {
         let (dx, dy) = (outer.x.start, outer.y.start);
         Self { x: self.x.start - dx..self.x.end - dx, y: self.y.start - dy..self.y.end - dy }
     }
 
-    /// Where it is in an image `width` pixels wide that has left and right exchanged.
+    /// Its position in an image `width` pixels wide after left and right are exchanged.
     #[must_use]
     pub fn mirrored(&self, width: usize) -> Self {
         Self { x: width - self.x.end..width - self.x.start, y: self.y.clone() }
@@ -61,7 +61,7 @@ pub struct Plane<T> {
     data: Vec<T>,
 }
 
-/// Its size: the values of a map fill no log.
+/// Prints only the size: the values of a map would fill a log.
 impl<T> fmt::Debug for Plane<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Plane({} x {})", self.width, self.height)
@@ -114,12 +114,12 @@ impl<T> Plane<T> {
         &self.data
     }
 
-    /// All values, row by row, to change.
+    /// All values, row by row, mutable.
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
 
-    /// The values, row by row, without the plane around them.
+    /// The values, row by row, moved out of the plane.
     #[must_use]
     pub fn into_data(self) -> Vec<T> {
         self.data
@@ -131,7 +131,7 @@ impl<T> Plane<T> {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
-    /// Row `y`, to change.
+    /// Row `y`, mutable.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         &mut self.data[y * self.width..(y + 1) * self.width]
     }
@@ -185,7 +185,7 @@ impl<T> std::ops::Index<(usize, usize)> for Plane<T> {
 }
 
 impl<T> std::ops::IndexMut<(usize, usize)> for Plane<T> {
-    /// The value at (x, y), to change.
+    /// The value at (x, y), mutable.
     fn index_mut(&mut self, (x, y): (usize, usize)) -> &mut T {
         &mut self.data[y * self.width + x]
     }
@@ -195,23 +195,23 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Plane<T> {
 /// from 8-bit files, 0 ..= 65535 at most).
 pub type Pixel = [u16; 4];
 
-/// An image with the mask of what to ignore in it.
+/// An image with its mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// Colour and grey of each pixel.
     pub pixels: Plane<Pixel>,
-    /// `true` where a pixel carries no information: its value is never looked at.
+    /// `true` where a pixel carries no information: its value is never read.
     pub masked: Plane<bool>,
 }
 
-/// Grey of a colour by the weights of ITU-R BT.601, in integers: round(0.299 r + 0.587 g + 0.114 b).
+/// Grey of a colour with the weights of ITU-R BT.601, in integers: round(0.299 r + 0.587 g + 0.114 b).
 #[must_use]
 pub fn grey(r: u16, g: u16, b: u16) -> u16 {
     ((299 * r as u32 + 587 * g as u32 + 114 * b as u32 + 500) / 1000) as u16
 }
 
 impl Image {
-    /// An image from 8-bit colours, nothing masked.
+    /// An image from 8-bit colours, without masked pixels.
     #[must_use]
     pub fn from_rgb8(rgb: &Plane<[u8; 3]>) -> Self {
         let pixels = rgb.map(|&[r, g, b]| {
@@ -240,7 +240,7 @@ impl Image {
         Self { pixels: self.pixels.flipped(), masked: self.masked.flipped() }
     }
 
-    /// What is in `part`.
+    /// The image inside `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
         Self { pixels: self.pixels.crop(part), masked: self.masked.crop(part) }
@@ -259,7 +259,7 @@ impl Image {
     }
 }
 
-/// A rectified pair. The left image is the reference: its pixel (x, y) with disparity d is seen at (x - d, y)
+/// A rectified pair. The left image is the reference: its pixel (x, y) with disparity d appears at (x - d, y)
 /// in the right image. Clones share the images.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pair {
@@ -268,15 +268,15 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// A pair of images of one size.
+    /// A pair of two images of the same size.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when the sizes differ or there is no pixel at all.
+    /// [`Error::Mismatch`] when the sizes differ or the images are empty.
     pub fn new(left: Image, right: Image) -> Result<Self> {
         let (l, r) = (left.pixels.size(), right.pixels.size());
         if l != r {
             return Err(Error::Mismatch(format!(
-                "the left image is {} x {} and the right one {} x {}: a rectified pair has one size",
+                "the left image is {} x {} and the right one {} x {}: both views of a rectified pair have one size",
                 l.0, l.1, r.0, r.1
             )));
         }
@@ -292,7 +292,7 @@ impl Pair {
         &self.left
     }
 
-    /// The reference view, to share.
+    /// The reference view, shared.
     pub(crate) fn shared_left(&self) -> Arc<Image> {
         Arc::clone(&self.left)
     }
@@ -308,13 +308,14 @@ impl Pair {
         &self.right
     }
 
-    /// The pair as in a mirror: the right view, mirrored, takes the left one's place, and disparities stay what they are.
+    /// The pair seen in a mirror: the mirrored right view takes the place of the left one, and disparities
+    /// stay the same.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         Self { left: Arc::new(self.right.mirrored()), right: Arc::new(self.left.mirrored()) }
     }
 
-    /// What is in `part` of both views.
+    /// Both views inside `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
         Self { left: Arc::new(self.left.crop(part)), right: Arc::new(self.right.crop(part)) }

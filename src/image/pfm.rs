@@ -7,27 +7,28 @@ use super::file::{self, MAX_PIXELS};
 use super::save::save;
 use crate::error::{Error, ReadError, Result};
 
-/// What a PFM file holds, the top row first (the file has the bottom row first).
+/// The contents of a PFM file, top row first (the file has the bottom row first).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Pfm {
-    /// One value a pixel (`Pf`).
+    /// One value per pixel (`Pf`).
     Grey(Plane<f32>),
     /// Red, green and blue of each pixel (`PF`).
     Colour(Plane<[f32; 3]>),
 }
 
-/// Reads a PFM file of either byte order. Values come as they are; the magnitude of the scale is ignored, as
-/// the stereo benchmarks do. Comments in the header are skipped.
+/// Reads a PFM file of either byte order. Values are returned as stored; the magnitude of the scale is
+/// ignored, as in the stereo benchmarks. Comments in the header are skipped.
 ///
 /// # Errors
-/// [`Error::Read`] when there is no such file, it is no complete PFM file, or has more than [`MAX_PIXELS`].
+/// [`Error::Read`] when there is no such file, it is no complete PFM file, or it has more than
+/// [`MAX_PIXELS`].
 pub fn read(path: &Path) -> Result<Pfm> {
     let not_pfm = |bytes: &[u8]| (!is_pfm(bytes)).then(|| NOT_PFM.into());
     decode(&file::load(path, MAX_PIXELS, not_pfm)?, MAX_PIXELS).map_err(|cause| Error::read(path, cause))
 }
 
-/// Writes a plane as single-channel PFM, little endian with scale -1.0, whole or not at all.
+/// Writes a plane as single-channel PFM, little endian with scale -1.0, completely or not at all.
 ///
 /// # Errors
 /// [`Error::Write`] when the file cannot be written.
@@ -71,7 +72,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Pfm, ReadError> {
 
     let channels = if colour { 3 } else { 1 };
     let need = (width * height).saturating_mul(channels * 4);
-    // Exactly one byte ends the header, but some writers end lines with two: the length tells.
+    // Exactly one byte ends the header, but some writers end lines with two: the file length decides.
     let two = bytes[at..].starts_with(b"\r\n") && (bytes.len() - at).checked_sub(2) == Some(need);
     at += if two { 2 } else { 1 };
     let data = bytes.get(at..).unwrap_or_default();
@@ -95,7 +96,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Pfm, ReadError> {
     })
 }
 
-/// The next word of the header, behind white space and comments. `at` is left on the byte after it.
+/// The next word of the header, after white space and comments. `at` moves to the byte after it.
 fn token<'a>(bytes: &'a [u8], at: &mut usize) -> Option<&'a str> {
     loop {
         match bytes.get(*at)? {
@@ -105,7 +106,7 @@ fn token<'a>(bytes: &'a [u8], at: &mut usize) -> Option<&'a str> {
         }
     }
     let rest = &bytes[*at..];
-    // No number of a sound header is longer; without a bound a hostile file could be quoted whole.
+    // No valid number in a header is longer. Without a limit, an error could quote a whole malicious file.
     let length = rest.iter().take(40).position(u8::is_ascii_whitespace)?;
     *at += length;
     std::str::from_utf8(&rest[..length]).ok()
@@ -115,7 +116,7 @@ fn dimension(bytes: &[u8], at: &mut usize, name: &str) -> Result<usize, String> 
     let word = token(bytes, at).ok_or_else(|| format!("the PFM header ends before the {name}"))?;
     match word.parse::<u32>() {
         Ok(n) => Ok(n as usize),
-        Err(_) => Err(format!("the PFM header has the {name} {word:?}, which is no number of pixels")),
+        Err(_) => Err(format!("the PFM header has the {name} {word:?}, which is not a number of pixels")),
     }
 }
 
@@ -192,7 +193,7 @@ mod tests {
         refused(b"Pf\n1 1\n-1\n\0\0\0", "truncated");
         refused(b"Pf\n16384 16384\n-1\n\0\0\0", "truncated");
         refused(b"Pf\n16385 16384\n-1\n\0\0\0", "at most 268435456");
-        // No limit of the caller's makes the arithmetic overflow.
+        // The arithmetic does not overflow, whatever limit the caller sets.
         let reason = super::decode(b"PF\n4294967295 4294967295\n-1\n\0", u64::MAX).unwrap_err().to_string();
         assert!(reason.contains("truncated"), "{reason}");
         refused(&[b"Pf\n".as_slice(), &[b'7'; 5000]].concat(), "width");

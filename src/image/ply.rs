@@ -16,18 +16,18 @@ pub struct Point {
     pub confidence: u8,
 }
 
-/// Writes points as binary little-endian PLY, whole or not at all: one element `vertex` with `x`, `y`, `z` (float), `red`,
-/// `green`, `blue` (uchar) and `quality` (float), which is the confidence. Under this name and type `MeshLab` shows it;
-/// a float called `confidence` it misreads, and of any other it says nothing.
+/// Writes points as binary little-endian PLY, completely or not at all: one element `vertex` with `x`, `y`,
+/// `z` (float), `red`, `green`, `blue` (uchar) and `quality` (float), which is the confidence. `MeshLab`
+/// shows it under this name and type. It misreads a float called `confidence`, and ignores any other name.
 ///
 /// # Errors
-/// [`crate::Error::Write`] when the name does not end in `.ply` or the file cannot be written.
+/// [`crate::Error::Write`] when the name does not end in `.ply`, or the file cannot be written.
 pub fn write(path: &Path, points: &[Point]) -> Result<()> {
     write::check_ply_extension(path)?;
     write::save(path, &encode(points))
 }
 
-/// The file's bytes.
+/// The bytes of the file.
 fn encode(points: &[Point]) -> Vec<u8> {
     let header = format!(
         "ply\n\

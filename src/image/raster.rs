@@ -1,4 +1,4 @@
-//! Images as they are stored, and the levels that the matcher sees in them.
+//! Images as they are stored, and their conversion to the levels that the matcher sees.
 
 use std::borrow::Cow;
 
@@ -6,10 +6,10 @@ use super::{Image, Pair, Pixel, Plane, grey};
 use crate::error::{Error, MemoryError, Purpose, Result};
 use crate::memory;
 
-/// Float values and the wider integers end here: 255 in 1/256 of an 8-bit level.
+/// Float values and wide integers are scaled up to this: 255 in 1/256 of an 8-bit level.
 const LINEAR_TOP: f64 = 65280.0;
 
-/// Samples as they are stored, all channels of a pixel next to each other.
+/// Samples as stored, with all channels of a pixel next to each other.
 #[derive(Clone, Debug)]
 pub enum Samples<'a> {
     /// 8 bits.
@@ -18,7 +18,7 @@ pub enum Samples<'a> {
     Word(Cow<'a, [u16]>),
     /// Float.
     Float(Cow<'a, [f32]>),
-    /// Double, and integers that do not fit a word.
+    /// Double precision, and integers that do not fit in a word.
     Double(Cow<'a, [f64]>),
 }
 
@@ -28,7 +28,7 @@ impl Samples<'_> {
     }
 }
 
-/// An image as it is stored, in a file or in memory.
+/// An image as stored, in a file or in memory.
 #[derive(Clone, Debug)]
 pub struct Raster<'a> {
     pub(super) width: usize,
@@ -36,11 +36,11 @@ pub struct Raster<'a> {
     /// 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
     pub(super) channels: usize,
     pub(super) samples: Samples<'a>,
-    /// `true` where a pixel holds no data, row by row; of the size of the image.
+    /// `true` where a pixel holds no data, row by row; as large as the image.
     pub(super) no_data: Option<Vec<bool>>,
 }
 
-/// A type of samples that a frame in memory may have: `u8`, `u16`, `f32` and `f64`.
+/// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
 pub trait Sample: Copy {
     /// Samples of this type.
     fn samples(values: Cow<[Self]>) -> Samples
@@ -73,12 +73,12 @@ impl Sample for f64 {
 }
 
 impl<'a> Raster<'a> {
-    /// A frame of `width` x `height` pixels with `channels` samples each, borrowed. Rows begin `stride` samples apart; where
-    /// that is more than a row takes, the rows are copied.
+    /// Borrows a frame of `width` x `height` pixels with `channels` samples each. Rows begin `stride` samples
+    /// apart; where that is more than the length of a row, the rows are copied.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when it has no pixel, a number of channels other than 1 to 4, or rows that `data` does not hold;
-    /// [`Error::Memory`] when the system has not enough for the copy.
+    /// [`Error::Mismatch`] when it has no pixel, a number of channels other than 1 to 4, or `data` is too
+    /// short for its rows; [`Error::Memory`] when the system has not enough memory for the copy.
     pub fn borrowed<S: Sample>(
         data: &'a [S],
         (width, height): (usize, usize),
@@ -103,10 +103,12 @@ impl<'a> Raster<'a> {
         Self::new(width, height, channels, S::samples(Cow::Owned(rows)))
     }
 
-    /// An image of `channels` a pixel: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 those and alpha.
+    /// An image with `channels` samples per pixel: 1 grey, 2 grey and alpha, 3 red, green and blue, 4 these
+    /// and alpha.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] when it has no pixel or another number of channels, or `samples` are not as many.
+    /// [`Error::Mismatch`] when it has no pixel or another number of channels, or the number of `samples`
+    /// does not match.
     pub fn new(width: usize, height: usize, channels: usize, samples: Samples<'a>) -> Result<Self> {
         let count = match &samples {
             Samples::Byte(v) => v.len(),
@@ -123,10 +125,10 @@ impl<'a> Raster<'a> {
         Ok(Self { width, height, channels, samples, no_data: None })
     }
 
-    /// The image with every pixel masked whose grey, or every one of whose colours, is `value`, as it is stored.
+    /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.
     ///
     /// # Errors
-    /// [`Error::Memory`] when the system has not enough.
+    /// [`Error::Memory`] when the system has not enough memory.
     pub fn without(self, value: f64) -> Result<Self> {
         Ok(self.marked(value)?)
     }
@@ -137,7 +139,7 @@ impl<'a> Raster<'a> {
         Ok(Self { no_data, ..self })
     }
 
-    /// The image with the pixels masked where `ignored` is `true`.
+    /// Masks the pixels where `ignored` is `true`.
     ///
     /// # Errors
     /// [`Error::Mismatch`] when the sizes differ.
@@ -158,7 +160,7 @@ impl<'a> Raster<'a> {
         (self.width, self.height)
     }
 
-    /// `f` of the grey or colour samples of each pixel.
+    /// `f` applied to the grey or colour samples of each pixel.
     pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
         let colours = if self.channels < 3 { 1 } else { 3 };
         let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
@@ -190,7 +192,7 @@ impl<'a> Raster<'a> {
         plane
     }
 
-    /// Calls `f` with the grey or colour samples of every pixel that is not masked.
+    /// Calls `f` with the grey or colour samples of every unmasked pixel.
     pub(super) fn each<S: Copy>(&self, samples: &[S], masked: &Plane<bool>, mut f: impl FnMut(S)) {
         let colours = if self.channels < 3 { 1 } else { 3 };
         for (pixel, _) in samples.chunks_exact(self.channels).zip(masked.data()).filter(|(_, m)| !**m) {
@@ -218,7 +220,8 @@ impl<'a> Raster<'a> {
     }
 }
 
-/// Where the first `colours` of the `n` samples of a pixel are all `value`, rounded as they are. NaN is equal to NaN.
+/// Whether the first `colours` of the `n` samples of a pixel are all `value`, rounded to their type. NaN
+/// counts as equal to NaN.
 #[allow(clippy::float_cmp, reason = "it is that very value that stands for no data")]
 pub(super) fn holding(
     samples: &Samples,
@@ -239,7 +242,7 @@ pub(super) fn holding(
     match samples {
         Samples::Byte(v) => all(v, n, colours, |v| f64::from(v) == value),
         Samples::Word(v) => all(v, n, colours, |v| f64::from(v) == value),
-        // Written with fewer digits, the value is that of the nearest float.
+        // The value may have been written with fewer digits; it then stands for the nearest float.
         Samples::Float(v) => all(v, n, colours, |v| v == value as f32 || v.is_nan() && value.is_nan()),
         Samples::Double(v) => all(v, n, colours, |v| v == value || v.is_nan() && value.is_nan()),
     }
@@ -251,7 +254,7 @@ pub(in crate::image) fn stretched(v: u8) -> u16 {
 }
 
 impl Pair {
-    /// The pair that two frames in memory make, as [`pair`] does.
+    /// The pair of two frames in memory, as [`pair`] makes it.
     ///
     /// # Errors
     /// Those of [`pair`].
@@ -260,17 +263,17 @@ impl Pair {
     }
 }
 
-/// The pair that two images make, their values scaled alike; where `ignored`, the left one is masked. [`Reader::pair`] says
-/// how.
+/// The pair of two images, with their values scaled alike; the left one is masked where `ignored` is `true`.
+/// [`Reader::pair`] gives the rules.
 ///
 /// # Errors
-/// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values; [`Error::Memory`] when the system has
-/// not enough.
+/// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values; [`Error::Memory`]
+/// when the system has not enough memory.
 ///
 /// [`Reader::pair`]: super::read::Reader::pair
 pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Result<Pair> {
     let images = [&left, &right];
-    // Of either view the pixels and their mask.
+    // The pixels and the mask of both views.
     let pixels = left.width as u64 * left.height as u64;
     memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
     if left.samples.is_float() != right.samples.is_float() {
@@ -297,7 +300,7 @@ pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Resul
     Pair::new(l, scale.apply(&right, in_right))
 }
 
-/// From samples to levels, the same for both images of a pair.
+/// The conversion from samples to levels, the same for both images of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Scale {
     /// 8-bit levels, stored as they are or times 257.
@@ -309,7 +312,7 @@ enum Scale {
 }
 
 impl Scale {
-    /// The scale that what is not masked asks for.
+    /// The scale that the unmasked samples need.
     fn of(images: [&Raster; 2], masks: &[Plane<bool>; 2]) -> Self {
         let each = || images.iter().zip(masks);
         if images[0].samples.is_float() {
@@ -355,7 +358,7 @@ impl Scale {
 
     fn double(self, v: f64) -> u16 {
         match self {
-            // Halves, for the difference of two doubles may be none.
+            // Halves are used, because the difference of two doubles may overflow.
             Self::Linear { min, max } if max > min => {
                 ((v / 2.0 - min / 2.0) / (max / 2.0 - min / 2.0) * LINEAR_TOP).round() as u16
             }
@@ -364,7 +367,7 @@ impl Scale {
     }
 }
 
-/// Pixels from samples of `n` channels; what is masked becomes zero, whatever it was.
+/// Pixels from samples of `n` channels; masked pixels become zero.
 fn pixels<S: Copy>(samples: &[S], n: usize, masked: &Plane<bool>, level: impl Fn(S) -> u16) -> Plane<Pixel> {
     let pixel = |(p, masked): (&[S], &bool)| match p {
         _ if *masked => [0; 4],

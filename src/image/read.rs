@@ -1,6 +1,6 @@
 //! Reading pairs, masks and disparity maps.
 //!
-//! What a file is follows from its first bytes, never from its name.
+//! The kind of a file is detected from its first bytes, never from its name.
 
 use std::path::Path;
 
@@ -14,19 +14,21 @@ use crate::error::{Error, ReadError, Result};
 pub use super::decode::is_guarded;
 pub use super::file::MAX_PIXELS;
 
-/// How files are read. The functions of this module read as the default does.
+/// The settings for reading files. The functions of this module use the default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reader {
-    /// Most pixels that an image may have. A file whose header claims more is refused before memory is taken for them, so
-    /// that a small file cannot take all there is. An image takes up to 32 bytes a pixel while it is read.
+    /// Largest number of pixels of an image. A file whose header claims more is rejected before memory is
+    /// allocated for them, so that a small file cannot exhaust the memory. Reading an image takes up to 32
+    /// bytes per pixel.
     pub max_pixels: u64,
-    /// The value that stands for no data in both images of a pair and in maps of disparities, as the file stores it: 0 to 255 of 8
-    /// bits, an index of a palette in TIFF. A pixel is masked whose every sample has it. `None`: what a TIFF file says itself.
+    /// The value that stands for no data, in both images of a pair and in disparity maps, as the file stores
+    /// it: 0 to 255 for 8 bits, an index into the palette in TIFF. A pixel is masked where all of its samples
+    /// have this value. `None`: the value that a TIFF file declares itself.
     pub no_data: Option<f64>,
 }
 
 impl Default for Reader {
-    /// [`MAX_PIXELS`], and what files say themselves of no data.
+    /// [`MAX_PIXELS`], and the no-data value that a file declares itself.
     fn default() -> Self {
         Self { max_pixels: MAX_PIXELS, no_data: None }
     }
@@ -45,16 +47,17 @@ impl Reader {
     /// - float, signed, or wider than 16 bits: linearly, from the least to the largest unmasked value of both images
     ///   to 0 ..= 65280.
     ///
-    /// Before that, whatever the file packs is unpacked: palettes become colours, fewer than 8 bits span the levels of 8,
-    /// those from 9 to 15 are words, PNM counts up to what it says is white, YCbCr and CMYK (JPEG, TIFF) become RGB, white
-    /// that is 0 becomes bright, alpha that the colours have been multiplied by is divided out, and rows, planes and tiles come
-    /// in order. Of several images in a TIFF file the first is read that is no reduced copy and no mask. Pixels are taken as
-    /// they are stored: an orientation in the file turns nothing, for it is as stored that a pair is rectified.
+    /// Before that, packed samples are unpacked: palettes become colours, fewer than 8 bits are stretched to
+    /// all 8-bit levels, 9 to 15 bits become words, and PNM counts up to its declared white. YCbCr and CMYK
+    /// (JPEG, TIFF) become RGB, images whose white is 0 are inverted, and colours premultiplied by alpha are
+    /// divided by it. Rows, planes and tiles are put in order. A TIFF file with several images is read from
+    /// the first one that is no reduced copy and no mask. Pixels are taken as they are stored: an orientation
+    /// tag is ignored, because a pair is rectified as it is stored.
     ///
-    /// Masked are pixels with alpha 0, a transparent palette entry included, pixels with a value that is not finite, and
-    /// those whose every sample stands for no data ([`Reader::no_data`]); any other alpha says nothing. Negative values are
-    /// values like others. `mask` is an image of the size of the left one; where it is not black, the left image is masked as
-    /// well. A masked pixel holds zeros.
+    /// A pixel is masked where its alpha is 0 (which includes a transparent palette entry), where one of its
+    /// values is not finite, and where all of its samples stand for no data ([`Reader::no_data`]). Any other
+    /// alpha is ignored. Negative values are ordinary values. `mask` is an image of the size of the left one;
+    /// where it is not black, the left image is masked as well. A masked pixel holds zeros.
     ///
     /// # Errors
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
@@ -66,7 +69,7 @@ impl Reader {
         let [l, r] = &images;
         if l.size() != r.size() {
             return Err(Error::Mismatch(format!(
-                "{} is {} x {} and {} is {} x {}: a rectified pair has one size",
+                "{} is {} x {} and {} is {} x {}: both views of a rectified pair have one size",
                 left.display(),
                 l.width,
                 l.height,
@@ -120,8 +123,8 @@ impl Reader {
         Ok(plane)
     }
 
-    /// Reads 8-bit levels, such as those of Middlebury's left-right check masks, from any integer image that [`Reader::pair`] reads:
-    /// of 16 bits the upper 8, of colours the grey.
+    /// Reads 8-bit levels, such as those of Middlebury's visibility masks, from any integer image that
+    /// [`Reader::pair`] reads: of 16 bits the upper 8, of colours the grey.
     ///
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`], and for float values.
@@ -144,8 +147,8 @@ impl Reader {
         }
     }
 
-    /// Reads a disparity map in pixels; what is invalid becomes +infinity. PFM and float TIFF hold disparities as
-    /// they are (not finite: invalid), 16-bit PNG holds them times 256 (0: invalid).
+    /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM and float TIFF hold disparities
+    /// as they are (not finite = invalid), 16-bit PNG holds them times 256 (0 = invalid).
     ///
     /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these ways.
@@ -181,11 +184,11 @@ impl Reader {
         Ok(map)
     }
 
-    /// Reads an 8-bit PNG that holds disparities times `scale`, as the ground truth of the older Middlebury sets; 0 is
-    /// unknown and becomes +infinity.
+    /// Reads an 8-bit PNG that holds disparities times `scale`, as in the ground truth of the older
+    /// Middlebury sets; 0 means unknown and becomes +infinity.
     ///
     /// # Errors
-    /// [`Error::Read`] when the file is missing, damaged, or anything else than a grey 8-bit PNG.
+    /// [`Error::Read`] when the file is missing, damaged, or not a grey 8-bit PNG.
     pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
         let bytes = load(path, self.max_pixels)?;
         let kind = Kind::of(&bytes);
@@ -211,7 +214,7 @@ impl Pair {
     }
 }
 
-/// [`Reader::pair`] by the default.
+/// [`Reader::pair`] with the default settings.
 ///
 /// # Errors
 /// Those of [`Reader::pair`].
@@ -219,7 +222,7 @@ pub fn pair(left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
     Reader::default().pair(left, right, mask)
 }
 
-/// [`Reader::mask`] by the default.
+/// [`Reader::mask`] with the default settings.
 ///
 /// # Errors
 /// Those of [`Reader::mask`].
@@ -227,7 +230,7 @@ pub fn mask(path: &Path) -> Result<Plane<bool>> {
     Reader::default().mask(path)
 }
 
-/// [`Reader::grey8`] by the default.
+/// [`Reader::grey8`] with the default settings.
 ///
 /// # Errors
 /// Those of [`Reader::grey8`].
@@ -235,7 +238,7 @@ pub fn grey8(path: &Path) -> Result<Plane<u8>> {
     Reader::default().grey8(path)
 }
 
-/// [`Reader::disparity`] by the default.
+/// [`Reader::disparity`] with the default settings.
 ///
 /// # Errors
 /// Those of [`Reader::disparity`].
@@ -243,7 +246,7 @@ pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
     Reader::default().disparity(path)
 }
 
-/// [`Reader::scaled_disparity`] by the default.
+/// [`Reader::scaled_disparity`] with the default settings.
 ///
 /// # Errors
 /// Those of [`Reader::scaled_disparity`].

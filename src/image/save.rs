@@ -1,4 +1,5 @@
-//! Files that appear whole or not at all. A symbolic link stays one: what it points to is written, there already or not.
+//! Files that are written completely or not at all. A symbolic link stays a link: its target is written,
+//! whether it exists or not.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -8,12 +9,12 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
 
-/// Links that are followed, at most.
+/// Largest number of links that are followed.
 const MAX_LINKS: usize = 40;
 
-/// Where bytes go.
+/// The destination of a file.
 pub(super) enum Target {
-    /// A regular file, there already or not: another one takes its place once it is whole.
+    /// A regular file, existing or not: it is replaced once the new file is complete.
     File { file: PathBuf, folder: PathBuf },
     /// Anything else that exists: a device or a pipe must not be replaced by a file.
     Special,
@@ -52,12 +53,12 @@ impl Target {
     }
 }
 
-/// Where the links lead that begin at `path`, if it is one.
+/// The target of the chain of links that begins at `path`, or `path` itself.
 fn followed(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
         match fs::read_link(&path) {
-            // It counts from the folder of the link.
+            // A relative target starts at the folder of the link.
             Ok(next) => path = path.parent().unwrap_or(Path::new("")).join(next),
             Err(_) => return Ok(path),
         }
@@ -65,9 +66,9 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("its links lead in a circle"))
 }
 
-/// A file in the making, gone when dropped.
+/// An unfinished file, which is deleted when dropped.
 enum Temporary {
-    /// Without a name: it is gone whatever ends the program.
+    /// Without a name: it disappears no matter how the program ends.
     #[cfg(target_os = "linux")]
     Unnamed(File),
     Named(NamedTempFile),
@@ -84,7 +85,7 @@ impl Temporary {
         })
     }
 
-    /// The file alone: with its name an error would tell that.
+    /// The bare file: with its name, errors would mention the temporary name.
     fn file(&mut self) -> &mut File {
         match self {
             #[cfg(target_os = "linux")]
@@ -93,13 +94,13 @@ impl Temporary {
         }
     }
 
-    /// Gives it its name, which another file may have.
+    /// Gives it its name, replacing an existing file.
     fn persist(self, name: &Path) -> io::Result<()> {
         match self {
             #[cfg(target_os = "linux")]
             Self::Unnamed(file) => match link(&file, name) {
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-                    // Only a name can take the place of another.
+                    // Only a named file can replace another.
                     let folder =
                         name.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
                     let other = builder().make_in(folder, |other| link(&file, other))?;
@@ -117,14 +118,14 @@ fn builder() -> tempfile::Builder<'static, 'static> {
     builder.prefix(".mrfgs-").suffix(".tmp");
     #[cfg(unix)]
     {
-        // Temporary files are private by default; an output is as open as the umask lets it be.
+        // Temporary files are private by default; an output is as readable as the umask allows.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder
 }
 
-/// A file without a name in `folder`, where the file system has such files and they can be given one.
+/// A file without a name in `folder`, where the file system supports such files and can name them later.
 #[cfg(target_os = "linux")]
 fn unnamed(folder: &Path) -> io::Result<File> {
     use rustix::fs::{Mode, OFlags};
@@ -134,22 +135,22 @@ fn unnamed(folder: &Path) -> io::Result<File> {
     fs::symlink_metadata(place(&file)).map(|_| file)
 }
 
-/// Where the system shows an open file.
+/// The path under which the system shows an open file.
 #[cfg(target_os = "linux")]
 fn place(file: &File) -> PathBuf {
     use std::os::fd::AsRawFd;
     PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
 }
 
-/// Gives a file without a name the name `name`, which no other may have.
+/// Gives a file without a name the name `name`, which must be free.
 #[cfg(target_os = "linux")]
 fn link(file: &File, name: &Path) -> io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
     Ok(linkat(CWD, place(file), CWD, name, AtFlags::SYMLINK_FOLLOW)?)
 }
 
-/// Writes a file that appears whole or not at all. What exists and is no regular file is written to directly; a symbolic link
-/// is followed.
+/// Writes a file completely or not at all. An existing path that is not a regular file is written to
+/// directly; a symbolic link is followed.
 ///
 /// # Errors
 /// [`Error::Write`] when the file cannot be written.
@@ -162,14 +163,14 @@ pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
         Target::File { file, folder } => {
             let mut temporary = Temporary::new(path, &folder)?;
             temporary.file().write_all(bytes).map_err(error)?;
-            // Else a crash of the machine could leave the name without the content.
+            // Otherwise a crash of the machine could leave the name without the contents.
             temporary.file().sync_all().map_err(error)?;
             temporary.persist(&file).map_err(error)
         }
     }
 }
 
-/// Moves the file `staged` to `path`, whatever is there; a symbolic link is followed.
+/// Moves the file `staged` to `path`, replacing what is there; a symbolic link is followed.
 ///
 /// # Errors
 /// [`Error::Write`] for `path` when it cannot be moved.
@@ -186,7 +187,7 @@ pub fn publish(staged: &Path, path: &Path) -> Result<()> {
     }
 }
 
-/// Removes the file that `path` is or leads to; that there is none is no error.
+/// Removes the file at `path`, or at the target of its links. A missing file is no error.
 ///
 /// # Errors
 /// [`Error::Write`] for `path` when it cannot be removed.
@@ -211,7 +212,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("below")).unwrap();
-        // To a file, to nothing yet, through another link, and as an absolute path.
+        // Links to a file, to nothing yet, through another link, and as an absolute path.
         fs::write(at("below/there"), "old").unwrap();
         for (link, to) in [("a", "below/there"), ("b", "below/new"), ("c", "a")] {
             symlink(to, at(link)).unwrap();

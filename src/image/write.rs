@@ -1,4 +1,4 @@
-//! Writing maps and pictures: whole or not at all.
+//! Writing maps and pictures: a file is written completely or not at all.
 
 use std::fs;
 use std::io::{Cursor, Seek, Write};
@@ -19,7 +19,7 @@ pub use super::save::{publish, remove, save};
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;
 
-/// How a disparity map is stored.
+/// The format of a disparity map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Pfm,
@@ -27,15 +27,15 @@ enum Format {
     Tiff,
 }
 
-/// Writes a disparity map (in pixels; what is not finite is invalid) in the format that the extension names:
+/// Writes a disparity map (in pixels; not finite = invalid) in the format of the extension:
 ///
-/// - `.pfm`: float, invalid is +infinity;
-/// - `.tif`, `.tiff`: float, invalid is NaN, which GDAL's tag for no data says;
-/// - `.png`: 16 bits, disparity times 256, invalid is 0, as in the KITTI benchmark. Disparities from 0 to below 256 only; a
-///   valid one that would round to 0 becomes 1.
+/// - `.pfm`: float; invalid is +infinity;
+/// - `.tif`, `.tiff`: float; invalid is NaN, which GDAL's no-data tag declares;
+/// - `.png`: 16 bits, disparity times 256; invalid is 0, as in the KITTI benchmark. Only disparities from 0
+///   to below 256; a valid one that would round to 0 becomes 1.
 ///
-/// What exists and is no regular file (`/dev/null`, a pipe) is written to directly, as PFM when its name has
-/// no known extension.
+/// An existing path that is not a regular file (`/dev/null`, a pipe) is written to directly, as PFM when its
+/// name has no known extension.
 ///
 /// # Errors
 /// [`Error::Write`] for an unknown extension, a disparity that PNG cannot hold, or a file that cannot be
@@ -53,7 +53,7 @@ pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
 }
 
 impl Plane<f32> {
-    /// Writes this map of disparities, as [`disparity`] does.
+    /// Writes this disparity map, as [`disparity`] does.
     ///
     /// # Errors
     /// Those of [`disparity`].
@@ -62,8 +62,8 @@ impl Plane<f32> {
     }
 }
 
-/// Writes a depth map (what is not finite is invalid) as [`disparity`] writes disparities, but not as PNG, which holds no
-/// unit.
+/// Writes a depth map (not finite = invalid) as [`disparity`] writes disparities, but not as PNG, which has
+/// no unit.
 ///
 /// # Errors
 /// [`Error::Write`] for an extension other than `.pfm`, `.tif` and `.tiff`, or a file that cannot be written.
@@ -72,12 +72,12 @@ pub fn depth(path: &Path, map: &Plane<f32>) -> Result<()> {
     disparity(path, map)
 }
 
-/// Says before any computing whether [`disparity`] will be able to write a map with disparities from
-/// `min_disparity` to `max_disparity` (pixels, both inclusive) to `path`. A file that is there stays untouched.
+/// Checks before any computation that [`disparity`] will be able to write a map with disparities from
+/// `min_disparity` to `max_disparity` (pixels, both inclusive) to `path`. An existing file stays untouched.
 ///
 /// # Errors
-/// [`Error::Write`] when the extension is unknown, the path is a folder or lies in none that can be written to,
-/// or the format cannot hold the range.
+/// [`Error::Write`] when the extension is unknown, the path is a folder or its folder is not writable, or the
+/// format cannot hold the range.
 pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32) -> Result<()> {
     if format(path)? == Format::Png && (min_disparity < 0 || max_disparity > 255) {
         let reason = format!(
@@ -89,39 +89,38 @@ pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32)
     Target::of(path)?.check(path)
 }
 
-/// Says before any computing whether [`depth`] will be able to write a map to `path`.
+/// Checks before any computation that [`depth`] will be able to write a map to `path`.
 ///
 /// # Errors
-/// [`Error::Write`] when the extension is none of `.pfm`, `.tif` and `.tiff`, or the path is a folder or lies in none that
-/// can be written to.
+/// [`Error::Write`] when the extension is none of `.pfm`, `.tif` and `.tiff`, the path is a folder, or its
+/// folder is not writable.
 pub fn check_depth_path(path: &Path) -> Result<()> {
     check_float(path)?;
     Target::of(path)?.check(path)
 }
 
-/// Says before any computing whether a point cloud can be written to `path`.
+/// Checks before any computation that a point cloud can be written to `path`.
 ///
 /// # Errors
-/// [`Error::Write`] when the extension is not `.ply`, or the path is a folder or lies in none that can be written to.
+/// [`Error::Write`] when the extension is not `.ply`, the path is a folder, or its folder is not writable.
 pub fn check_ply_path(path: &Path) -> Result<()> {
     check_ply_extension(path)?;
     Target::of(path)?.check(path)
 }
 
-/// Says before any computing whether a PNG picture can be written to `path`.
+/// Checks before any computation that a PNG picture can be written to `path`.
 ///
 /// # Errors
-/// [`Error::Write`] when the extension is not `.png`, or the path is a folder or lies in none that can be
-/// written to.
+/// [`Error::Write`] when the extension is not `.png`, the path is a folder, or its folder is not writable.
 pub fn check_png_path(path: &Path) -> Result<()> {
     png_extension(path)?;
     Target::of(path)?.check(path)
 }
 
-/// Says before any computing whether a file can be written to `path`, whatever its name ends in.
+/// Checks before any computation that a file can be written to `path`, with any extension.
 ///
 /// # Errors
-/// [`Error::Write`] when the path is a folder or lies in none that can be written to.
+/// [`Error::Write`] when the path is a folder, or its folder is not writable.
 pub fn check_path(path: &Path) -> Result<()> {
     Target::of(path)?.check(path)
 }
@@ -147,7 +146,7 @@ pub fn rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<()> {
 /// The bytes of the file that [`rgb8`] would write to `path`.
 ///
 /// # Errors
-/// [`Error::Write`] when PNG holds no picture of this size.
+/// [`Error::Write`] when PNG cannot hold a picture of this size.
 pub fn encode_rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<Vec<u8>> {
     png(path, plane.data().as_flattened(), plane.size(), ExtendedColorType::Rgb8)
 }
@@ -193,7 +192,7 @@ fn is_special(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// Disparities as KITTI stores them.
+/// Disparities in KITTI's format.
 fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
     let level = |&d: &f32| {
         let level = (d * PNG_SCALE).round();
@@ -210,7 +209,7 @@ fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
     map.data().iter().map(level).collect()
 }
 
-/// A PNG file; samples of 16 bits are in the byte order of the machine.
+/// A PNG file; 16-bit samples are in the byte order of the machine.
 fn png(path: &Path, samples: &[u8], size: (usize, usize), kind: ExtendedColorType) -> Result<Vec<u8>> {
     let (w, h) = png_or_tiff_size(path, size)?;
     let mut bytes = Vec::new();
@@ -221,7 +220,7 @@ fn png(path: &Path, samples: &[u8], size: (usize, usize), kind: ExtendedColorTyp
 fn tiff(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
     let (w, h) = png_or_tiff_size(path, map.size())?;
     let mut bytes = Cursor::new(Vec::new());
-    // Offsets in plain TIFF end at 4 GiB; few programs read BigTIFF, so only what needs it gets it.
+    // Offsets in plain TIFF end at 4 GiB. Few programs read BigTIFF, so it is used only where it is needed.
     let written = if map.data().len() < 1_000_000_000 {
         TiffEncoder::new(&mut bytes).and_then(|e| tiff_image(e, (w, h), map.data()))
     } else {
@@ -237,7 +236,7 @@ fn tiff_image<W: Write + Seek, K: TiffKind>(
     values: &[f32],
 ) -> TiffResult<()> {
     let mut image = encoder.new_image::<Gray32Float>(width, height)?;
-    // By GDAL, and so for whatever stands on it.
+    // GDAL's tag, which the programs based on GDAL read too.
     image.encoder().write_tag(Tag::GdalNodata, "nan")?;
     image.write_data(values)
 }
@@ -408,7 +407,7 @@ mod tests {
         disparity(null, &Plane::filled(1, 1, 0.0)).unwrap();
         rgb8(null, &Plane::filled(1, 1, [0; 3])).unwrap();
         assert!(is_special(null));
-        // The disk that is always full.
+        // A disk that is always full.
         let error = disparity(Path::new("/dev/full"), &Plane::filled(1, 1, 0.0)).unwrap_err();
         assert!(matches!(error, Error::Write { .. }), "{error}");
     }

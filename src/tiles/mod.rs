@@ -1,16 +1,17 @@
-//! How a pair that is too large for the memory is cut: volumes are per tile, maps never are.
+//! Splits a pair whose volumes do not fit in memory into tiles: volumes are per tile, maps are always whole.
 //!
-//! Pure: it follows from the plan of the whole image alone, so the bits are the same on every machine.
+//! The split is pure: it depends on the plan of the whole image alone, so the bits are the same on every
+//! machine.
 //!
 //! ```text
 //! crop: ─────────────────────────────────────────────
 //!       │ reach │ overlap │      core      │ overlap │
 //! ```
 //!
-//! The cores share out the image; of its crop a tile leaves nothing else behind. The overlap gives the core's outermost
-//! pixels the surroundings that they have in the whole image. The reach is where their matches lie, as the right view is
-//! cropped alike: it is as wide as the largest disparity, and where disparities are negative there is one on the right too.
-//! At the borders of the image a crop ends.
+//! The cores partition the image; only the core of a tile's crop enters the maps. The overlap gives the
+//! core's outermost pixels the surroundings that they have in the whole image. The reach contains their
+//! matches, because the right view is cropped in the same way: it is as wide as the largest disparity, and
+//! where disparities are negative there is one on the right too. A crop ends at the borders of the image.
 
 pub mod mosaic;
 
@@ -21,22 +22,23 @@ use std::ops::Range;
 
 /// Width of the overlap in pixels, rounded up to whole pixels of the coarsest level (32 of them by default).
 ///
-/// Measured by the share of pixels that a cut moves by more than 1 px (default preset; 0, 32, 64 and 96 px, as the grid has
-/// it). Five Middlebury pairs in 2 to 4 tiles: 0.00 to 0.19 % without a overlap, at most 0.002 % with 32, at most 0.001 % with
-/// 64 or 96. Seven rendered scenes in 2 to 12: 0.00 to 0.90 % without, none with 32. The plain wall, whose only hold is far
-/// away: 5 and 11 % without, 0.11 % and none with 32. No overlap helps where labels are limited by texture zones, for each tile
-/// finds its own: of two pairs, a fifth to a half of the pixels move, towards the truth as often as away from it.
+/// Measured by the share of pixels that tiling moves by more than 1 px (default preset; 0, 32, 64 and 96 px,
+/// as the grid allows). Five Middlebury pairs in 2 to 4 tiles: 0.00 to 0.19 % without an overlap, at most
+/// 0.002 % with 32, at most 0.001 % with 64 or 96. Seven rendered scenes in 2 to 12 tiles: 0.00 to 0.90 %
+/// without, none with 32. The plain wall, whose only cues are far away: 5 and 11 % without, 0.11 % and none
+/// with 32. No overlap helps where texture zones limit the labels, because each tile finds its own zones: in
+/// two pairs, a fifth to a half of the pixels move, towards the truth as often as away from it.
 pub const OVERLAP: usize = 32;
 
 /// A part of the image that is matched by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// The pixels that it leaves to the maps.
+    /// The pixels that enter the maps.
     pub core: Rect,
-    /// The pixels that are matched. They start at a whole pixel of the coarsest level, so that the pyramid's grids are those
-    /// of the whole image.
+    /// The pixels that are matched. The crop starts at a whole pixel of the coarsest level, so that the
+    /// pyramid's grids are those of the whole image.
     pub crop: Rect,
-    /// The plan for the crop; its [`Plan::core`] is the core's columns, seen from the crop.
+    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop.
     pub plan: Plan,
 }
 
@@ -48,8 +50,9 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// The tiles for a match by `whole`, which is the plan for the whole image: one where that fits the memory of its method;
-    /// else those that do and crop the fewest pixels in all.
+    /// The tiles for a match by `whole`, the plan for the whole image. There is one tile where the whole
+    /// image fits in the memory of its method; otherwise the tiles are those that fit and crop the fewest
+    /// pixels in all.
     ///
     /// # Errors
     /// [`Error::Budget`](crate::Error::Budget) when no tile is small enough.
@@ -57,7 +60,7 @@ impl Tiles {
         Self::with_overlap(whole, OVERLAP)
     }
 
-    /// As [`Tiles::new`], with a overlap of at least `overlap` pixels, to see what it is good for.
+    /// As [`Tiles::new`], with an overlap of at least `overlap` pixels, to measure its effect.
     ///
     /// # Errors
     /// As [`Tiles::new`].
@@ -78,7 +81,7 @@ impl Tiles {
         let bytes = |(width, height): (usize, usize)| beside(whole) + whole.resized(width, height).bytes();
         let candidates = (1..=across.most()).filter_map(|columns| {
             let width = across.crop(columns);
-            // The fewest rows of tiles that fit.
+            // The smallest number of rows of tiles that fits.
             let rows = partition(1..down.most() + 1, |rows| bytes((width, down.crop(rows))) <= memory)?;
             let size = (width, down.crop(rows));
             Some((across.cropped(size.0) * down.cropped(size.1), size))
@@ -96,7 +99,7 @@ impl Tiles {
         };
         let rows = down.spans(height);
         let mut tiles = Vec::new();
-        // Down first: crops of one column have one width.
+        // Column by column: all crops of a column have the same width.
         for [core_x, crop_x] in across.spans(width) {
             for [core_y, crop_y] in &rows {
                 let core = Rect { x: core_x.clone(), y: core_y.clone() };
@@ -121,20 +124,20 @@ impl Tiles {
         &self.tiles
     }
 
-    /// How many they are.
+    /// The number of tiles.
     #[must_use]
     pub fn count(&self) -> usize {
         self.tiles.len()
     }
 
-    /// The plan that takes the most memory: that of the whole image where it is in one piece.
+    /// The plan that takes the most memory: the plan of the whole image where there is one tile.
     #[must_use]
     pub fn largest(&self) -> &Plan {
         let plans = self.tiles.iter().map(|tile| &tile.plan);
         plans.max_by_key(|plan| plan.bytes()).unwrap_or(&self.whole)
     }
 
-    /// Bytes that the match takes, at most.
+    /// Largest number of bytes that the match takes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let whole = if self.count() == 1 { 0 } else { beside(&self.whole) };
@@ -142,12 +145,12 @@ impl Tiles {
     }
 }
 
-/// Bytes that a match in tiles takes beside the tile at hand.
+/// Bytes that a match in tiles takes besides the current tile.
 fn beside(whole: &Plan) -> u64 {
     whole.pair_bytes() + whole.mosaic_bytes()
 }
 
-/// The smallest in `range` for which `holds`, which holds for all above it.
+/// The smallest number in `range` for which `holds` is true; it must be true for all larger ones.
 fn partition(range: Range<usize>, holds: impl Fn(usize) -> bool) -> Option<usize> {
     let Range { start: mut low, end: mut high } = range.clone();
     while low < high {
@@ -161,7 +164,7 @@ fn partition(range: Range<usize>, holds: impl Fn(usize) -> bool) -> Option<usize
     (low < range.end).then_some(low)
 }
 
-/// The cuts along one side of the image.
+/// The split along one side of the image.
 struct Axis {
     /// Pixels of the image.
     length: usize,
@@ -176,24 +179,24 @@ impl Axis {
         Self { length, around: around.map(|pixels| pixels.next_multiple_of(step)), step }
     }
 
-    /// What two crops side by side share.
+    /// The width that two adjacent crops share.
     fn shared(&self) -> usize {
         self.around[0] + self.around[1]
     }
 
-    /// The most tiles that make sense.
+    /// The largest useful number of tiles.
     fn most(&self) -> usize {
         self.length.div_ceil(self.step)
     }
 
-    /// Pixels of the largest crop if `count` tiles share out the image evenly.
+    /// Pixels of the largest crop if the image is split evenly into `count` tiles.
     fn crop(&self, count: usize) -> usize {
         let all = self.length + (count - 1) * self.shared();
         let even = all.div_ceil(count).next_multiple_of(self.step);
         even.max(self.shared() + self.step).min(self.length)
     }
 
-    /// Pixels of all crops if none has more than `crop`.
+    /// Pixels of all crops together if none has more than `crop`.
     fn cropped(&self, crop: usize) -> usize {
         if crop >= self.length {
             return self.length;
@@ -202,7 +205,7 @@ impl Axis {
         self.length + borders * self.shared()
     }
 
-    /// Cores and crops of at most `crop` pixels, as few as can be.
+    /// Cores and crops of at most `crop` pixels, as few as possible.
     fn spans(&self, crop: usize) -> Vec<[Range<usize>; 2]> {
         let [before, after] = self.around;
         let mut spans: Vec<[Range<usize>; 2]> = Vec::new();

@@ -1,4 +1,4 @@
-//! Comparison of volumes and maps that says where they part.
+//! Comparison of volumes and maps that reports where they first differ.
 
 use super::twin::Finest;
 use mrfgs::image::Plane;
@@ -6,7 +6,8 @@ use mrfgs::low_level::backend::{Backend, Volume, volume_shape};
 use mrfgs::low_level::plan::Plan;
 use std::fmt::Debug;
 
-/// Where `actual` first differs from `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and how often.
+/// Where `actual` first differs from `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and how often
+/// they differ.
 pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) -> Result<(), String> {
     let (rows, labels, _) = volume_shape(plan, volume);
     let (level, slots) = match volume {

@@ -1,4 +1,4 @@
-//! Every backend that this machine can run, for tests that hold each of them to the twins.
+//! Every backend that this machine can run, for tests that compare each of them with the twins.
 
 use mrfgs::Result;
 use mrfgs::image::Plane;
@@ -13,25 +13,26 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// Devices that no test is using: opening one and compiling its shaders takes longer than most tests.
+/// Devices that no test is using: opening a device and compiling its shaders takes longer than most tests.
 static IDLE: Mutex<Vec<Gpu>> = Mutex::new(Vec::new());
 
-/// A GPU of its own, with a faults. `None`, said on stderr, where there is no driver; a panic where
-/// `MRFGS_REQUIRE_GPU` is set and not 0.
+/// A separate GPU with injected faults. Where there is no driver it is `None`, reported on stderr, or a panic
+/// if `MRFGS_REQUIRE_GPU` is set and not 0.
 pub fn open(faults: FaultInjection) -> Option<Gpu> {
     match Gpu::with_faults(None, faults) {
         Ok(gpu) => Some(gpu),
         Err(e) => {
             let required = std::env::var("MRFGS_REQUIRE_GPU").is_ok_and(|v| v != "0" && !v.is_empty());
             assert!(!required, "MRFGS_REQUIRE_GPU is set and there is none: {e}");
-            // Past the capture of the test harness: a test without its GPU must not look like one that passed.
+            // Bypasses the capture of the test harness: a test without its GPU must not look like a passed
+            // one.
             let _ = writeln!(std::io::stderr(), "SKIPPED on the GPU: {e}");
             None
         }
     }
 }
 
-/// A device, an idle one if there is one.
+/// A device, an idle one if possible.
 pub fn gpu() -> Option<Pooled> {
     let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
     idle.or_else(|| open(FaultInjection::default())).map(|gpu| Pooled(Some(gpu)))
@@ -39,7 +40,7 @@ pub fn gpu() -> Option<Pooled> {
 
 /// Name and a fresh instance of every backend.
 ///
-/// The twins are no backend and never in this list: a backend that were compared with itself would always pass.
+/// The twins are not a backend and never in this list: a backend compared with itself would always pass.
 pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
     let mut all: Vec<(String, Box<dyn Backend>)> = vec![("cpu".into(), Box::new(Cpu::default()))];
     if let Some(gpu) = gpu() {
@@ -48,7 +49,7 @@ pub fn backends() -> Vec<(String, Box<dyn Backend>)> {
     all
 }
 
-/// A device that goes back to the idle ones when it is dropped.
+/// A device that returns to the idle ones when it is dropped.
 pub struct Pooled(Option<Gpu>);
 
 impl Pooled {

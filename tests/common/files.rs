@@ -1,12 +1,12 @@
-//! Image files byte by byte, for what no encoder at hand writes: small bit depths, palettes, interlacing, and headers that
-//! lie.
+//! Image files built byte by byte, for features that no available encoder writes: small bit depths, palettes,
+//! interlacing, and wrong headers.
 
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of it")]
 
-/// A PNG file whose header claims `size`; `rows` are its filtered rows, of every pass where it is interlaced.
+/// A PNG file whose header claims `size`; `rows` are its filtered rows, of all passes where it is interlaced.
 pub struct Png<'a> {
     pub size: (u32, u32),
-    /// Bits of a sample.
+    /// Bits per sample.
     pub depth: u8,
     /// 0 grey, 2 colour, 3 palette, 4 grey and alpha, 6 colour and alpha.
     pub colour: u8,
@@ -43,7 +43,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-/// A zlib stream that holds `data`, at most 65,535 bytes, as they are.
+/// A zlib stream that stores `data`, at most 65,535 bytes, uncompressed.
 fn stored(data: &[u8]) -> Vec<u8> {
     let length = u16::try_from(data.len()).expect("one block");
     let (a, b) = data.iter().fold((1, 0), |(a, b), byte| {
@@ -54,8 +54,8 @@ fn stored(data: &[u8]) -> Vec<u8> {
     [&[0x78, 1, 1][..], &lengths, data, &(b << 16 | a).to_be_bytes()].concat()
 }
 
-/// A TIFF file, little endian: its one directory at byte 8, then `data`. An entry is tag, type (3 for 16 bits, 4 for 32),
-/// count, and value or place.
+/// A little-endian TIFF file: its only directory at byte 8, then `data`. An entry is tag, type (3 for 16
+/// bits, 4 for 32), count, and value or position.
 pub fn tiff(entries: &[(u16, u16, u32, u32)], data: &[u8]) -> Vec<u8> {
     let mut out = b"II*\0\x08\0\0\0".to_vec();
     out.extend((entries.len() as u16).to_le_bytes());
@@ -68,7 +68,7 @@ pub fn tiff(entries: &[(u16, u16, u32, u32)], data: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Where the data of a [`tiff`] with so many entries begin.
+/// Position of the data in a [`tiff`] file with this many entries.
 pub fn tiff_data(entries: usize) -> u32 {
     8 + 2 + 12 * entries as u32 + 4
 }
@@ -87,7 +87,7 @@ pub enum Values<'a> {
 pub struct Tiff<'a> {
     pub big_endian: bool,
     pub tiled: bool,
-    /// In the order of their numbers, but for the places and sizes of `chunks`.
+    /// All tags except the positions and sizes of `chunks`.
     pub tags: &'a [(u16, Values<'a>)],
     pub chunks: &'a [&'a [u8]],
 }
@@ -98,7 +98,7 @@ impl Tiff<'_> {
         let long = |v: u32| if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() };
         let mut out = if self.big_endian { b"MM\0*".to_vec() } else { b"II*\0".to_vec() };
         out.extend(long(0));
-        // What is pointed to comes first.
+        // Data that entries point to comes first.
         let mut places = Vec::new();
         for chunk in self.chunks {
             places.push(out.len() as u32);
@@ -139,8 +139,9 @@ impl Tiff<'_> {
     }
 }
 
-/// A JPEG file of 8 x 8 pixels, baseline, whose components all have one value each. `adobe` is the colour transform of its
-/// Adobe mark, without which four components say nothing of their colours; `exif` what its Exif mark holds.
+/// A baseline JPEG file of 8 x 8 pixels in which each component has a single value. `adobe` is the colour
+/// transform of its Adobe marker, without which the colours of four components are undefined; `exif` is the
+/// contents of its Exif marker.
 pub fn jpeg(components: &[u8], adobe: Option<u8>, exif: Option<&[u8]>) -> Vec<u8> {
     let segment = |mark: u8, data: &[u8]| {
         let length = (data.len() as u16 + 2).to_be_bytes();
@@ -158,7 +159,8 @@ pub fn jpeg(components: &[u8], adobe: Option<u8>, exif: Option<&[u8]>) -> Vec<u8
     out.extend(segment(0xdb, &[&[0, 8][..], &[1; 63]].concat()));
     let frame = (1..=count).flat_map(|i| [i, 0x11, 0]);
     out.extend(segment(0xc0, &[8, 0, 8, 0, 8, count].into_iter().chain(frame).collect::<Vec<_>>()));
-    // The first coefficient: 8 codes of 4 bits, for numbers of 0 to 7 bits; the others: a code of 1 bit, for no more.
+    // The first coefficient: 8 codes of 4 bits, for numbers of 0 to 7 bits. The others: one code of 1 bit,
+    // for the end of the block.
     out.extend(segment(0xc4, &[&[0, 0, 0, 0, 8][..], &[0; 12], &[0, 1, 2, 3, 4, 5, 6, 7]].concat()));
     out.extend(segment(0xc4, &[&[0x10, 1][..], &[0; 15], &[0]].concat()));
     let scan = (1..=count).flat_map(|i| [i, 0]);
@@ -174,18 +176,18 @@ pub fn jpeg(components: &[u8], adobe: Option<u8>, exif: Option<&[u8]>) -> Vec<u8
         put(0, 1);
     }
     put(0xff, 7);
-    // What is left of the last byte are ones.
+    // The rest of the last byte is filled with ones.
     for byte in bits.chunks_exact(8) {
         let byte = byte.iter().fold(0, |byte, bit| byte << 1 | bit);
         out.push(byte);
-        // A byte of ones is told from a mark by the zero after it.
+        // A zero follows a byte of ones, to tell it from a marker.
         out.extend((byte == 0xff).then_some(0));
     }
     out.extend([0xff, 0xd9]);
     out
 }
 
-/// Exif data that say how the camera was held: 1 upright, 6 turned by a quarter.
+/// Exif data with the orientation of the camera: 1 upright, 6 rotated by a quarter turn.
 pub fn exif_orientation(value: u8) -> Vec<u8> {
     [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".as_slice(), &[value, 0, 0, 0], &[0; 4]].concat()
 }

@@ -1,5 +1,5 @@
-//! What the test binaries share: a naive twin of every stage, the backends under test, seeded random input, and a
-//! comparison that says where two volumes part.
+//! Shared parts of the test binaries: a naive twin of every stage, the backends under test, seeded random
+//! input, and a comparison that reports where two volumes differ.
 
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
@@ -16,7 +16,7 @@ use mrfgs::low_level::solver::{self, Run};
 use mrfgs::low_level::watch::Watch;
 use std::ops::ControlFlow;
 
-/// Runs the flooding of `plan` on the evidence that `backend` holds; the number of iterations.
+/// Runs the message passing of `plan` on the evidence that `backend` holds; returns the number of iterations.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     let mut go_on = |_| ControlFlow::Continue(());
     let watch = Watch::new(&mut go_on, 1.0);

@@ -1,4 +1,5 @@
-//! Seeded random input: images, pairs, methods, graphs, and states of the volumes that keep the invariants.
+//! Seeded random input: images, pairs, methods, graphs, and states of the volumes that respect the
+//! invariants.
 
 use super::twin::{self, Finest};
 use mrfgs::image::{Image, Pair, Plane};
@@ -43,7 +44,7 @@ impl Random {
         choices[self.within(0, choices.len() as u32 - 1) as usize]
     }
 
-    /// `low` times a power, up to `high`.
+    /// `low` times a random power, up to `high`.
     pub fn log_within(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(f64::from(self.within(0, 1000)) / 1000.0)
     }
@@ -62,7 +63,7 @@ fn pixel(r: u16, g: u16, b: u16) -> [u16; 4] {
     [r, g, b, ((u32::from(r) + u32::from(g) + u32::from(b)) / 3) as u16]
 }
 
-/// An image of full noise, faint noise, few values or one, and some of it, none of it or all of it masked.
+/// An image of strong noise, faint noise, few values or one value, with some, none or all of it masked.
 pub fn image(random: &mut Random, width: usize, height: usize) -> Image {
     let style = random.within(0, 3);
     let base = random.within(0, 60_000);
@@ -88,7 +89,7 @@ fn mask(random: &mut Random, width: usize, height: usize) -> Plane<bool> {
     Plane::from_fn(width, height, |x, y| seeds[(x / block, y / block)])
 }
 
-/// A pair of unrelated images, or one whose right image is the left one moved and disturbed.
+/// A pair of unrelated images, or one whose right image is the left one shifted and disturbed.
 pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
     let left = image(random, width, height);
     let mut right = image(random, width, height);
@@ -104,7 +105,8 @@ pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
     Pair::new(left, right).unwrap()
 }
 
-/// A method with every parameter that the stages read drawn anew, and `neighbours` a factor.
+/// A method with random values for all parameters that the stages read, and `neighbours` neighbours per
+/// factor.
 pub fn method(random: &mut Random, neighbours: usize) -> Method {
     let mut m = Method::default();
     m.cost.matching = random.pick(&[
@@ -161,7 +163,7 @@ pub fn plan((width, height): (usize, usize), min: i32, labels: usize, method: &M
     Plan::new(width, height, range, method).unwrap()
 }
 
-/// Graphs of any shape for every level of `plan`: each factor takes random neighbours in random slots.
+/// Random graphs for every level of `plan`: each factor has random neighbours in random slots.
 pub fn graphs(random: &mut Random, plan: &Plan) -> Vec<LevelGraph> {
     let window: Vec<u8> = (0..49).filter(|&code| code != 24).collect();
     plan.levels
@@ -186,16 +188,16 @@ pub fn graphs(random: &mut Random, plan: &Plan) -> Vec<LevelGraph> {
         .collect()
 }
 
-/// All volumes of a flood, a vector a level; empty where a level has none.
+/// All volumes of message passing, one vector per level; empty where a level has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct State {
     /// Evidence.
     pub evidence: Vec<Vec<u32>>,
     /// Dependency messages.
     pub dependency: Vec<Vec<u32>>,
-    /// Messages from the level above.
+    /// Messages from the next coarser level.
     pub down: Vec<Vec<u32>>,
-    /// Messages from the level below.
+    /// Messages from the next finer level.
     pub up: Vec<Vec<u32>>,
     /// Beliefs.
     pub belief: Vec<Vec<u32>>,
@@ -215,7 +217,7 @@ impl State {
         }
     }
 
-    /// Every volume of it, with its values.
+    /// All its volumes, with their values.
     pub fn volumes(&self) -> Vec<(Volume, &[u32])> {
         let mut all: Vec<(Volume, &[u32])> = Vec::new();
         for z in 0..self.evidence.len() {
@@ -232,7 +234,7 @@ impl State {
         all
     }
 
-    /// Puts all of it into `backend`.
+    /// Writes all of it to `backend`.
     pub fn write(&self, backend: &mut dyn Backend) {
         for (volume, values) in self.volumes() {
             backend.probe().write(volume, values).unwrap();
@@ -288,9 +290,9 @@ pub fn evidence(random: &mut Random, plan: &Plan) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// A state in the middle of a flood: messages with minimum 0 and at most their cut, 0 where a slot has no member or
-/// a factor no second one, and beliefs that are the sum of their parts, or, where `loose`, any that are at
-/// most the largest and not below a message that is part of them.
+/// A state in the middle of message passing. Messages have minimum 0 and are at most their truncation, and
+/// are 0 where a slot has no member or a factor has only one. Beliefs are the sums of their terms or, where
+/// `loose`, any values that are at most the largest belief and not below any message that is a term of them.
 pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: bool) -> State {
     let mut state = State::fresh(plan, evidence(random, plan));
     for (z, level) in plan.levels.iter().enumerate() {
@@ -351,7 +353,7 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
     state
 }
 
-/// Maps as they may stand somewhere after the estimate; the validity, where `filled`, after the fill.
+/// Maps that may occur after the estimate; where `filled`, with a validity that may occur after the fill.
 pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
     let (width, height) = plan.size();
     let labels = plan.levels[0].labels as u32;
@@ -384,7 +386,7 @@ pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
     maps
 }
 
-/// Flags as they may stand before the fill, or, where `filled`, after it.
+/// Flags that may occur before the fill or, where `filled`, after it.
 fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<i32> {
     let density = random.pick(&[1, 2, 3, 10, 1000]);
     Plane::from_fn(width, height, |_, _| {

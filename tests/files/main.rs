@@ -1,4 +1,4 @@
-//! Unusual image files, by the rules of `Reader::pair`; none of them is beyond what a user may hand over.
+//! Unusual image files, by the rules of `Reader::pair`; users may have any of them.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
@@ -11,7 +11,7 @@ use mrfgs::image::{Image, read};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// A file with these bytes, and the folder that keeps it.
+/// A file with these bytes, and its temporary folder.
 fn file(bytes: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("image");
@@ -31,7 +31,7 @@ fn colours(bytes: &[u8]) -> Vec<Option<[u16; 3]>> {
     pixels.map(|([r, g, b, _], masked)| (!masked).then_some([r, g, b].map(|v| v >> 8))).collect()
 }
 
-/// The same of grey images.
+/// The same for grey images.
 fn greys(bytes: &[u8]) -> Vec<Option<u16>> {
     let grey = |[r, g, b]: [u16; 3]| {
         assert!(r == g && g == b);
@@ -60,7 +60,7 @@ fn small_depths_span_all_levels() {
     // In PBM 1 is black.
     assert_eq!(greys(b"P4\n3 1\n\x60"), [255, 0, 0].map(Some));
     assert_eq!(greys(b"P1\n3 1\n0 1 1\n"), [255, 0, 0].map(Some));
-    // PNM says what its white is.
+    // PNM declares its white.
     assert_eq!(greys(b"P5\n3 1\n15\n\x00\x08\x0f"), [0, 136, 255].map(Some));
     assert_eq!(greys(b"P5\n2 1\n1023\n\x00\x00\x03\xff"), [0, 255].map(Some));
 }
@@ -76,7 +76,7 @@ fn palettes_are_looked_up_and_their_alpha_masks() {
     let indexed = Png { size: (3, 1), depth: 2, colour: 3, rows: &rows, ..GREY };
     let masked = [Some(expected[0]), None, Some(expected[2])];
     assert_eq!(colours(&Png { chunks, ..indexed }.bytes()), masked);
-    // One grey level may be the transparent one.
+    // A single grey level may be transparent.
     let png = Png { size: (3, 1), chunks: &[(*b"tRNS", &[0, 7])], rows: &[0, 6, 7, 8], ..GREY };
     assert_eq!(greys(&png.bytes()), [Some(6), None, Some(8)]);
 }
@@ -125,12 +125,12 @@ fn jpeg_of_every_colour_model() {
     close(&jpeg(&[200], None, None), [200; 3]);
     // Y, Cb, Cr by BT.601: R = Y + 1.402 (Cr - 128) and so on.
     close(&jpeg(&[120, 148, 98], None, None), [78, 134, 155]);
-    // Adobe stores the inks inverted: 255 is none. Red is what cyan and black leave.
+    // Adobe stores the inks inverted: 255 is none. Cyan and black determine red.
     close(&jpeg(&[200, 100, 50, 128], Some(0), None), [100, 50, 25]);
     close(&jpeg(&[255 / 2, 128, 128, 255], Some(2), None), [128; 3]);
 }
 
-/// The decoder would fill up with grey what comes after the damage.
+/// By default, the decoder would fill everything after the damage with grey.
 #[test]
 fn damage_within_a_jpeg_file_is_noticed() {
     let mut bytes = Vec::new();
@@ -139,12 +139,12 @@ fn damage_within_a_jpeg_file_is_noticed() {
     picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Jpeg).unwrap();
     assert_eq!(left(&bytes).width(), 64);
     let middle = bytes.len() / 2;
-    // Sixteen ones in a row are no code.
+    // Sixteen ones in a row are not a valid code.
     bytes[middle..middle + 8].copy_from_slice(&[0xff, 0, 0xff, 0, 0xff, 0, 0xff, 0]);
     refused(&bytes, &["corrupt", "get the file again"]);
 }
 
-/// Pixels are taken as they are stored, since that is what a pair was rectified as.
+/// Pixels are taken as stored, because a pair is rectified in its stored orientation.
 #[test]
 fn exif_orientation_turns_nothing() {
     let turned = exif_orientation(6);
@@ -155,7 +155,8 @@ fn exif_orientation_turns_nothing() {
     assert_eq!(left(&jpeg(&[9], None, Some(&turned))), left(&jpeg(&[9], None, None)));
 }
 
-/// NaN and the infinities are masked; of the rest the least is black and the largest white, negative ones too.
+/// NaN and the infinities are masked. Of the other values the smallest becomes black and the largest white,
+/// negative ones included.
 #[test]
 fn float_values_beyond_all_bounds() {
     let pfm = |values: &[f32]| {
@@ -170,7 +171,7 @@ fn float_values_beyond_all_bounds() {
     assert_eq!(greys(&pfm(&[f32::MIN, f32::MAX, -0.0, 1e-45])), [0, 255, 127, 127].map(Some));
     assert_eq!(greys(&pfm(&[-3.0, -2.0, -1.0])), [0, 127, 255].map(Some));
     assert_eq!(greys(&pfm(&[nan, infinite, -infinite])), [None; 3]);
-    // A colour is masked where any of its channels is not finite.
+    // A pixel is masked where any of its channels is not finite.
     let data = [1.0, 2.0, nan, 1.0, 2.0, 3.0_f32].into_iter().flat_map(f32::to_le_bytes);
     let colour: Vec<u8> = b"PF\n2 1\n-1\n".iter().copied().chain(data).collect();
     assert_eq!(colours(&colour), [None, Some([0, 127, 255])]);

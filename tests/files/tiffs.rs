@@ -1,11 +1,11 @@
-//! TIFF: whatever its tags make of the samples, they are read as what they mean, or refused.
+//! TIFF: samples are interpreted as the tags say, or the file is rejected.
 
 use super::files::{Tiff, Values, jpeg};
 use super::{colours, file, greys, left, refused};
 use Values::{Fraction, Long, Short, Text};
 use mrfgs::image::read::{self, Reader};
 
-/// A file of 8-bit grey: the tags replace or add to those that it needs.
+/// A file of 8-bit grey: `tags` replace or extend the required ones.
 fn grey(size: [u32; 2], tags: &[(u16, Values)], chunks: &[&[u8]]) -> Vec<u8> {
     image(size, &[(258, Short(&[8])), (262, Short(&[1]))], tags, chunks, false)
 }
@@ -36,7 +36,7 @@ fn known<T, const N: usize>(values: [T; N]) -> [Option<T>; N] {
     values.map(Some)
 }
 
-/// GDAL's `INTERLEAVE=BAND, TILED=YES` for a size that is no multiple of the tile's.
+/// GDAL's `INTERLEAVE=BAND, TILED=YES`, for a size that is no multiple of the tile size.
 #[test]
 fn planes_in_tiles_that_stick_out() {
     // 5 x 3 pixels in tiles of 4 x 2: two across, two down, for each of three planes.
@@ -51,7 +51,7 @@ fn planes_in_tiles_that_stick_out() {
     let expected: Vec<_> =
         (0..15).map(|i| Some([0, 1, 2].map(|c| u16::from(value(i % 5, i / 5, c))))).collect();
     assert_eq!(colours(&rgb([5, 3], &tags, &tiles)), expected);
-    // Some programs name the places of tiles as those of strips.
+    // Some programs store the positions of tiles in the tags of strips.
     let size = [(256, Long(&[5])), (257, Long(&[3])), (258, Short(&[8, 8, 8])), (262, Short(&[2]))];
     let tags = [&size[..], &[(277, Short(&[3]))], &tags].concat();
     assert_eq!(
@@ -85,12 +85,12 @@ fn bits_in_either_order() {
     assert_eq!(greys(&grey([4, 1], &[], &[&row])), expected);
     assert_eq!(greys(&grey([4, 1], &[least_first], &[&reversed])), expected);
     assert_ne!(greys(&grey([4, 1], &[], &[&reversed])), expected, "control");
-    // PackBits: four bytes as they are; its own bytes are reversed too.
+    // PackBits: four literal bytes; its own bytes are reversed too.
     let packed = [&[3], &row[..]].concat();
     let reversed: Vec<u8> = packed.iter().map(|byte| byte.reverse_bits()).collect();
     assert_eq!(greys(&grey([4, 1], &[(259, Short(&[32_773]))], &[&packed])), expected);
     assert_eq!(greys(&grey([4, 1], &[(259, Short(&[32_773])), least_first], &[&reversed])), expected);
-    // Not within JPEG.
+    // Within JPEG, bits are not reversed.
     let jpeg = jpeg(&[200], None, None);
     let tags = [(259, Short(&[7])), least_first];
     assert_eq!(greys(&grey([8, 8], &tags, &[&jpeg])), [Some(200); 64]);
@@ -105,19 +105,19 @@ fn samples_of_every_depth() {
     let levels = |bits, row: &[u8], width| -> Vec<u16> {
         unsigned(bits, false, row, width).pixels.data().iter().map(|pixel| pixel[3]).collect()
     };
-    // Up to 8 bits all levels of 8.
+    // Up to 8 bits, values are stretched to all 8-bit levels.
     let spread = |values: &[u16]| values.iter().map(|v| v << 8).collect::<Vec<u16>>();
     assert_eq!(levels(1, &[0b0110_0000], 3), spread(&[0, 255, 255]));
     assert_eq!(levels(2, &[0b0001_1011], 4), spread(&[0, 85, 170, 255]));
     assert_eq!(levels(3, &[0b0001_1101, 0b1000_0000], 3), spread(&[0, 255, 109]));
     assert_eq!(levels(4, &[0x08, 0xf0], 3), spread(&[0, 136, 255]));
     assert_eq!(levels(8, &[0, 7, 255], 3), spread(&[0, 7, 255]));
-    // More are shifted up by the bits that all leave free.
+    // Values of more bits are shifted up by the bits that all of them leave free.
     assert_eq!(levels(10, &[0xff, 0xc0, 0x10], 2), [1023 << 6, 1 << 6]);
     assert_eq!(levels(12, &[0x12, 0x3f, 0xff], 2), [0x123 << 4, 0xfff << 4]);
     assert_eq!(levels(14, &[0xff, 0xfc, 0x00, 0x10], 2), [0x3fff << 2, 1 << 2]);
     assert_eq!(levels(16, &[0x23, 0x81, 0xff, 0xff], 2), [0x8123, 0xffff]);
-    // Wider ones are spread from the least to the largest.
+    // Wider values are scaled from the smallest to the largest.
     for (bits, row) in [
         (20, &[0, 0, 0, 0, 2, 0, 0, 0x50][..]),
         (24, &[0, 0, 0, 2, 0, 0, 5, 0, 0]),
@@ -126,7 +126,7 @@ fn samples_of_every_depth() {
     ] {
         assert_eq!(levels(bits, row, 3), [0, 26_112, 65_280], "{bits}");
     }
-    // The order of bytes is the file's; of packed bits there is but one.
+    // The byte order is that of the file; packed bits have only one order.
     let big = unsigned(16, true, &[0x81, 0x23, 0xff, 0xff], 2);
     assert_eq!(big.pixels.data()[0][3], 0x8123);
     let big = unsigned(12, true, &[0x12, 0x3f, 0xff], 2);
@@ -152,7 +152,7 @@ fn samples_of_every_format() {
     assert_eq!(formatted(&[1]), known([0, 255, 0]));
     // -1 is below 0.
     assert_eq!(formatted(&[2]), known([127, 0, 255]));
-    // 0, NaN and the least number above 0.
+    // 0, NaN and the smallest number above 0.
     assert_eq!(formatted(&[3]), [Some(0), None, Some(255)]);
     assert_eq!(formatted(&[4]), formatted(&[1]), "undefined");
     for (format, words) in [(5_u16, "complex"), (6, "complex"), (7, "unknown format 7")] {
@@ -162,7 +162,7 @@ fn samples_of_every_format() {
     let mixed = rgb([1, 1], &[(339, Short(&[1, 1, 2]))], &[&[1, 2, 3]]);
     refused(&mixed, &["different formats"]);
     refused(&grey([3, 1], &[(258, Short(&[24])), (339, Short(&[3]))], &[&[0; 9]]), &["24 bits"]);
-    // Signed ones of 8, 32 and 64 bits, and doubles.
+    // Signed samples of 8, 32 and 64 bits, and doubles.
     let signed = |bits: u16, format: u16, values: &[&[u8]]| {
         let row = values.concat();
         greys(&grey([3, 1], &[(258, Short(&[bits])), (339, Short(&[format]))], &[&row]))
@@ -196,7 +196,7 @@ fn white_may_be_zero() {
 fn palettes_of_every_depth() {
     let palette = |bits: u16, shift: u16, row: &[u8], width| {
         let count = 1_usize << bits;
-        // Red the index, green 100 more, blue twice as much, in the upper bytes.
+        // Red is the index, green 100 more, blue twice as much, in the upper bytes.
         let map: Vec<u16> = (0..3 * count)
             .map(|i| ((i % count + [0, 100, i % count][i / count]) as u16 & 255) << shift)
             .collect();
@@ -223,7 +223,7 @@ fn alpha_as_it_is_and_multiplied_into_the_colours() {
         colours(&rgb([2, 1], tags, &[row]))
     };
     let row = [10, 20, 100, 128, 1, 2, 3, 0];
-    // 1: multiplied by alpha. 10 / (128 / 255) is 20.
+    // 1: premultiplied by alpha. 10 / (128 / 255) is 20.
     assert_eq!(with(&[1], &row), [Some([20, 40, 199]), None]);
     assert_eq!(with(&[2], &row), [Some([10, 20, 100]), None]);
     assert_eq!(with(&[], &row), [Some([10, 20, 100]), None], "not said, but meant");
@@ -235,7 +235,7 @@ fn alpha_as_it_is_and_multiplied_into_the_colours() {
     let row = [0, 16, 0, 32, 0, 64, 0, 128];
     let pixel = left(&rgb([1, 1], &tags, &[&row])).pixels.data()[0];
     assert_eq!(pixel[..3], [0x1000, 0x2000, 0x4000].map(|v: u32| ((v * 65_535 + 0x4000) / 0x8000) as u16));
-    // More samples than that are no picture.
+    // More samples than these are not a picture.
     let tags = [(258, Short(&[8, 8])), (277, Short(&[2])), (338, Short(&[0]))];
     refused(&grey([2, 1], &tags, &[&[1, 2, 3, 4]]), &["2 bands", "extract one"]);
     let tags = [(258, Short(&[8; 5])), (277, Short(&[5])), (338, Short(&[0, 0]))];
@@ -254,7 +254,7 @@ fn inks_and_chroma() {
     };
     let full = (530, Short(&[1, 1]));
     assert_eq!(ycbcr(&[full], [1, 1], &[120, 148, 98]), known([[78, 135, 155]]));
-    // Pairs of columns and rows share their chroma, and the last ones stick out.
+    // Pairs of columns and rows share their chroma, and the last ones extend beyond the image.
     let units = [120, 121, 122, 123, 148, 98, 50, 0, 51, 0, 128, 128];
     let found = ycbcr(&[(530, Short(&[2, 2]))], [3, 2], &units);
     assert_eq!(
@@ -308,7 +308,7 @@ fn what_is_no_picture_is_refused() {
 
 #[test]
 fn the_first_image_that_is_no_copy_is_read() {
-    // Two directories by hand: that of one file behind the other.
+    // Two directories by hand: that of a second file after the first.
     let chain = |kind: u32| {
         let mut first = grey([1, 1], &[(254, Long(&[kind]))], &[&[9]]);
         let second = grey([2, 1], &[], &[&[5, 6]]);
@@ -316,7 +316,7 @@ fn the_first_image_that_is_no_copy_is_read() {
         let end = first.len();
         first[end - 4..]
             .copy_from_slice(&(base + u32::from_le_bytes(second[4..8].try_into().unwrap())).to_le_bytes());
-        // Its strip is in the first file's terms.
+        // The position of its strip, from the start of the first file.
         let mut second = second;
         let place = second.windows(2).rposition(|tag| tag == 273_u16.to_le_bytes()).unwrap();
         second[place + 8..place + 12].copy_from_slice(&(base + 8).to_le_bytes());
@@ -331,7 +331,7 @@ fn the_first_image_that_is_no_copy_is_read() {
     refused(&grey([1, 1], &below, &[&[9]]), &["reduced copy", "directory below"]);
 }
 
-/// GDAL's tag, in every kind of samples.
+/// GDAL's tag, with every kind of sample.
 #[test]
 fn what_holds_no_data_is_masked() {
     let masked = |bits: u16, format: u16, text: &str, values: &[&[u8]]| {
@@ -357,12 +357,12 @@ fn what_holds_no_data_is_masked() {
     assert_eq!(masked(64, 3, "-1.7976931348623157e+308", &double.each_ref().map(|b| &b[..])), [true, false]);
     let float = [f32::NAN, 5.0].map(f32::to_le_bytes);
     assert_eq!(masked(32, 3, "nan", &float.each_ref().map(|b| &b[..])), [true, false]);
-    // What is masked does not count for the levels of the rest.
+    // Masked values do not affect the levels of the others.
     let values = [f32::MIN, 5.0, 6.0].map(f32::to_le_bytes).concat();
     let tags = [(258, Short(&[32])), (339, Short(&[3])), (42_113, Text("-3.4028235e+38"))];
     assert_eq!(greys(&grey([3, 1], &tags, &[&values])), [None, Some(0), Some(255)]);
     assert_eq!(greys(&grey([3, 1], &tags[..2], &[&values])), known([0, 255, 255]), "control");
-    // Of colours all have to be so, and a palette's index is meant, as is the value where white is 0.
+    // All colour samples must match, a palette matches by index, and an inverted image by its stored value.
     let tag = (42_113, Text("3"));
     assert_eq!(colours(&rgb([2, 1], &[tag], &[&[3, 3, 3, 3, 3, 4]])), [None, Some([3, 3, 4])]);
     assert_eq!(greys(&grey([2, 1], &[(262, Short(&[0])), tag], &[&[3, 252]])), [None, Some(3)]);
@@ -378,7 +378,7 @@ fn the_caller_may_say_what_holds_no_data() {
     };
     assert_eq!(masked(None), [false, true, false]);
     assert_eq!(masked(Some(255.0)), [false, false, true]);
-    // Of other formats too.
+    // The same for other formats.
     let (_folder, path) = file(b"P5\n3 1\n255\n\x00\x07\xff");
     let reader = Reader { no_data: Some(0.0), ..Reader::default() };
     assert_eq!(reader.pair(&path, &path, None).unwrap().left().masked.data(), [true, false, false]);

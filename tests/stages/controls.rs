@@ -1,4 +1,4 @@
-//! Negative controls: what is wrong is found.
+//! Negative controls: errors are detected.
 
 use crate::common::compare::compare;
 use crate::common::devices::backends;
@@ -16,7 +16,7 @@ use mrfgs::options::{Agreement, MatchingCost, Method, Order, Pyramid};
 /// A change of a plan, as a negative control makes it.
 type Change = fn(&mut Plan);
 
-/// Negative control: whatever single element of whatever volume is wrong, the comparison says so and says where.
+/// Negative control: any single wrong element of any volume is detected and located.
 #[test]
 fn control_one_wrong_element_is_found() {
     let mut random = Random::new(5);
@@ -70,7 +70,7 @@ fn twin_of_the_control(plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) -> Vec<(
     all
 }
 
-/// Negative control: a twin that follows a slightly different plan is found out.
+/// Negative control: a twin that follows a slightly different plan is detected.
 #[test]
 fn control_a_changed_parameter_is_found() {
     let mut method = Method::default();
@@ -118,11 +118,11 @@ fn control_a_changed_parameter_is_found() {
         let differs = base.iter().zip(&other).any(|(a, b)| a.0 == *volume && a.1 != b.1);
         assert!(differs, "{name}: {volume} is the same");
     }
-    // And the unchanged plan passes, against the backends.
+    // The unchanged plan passes, against the backends.
     whole_flood(&plan, &pair);
 }
 
-/// Negative control for the graph: a range a little wider moves a neighbour somewhere.
+/// Negative control for the graph: a slightly larger range sigma moves a neighbour somewhere.
 #[test]
 fn control_a_changed_sigma_is_found() {
     let mut random = Random::new(8);

@@ -1,4 +1,4 @@
-//! What is filled in.
+//! The fill.
 
 use crate::common::random::{self, Random};
 use crate::common::twin;

@@ -1,4 +1,4 @@
-//! The median of what was filled.
+//! The median of the filled pixels.
 
 use crate::common::twin;
 use crate::maps::on_maps;

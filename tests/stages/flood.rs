@@ -26,12 +26,13 @@ fn flood() {
     });
 }
 
-/// On the CPU path every thread sweeps bands of its own: what is around their borders must not be early or late.
+/// On the CPU path every thread sweeps bands of its own: beliefs around their borders must be summed at the
+/// right time.
 #[test]
 fn a_sweep_in_bands_is_a_sweep() {
     let mut random = Random::new(11);
     for preset in ["default", "paper"] {
-        // Not a whole number of rows a band.
+        // The rows do not divide evenly into bands.
         let plan = random::plan((9, 133), -2, 21, &Method::preset(preset).unwrap());
         let pair = random::pair(&mut random, 9, 133);
         let graphs = graph::build(pair.left(), &plan);
@@ -52,7 +53,7 @@ fn a_sweep_in_bands_is_a_sweep() {
         for threads in [1, 2, 3] {
             assert!(run(threads, &[Stage::Flood(0)]) == expected, "{preset}, {threads} threads");
         }
-        // Control: beliefs before the messages are others.
+        // Control: summing beliefs before the messages are sent gives different ones.
         assert!(run(2, &[Stage::Belief(0), Stage::Dependency(0)]) != expected, "{preset}");
     }
 }

@@ -1,4 +1,4 @@
-//! Whole floods, against the twins on a schedule of their own.
+//! Whole runs of message passing, against the twins on a separate schedule.
 
 use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
@@ -13,7 +13,8 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{Agreement, MatchingCost, Method, Order, PRESETS, Potential};
 use std::collections::HashSet;
 
-/// What was written must carry a flood on, whatever a backend stores beside the labels.
+/// Message passing continues correctly from volumes that were written, whatever a backend stores in the
+/// padding.
 #[test]
 fn a_flood_goes_on_from_a_written_state() {
     on_all(|case, backend, random| {
@@ -48,9 +49,10 @@ fn a_flood_goes_on_from_a_written_state() {
     });
 }
 
-/// The schedule once more, on the twins: all levels together, or coarse ones first. Then a new level and the one above hear
-/// of each other before the new one's own messages start, which spares the first iteration's exchange; in the end the
-/// coarser levels speak in every other iteration, and those that level 0 cannot hear any more do not.
+/// The schedule a second time, on the twins: all levels together, or coarse ones first. When a level is
+/// added, it exchanges resolution messages with the next coarser one before its own dependency messages
+/// start, so the first iteration needs no exchange. At level 0 the coarser levels send messages in every
+/// other iteration only, and levels whose messages can no longer reach level 0 send none.
 pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) -> u32 {
     let last = plan.levels.len() - 1;
     let method = &plan.method;
@@ -75,7 +77,8 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
         }
         for i in 0..iterations {
             total += 1;
-            // Levels that speak, and levels that hear from the next finer one.
+            // Levels that send dependency messages, and levels that exchange messages with the next finer
+            // one.
             let mut speak: Vec<usize> = (finest..=last).collect();
             let mut hear: Vec<usize> = (finest + 1..=last).collect();
             if method.schedule.order == Order::CoarseFirst {
@@ -109,14 +112,14 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
     total
 }
 
-/// What follows the flooding and looks at volumes.
+/// The stages after message passing that read volumes.
 fn twin_read_out(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Finest) {
     twin::winner_takes_all::winner_takes_all(plan, belief, maps);
     twin::right_view::right_view(plan, belief, maps);
     twin::sub_pixel::sub_pixel(plan, cost, maps);
 }
 
-/// From the pair to the estimate, on every backend and on the twins; the number of iterations.
+/// From the pair to the estimate, on every backend and on the twins; returns the number of iterations.
 pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     let graphs = graph::build(pair.left(), plan);
     let (costs, mut state) = twin_start(plan, pair);

@@ -1,4 +1,4 @@
-//! The comparison with the right view.
+//! The left-right check.
 
 use crate::common::random::{self, Random};
 use crate::common::twin;

@@ -1,5 +1,6 @@
-//! Every stage of every backend against its naive twin, bit for bit, on seeded random input at awkward sizes, and
-//! whole floods against a schedule written here once more. Negative controls show that the comparison can fail.
+//! Every stage of every backend against its naive twin, bit for bit, on seeded random input of awkward sizes,
+//! and whole runs of message passing against a second implementation of the schedule. Negative controls show
+//! that the comparison can fail.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on panics")]
 #![allow(clippy::needless_range_loop, reason = "levels are counted, as in the schedule that is checked")]
@@ -34,15 +35,15 @@ use mrfgs::low_level::graph::{self, LevelGraph};
 use mrfgs::low_level::plan::{COST_MAX, Plan};
 use std::collections::HashSet;
 
-/// One pixel, one column, one row, odd, divisible by no power of two, and wider than a block of anything.
+/// One pixel, one column, one row, odd, divisible by no power of two, and wider than any block.
 const SIZES: &[(usize, usize)] =
     &[(1, 1), (1, 9), (13, 1), (2, 2), (5, 7), (8, 8), (17, 11), (33, 6), (9, 40), (31, 19), (67, 3)];
 const LABELS: &[usize] = &[1, 2, 31, 32, 33, 64, 257];
 const MINIMA: &[i32] = &[-20, 0, 5, 700, -900];
 const NEIGHBOURS: &[usize] = &[0, 1, 2, 4, 8, 12, 25, 48];
-/// Cells of the dependency messages of one case, at most.
+/// Largest number of cells of the dependency messages of one case.
 const CELLS: usize = 1_000_000;
-/// Cases of one size and number of labels.
+/// Cases per size and number of labels.
 const ROUNDS: usize = 3;
 
 struct Case {
@@ -53,7 +54,7 @@ struct Case {
     graphs: Vec<LevelGraph>,
 }
 
-/// Every size with every number of labels; all else is drawn.
+/// Every size with every number of labels; everything else is drawn at random.
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (&size, &labels) in SIZES.iter().flat_map(|size| LABELS.iter().map(move |labels| (size, labels))) {
@@ -79,7 +80,7 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// Runs `check` for every case on every backend, prepared, with a generator of the case's own.
+/// Runs `check` for every case on every backend, prepared, with a separate generator for each case.
 fn on_all(check: impl Fn(&Case, &mut dyn Backend, &mut Random) -> Result<(), String>) {
     for case in cases() {
         for (name, mut backend) in backends() {
@@ -92,7 +93,7 @@ fn on_all(check: impl Fn(&Case, &mut dyn Backend, &mut Random) -> Result<(), Str
     }
 }
 
-/// Compares what `backend` holds with what the twin says.
+/// Compares a volume of `backend` with the twin's.
 fn same(plan: &Plan, backend: &mut dyn Backend, volume: Volume, expected: &[u32]) -> Result<(), String> {
     compare(plan, volume, &backend.probe().read(volume).unwrap(), expected)
 }
@@ -101,7 +102,7 @@ fn cells(plan: &Plan, z: usize) -> usize {
     plan.levels[z].pixels() * plan.levels[z].labels
 }
 
-/// Costs of a level as it stores them, far apart, close together, or all alike.
+/// Costs of a level as it stores them: far apart, close together, or all equal.
 fn random_cost(random: &mut Random, plan: &Plan, z: usize) -> Vec<u32> {
     let most = u32::from(COST_MAX) * if z == 0 { 1 } else { 256 };
     let most = random.pick(&[most, most, most / 20, 1, 0]);
@@ -166,7 +167,7 @@ fn downsample() {
     }
 }
 
-/// The twins' costs of all levels, and their state before anyone has spoken.
+/// The twins' costs of all levels, and their state before any messages are sent.
 fn twin_start(plan: &Plan, pair: &Pair) -> (Vec<Vec<u32>>, State) {
     let mut costs = vec![twin::cost::cost(plan, pair)];
     for z in 1..plan.levels.len() {
@@ -178,7 +179,7 @@ fn twin_start(plan: &Plan, pair: &Pair) -> (Vec<Vec<u32>>, State) {
     (costs, state)
 }
 
-/// The twin's resolution messages of one level, into the state.
+/// Writes the twin's resolution messages of one level to the state.
 fn resolve(plan: &Plan, state: &mut State, z: usize) {
     let (down, up) = twin::resolution::resolution(
         plan,

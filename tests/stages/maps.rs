@@ -1,4 +1,4 @@
-//! What the tests of the stages that look at maps alone share, and what concerns several of them.
+//! Shared parts of the tests of stages that only read maps, and tests of several of these stages.
 
 use super::common::compare::compare_finest;
 use super::common::devices::backends;
@@ -17,7 +17,7 @@ const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (2
 /// A stage by its definition.
 pub(crate) type Twin = fn(&Plan, &Pair, &mut Finest);
 
-/// A plan with one level and no neighbours for a method drawn anew.
+/// A plan with one level and no neighbours, for a random method.
 pub(crate) fn small_plan(random: &mut Random, size: (usize, usize), change: impl Fn(&mut Method)) -> Plan {
     let mut method = random::method(random, 0);
     method.graph.levels = 1;
@@ -26,7 +26,8 @@ pub(crate) fn small_plan(random: &mut Random, size: (usize, usize), change: impl
     random::plan(size, random.pick(&[-20, -1, 0, 5]), labels, &method)
 }
 
-/// Runs `stage` on the maps that `input` makes, of every size with many seeds, and compares all maps with the twin's.
+/// Runs `stage` on the maps that `input` makes, for every size with many seeds, and compares all maps with
+/// the twin's.
 pub(crate) fn on_maps(
     stage: Stage,
     rounds: u64,
@@ -58,7 +59,7 @@ pub(crate) fn on_maps(
     }
 }
 
-/// Maps without anything to go by: all masked, or all given up.
+/// Maps without any usable pixel: all masked, or all rejected.
 #[test]
 fn nothing_valid() {
     for &size in SIZES {
@@ -88,10 +89,11 @@ fn nothing_valid() {
     }
 }
 
-/// A stage, whether its input has left-right check flags alone, its twin, and what makes that one differ.
+/// A stage, whether its input has only the flags of the left-right check, its twin, and a change that makes
+/// the twin differ.
 type Control = (Stage, bool, Twin, fn(&mut Plan));
 
-/// Negative control: every stage notices a parameter that is a little off, or a value that is.
+/// Negative control: every stage detects a parameter that is slightly off, or a value that is.
 #[test]
 fn control_changes_are_found() {
     let mut random = Random::new(21);

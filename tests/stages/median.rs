@@ -8,7 +8,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::weights::MedianWeights;
 use mrfgs::options::{Median, Method};
 
-/// Any parameters of the median.
+/// Random parameters of the median.
 pub(crate) fn any_method(random: &mut Random, method: &mut Method) {
     method.refinement.median = random.pick(&[Median::Off, Median::Filled, Median::All, Median::All]);
     method.refinement.median_sigma_space = random.log_within(0.1, 100.0);
@@ -16,7 +16,7 @@ pub(crate) fn any_method(random: &mut Random, method: &mut Method) {
     method.refinement.median_window = random.pick(&[3, 5, 15, 31]);
 }
 
-/// Any maps, now and then with disparities as far apart as they get.
+/// Random maps, sometimes with disparities as far apart as possible.
 pub(crate) fn any_maps(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = random::finest(random, plan, true);
     if random.one_in(4) {
@@ -55,7 +55,7 @@ fn median_weights() {
             let apart: u32 = (0..3).map(|c| guide(a[c]).abs_diff(guide(b[c]))).sum();
             let taken = twin::median::colour(a, b, range);
             assert_eq!(i64::from(apart << weights.doublings()), taken, "{a:?}, {b:?}; sigma {range}");
-            // As the definition has it: all of the weight at 1270 sigmas in 8-bit levels.
+            // By the definition: all of the weight at 1270 sigmas in 8-bit levels.
             let levels: f64 = (0..3).map(|c| f64::from(a[c].abs_diff(b[c])) / 256.0).sum();
             let exact = 127.0 * levels / (1270.0 * range);
             let step = f64::from(1 << weights.doublings());

@@ -1,4 +1,4 @@
-//! The map of the right view.
+//! The label map of the right view.
 
 use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;
@@ -22,11 +22,11 @@ fn right_view() {
             backend.run(Stage::RightView).unwrap();
             twin::right_view::right_view(&plan, &belief, &mut maps);
             compare_finest(backend, &maps)?;
-            // Control: with all columns it is another right view.
+            // Control: all columns give a different right view.
             let mut all = maps.clone();
             twin::right_view::right_view(&case.plan, &belief, &mut all);
             narrower.set(narrower.get() + usize::from(all != maps));
-            // Then a tile with a core of its own, in the same buffers.
+            // Then a tile with its own core, in the same buffers.
             let start = random.within(0, width as u32 - 1) as usize;
             plan.core = start..random.within(start as u32 + 1, width as u32) as usize;
             backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();

@@ -1,4 +1,4 @@
-//! Sums at their largest, in 8 and in 16 bits.
+//! Saturating sums, in 8 and in 16 bits.
 
 use crate::common::devices::backends;
 use crate::common::random::{self, Random, State};
@@ -13,7 +13,7 @@ use mrfgs::low_level::plan::{LevelPlan, Plan, Truncation, TruncationRule, Volume
 use mrfgs::options::{Agreement, Method};
 use std::collections::HashSet;
 
-/// Graphs in which everyone is everyone's neighbour in every window: as many factors a pixel as there can be.
+/// Graphs in which all pixels of a window are neighbours: the largest possible number of factors per pixel.
 fn full_graphs(plan: &Plan) -> Vec<LevelGraph> {
     assert_eq!(plan.neighbours, 48);
     let graph = |level: &LevelPlan| {
@@ -32,7 +32,7 @@ fn full_graphs(plan: &Plan) -> Vec<LevelGraph> {
     plan.levels.iter().map(graph).collect()
 }
 
-/// Evidence of everyone for label 0, as strong as it gets.
+/// The strongest evidence for label 0, at every pixel.
 fn sure(plan: &Plan) -> Vec<Vec<u32>> {
     let evidence = |level: &LevelPlan| {
         let cap = u32::from(level.evidence.cap);
@@ -41,7 +41,8 @@ fn sure(plan: &Plan) -> Vec<Vec<u32>> {
     plan.levels.iter().map(evidence).collect()
 }
 
-/// A flood on full graphs from sure evidence, on the twins and on every backend; the largest belief.
+/// Message passing on full graphs from the strongest evidence, on the twins and every backend; returns the
+/// largest belief.
 fn flood_of_the_sure(plan: &Plan) -> u32 {
     let (width, height) = plan.size();
     let pair = random::pair(&mut Random::new(3), width, height);
@@ -62,7 +63,7 @@ fn flood_of_the_sure(plan: &Plan) -> u32 {
     state.belief.iter().flatten().copied().max().unwrap()
 }
 
-/// The largest in-degree there is, the strongest potential, the largest evidence: 16 bits hold it.
+/// The largest possible in-degree, the strongest potential, the largest evidence: they fit in 16 bits.
 #[test]
 fn wide_beliefs_stay_below_their_largest() {
     for (resolution, levels) in [(Agreement::Strict, 3), (Agreement::Interpolating, 2)] {
@@ -73,12 +74,13 @@ fn wide_beliefs_stay_below_their_largest() {
         assert_eq!(plan.levels[0].evidence.cap, 255);
         let largest = flood_of_the_sure(&plan);
         assert!(largest < belief_most(&plan));
-        // The case is as bad as it gets: all 49 factors are at their cap.
+        // The worst case is reached: all 49 factors are at their cap.
         assert!(largest >= 255 + 49 * 1023, "{largest}");
     }
 }
 
-/// A plan of either width whose cuts are larger than a plan's own: beliefs exceed what it stores on full graphs.
+/// A plan of either width whose truncations are larger than a plan's own, so that beliefs exceed the width on
+/// full graphs.
 fn saturating(neighbours: usize, width: VolumeWidth, rule: TruncationRule, resolution: Agreement) -> Plan {
     let mut method = Method::default();
     method.graph.percentile = 100.0 - neighbours as f64 * 100.0 / 48.0;
@@ -107,8 +109,8 @@ fn beliefs_that_saturate() {
     }
 }
 
-/// Negative control: where every label's sum saturates, a message says nothing, and a belief as little; one that did not
-/// saturate would.
+/// Negative control: where every label's sum saturates, messages and beliefs carry no information; without
+/// saturation they would.
 #[test]
 fn control_saturated_sums_say_nothing() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
@@ -117,7 +119,8 @@ fn control_saturated_sums_say_nothing() {
             let pair = random::pair(&mut Random::new(3), 15, 13);
             let graphs = full_graphs(&plan);
             let tau = u32::from(plan.dependency.tau);
-            // Label 0 is a little better everywhere, in beliefs and in messages that are not at their minimum.
+            // Label 0 is slightly better everywhere, in beliefs and in messages that are not at their
+            // minimum.
             let better = |plan: &Plan, volume: Volume, most: u32| {
                 let (rows, labels, _) = volume_shape(plan, volume);
                 (0..rows * labels).map(|i| if i % labels == 0 { most - 5 } else { most }).collect::<Vec<_>>()
@@ -160,8 +163,8 @@ fn control_saturated_sums_say_nothing() {
     }
 }
 
-/// Negative control: what belongs to no label must not look better than labels that are all as bad as can be, even when its
-/// message is taken off it.
+/// Negative control: padding must not look better than labels that all have the largest cost, even after its
+/// message is subtracted.
 #[test]
 fn control_padding_stays_behind_beliefs_that_saturate() {
     for width in [VolumeWidth::Narrow, VolumeWidth::Wide] {
@@ -196,7 +199,7 @@ fn control_padding_stays_behind_beliefs_that_saturate() {
     }
 }
 
-/// Where nothing saturates even if a pixel is in more factors than usual, and where it may not.
+/// Where nothing saturates even if a pixel is in more factors than usual, and where it may saturate.
 #[test]
 fn every_plan_leaves_room_for_its_beliefs() {
     let mut random = Random::new(11);
@@ -205,7 +208,7 @@ fn every_plan_leaves_room_for_its_beliefs() {
         let neighbours = random.pick(NEIGHBOURS);
         let plan = random::plan((9, 9), 0, 9, &random::method(&mut random, neighbours));
         let (dependency, resolution) = (u32::from(plan.dependency.tau), u32::from(plan.resolution.tau));
-        // As many as a factor has members in 8 bits, as many as there can be in 16.
+        // As many as a factor has members in 8 bits, as many as possible in 16.
         let factors = match plan.volume_width {
             VolumeWidth::Narrow => plan.neighbours as u32 + 1,
             VolumeWidth::Wide => 49,
@@ -220,7 +223,7 @@ fn every_plan_leaves_room_for_its_beliefs() {
     assert_eq!(widths.len(), 2);
 }
 
-/// Negative control: twins that saturate later than a narrow plan does give other volumes.
+/// Negative control: twins that saturate later than a narrow plan give different volumes.
 #[test]
 fn control_saturation_in_8_bits_is_found() {
     let plan = saturating(48, VolumeWidth::Narrow, TruncationRule::Relative, Agreement::Interpolating);

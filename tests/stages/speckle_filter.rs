@@ -1,4 +1,4 @@
-//! Small regions.
+//! The speckle filter.
 
 use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
@@ -20,7 +20,7 @@ fn speckle_filter() {
         |random: &mut Random, method: &mut Method| method.refinement.speckle_size = random.pick(&sizes);
     let input = |random: &mut Random, plan: &Plan| {
         let mut maps = random::finest(random, plan, false);
-        // As the left-right check leaves it.
+        // Flags that the left-right check may leave.
         for validity in maps.validity.data_mut() {
             *validity &= i32::from(flag::OUTSIDE | flag::OCCLUDED | flag::MASKED);
         }
@@ -34,7 +34,7 @@ fn speckle_filter() {
 /// Which pixels belong to a region.
 type Shape<'a> = &'a dyn Fn(usize, usize) -> bool;
 
-/// Regions of every shape that defeats a shortcut: a spiral, a comb, rows that meet at their ends alone.
+/// Regions whose shapes defeat shortcuts: a spiral, a comb, rows that meet only at their ends.
 #[test]
 fn regions_that_wind() {
     let (width, height) = (131, 70);

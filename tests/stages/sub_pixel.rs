@@ -1,4 +1,4 @@
-//! The disparity between the labels.
+//! The sub-pixel disparity.
 
 use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;
@@ -13,7 +13,7 @@ fn sub_pixel() {
             let belief: Vec<u32> = (0..cells(&case.plan, 0)).map(|_| random.within(0, most)).collect();
             let cost = random_cost(random, &case.plan, 0);
             let mut maps = random::finest(random, &case.plan, false);
-            // Labels as a match leaves them.
+            // Labels that a match may leave.
             twin::winner_takes_all::winner_takes_all(&case.plan, &belief, &mut maps);
             backend.probe().write(Volume::Cost(0), &cost).unwrap();
             maps.write(backend);

@@ -1,4 +1,4 @@
-//! The optimum of the beliefs.
+//! Winner takes all: the optimum of the beliefs.
 
 use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;

@@ -7,13 +7,13 @@ use crate::plan::Plan;
 use rayon::prelude::*;
 use std::array::from_fn;
 
-/// What the beliefs of a level are the sums of.
+/// The terms of the beliefs of a level.
 pub(super) struct Summands<'a, U> {
     pub(super) graph: &'a LevelGraph,
     evidence: &'a [u8],
-    /// Empty where nothing came from above.
+    /// Empty where the coarser level has sent no messages yet.
     down: &'a [U],
-    /// Empty where nothing came from below.
+    /// Empty where the finer level has sent no messages yet.
     up: &'a [U],
     stride: usize,
     most: U,
@@ -21,7 +21,8 @@ pub(super) struct Summands<'a, U> {
 }
 
 impl<'a, U: Units> Summands<'a, U> {
-    /// Those of level `z`; beside them its dependency messages and its beliefs, and whether the factors have sent the messages.
+    /// The terms of level `z`, with its dependency messages, its beliefs, and whether its factors have sent
+    /// their messages.
     pub(super) fn of(
         plan: &Plan,
         levels: &'a mut [Level<U>],
@@ -34,7 +35,7 @@ impl<'a, U: Units> Summands<'a, U> {
         let summands = Self {
             graph,
             evidence,
-            // What holds nothing yet is no summand.
+            // A volume without messages is left out of the sum.
             down: if above { down } else { &[] },
             up: if *resolution_sent { up } else { &[] },
             stride: l.stride,
@@ -45,8 +46,8 @@ impl<'a, U: Units> Summands<'a, U> {
     }
 }
 
-/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on; the factors have sent none yet where there
-/// are no messages.
+/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on. `None` means that
+/// the factors have not sent any yet.
 pub(super) fn row<U: Units>(
     summands: &Summands<U>,
     y: usize,
@@ -82,13 +83,13 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     belief.par_chunks_mut(cells).enumerate().for_each(|(y, belief)| row(&summands, y, 0, dependency, belief));
 }
 
-/// A pixel's belief, and what it is the sum of.
+/// A pixel's belief, and its terms.
 struct Sum<'a, U> {
     evidence: &'a [u8],
     down: Option<&'a [U]>,
     up: Option<&'a [U]>,
     dependency: &'a [U],
-    /// What the entries of `incoming` count from.
+    /// The slot that `dependency` starts at; it is subtracted from the entries of `incoming`.
     base: usize,
     incoming: &'a [u32],
     most: U,

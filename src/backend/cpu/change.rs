@@ -1,4 +1,4 @@
-//! How much the label map changed: see [`crate::backend::Stage::Change`].
+//! The change of the label map: see [`crate::backend::Stage::Change`].
 
 use super::units::{Units, argmin};
 use super::volumes::Volumes;

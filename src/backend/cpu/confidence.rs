@@ -1,4 +1,4 @@
-//! How sure each pixel is: see [`crate::backend::Stage::Confidence`].
+//! The confidence of each pixel: see [`crate::backend::Stage::Confidence`].
 
 use super::finest::Finest;
 use crate::image::Image;

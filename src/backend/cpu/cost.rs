@@ -29,7 +29,7 @@ fn difference(a: Pixel, b: Pixel) -> u32 {
 fn census(plan: &Plan, pair: &Pair, out: &mut [u8]) {
     let level = &plan.levels[0];
     let width = level.width;
-    // The right image is seen from right to left, so that ascending labels are side by side.
+    // The right image is read from right to left, so that ascending labels are side by side.
     let [left, right] = [Greys::new(pair.left(), false), Greys::new(pair.right(), true)];
     out.par_chunks_mut(width * level.stride).enumerate().for_each_init(
         || (Row::new(width, level.stride), Row::new(width, level.stride), Contrast::new(width)),
@@ -81,11 +81,11 @@ fn cost_row_on<'a, S: pulp::Simd>(
     }
 }
 
-/// The costs of a left pixel against those of the right row, whatever is there.
+/// The costs of a left pixel against every pixel of the right row.
 struct PixelCosts<'a> {
     here: &'a Row,
     there: &'a Row,
-    /// Where the pixel is in its row, and where the one of label index 0 is in the other.
+    /// Position of the pixel in its row, and of the pixel of label index 0 in the other row.
     at: usize,
     place: usize,
     weight: u16,
@@ -115,13 +115,13 @@ impl Blocks for PixelCosts<'_> {
     }
 }
 
-/// The grey of an image, its columns continued by what a census sees beyond the border.
+/// The grey of an image, its columns continued beyond the border as far as a census reaches.
 struct Greys {
     size: (usize, usize),
     mirrored: bool,
-    /// By rows of the width and [`CENSUS_X`] more on either side.
+    /// Row by row, with [`CENSUS_X`] more columns on either side.
     values: Vec<u16>,
-    /// 0, or the largest there is where masked; `None` where nothing is.
+    /// 0, or the largest value where masked; `None` where no pixel is masked.
     masked: Option<Vec<u16>>,
 }
 
@@ -148,15 +148,16 @@ impl Greys {
         }
     }
 
-    /// Calls `see` with every place (dx, dy) of the window around the pixels of row `y`, with the greys there for each of
-    /// them, and what is masked: a row at once is a vector.
+    /// Calls `see` for every offset (dx, dy) of the window around the pixels of row `y`, with the greys at
+    /// that offset for all of them, and which of these are masked. A whole row at a time is processed with
+    /// vectors.
     #[inline(always)]
     fn around(&self, y: usize, mut see: impl FnMut(isize, isize, &[u16], Option<&[u16]>)) {
         let (width, height) = self.size;
         for dy in -CENSUS_Y..=CENSUS_Y {
             let ny = (y as isize + dy).clamp(0, height as isize - 1) as usize;
             for i in 0..=2 * CENSUS_X {
-                // In the image's own order, whichever way it is seen.
+                // In the order of the original image, mirrored or not.
                 let column = if self.mirrored { 2 * CENSUS_X - i } else { i };
                 let there = ny * (width + 2 * CENSUS_X) + column..;
                 let masked = self.masked.as_ref().map(|masked| &masked[there.clone()][..width]);
@@ -172,10 +173,10 @@ impl Greys {
     }
 }
 
-/// A row of an image as the costs see it, with as many places as there are labels beyond either end.
+/// A row of an image as the costs need it, with as many extra pixels at either end as there are labels.
 struct Row {
     margin: usize,
-    /// Eight bits of the census a plane.
+    /// Eight bits of the census per plane.
     census: [Vec<u8>; 8],
     /// 8-bit levels.
     channels: [Vec<u8>; 3],
@@ -209,7 +210,7 @@ fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, grey
             *bits = before | u8::from(grey < centre);
         }
         if let Some(masked) = masked {
-            // A masked pixel is below nobody.
+            // A masked pixel is never below the centre.
             plane.iter_mut().zip(masked).for_each(|(bits, &masked)| *bits &= !(masked as u8 & 1));
         }
     });
@@ -226,10 +227,10 @@ fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, grey
     row.masked[inside].iter_mut().enumerate().for_each(|(x, out)| *out = u8::from(masked[at(x)]));
 }
 
-/// How much colour counts at each pixel of a row, and what that is reckoned from.
+/// The weight of colour at each pixel of a row, and the sums that it is computed from.
 struct Contrast {
     weights: Vec<u16>,
-    /// Of grey and of its square over the window.
+    /// Sums of grey, and of its square, over the window.
     sums: Vec<u16>,
     squares: Vec<u32>,
 }
@@ -240,7 +241,7 @@ impl Contrast {
     }
 }
 
-/// How much colour counts at each pixel of row `y`: by the variance of grey around it.
+/// The weight of colour at each pixel of row `y`, from the variance of grey around it.
 #[pulp::with_simd(colour_weights = pulp::Arch::new())]
 #[inline(always)]
 fn colour_weights_on<'a, S: pulp::Simd>(

@@ -1,8 +1,8 @@
 //! Messages of the dependency factors: see [`crate::backend::Stage::Dependency`].
 //!
-//! A factor reads old beliefs and its own old messages and writes its own messages only, so flooding is exact in
-//! place. Padding labels go through the same arithmetic as labels; their belief is the largest there is, and no label's
-//! exceeds [`Plan::belief_most`], so that no minimum is theirs alone.
+//! A factor reads old beliefs and its own old messages and writes only its own messages, so flooding in place
+//! is exact. Padding labels go through the same arithmetic as real labels. Their belief is the largest value,
+//! and no real label exceeds [`Plan::belief_most`], so a minimum never comes from padding alone.
 
 use super::units::{Blocks, Least, Truncating, Units, block, block_mut, keep_least, smallest};
 use super::volumes::{Level, Volumes};
@@ -12,16 +12,17 @@ use rayon::prelude::*;
 use std::array::from_fn;
 use std::mem;
 
-/// What a thread needs for its factors.
+/// Working memory of a thread.
 pub(super) struct Scratch<U> {
-    /// q of each member, \[member\]\[label\], and the sum of q over the members after it.
+    /// q of each member, \[member\]\[label\]; `after` has the sum of q over the members after it.
     q: Vec<U>,
     after: Vec<U>,
     /// Sum of q over the members before.
     before: Vec<U>,
     /// Sums of q over the other members.
     sums: Vec<U>,
-    /// Slot of each member, and where its belief starts in which row around the factor's.
+    /// For each member its slot, the row that holds its belief (relative to the factor's), and its start in
+    /// that row.
     members: Vec<(usize, usize, usize)>,
 }
 
@@ -37,16 +38,16 @@ impl<U: Units> Scratch<U> {
     }
 }
 
-/// How far a factor reaches, in rows and columns.
+/// Radius of a factor, in rows and columns.
 pub(super) const REACH: usize = GRAPH_WINDOW / 2;
 
-/// Beliefs of the rows around a factor's, [`REACH`] above to as many below; empty outside the image.
+/// Beliefs of the rows around a factor, from [`REACH`] above to [`REACH`] below; empty outside the image.
 pub(super) type Around<'a, U> = [&'a [U]; GRAPH_WINDOW];
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (plan, l) = (&v.plan, &v.plan.levels[level]);
     let Level { graph, belief, dependency: messages, dependency_sent, .. } = &mut v.levels[level];
-    // The messages before the first are 0, whatever is stored.
+    // The first messages count as 0, whatever is stored.
     let initial = !mem::replace(dependency_sent, true);
     let cells = l.width * l.stride;
     messages.par_chunks_mut(cells * graph.slots()).enumerate().for_each_init(
@@ -75,7 +76,7 @@ pub(super) fn row<U: Units>(
     scratch: &mut Scratch<U>,
 ) {
     let (cut, stride, slots) = (plan.dependency, plan.levels[level].stride, graph.slots());
-    // Row and way of every code.
+    // Row and offset within the row, for every code.
     let places: [(usize, isize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
         let (dx, dy) = offset(code as u8);
         (REACH.wrapping_add_signed(dy as isize), dx as isize * stride as isize)
@@ -110,15 +111,15 @@ pub(super) fn row<U: Units>(
     }
 }
 
-/// Brings a row into the cache in its own order, which the processor foresees; that in which factors come upon it, it does
-/// not.
+/// Brings a row into the cache in sequential order, which the prefetcher predicts. It cannot predict the
+/// order in which factors access the row.
 fn touch<U: Units>(row: &[U]) {
     const CACHE_LINE: usize = 64;
     let step = CACHE_LINE / size_of::<U>();
     std::hint::black_box(row.iter().step_by(step).fold(U::default(), |most, &v| most.max(v)));
 }
 
-/// A factor of three, whose sums are of two each.
+/// A factor of three members. Each sum has two terms.
 struct Three<'a, U> {
     beliefs: [&'a [U]; 3],
     messages: &'a [U],
@@ -144,7 +145,7 @@ impl<U: Units> Three<'_, U> {
         from_fn(|i| b[i].less(m[i]))
     }
 
-    /// The sum for the member in `slot`, of the q of the two others.
+    /// The sum for the member in `slot`: the q of the other two.
     #[inline(always)]
     fn sum<const N: usize>(&mut self, slot: usize, at: usize, a: &[U; N], b: &[U; N]) {
         let sums: [U; N] = from_fn(|i| a[i].plus(b[i]));
@@ -166,8 +167,8 @@ fn three<U: Units>(cut: Truncation, beliefs: [&[U]; 3], messages: &mut [U], sums
     }
 }
 
-/// The smallest of all lanes, in each of them. (So the bounds of a message stay in vectors; on their way through single bytes
-/// a factor waited longer than it computed.)
+/// The smallest of all lanes, in each of them. This keeps the bounds of a message in vectors. When they
+/// passed through single bytes, a factor waited longer than it computed.
 #[inline(always)]
 fn least_in_all<U: Units>(mut lanes: Least<U>) -> Least<U> {
     for apart in [8, 4, 2, 1] {
@@ -176,7 +177,7 @@ fn least_in_all<U: Units>(mut lanes: Least<U>) -> Least<U> {
     lanes
 }
 
-/// [`Truncating`] by [`TruncationRule::Relative`], with bounds that are vectors.
+/// [`Truncating`] by [`TruncationRule::Relative`], with bounds in vectors.
 struct RelativeCutting<'a, U> {
     sums: &'a [U],
     least: Least<U>,
@@ -217,7 +218,8 @@ fn any<U: Units>(
             }
         }
     }
-    // Sums that saturate cannot be taken off again: those of the members before and after are added.
+    // Saturated sums cannot be undone by subtraction, so the sums of the members before and after are added
+    // instead.
     let last = (members.len() - 1) * stride;
     after[last..][..stride].fill(U::default());
     for at in (0..last).step_by(stride).rev() {

@@ -34,7 +34,7 @@ fn evidence_row_on<'a, S: pulp::Simd, C: StoredCost, U: Units>(
 ) {
     let pixels = cost.chunks_exact(level.stride).zip(evidence.chunks_exact_mut(level.stride));
     for ((cost, evidence), belief) in pixels.zip(belief.chunks_exact_mut(level.stride)) {
-        // The padding's cost is the largest there is.
+        // The cost of padding is the largest value.
         let min = cost.iter().copied().fold(C::MOST, C::min).fraction();
         for ((e, b), c) in evidence.iter_mut().zip(belief.iter_mut()).zip(cost) {
             *e = level.evidence.apply(c.fraction() - min);

@@ -1,4 +1,4 @@
-//! The farther of two neighbours for what has no disparity of its own: see [`crate::backend::Stage::Fill`].
+//! Fills invalid pixels from the farther of two neighbours: see [`crate::backend::Stage::Fill`].
 
 use super::finest::Finest;
 use crate::image::Image;
@@ -30,7 +30,7 @@ pub(super) fn run(maps: &mut Finest, _: &Plan, _: &Image) {
     });
 }
 
-/// A row with at least one valid pixel, its invalid ones filled.
+/// Fills the invalid pixels of a row that has at least one valid one.
 fn fill_row(disparity: &[i32], flags: &[u8]) -> Vec<i32> {
     let nearest = |order: &mut dyn Iterator<Item = usize>| {
         let mut last = None;

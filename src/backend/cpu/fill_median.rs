@@ -1,4 +1,4 @@
-//! The stretched median of what was filled: see [`crate::backend::Stage::FillMedian`].
+//! The stretched median of the filled pixels: see [`crate::backend::Stage::FillMedian`].
 
 use super::finest::Finest;
 use super::median::smooth;

@@ -1,9 +1,9 @@
-//! What a match knows of each pixel once the labels are found.
+//! The maps of a match, from the labels on.
 
 use crate::backend::Map;
 use crate::image::{Plane, Rect};
 
-/// What the finest level knows of each pixel, at last.
+/// The maps of the finest level.
 pub(crate) struct Finest {
     pub(crate) optima: Plane<Optimum>,
     pub(crate) right: Plane<u16>,
@@ -55,7 +55,7 @@ impl Finest {
         self.write_part(map, values, &Rect::whole(values.size()), (0, 0));
     }
 
-    /// Replaces the values of `map` from `corner` on by `part` of `values`.
+    /// Copies `part` of `values` into `map`, with its top left corner at `corner`.
     pub(crate) fn write_part(&mut self, map: Map, values: &Plane<i32>, part: &Rect, corner: (usize, usize)) {
         fn put<T>(
             plane: &mut Plane<T>,

@@ -1,8 +1,9 @@
 //! Messages of the dependency factors and beliefs in one sweep: see [`crate::backend::Stage::Flood`].
 //!
-//! A belief is summed up as soon as the last factor that holds its pixel has sent its messages, three rows below: by then no factor
-//! needs the old belief any more, and the messages are still in the cache. Every thread sweeps a band of rows. What is within
-//! three rows of where two bands meet waits until all have swept.
+//! A belief is summed as soon as the last factor that contains its pixel has sent its messages, three rows
+//! below. By then no factor needs the old belief any more, and the messages are still in the cache. Every
+//! thread sweeps a band of rows. Beliefs within three rows of the border between two bands wait until all
+//! bands are done.
 
 use super::belief::{self, Summands};
 use super::dependency::{self, Around, REACH, Scratch};
@@ -13,14 +14,14 @@ use rayon::prelude::*;
 use std::array::from_fn;
 use std::mem;
 
-/// Bands a thread, so that one that is held up does not hold up all.
+/// Bands per thread, so that one slow thread does not delay all others.
 const BANDS: usize = 4;
-/// Rows of a band, at least.
+/// Smallest number of rows of a band.
 const LEAST_ROWS: usize = 8 * REACH;
 
-/// The beliefs of a band, which nobody else changes.
+/// A band of rows, with the beliefs that no other band changes.
 struct Band<'a, U> {
-    /// The first row of its factors, and of the beliefs that are its own.
+    /// First row of its factors; `first_own` is the first row of its own beliefs.
     first: usize,
     first_own: usize,
     messages: &'a mut [U],
@@ -31,7 +32,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let plan = &v.plan;
     let (summands, [messages, belief], sent) = Summands::of(plan, &mut v.levels, level);
     let summands = &summands;
-    // The messages before the first are 0, whatever is stored.
+    // The first messages count as 0, whatever is stored.
     let initial = !mem::replace(sent, true);
     let l = &plan.levels[level];
     let (cells, height) = (l.width * l.stride, l.height);
@@ -39,7 +40,8 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let count = (BANDS * rayon::current_num_threads()).min(height / LEAST_ROWS).max(1);
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
 
-    // Beliefs in turns: those of a band alone, those around the border to the next, ...
+    // The beliefs alternate: those of one band alone, then those around the border to the next band, and so
+    // on.
     let (mut own, mut edges) = (Vec::new(), Vec::new());
     let mut rest = &mut *belief;
     let mut row = 0;
@@ -76,8 +78,8 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
 }
 
 impl<U: Units> Band<'_, U> {
-    /// Sweeps the band; `edges` are the beliefs around its borders. Messages that are `initial` are 0 before, whatever is stored:
-    /// nothing has to come from memory for them.
+    /// Sweeps the band; `edges` are the beliefs around its borders. If the messages are `initial`, the old
+    /// ones are 0 whatever is stored, and nothing has to be loaded from memory for them.
     fn sweep(&mut self, plan: &Plan, level: usize, summands: &Summands<U>, edges: [&[U]; 2], initial: bool) {
         let l = &plan.levels[level];
         let (cells, slots) = (l.width * l.stride, summands.graph.slots());

@@ -1,4 +1,4 @@
-//! Costs within the pixels' label range alone: see [`crate::backend::Stage::LabelRange`].
+//! Restricts the costs to the pixels' label ranges: see [`crate::backend::Stage::LabelRange`].
 
 use super::units::Units;
 use super::volumes::Volumes;

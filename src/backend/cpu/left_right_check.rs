@@ -1,4 +1,4 @@
-//! What the right view says of each pixel: see [`crate::backend::Stage::LeftRightCheck`].
+//! The left-right check: see [`crate::backend::Stage::LeftRightCheck`].
 
 use super::finest::Finest;
 use crate::backend::volume::NO_LABEL;

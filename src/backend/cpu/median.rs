@@ -19,21 +19,21 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
     smooth(&MedianWeights::of(&plan.method), touched, guide, maps);
 }
 
-/// Replaces the disparity of every pixel whose flags are `touched`.
+/// Applies the median to every pixel whose flags are `touched`.
 pub(super) fn smooth(
     weights: &MedianWeights,
     touched: impl Fn(u8) -> bool + Sync,
     guide: &Image,
     maps: &mut Finest,
 ) {
-    // Rows of the window are vectors of one length or another.
+    // Rows of the window are vectors of one of two lengths.
     match 2 * weights.radius() + 1 {
         ..=16 => smooth_by::<16>(weights, touched, guide, maps),
         _ => smooth_by::<32>(weights, touched, guide, maps),
     }
 }
 
-/// As [`smooth`], with `LANES` places for each row of a window: padded where they are more than it has.
+/// As [`smooth`], with `LANES` lanes for each row of a window, padded where the row is shorter.
 fn smooth_by<const LANES: usize>(
     weights: &MedianWeights,
     touched: impl Fn(u8) -> bool + Sync,
@@ -46,7 +46,7 @@ fn smooth_by<const LANES: usize>(
     let seen = Seen::new(weights, LANES, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
     disparity.for_each_init(Window::<LANES>::new, |window, (y, row)| {
-        // The window's rows, in between those that it does not see.
+        // The rows of the window, without those that it skips.
         let (apart, reach) = (step << weights.row_bits(), radius >> weights.row_bits());
         let first = y - reach.min(y / apart) * apart;
         let rows = (first..(y + reach * apart + 1).min(height)).step_by(apart);
@@ -55,7 +55,7 @@ fn smooth_by<const LANES: usize>(
     });
 }
 
-/// The medians of row `y`, where it is touched.
+/// The medians of the touched pixels of row `y`.
 #[pulp::with_simd(median_row = pulp::Arch::new())]
 #[inline(always)]
 fn median_row_on<'a, S: pulp::Simd, const LANES: usize>(
@@ -82,14 +82,15 @@ fn median_row_on<'a, S: pulp::Simd, const LANES: usize>(
     }
 }
 
-/// What the windows see: rows in which the columns of a window are side by side, with unknown ones beyond both borders.
+/// The input of the windows: rows in which the columns of one window are adjacent, with unknown pixels beyond
+/// both borders.
 struct Seen {
     radius: usize,
     pitch: usize,
-    /// Where the window of the pixel of each column starts in a row.
+    /// Start of the window of each column's pixel, within a row.
     columns: Vec<usize>,
     guides: [Vec<u8>; 3],
-    /// The largest there is where there is a disparity, else 0.
+    /// The largest value where there is a disparity, else 0.
     known: Vec<u8>,
     values: Vec<i32>,
 }
@@ -137,38 +138,39 @@ impl Seen {
     }
 }
 
-/// How near to what it replaces a median mostly is, in 1/256 px.
+/// Most medians are this close to the value that they replace, in 1/256 px.
 const NEAR: i32 = 64;
-/// The values of a window are seen as far as this around a guess.
+/// The values of a window are clamped to this distance from a guess.
 const FAR: i32 = i16::MAX as i32;
 
-/// Pixels whose medians are sought side by side: each cut of an interval waits for the one before.
+/// Number of pixels whose medians are found side by side: each step of one search waits for the step before.
 const GROUP: usize = 4;
-/// Places of a window that are summed up side by side: what is left over would be summed up one by one.
+/// Number of samples of a window that are summed side by side; a remainder would be summed one by one.
 const SIDE: usize = 32;
-/// Sums of so many weights fit 16 bits.
+/// Sums of this many weights fit in 16 bits.
 const PART: usize = 512;
 
 /// The windows of a group of pixels of one row.
 struct Window<const LANES: usize> {
-    /// Where their rows start in what they see.
+    /// Start of each row in the input.
     rows: Vec<usize>,
-    /// What distance takes off the weights.
+    /// The weight that distance subtracts.
     space: Vec<[u8; LANES]>,
     contents: [Contents<LANES>; GROUP],
 }
 
-/// Values and weights of a window, row by row, in whole blocks of [`SIDE`]. What has no disparity has no weight.
+/// Values and weights of a window, row by row, in whole blocks of [`SIDE`]. A pixel without disparity has
+/// weight 0.
 #[derive(Clone, Default)]
 struct Contents<const LANES: usize> {
     column: usize,
-    /// Where the median is sought first.
+    /// Where the search for the median starts.
     guess: i32,
     /// Relative to the guess.
     values: Vec<[i16; LANES]>,
     weights: Vec<[u16; LANES]>,
     total: u32,
-    /// The ends of the interval that the median is in, relative to the guess.
+    /// The ends of the interval that contains the median, relative to the guess.
     low: i32,
     high: i32,
 }
@@ -178,7 +180,7 @@ impl<const LANES: usize> Window<LANES> {
         Self { rows: Vec::new(), space: Vec::new(), contents: from_fn(|_| Contents::default()) }
     }
 
-    /// Takes rows: where each starts in what is seen, and what distance takes off in it.
+    /// Sets the rows: the start of each in the input, and the weight that distance subtracts in it.
     fn open<'a>(&mut self, rows: impl Iterator<Item = (usize, &'a [u8])>) {
         self.rows.clear();
         self.space.clear();
@@ -194,8 +196,8 @@ impl<const LANES: usize> Window<LANES> {
         }
     }
 
-    /// Replaces the pixels at `places` of row `y` by the weighted medians of their windows, which are sought near what is
-    /// replaced first.
+    /// Replaces the pixels `places` of row `y` by the weighted medians of their windows. Each search starts
+    /// near the value that it replaces.
     #[inline(always)]
     fn medians(&mut self, doublings: u32, seen: &Seen, places: &[usize], y: usize, row: &mut [i32]) {
         let Self { rows, space, contents } = self;
@@ -209,7 +211,7 @@ impl<const LANES: usize> Window<LANES> {
             for window in contents.iter_mut().filter(|window| window.is_open()) {
                 window.cut();
                 if !window.is_open() && window.low.abs() == FAR {
-                    // Beyond what is seen from this guess.
+                    // The median is out of reach of this guess.
                     window.guess += window.low;
                     window.open(seen, rows);
                 }
@@ -226,7 +228,7 @@ impl<const LANES: usize> Contents<LANES> {
     fn weigh(&mut self, doublings: u32, seen: &Seen, rows: &[usize], space: &[[u8; LANES]], y: usize) {
         let centre = y * seen.pitch + self.column + seen.radius;
         let centres = seen.guides.each_ref().map(|guide| guide[centre]);
-        // What takes off all of the weight, doubled.
+        // The value that takes all of the weight once it is doubled.
         let most = (MEDIAN_WEIGHT + 1) >> doublings;
         for ((weights, space), &row) in self.weights.iter_mut().zip(space).zip(rows) {
             let at = row + self.column;
@@ -248,7 +250,7 @@ impl<const LANES: usize> Contents<LANES> {
         }
     }
 
-    /// Looks at the values around the guess, and finds out in which of three intervals the median is.
+    /// Loads the values around the guess, and finds out which of three intervals contains the median.
     #[inline(always)]
     fn open(&mut self, seen: &Seen, rows: &[usize]) {
         for (values, &row) in self.values.iter_mut().zip(rows) {
@@ -272,7 +274,7 @@ impl<const LANES: usize> Contents<LANES> {
         self.low < self.high
     }
 
-    /// Cuts the interval into four: that needs no sort.
+    /// Divides the interval into four and keeps the one with the median. This needs no sort.
     #[inline(always)]
     fn cut(&mut self) {
         let share = (self.high - self.low + 4) / 4;
@@ -282,7 +284,7 @@ impl<const LANES: usize> Contents<LANES> {
         self.high = self.high.min(self.low + share - 1);
     }
 
-    /// The weights of values up to each of three.
+    /// The weight of all values up to each of three ends.
     #[inline(always)]
     fn below(&self, ends: [i32; 3]) -> [u32; 3] {
         let [a, b, c] = ends.map(|end| end.min(FAR) as i16);

@@ -1,4 +1,4 @@
-//! The CPU path: every stage, parallel over rows, its inner loops over labels.
+//! The CPU path: every stage, parallel over rows, with inner loops over labels.
 
 mod finest;
 mod pages;
@@ -54,7 +54,7 @@ macro_rules! declare {
         }
 
         impl Finest {
-            /// Runs a stage that looks at maps alone; `left` is the left view, as it was matched.
+            /// Runs a stage that needs only maps; `left` is the left view of the pair that was matched.
             pub(crate) fn run(&mut self, stage: Stage, plan: &Plan, left: &Image) {
                 match stage {
                     $( Stage::$map => $map_name::run(self, plan, left), )*
@@ -90,7 +90,7 @@ impl Backend for Cpu {
             Some(State::Narrow(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),
             Some(State::Wide(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),
             _ => {
-                // What the last match holds goes before the next one asks for more.
+                // The volumes of the last match are freed before new ones are allocated.
                 self.state = None;
                 memory::check(plan.bytes(), Purpose::Match)?;
                 self.state = Some(match plan.volume_width {

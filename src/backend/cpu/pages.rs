@@ -6,10 +6,10 @@ use memmap2::MmapMut;
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// Values that are 0 at first, in large pages where the system has them: it hands out small ones at their first touch, one
-/// by one, and that takes longer than a match.
+/// Values that are 0 at first, in large pages where the system has them. Small pages are allocated one by one
+/// at their first access, and that takes longer than a match.
 pub(super) struct Pages<T> {
-    /// `None` where there are none.
+    /// `None` where there are no values.
     bytes: Option<MmapMut>,
     values: PhantomData<T>,
 }
@@ -18,7 +18,7 @@ impl<T: Pod> Pages<T> {
     /// `len` values.
     ///
     /// # Errors
-    /// [`MemoryError::Machine`] when the system has not as much.
+    /// [`MemoryError::Machine`] when the system does not have as much memory.
     pub(super) fn new(len: usize) -> Result<Self, MemoryError> {
         let size = len * size_of::<T>();
         if size == 0 {
@@ -29,7 +29,7 @@ impl<T: Pod> Pages<T> {
             available: None,
             purpose: Purpose::Match,
         })?;
-        // A wish: a system without large pages gives small ones.
+        // Only a hint: a system without large pages gives small ones.
         #[cfg(target_os = "linux")]
         let _ = bytes.advise(memmap2::Advice::HugePage);
         Ok(Self { bytes: Some(bytes), values: PhantomData })
@@ -40,7 +40,7 @@ impl<T: Pod> Deref for Pages<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        // Pages are aligned for everything.
+        // Pages are aligned for every type.
         self.bytes.as_ref().map_or(&[], |bytes| bytemuck::cast_slice(bytes))
     }
 }

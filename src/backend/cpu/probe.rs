@@ -1,4 +1,4 @@
-//! Volumes and maps of the CPU path, value by value, and the rate at which it copies.
+//! Reads and writes volumes and maps of the CPU path, and measures its copy rate.
 
 use super::units::Units;
 use super::volumes::Volumes;
@@ -13,18 +13,18 @@ use std::hint::black_box;
 use std::mem;
 use std::time::Instant;
 
-/// What [`Cpu::copy_rate`] copies, and how often.
+/// Bytes that [`Cpu::copy_rate`] copies, and its number of tries.
 const COPIED_BYTES: usize = 1 << 28;
 const COPY_TRIES: usize = 8;
 
 impl Cpu {
-    /// The rate at which the threads of the current pool copy from one buffer to another, both larger than caches are:
-    /// bytes read and written a second, the best of a few tries.
+    /// The rate at which the threads of the current pool copy between two buffers larger than caches: bytes
+    /// read and written per second, the best of a few tries.
     #[must_use]
     pub fn copy_rate() -> f64 {
         let from = vec![1u8; COPIED_BYTES];
         let mut to = vec![0u8; COPIED_BYTES];
-        // A piece a thread: what copies long runs goes past the caches.
+        // One piece per thread: copies of long runs bypass the caches.
         let piece = COPIED_BYTES.div_ceil(rayon::current_num_threads());
         let mut rate = || {
             let start = Instant::now();
@@ -79,7 +79,8 @@ impl<U: Units> Volumes<U> {
         }
     }
 
-    /// Stores the messages between level `z` and the next finer one, where nothing was stored since they are 0.
+    /// Makes the messages between level `z` and the next finer one count as stored: where none have been sent
+    /// yet, they become 0.
     fn store_resolution(&mut self, z: usize) {
         if !mem::replace(&mut self.levels[z].resolution_sent, true) {
             self.levels[z].up.fill(U::default());
@@ -129,7 +130,7 @@ impl<U: Units> Volumes<U> {
     }
 }
 
-/// Rows of a padded volume without their padding.
+/// The rows of a padded volume, without their padding.
 fn gather<T: Copy + Into<u32>>(data: &[T], labels: usize, stride: usize) -> Vec<u32> {
     data.chunks_exact(stride).flat_map(|row| row[..labels].iter().map(|&v| v.into())).collect()
 }

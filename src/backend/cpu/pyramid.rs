@@ -9,22 +9,22 @@ const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
 
 /// A stored cost.
 pub(super) trait StoredCost: Copy + Default + Ord + Send + Sync {
-    /// What sums of it over a 5 x 5 binomial window fit in: of 256 times 254 at most, or of 16-bit values.
+    /// A type for sums over a 5 x 5 binomial window, of up to 256 times 254 or of 16-bit values.
     type Sum: Copy + Default + Send + Sync;
 
-    /// The largest that can be stored.
+    /// The largest value that can be stored.
     const MOST: Self;
 
-    /// In 1/256 cost units.
+    /// The cost in 1/256 cost units.
     fn fraction(self) -> u16;
 
-    /// `sum` and `weight` times this.
+    /// `sum` plus `weight` times this cost.
     fn add(self, sum: Self::Sum, weight: u32) -> Self::Sum;
 
-    /// `sum` and `weight` times `other`.
+    /// `sum` plus `weight` times `other`.
     fn add_sums(sum: Self::Sum, weight: u32, other: Self::Sum) -> Self::Sum;
 
-    /// What a sum over the whole window is in 1/256 cost units, to the nearest.
+    /// The mean of a sum over the whole window, in 1/256 cost units, to the nearest.
     fn mean(sum: Self::Sum) -> u16;
 }
 
@@ -48,7 +48,7 @@ impl StoredCost for u8 {
         sum.wrapping_add(other.wrapping_mul(weight as u16))
     }
 
-    /// The weights sum to 256, which are the fraction.
+    /// The weights sum to 256, so the sum is already in 1/256 units.
     #[inline(always)]
     fn mean(sum: u16) -> u16 {
         sum
@@ -97,7 +97,8 @@ fn reduce<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mut [u16])
     let minimum = plan.minimum_over_d();
     let row_cells = fl.width * fl.stride;
     out.par_chunks_mut(cl.width * cl.stride).enumerate().for_each_init(
-        // The five fine rows reduced over y, then one pixel reduced over x as well, two labels around it.
+        // The five fine rows reduced over y, then one pixel reduced over x as well, with a margin of
+        // two labels.
         || {
             let sums = |n| vec![C::Sum::default(); n];
             (sums(row_cells), sums(fl.stride), vec![0u16; 2 * cl.stride + 5])
@@ -127,7 +128,7 @@ fn reduce<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mut [u16])
     );
 }
 
-/// The binomial sum of five rows, by what adds to a sum a weight times a value.
+/// The binomial sum of five rows; `add` adds a weight times a value to a sum.
 #[inline(always)]
 fn add_all<T: Copy, S: Copy + Default>(rows: [&[T]; 5], add: impl Fn(S, u32, T) -> S, out: &mut [S]) {
     let [a, b, c, d, e] = rows.map(|row| &row[..out.len()]);
@@ -137,12 +138,14 @@ fn add_all<T: Copy, S: Copy + Default>(rows: [&[T]; 5], add: impl Fn(S, u32, T) 
     }
 }
 
-/// The cost of each coarse label from the smoothed costs of the fine ones: the five around coarse label z start at 2 z.
+/// The cost of each coarse label from the smoothed costs of the fine labels: the five around coarse label z
+/// start at 2 z.
 #[inline(always)]
 fn reduce_labels(fine: &[u16], minimum: bool, out: &mut [u16]) {
     let pairs = || fine.chunks_exact(2);
     if minimum {
-        // Clamping repeats a label of the three unless the centre is outside; then it is the one inside.
+        // Clamping repeats one of the three labels, unless the centre is outside; then it repeats the one
+        // inside.
         for (out, (first, second)) in out.iter_mut().zip(pairs().zip(pairs().skip(1))) {
             *out = first[1].min(second[0]).min(second[1]);
         }

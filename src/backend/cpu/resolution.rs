@@ -1,6 +1,6 @@
 //! Messages of the resolution factors: see [`crate::backend::Stage::Resolution`].
 //!
-//! Rows of labels are worked on with their padding; what belongs to no label counts as infinite.
+//! Rows of labels are processed with their padding; values that belong to no label count as infinite.
 
 use super::units::{Blocks, Truncating, Units, block, block_mut, keep_least, least_of, padding, smallest};
 use super::volumes::{Level, Volumes};
@@ -12,17 +12,19 @@ use std::mem;
 struct Scratch<U> {
     /// q of the parent, by coarse label.
     parent: Vec<U>,
-    /// q of each child, infinite around it: at 2 z + 1 the fine label that agrees best with coarse label z.
+    /// q of each child, padded with infinity: the fine label that agrees best with coarse label z is at 2 z +
+    /// 1.
     child: [Vec<U>; 4],
     /// U of each child, \[child\]\[coarse label\]; 0 for a child outside the image.
     best: [Vec<U>; 4],
-    /// The message to the parent before its cut, and t of each child with an infinite value after it.
+    /// The message to the parent before its truncation, and t of each child followed by an infinite value.
     sums: [Vec<U>; 5],
-    /// The message to each child before its cut, at 2 z the fine label that agrees best with coarse label z.
+    /// The message to each child before its truncation; the fine label that agrees best with coarse label z
+    /// is at 2 z.
     fine: [Vec<U>; 4],
 }
 
-/// What all factors between two levels share.
+/// The data shared by all factors between two levels.
 struct Between<U> {
     cut: Truncation,
     interpolating: bool,
@@ -39,7 +41,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (finer, coarser) = v.levels.split_at_mut(level);
     let (Level { belief: fine_belief, down, .. }, coarse) = (&mut finer[level - 1], &mut coarser[0]);
     let Level { belief: coarse_belief, up, resolution_sent, .. } = coarse;
-    // The messages before the first are 0, whatever is stored.
+    // The first messages count as 0, whatever is stored.
     let initial = !mem::replace(resolution_sent, true);
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
     let between = Between {
@@ -75,7 +77,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
             let coarse = coarse_belief[y * cl.width * cl.stride..].chunks_exact(cl.stride);
             let fine = &fine_belief[2 * y * fl.width * fl.stride..];
             for (x, (up, belief)) in up.chunks_exact_mut(cl.stride).zip(coarse).enumerate() {
-                // Where each child is in the rows of this factor.
+                // The position of each child in the rows of this factor.
                 let children = [0, 1, 2, 3].map(|c| {
                     let (fx, j) = (2 * x + c % 2, c / 2);
                     let inside = fx < fl.width && 2 * y + j < fl.height;
@@ -99,7 +101,8 @@ fn factor<U: Units>(
 ) {
     let Between { cut, interpolating, lead, fine_stride, coarse_stride, .. } = *between;
     variable_message(coarse_belief, up, parent, &between.coarse_padding, cut);
-    // What is written at one alignment and read at another goes through memory: everything is written first.
+    // Values written at one alignment and read at another go through memory, so everything is written before
+    // it is read.
     for (place, child) in children.into_iter().zip(child.iter_mut()) {
         if let Some(at) = place {
             let (belief, old) = (&fine_belief[at..][..fine_stride], &down[at..][..fine_stride]);
@@ -115,7 +118,7 @@ fn factor<U: Units>(
             agreeing(block(child, 2 * z), interpolating, block_mut(best, z));
         }
     }
-    // Sums that saturate cannot be taken off again: each is of the others.
+    // Saturated sums cannot be undone by subtraction, so each sum is taken over the others.
     let mut least = [U::MOST; LABEL_BLOCK];
     for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
         let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
@@ -136,7 +139,7 @@ fn factor<U: Units>(
             *block_mut(sums, z) = all;
         }
     }
-    // The padding of the sums to the parent is infinite, as all that agrees with it is.
+    // The padding of the sums to the parent is infinite, because everything that agrees with it is.
     Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(coarse_stride);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
@@ -160,7 +163,8 @@ fn factor<U: Units>(
     }
 }
 
-/// The smallest q of the fine labels that agree with each coarse one; `around` holds those below, at and above the centres.
+/// The smallest q of the fine labels that agree with each coarse label; `around` holds those below, at and
+/// above the centres.
 #[inline(always)]
 fn agreeing<U: Units>(around: &[U; 2 * LABEL_BLOCK + 1], interpolating: bool, best: &mut [U; LABEL_BLOCK]) {
     let [below, at] = U::deinterleave(block(around, 0));
@@ -172,7 +176,7 @@ fn agreeing<U: Units>(around: &[U; 2 * LABEL_BLOCK + 1], interpolating: bool, be
     }
 }
 
-/// What fine labels take from the coarse ones that agree with them.
+/// The sums for the fine labels, from the coarse labels that agree with them.
 #[inline(always)]
 fn spread<U: Units>(t: &[U; LABEL_BLOCK + 1], interpolating: bool, fine: &mut [U; 2 * LABEL_BLOCK]) {
     let at = *block(t, 0);
@@ -184,7 +188,7 @@ fn spread<U: Units>(t: &[U; LABEL_BLOCK + 1], interpolating: bool, fine: &mut [U
     }
 }
 
-/// q: the belief less the factor's old message; infinite where there is no label.
+/// q: the belief minus the factor's old message; infinite where there is no label.
 #[inline(always)]
 fn variable_message<U: Units>(belief: &[U], message: &[U], q: &mut [U], padding: &[U], cut: Truncation) {
     for at in (0..belief.len()).step_by(LABEL_BLOCK) {

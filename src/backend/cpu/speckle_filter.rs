@@ -1,4 +1,4 @@
-//! Regions too small to be trusted: see [`crate::backend::Stage::SpeckleFilter`].
+//! The speckle filter: see [`crate::backend::Stage::SpeckleFilter`].
 
 use super::finest::Finest;
 use crate::image::Image;
@@ -10,7 +10,7 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
     let Finest { optima, validity, .. } = maps;
     let (width, height) = optima.size();
     let flags = validity.data_mut();
-    // With a border of what belongs to no region, so that every pixel has four neighbours.
+    // With a border of pixels that belong to no region, so that every pixel has four neighbours.
     let pitch = width + 2;
     let mut labels = vec![0; pitch * (height + 2)];
     let mut seen = vec![true; labels.len()];

@@ -1,28 +1,29 @@
-//! Amounts of cost in the two widths of volumes, and rows of them.
+//! Cost values in the two widths of volumes, and operations on rows of them.
 
 use crate::plan::{LABEL_BLOCK, Truncation};
 use std::array::from_fn;
 
-/// An amount of cost, in units, as a volume stores it. Its sums saturate and its differences stop at 0.
+/// A cost in units, as a volume stores it. Sums saturate, and differences stop at 0.
 pub(super) trait Units:
     bytemuck::Pod + Default + Ord + Send + Sync + From<u8> + Into<u16> + Into<u32>
 {
-    /// The largest amount there is: stands for infinity.
+    /// The largest value, which stands for infinity.
     const MOST: Self;
 
-    /// The sum.
+    /// The saturating sum.
     fn plus(self, other: Self) -> Self;
 
-    /// The difference.
+    /// The difference, at least 0.
     fn less(self, other: Self) -> Self;
 
-    /// A value, at most the largest.
+    /// A value, clamped to the largest.
     fn of(value: u32) -> Self;
 
-    /// The even and the odd ones of `values`. (In words of two, as compilers know how to take apart and put together.)
+    /// The values at even and at odd indices. (Written with words of two values, a form that compilers turn
+    /// into shuffles.)
     fn deinterleave(values: &[Self; 2 * LABEL_BLOCK]) -> [[Self; LABEL_BLOCK]; 2];
 
-    /// `even` and `odd` by turns.
+    /// `even` and `odd`, alternating.
     fn interleave(even: [Self; LABEL_BLOCK], odd: [Self; LABEL_BLOCK], out: &mut [Self; 2 * LABEL_BLOCK]);
 }
 
@@ -72,39 +73,40 @@ macro_rules! units {
 units!(u8, u16);
 units!(u16, u32);
 
-/// The smallest of a row, the largest there is for an empty one.
+/// The smallest value of a row; the largest possible value for an empty one.
 #[inline(always)]
 pub(super) fn smallest<U: Units>(row: &[U]) -> U {
     row.iter().fold(U::MOST, |least, &v| least.min(v))
 }
 
-/// 0 for each label and the largest there is for the padding after them.
+/// 0 for each label, and the largest value for the padding after them.
 pub(super) fn padding<U: Units>(labels: usize, stride: usize) -> Vec<U> {
     (0..stride).map(|label| if label < labels { U::default() } else { U::MOST }).collect()
 }
 
-/// `N` labels of a row from `at` on: what stays in registers while several rows are worked on together.
+/// `N` labels of a row from `at` on: a block that stays in registers while several rows are processed
+/// together.
 #[inline(always)]
 pub(super) fn block<T, const N: usize>(row: &[T], at: usize) -> &[T; N] {
     row[at..].first_chunk().expect("rows are whole blocks")
 }
 
-/// As [`block`], to change.
+/// A mutable [`block`].
 #[inline(always)]
 pub(super) fn block_mut<T, const N: usize>(row: &mut [T], at: usize) -> &mut [T; N] {
     row[at..].first_chunk_mut().expect("rows are whole blocks")
 }
 
-/// The smallest of each of `LABEL_BLOCK` lanes.
+/// The smallest values in each of `LABEL_BLOCK` lanes.
 pub(super) type Least<U> = [U; LABEL_BLOCK];
 
-/// The smallest of all lanes, of each. (On its own, for inlined it is a chain of single bytes to the compiler.)
+/// The smallest of all lanes, of each. (Not inlined: inlined, the compiler makes it a chain of single bytes.)
 #[inline(never)]
 pub(super) fn least_of<U: Units, const N: usize>(each: &[Least<U>; N]) -> [U; N] {
     each.map(|lanes| smallest(&lanes))
 }
 
-/// Lane by lane, the smaller of `least` and all of `values`.
+/// The smaller, lane by lane, of `least` and all of `values`.
 #[inline(always)]
 pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values: &[U; N]) {
     for values in values.as_chunks().0 {
@@ -113,15 +115,15 @@ pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values:
     }
 }
 
-/// What is done to rows of labels block by block.
+/// An operation on rows of labels, block by block.
 pub(super) trait Blocks {
-    /// Whether four vectors of each row that is worked on fit the registers.
+    /// Whether four vectors of each row fit in the registers.
     const LONG: bool = false;
 
-    /// Works on `N` labels from `at` on.
+    /// Processes `N` labels from `at` on.
     fn block<const N: usize>(&mut self, at: usize);
 
-    /// Works on all of `stride` labels.
+    /// Processes all of `stride` labels.
     #[inline(always)]
     fn all(&mut self, stride: usize) {
         let mut at = 0;
@@ -139,7 +141,7 @@ pub(super) trait Blocks {
     }
 }
 
-/// Cuts sums into a message.
+/// Truncates sums to a message.
 pub(super) struct Truncating<'a, U> {
     sums: &'a [U],
     high: U,
@@ -167,7 +169,7 @@ impl<U: Units> Blocks for Truncating<'_, U> {
 #[inline(always)]
 pub(super) fn argmin<U: Units>(belief: &[U]) -> (usize, U) {
     let best = smallest(belief);
-    // By blocks: whether one holds it is a vector's question.
+    // Block by block: vectors test whether a block holds it.
     let holds = |block: &[U]| smallest(block) == best;
     let block = belief.chunks(LABEL_BLOCK).position(holds);
     let start = block.unwrap_or(0) * LABEL_BLOCK;

@@ -1,4 +1,4 @@
-//! The volumes of a match, in the width that its plan asks for.
+//! The volumes of a match, in the width that its plan needs.
 
 use super::finest::Finest;
 use super::pages::Pages;
@@ -13,12 +13,13 @@ use crate::plan::Plan;
 pub(super) struct Volumes<U> {
     pub(super) plan: Plan,
     pub(super) pair: Pair,
-    /// Cost of level 0; coarser ones are in `levels`.
+    /// Cost of level 0; the costs of coarser levels are in `levels`.
     pub(super) fine_cost: Pages<u8>,
     pub(super) levels: Vec<Level<U>>,
-    /// First and last label of each pixel, by level; empty where all labels are in question.
+    /// First and last label of each pixel, by level; empty where all labels are allowed.
     pub(super) label_ranges: Vec<Plane<[u16; 2]>>,
-    /// Label map of the last change, and its sum.
+    /// Label map of the last [`Stage::Change`](crate::backend::Stage::Change), and the sum of squared
+    /// changes.
     pub(super) labels: Vec<u16>,
     pub(super) change: u64,
     pub(super) maps: Finest,
@@ -31,9 +32,11 @@ pub(super) struct Level<U> {
     pub(super) cost: Pages<u16>,
     pub(super) evidence: Pages<u8>,
     pub(super) dependency: Pages<U>,
-    /// Whether the dependency factors have sent their messages: until then all are 0, whatever is stored.
+    /// Whether the dependency factors have sent their messages. Until then all count as 0, whatever is
+    /// stored.
     pub(super) dependency_sent: bool,
-    /// The same of the resolution factors between this level and the next finer one: of its `up` and that one's `down`.
+    /// The same for the resolution factors between this level and the next finer one: `up` of this level and
+    /// `down` of the finer one.
     pub(super) resolution_sent: bool,
     /// Empty at the coarsest level.
     pub(super) down: Pages<U>,
@@ -78,7 +81,7 @@ impl<U: Units> Volumes<U> {
         })
     }
 
-    /// Ready for another pair whose plan fits, as [`Self::new`] would be.
+    /// Resets everything for another pair whose plan fits, to the state that [`Self::new`] gives.
     pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
         let Prepared { pair, graphs, label_ranges, .. } = prepared;
         self.plan = plan.clone();

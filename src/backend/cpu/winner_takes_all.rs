@@ -1,4 +1,4 @@
-//! The optimum of the beliefs: see [`crate::backend::Stage::WinnerTakesAll`].
+//! Winner takes all: the optimum of the beliefs. See [`crate::backend::Stage::WinnerTakesAll`].
 
 use super::finest::Optimum;
 use super::units::{Units, argmin, smallest};

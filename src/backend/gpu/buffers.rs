@@ -1,8 +1,8 @@
-//! The buffers of a match, allocated once and from the plan alone.
+//! The buffers of a match, allocated once, from the plan alone.
 //!
-//! What is larger than a device's largest buffer is cut into parts of whole rows. Each part also holds a few rows of its
-//! neighbours, so that a stage that looks around a pixel finds all of it in one part; a stage that writes what others look
-//! around in ends with copies of those rows.
+//! A volume larger than the device's largest buffer is split into parts of whole rows. Each part also holds a
+//! halo: a few rows of its neighbours, so that a stage that reads around a pixel finds everything in one
+//! part. A stage that writes a volume with a halo ends with copies that update those rows.
 
 use super::device::Device;
 use super::uniform::{ALIGN_WORDS, LevelParams};
@@ -12,10 +12,10 @@ use crate::plan::{GRAPH_WINDOW, Plan};
 use std::num::NonZero;
 use std::ops::Range;
 
-/// Rows of its neighbours that a part holds on either side: as far as any stage looks around in a volume.
+/// Halo of a part, in rows on either side: as far as any stage reads around a pixel in a volume.
 pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
 
-/// Places of a quarter of the median's largest window, its axes included.
+/// Weights of a quarter of the median's largest window, its axes included.
 const MEDIAN_WORDS: u64 = 16 * 16;
 
 /// `rows` with up to `halo` rows above and below.
@@ -23,7 +23,7 @@ pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32>
     rows.start.saturating_sub(halo)..rows.end.saturating_add(halo).min(height)
 }
 
-/// Something stored row by row, in as few buffers as the device allows.
+/// Data stored row by row, in as few buffers as the device allows.
 #[derive(Clone)]
 pub(super) struct Rows {
     parts: Vec<Part>,
@@ -33,9 +33,9 @@ pub(super) struct Rows {
 #[derive(Clone)]
 struct Part {
     buffer: wgpu::Buffer,
-    /// The rows that are its own.
+    /// The rows that it owns.
     own: Range<u32>,
-    /// The rows that it holds.
+    /// The rows that it holds, halo included.
     held: Range<u32>,
 }
 
@@ -51,7 +51,7 @@ impl Binding {
         Self { buffer: buffer.clone(), bytes: 0..buffer.size() }
     }
 
-    /// Bytes that are bound.
+    /// Number of bytes that are bound.
     pub(super) fn size(&self) -> u64 {
         let end = self.bytes.end.min(self.buffer.size());
         end.saturating_sub(self.bytes.start)
@@ -66,7 +66,7 @@ impl Binding {
     }
 }
 
-/// Bytes from one buffer to another.
+/// A copy of bytes from one buffer to another.
 #[derive(Clone)]
 pub(super) struct Copy {
     pub(super) from: (wgpu::Buffer, u64),
@@ -75,8 +75,8 @@ pub(super) struct Copy {
 }
 
 impl Rows {
-    /// `rows`, which one part owns, with what else that part holds of them: bound for a stage that writes them, or
-    /// looks around in them.
+    /// Binds `rows`, which one part owns, with as much of their halo as that part holds: for a stage that
+    /// writes the rows, or reads around them.
     pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
         let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;
         let part = self.parts.iter().find(|p| within(&p.own)).or(self.parts.iter().find(|p| within(&p.held)));
@@ -85,7 +85,7 @@ impl Rows {
         Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
     }
 
-    /// Copies that renew what parts hold of their neighbours.
+    /// Copies that update the halos of all parts.
     pub(super) fn exchange(&self) -> Vec<Copy> {
         let mut copies = Vec::new();
         for (i, to) in self.parts.iter().enumerate() {
@@ -104,7 +104,7 @@ impl Rows {
         copies
     }
 
-    /// Copies of everything to `to`, which has the same rows.
+    /// Copies of all rows to `to`, which has the same rows.
     pub(super) fn copy_to(&self, to: &Self) -> Vec<Copy> {
         let pairs = self.parts.iter().zip(&to.parts);
         pairs
@@ -116,7 +116,7 @@ impl Rows {
             .collect()
     }
 
-    /// First rows of the parts.
+    /// First row of each part.
     pub(super) fn starts(&self) -> impl Iterator<Item = u32> {
         self.parts.iter().map(|p| p.own.start)
     }
@@ -125,7 +125,7 @@ impl Rows {
         self.parts.iter().map(|p| &p.buffer)
     }
 
-    /// Each part's buffer, and where in it its own rows are, in bytes.
+    /// Each part's buffer, and the byte range of its own rows in it.
     pub(super) fn own(&self) -> Vec<(wgpu::Buffer, Range<u64>)> {
         let own = self.parts.iter().map(|p| {
             let at = |row: u32| u64::from(row - p.held.start) * self.row_bytes;
@@ -145,14 +145,14 @@ impl Rows {
     }
 }
 
-/// Everything that a match needs on a device.
+/// All buffers of a match on a device.
 pub(super) struct Buffers {
     pub(super) levels: Vec<LevelBuffers>,
     pub(super) left: Rows,
     pub(super) right: Rows,
     /// Census of the left and of the right image.
     pub(super) census: [Rows; 2],
-    /// How much colour counts in the matching cost.
+    /// Weight of colour in the matching cost.
     pub(super) contrast: Rows,
     pub(super) median_weights: wgpu::Buffer,
     pub(super) stretched_weights: wgpu::Buffer,
@@ -167,12 +167,12 @@ pub(super) struct Buffers {
     pub(super) disparity: Rows,
     /// Validity and confidence.
     pub(super) flags: Rows,
-    /// What a stage that looks around writes, before it takes the place of what it looked at.
+    /// Output of a stage that reads around a pixel, until it replaces the map that was read.
     pub(super) spare_disparity: Rows,
     pub(super) spare_flags: Rows,
     pub(super) speckle_parents: Rows,
     pub(super) speckle_sizes: Rows,
-    /// Whether each row holds a valid pixel, and where it takes its values from.
+    /// Whether each row holds a valid pixel, and the row that it takes its values from.
     pub(super) filled_rows: wgpu::Buffer,
     pub(super) source_rows: wgpu::Buffer,
     all: Vec<wgpu::Buffer>,
@@ -187,18 +187,18 @@ pub(super) struct LevelBuffers {
     pub(super) down: Rows,
     pub(super) up: Rows,
     pub(super) belief: Rows,
-    /// First and last label of each pixel; nothing where all labels are in question.
+    /// First and last label of each pixel; empty where all labels are allowed.
     pub(super) label_range: Rows,
     pub(super) members: Rows,
     pub(super) starts: Rows,
-    /// Entries of the transposed table, of what each part holds.
+    /// Entries of the transposed table, for the rows that each part holds.
     incoming: Vec<(wgpu::Buffer, Range<u32>)>,
     /// First word of each row in the transposed table, and the end.
     incoming_rows: Vec<u32>,
 }
 
 impl LevelBuffers {
-    /// Entries of the transposed table of `rows`.
+    /// Entries of the transposed table for `rows`.
     pub(super) fn incoming(&self, rows: &Range<u32>) -> Binding {
         let part = self.incoming.iter().find(|(_, own)| own.start <= rows.start && rows.end <= own.end);
         let (buffer, own) = part.expect("bands stay within parts");
@@ -216,13 +216,13 @@ impl LevelBuffers {
         self.starts.write(device, &incoming.starts)
     }
 
-    /// The messages, which start at 0.
+    /// The message volumes, which start at 0.
     pub(super) fn messages(&self) -> [&Rows; 3] {
         [&self.dependency, &self.down, &self.up]
     }
 }
 
-/// Allocates, and remembers what it allocated.
+/// Allocates buffers, and keeps track of them.
 struct Allocator<'a> {
     device: &'a Device,
     all: Vec<wgpu::Buffer>,
@@ -247,7 +247,7 @@ impl Allocator<'_> {
         Ok(buffer)
     }
 
-    /// Rows of `words` words each, in parts that start at `starts`, the last of which is the height.
+    /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height.
     fn rows(&mut self, label: &str, words: u32, starts: &[u32]) -> Result<Rows> {
         let height = starts[starts.len() - 1];
         let parts = starts.windows(2).map(|ends| {
@@ -260,7 +260,8 @@ impl Allocator<'_> {
     }
 }
 
-/// First rows of the parts of a level, and its height: even, so that the two rows of a coarser pixel stay together.
+/// First rows of the parts of a level, and its height. They are even, so that the two rows of a coarser pixel
+/// stay together.
 fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec<u32>> {
     let bytes = plan.volume_width.bytes() as u32;
     let widest = (bytes * params.dependency_pitch).max(2 * params.pitch);
@@ -283,7 +284,7 @@ fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec
 }
 
 impl Buffers {
-    /// Everything that `plan` needs.
+    /// All buffers for `plan`.
     ///
     /// # Errors
     /// [`Error::Memory`] when it does not fit, [`Error::Device`] when the device fails.
@@ -299,12 +300,12 @@ impl Buffers {
         for (z, level) in plan.levels.iter().enumerate() {
             let p = LevelParams::new(plan, level);
             let starts = part_starts(device, plan, &p)?;
-            // What a level does not have still has a name in the shaders.
+            // A volume that a level does not have still needs a binding in the shaders.
             let none = [0, 0];
             let bytes = plan.volume_width.bytes() as u32;
             let values = bytes * p.pitch;
             let incoming = starts.windows(2).map(|own| {
-                // The factors that hold a pixel are at most three rows away; rows are aligned.
+                // The factors that contain a pixel are at most three rows away; rows are aligned.
                 let rows = with_halo(&(own[0]..own[1]), HALO, p.height).len() * p.width as usize;
                 let words = rows * plan.slots() + ALIGN_WORDS * (own[1] - own[0]) as usize;
                 Ok((a.buffer("transposed table", words as u64)?, own[0]..own[1]))
@@ -367,7 +368,7 @@ impl Buffers {
         })
     }
 
-    /// Every buffer.
+    /// All buffers.
     pub(super) fn all(&self) -> &[wgpu::Buffer] {
         &self.all
     }

@@ -1,4 +1,4 @@
-//! Adapters: which there are, which one to take, and a device on it that reports its failures.
+//! Adapters: listing them, choosing one, and opening a device on it that reports its failures.
 
 use crate::backend::Traffic;
 use crate::error::{DeviceError, Error, ExecutionError, MemoryError, Result};
@@ -7,27 +7,27 @@ use std::sync::mpsc;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// An adapter as `mrfgs devices` lists it.
+/// An adapter, as `mrfgs devices` lists it.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct DeviceInfo {
-    /// Place in the list: what `--device` takes, besides a part of the name.
+    /// Position in the list, which `--device` accepts besides a part of the name.
     pub index: usize,
-    /// Name by its driver.
+    /// Name given by its driver.
     pub name: String,
     /// Discrete GPU, integrated GPU, virtual GPU, software, or other.
     pub kind: &'static str,
     /// Vulkan or Metal.
     pub api: &'static str,
-    /// Driver and its version, as far as it says.
+    /// Driver and its version, as far as the adapter reports them.
     pub driver: String,
     /// Largest buffer, in bytes.
     pub max_buffer: u64,
     /// Largest range of a buffer that a shader can see at once, in bytes.
     pub max_binding: u64,
-    /// Whether it is a software driver, which `auto` does not take.
+    /// Whether it is a software driver, which `auto` does not choose.
     pub software: bool,
-    /// Whether `auto` takes this one.
+    /// Whether `auto` chooses this one.
     pub automatic: bool,
 }
 
@@ -39,7 +39,8 @@ fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor {
         backends,
         flags: wgpu::InstanceFlags::empty(),
-        // Past this share of what the driver says it can have, buffers are refused instead of others' evicted.
+        // Above this share of the memory that the driver reports, allocations are refused instead of evicting
+        // others' buffers.
         memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
             for_resource_creation: Some(95),
             for_device_loss: None,
@@ -68,12 +69,12 @@ fn api(backend: wgpu::Backend) -> &'static str {
     }
 }
 
-/// Driver and version, as far as the adapter says.
+/// Driver and version, as far as the adapter reports them.
 fn driver(info: &wgpu::AdapterInfo) -> String {
     format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
-/// How much a kind of device is preferred, the least first.
+/// Rank of a kind of device; the smallest is preferred.
 fn preference(device_type: wgpu::DeviceType) -> u8 {
     match device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -84,7 +85,7 @@ fn preference(device_type: wgpu::DeviceType) -> u8 {
     }
 }
 
-/// Place of the preferred adapter; the first of equals.
+/// Position of the preferred adapter, the first one on a tie.
 fn preferred(adapters: &[wgpu::Adapter]) -> Option<usize> {
     (0..adapters.len()).min_by_key(|&i| preference(adapters[i].get_info().device_type))
 }
@@ -94,7 +95,7 @@ fn is_automatic(device_type: wgpu::DeviceType) -> bool {
     preference(device_type) <= 1
 }
 
-/// Every adapter of this machine, in the order of their indices. None where there is no driver.
+/// Every adapter of this machine, in the order of their indices. Empty where there is no driver.
 #[must_use]
 pub fn devices() -> Vec<DeviceInfo> {
     let adapters = adapters();
@@ -119,7 +120,7 @@ pub fn devices() -> Vec<DeviceInfo> {
         .collect()
 }
 
-/// The adapter that `wanted` names by index or part of the name, or the preferred one.
+/// The adapter that `wanted` names by its index or a part of its name, or the preferred one.
 fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     let mut adapters = adapters();
     if adapters.is_empty() {
@@ -143,10 +144,11 @@ fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     Err(ExecutionError::NoSuchDevice { wanted: wanted.unwrap_or_default().into(), present }.into())
 }
 
-/// Whether there may be a GPU. On Linux every driver of one has a node in `/dev`; elsewhere only the driver knows.
+/// Whether there may be a GPU. On Linux every GPU driver has a node in `/dev`; elsewhere only the driver
+/// knows.
 #[must_use]
 pub fn may_have_gpu() -> bool {
-    // Of the kernel's graphics, NVIDIA, Windows below (WSL), Arm, Qualcomm, Imagination.
+    // The kernel's graphics, NVIDIA, WSL, Arm, Qualcomm, Imagination.
     const NODES: [&str; 9] = ["dri", "nvidia", "nvhost", "nvgpu", "nvmap", "dxg", "mali", "kgsl", "pvr"];
     if !cfg!(target_os = "linux") {
         return true;
@@ -156,61 +158,61 @@ pub fn may_have_gpu() -> bool {
     names.any(|name| NODES.iter().any(|node| name.to_string_lossy().starts_with(node)))
 }
 
-/// Whether `auto` finds a device to its taste. Where there is no GPU the driver is not asked: a loader that finds no display may
-/// print to standard error.
+/// Whether `auto` finds a suitable device. Where there is no GPU the driver is not asked, because a loader
+/// that finds no display may print to standard error.
 #[must_use]
 pub fn has_automatic() -> bool {
     may_have_gpu() && adapters().iter().any(|a| is_automatic(a.get_info().device_type))
 }
 
-/// What a device is denied, or does wrong, on purpose: tests run the engine as if on a lesser device, or a failing one.
+/// Limits and failures injected on purpose: tests run the engine as if on a weaker device, or a failing one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultInjection {
     /// Largest binding in bytes.
     pub max_binding: Option<u64>,
     /// Largest buffer in bytes.
     pub max_buffer: Option<u64>,
-    /// Most workgroups of a dispatch in one dimension.
+    /// Largest number of workgroups of a dispatch in one dimension.
     pub max_groups: Option<u32>,
-    /// Most invocations of a workgroup.
+    /// Largest number of invocations of a workgroup.
     pub max_invocations: Option<u32>,
-    /// Bytes of memory.
+    /// Size of its memory in bytes.
     pub memory: Option<u64>,
     /// How long a submission may take.
     pub patience: Option<Duration>,
     /// The device is lost after this many stages.
     pub lost_after: Option<usize>,
-    /// It has no clock.
+    /// It has no timestamp queries.
     pub no_clock: bool,
-    /// Instead of a driver, something that takes every command and computes nothing.
+    /// In place of a driver, a backend that accepts every command and computes nothing.
     pub noop: bool,
 }
 
-/// How long a submission may take before the device counts as hung. Drivers that watch over it give up sooner; a
-/// software driver shares a processor with whatever else runs there.
+/// How long a submission may take before the device counts as hung. Drivers with a watchdog give up sooner. A
+/// software driver shares a processor with everything else that runs there.
 const PATIENCE: Duration = Duration::from_secs(60);
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
-/// Submissions that may be under way: more keep no device busier, and a hang is noticed late.
+/// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late.
 const SUBMISSIONS: usize = 4;
 
 /// An open device with its queue and the first failure it reported.
 pub(super) struct Device {
-    /// Gone once the device hangs.
+    /// `None` once the device hangs.
     open: Option<(wgpu::Device, wgpu::Queue)>,
     pub(super) name: String,
     pub(super) driver: String,
-    /// Whether its memory is the machine's own.
+    /// Whether it uses the machine's main memory.
     pub(super) software: bool,
     pub(super) max_binding: u64,
     pub(super) max_buffer: u64,
     pub(super) max_groups: u32,
     pub(super) memory: Option<u64>,
-    /// Nanoseconds of a tick of its clock, where it has one.
+    /// Nanoseconds per tick of its timestamps, where it has them.
     pub(super) tick: Option<f64>,
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<wgpu::SubmissionIndex>,
-    /// Submissions so far, those under way included.
+    /// Submissions so far, including those in flight.
     submitted: u64,
     failure: Arc<Mutex<Option<Error>>>,
     pub(super) traffic: Traffic,
@@ -226,7 +228,7 @@ impl Device {
         };
         let info = adapter.get_info();
         let offered = adapter.limits();
-        // No more than every device of WebGPU has, but for the sizes of buffers and bindings.
+        // No more than every WebGPU device has, except for the sizes of buffers and bindings.
         let mut limits = wgpu::Limits::default().or_worse_values_from(&offered);
         limits.max_buffer_size = offered.max_buffer_size.min(faults.max_buffer.unwrap_or(u64::MAX));
         limits.max_storage_buffer_binding_size =
@@ -269,7 +271,7 @@ impl Device {
         }));
         let (lost, device_name) = (note(&failure), name.clone());
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the device says so too, when nobody listens any more.
+            // Dropping the device calls this too, when nobody listens any more.
             lost(failed(&device_name, &format!("the device was lost ({reason:?}) {message}")));
         });
         let software = info.device_type == wgpu::DeviceType::Cpu;
@@ -302,7 +304,8 @@ impl Device {
         self.open.as_ref().map(|open| &open.1).ok_or_else(|| self.hung())
     }
 
-    /// The first failure since the device was opened, if any. Lack of memory passes: it is said once.
+    /// The first failure since the device was opened, if any. A lack of memory is reported once and then
+    /// cleared.
     pub(super) fn check(&self) -> Result<()> {
         let Ok(mut failure) = self.failure.lock() else { return Ok(()) };
         match &*failure {
@@ -342,12 +345,12 @@ impl Device {
         let waiting = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.patience) };
         match self.inner()?.poll(waiting) {
             Err(wgpu::PollError::Timeout) => {
-                // Closing a device waits for its work, and this one's never ends.
+                // Closing a device waits for its work, and this device's work never ends.
                 std::mem::forget(self.open.take());
                 self.under_way.clear();
                 Err(self.hung())
             }
-            // A submission that never was: the device took it without a word, and is gone.
+            // The device accepted a submission silently and is gone, so the submission does not exist.
             Err(wgpu::PollError::WrongSubmissionIndex(..)) => {
                 self.check()?;
                 Err(failed(&self.name, &"the device was lost"))
@@ -356,27 +359,27 @@ impl Device {
         }
     }
 
-    /// Asks for buffers that what has been submitted so far fills.
+    /// Requests buffers, as they are after everything submitted so far.
     pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Requested {
         let (sender, mapped) = mpsc::channel();
         for buffer in &buffers {
             self.traffic.bytes_down += buffer.size();
             let sender = sender.clone();
             buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-                // Nobody listens when the wait for it failed.
+                // Nobody listens if the wait for it failed.
                 let _ = sender.send(result);
             });
         }
         Requested { buffers, mapped, submitted: self.submitted }
     }
 
-    /// The words of each buffer that was asked for; what was submitted later may still be under way.
+    /// The words of each requested buffer; later submissions may still be in flight.
     pub(super) fn collect(&mut self, requested: Requested) -> Result<Vec<Vec<u32>>> {
         while self.submitted - (self.under_way.len() as u64) < requested.submitted {
             self.wait_for_one()?;
         }
         self.check()?;
-        // What was submitted long ago is mapped by any poll.
+        // Buffers whose submission finished long ago are mapped by any poll.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
         let mut all = Vec::new();
         for _ in &requested.buffers {
@@ -395,7 +398,7 @@ impl Device {
         failed(&self.name, &format!("it did not finish its work within {:?}: it hangs", self.patience))
     }
 
-    /// Loses the device once it has run as many stages as its faults allows.
+    /// Destroys the device once it has run as many stages as its fault injection allows.
     pub(super) fn count_stage(&mut self) {
         if let (Some(left), Some((device, _))) = (&mut self.lost_after, &self.open) {
             match left.checked_sub(1) {
@@ -406,11 +409,11 @@ impl Device {
     }
 }
 
-/// Buffers on their way from the device.
+/// Buffers being read back from the device.
 pub(super) struct Requested {
     buffers: Vec<wgpu::Buffer>,
     mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
-    /// Submissions after which they are filled.
+    /// Number of submissions after which they are complete.
     submitted: u64,
 }
 

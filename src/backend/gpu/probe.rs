@@ -1,4 +1,4 @@
-//! Volumes and maps as a device holds them, value by value, and the rate at which it copies.
+//! Reads and writes volumes and maps on a device, and measures its copy rate.
 
 use super::Gpu;
 use super::buffers::Rows;
@@ -10,8 +10,8 @@ use crate::image::Plane;
 use crate::plan::Plan;
 use std::time::{Duration, Instant};
 
-/// What [`Gpu::copy_rate`] copies, how often it tries, and how long the copies of a try must take together, so that what a
-/// submission takes of itself no longer counts.
+/// Bytes that [`Gpu::copy_rate`] copies, its number of tries, and how long the copies of one try must take
+/// together, so that the overhead of a submission no longer counts.
 const COPIED_BYTES: u64 = 1 << 28;
 const COPY_TRIES: u32 = 12;
 const LONG_COPY: Duration = Duration::from_millis(100);
@@ -77,7 +77,7 @@ impl Probe for Gpu {
 }
 
 impl Gpu {
-    /// The rate at which the device copies from one large buffer to another: bytes read and written a second.
+    /// The rate at which the device copies between two large buffers: bytes read and written per second.
     ///
     /// # Errors
     /// [`Error::Memory`] when there is no room for two such buffers, [`Error::Device`] when the device fails.
@@ -98,7 +98,7 @@ impl Gpu {
             self.wait()?;
             Ok::<_, Error>(start.elapsed())
         };
-        // Memory is given at first touch.
+        // Memory is allocated on first access.
         time(1)?;
         let (mut best, mut copies) = (0.0, 1);
         for _ in 0..COPY_TRIES {
@@ -111,7 +111,7 @@ impl Gpu {
         Ok(best)
     }
 
-    /// The values of a map, which may share its words with others.
+    /// The values of a map, whose words may hold other maps too.
     pub(super) fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
         let (rows, words, word, bit, mask) = self.place_of(map);
         let data = self.rows(&[&rows])?.remove(0);
@@ -120,7 +120,7 @@ impl Gpu {
         Ok(Plane::from_fn(width, height, value))
     }
 
-    /// Where a volume is, words a row and values a word.
+    /// The location of a volume: its rows, words per row and values per word.
     fn volume(&self, volume: Volume) -> (Rows, usize, usize) {
         let state = self.state();
         let width = state.plan.volume_width.bytes();
@@ -140,7 +140,7 @@ impl Gpu {
         (rows.clone(), bytes * pitch as usize, 4 / bytes)
     }
 
-    /// Where a map is: the buffer, words a pixel, the word, the lowest bit and the mask.
+    /// The location of a map: its rows, words per pixel, the word, the lowest bit and the mask.
     fn place_of(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
         let b = &self.state().buffers;
         let (rows, words, word, bit, mask) = match map {
@@ -158,8 +158,8 @@ impl Gpu {
     }
 }
 
-/// The word of a row of `volume` that holds a label of its line \[x\]\[slot\]: the shaders keep the first four labels of all
-/// pixels together, then the next four, and so on, and the same of each slot.
+/// The word in a row of `volume` that holds a label of its line \[x\]\[slot\]. The shaders store the first
+/// four labels of all pixels together, then the next four, and so on, and the same for each slot.
 fn word_places(plan: &Plan, volume: Volume, per_word: usize) -> impl Fn(usize, usize) -> usize + use<> {
     let level = &plan.levels[volume.level()];
     let slots = volume_shape(plan, volume).0 / level.pixels();

@@ -1,14 +1,15 @@
-//! Shaders, put together from their files: a stage's own, the shared parts that it imports, and constants from Rust.
+//! Shaders, assembled from their files: the stage's own file, the shared parts that it imports, and constants
+//! from Rust.
 
 use crate::maps::{FRACTION, flag};
 use crate::plan::VolumeWidth;
 use crate::weights::MEDIAN_WEIGHT;
 use std::fmt::Write;
 
-/// Invocations of a workgroup.
+/// Invocations per workgroup.
 pub(super) const WORKGROUP: u32 = 64;
 
-/// What a shader may import, by the word of its `#import` line.
+/// The shared parts, by their names in `#import` lines.
 const SHARED: [(&str, &str); 6] = [
     ("band", include_str!("../../../shaders/shared/band.wgsl")),
     ("image", include_str!("../../../shaders/shared/image.wgsl")),
@@ -17,7 +18,7 @@ const SHARED: [(&str, &str); 6] = [
     ("volume", include_str!("../../../shaders/shared/volume.wgsl")),
     ("weighted_median", include_str!("../../../shaders/shared/weighted_median.wgsl")),
 ];
-/// What `messages` stands on, by the width of messages and beliefs.
+/// The base of `messages`, by the width of messages and beliefs.
 const NARROW: &str = include_str!("../../../shaders/shared/narrow.wgsl");
 const WIDE: &str = include_str!("../../../shaders/shared/wide.wgsl");
 
@@ -73,7 +74,8 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
     }
 }
 
-/// An entry point of a stage's shader, with the constants that specialise it. Equal kernels compile once.
+/// An entry point of a stage's shader, with the constants that specialise it. Equal kernels are compiled
+/// once.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Kernel {
     stage: &'static str,
@@ -94,25 +96,25 @@ impl Kernel {
         Self { width: Some(width), ..self }
     }
 
-    /// The same with a constant more.
+    /// The same with one more constant.
     pub(super) fn with(mut self, name: &'static str, value: impl Into<Constant>) -> Self {
         self.constants.push((name, value.into()));
         self
     }
 
-    /// Name of the stage whose shader it is.
+    /// Name of the stage that the shader belongs to.
     #[must_use]
     pub fn stage(&self) -> &'static str {
         self.stage
     }
 
-    /// The function that starts it.
+    /// The entry point.
     #[must_use]
     pub fn entry(&self) -> &'static str {
         self.entry
     }
 
-    /// The shader, as the device gets it: constants, then what it imports, then its own file.
+    /// The source of the shader: constants, then the imported parts, then its own file.
     #[must_use]
     pub fn source(&self) -> String {
         let mut parts = Vec::new();
@@ -143,7 +145,8 @@ fn shared_part(name: &str) -> &'static str {
     SHARED.iter().find(|part| part.0 == name).expect("an import names a file in shaders/shared").1
 }
 
-/// `text` without its `#import` lines; what they name, and what that imports itself, goes to `parts`, each once.
+/// `text` without its `#import` lines. The parts that they name, and the parts imported by those, are added
+/// to `parts`, each once.
 fn without_imports<'a>(text: &'a str, parts: &mut Vec<&'a str>) -> String {
     let mut body = String::with_capacity(text.len());
     for line in text.lines() {

@@ -1,4 +1,4 @@
-//! From a stage to dispatches: in bands of rows where a buffer exceeds what a device lets a shader see.
+//! Turns stages into dispatches, in bands of rows where a buffer exceeds the device's largest binding.
 
 use super::buffers::{Binding, Buffers, Copy, LevelBuffers, Rows};
 use super::device::Device;
@@ -9,10 +9,10 @@ use crate::plan::{LevelPlan, Plan};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
-/// Largest number of iterations of all loops of one invocation together.
+/// Largest total number of loop iterations of one invocation.
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 
-/// What a stage has a device do, in order.
+/// The commands of a stage, in order.
 pub(super) enum Step {
     Dispatch(Dispatch),
     Copy(Copy),
@@ -22,35 +22,36 @@ pub(super) struct Dispatch {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bind_group: wgpu::BindGroup,
     pub(super) groups: (u32, u32),
-    /// Iterations of all loops of all invocations, at most.
+    /// Largest total number of loop iterations of all invocations.
     pub(super) work: u64,
 }
 
 /// Compiled kernels.
 pub(super) type Pipelines = HashMap<Kernel, wgpu::ComputePipeline>;
 
-/// What a kernel is for a plan, before there is a device.
+/// A kernel as a plan specialises it, before there is a device.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// The entry point and its constants.
     pub kernel: Kernel,
-    /// How often all loops of one invocation run at most, together. Mesa 22 stops a shader silently after about 65,000.
+    /// Largest total number of loop iterations of one invocation. Mesa 22 stops a shader silently after about
+    /// 65,000.
     pub loops: usize,
     /// The uniform that it reads.
     pub uniform: UniformLayout,
 }
 
 impl Job {
-    /// `kernel` with a uniform `U` of the stage's own, whose loops run at most `loops` times.
+    /// `kernel` with `U` as the stage's own uniform, and at most `loops` loop iterations.
     pub(super) fn new<U: Layout>(kernel: Kernel, loops: usize) -> Self {
         Self { kernel, loops, uniform: UniformLayout::of::<U>() }
     }
 }
 
-/// Buffers to bind, each at the number that it has in the shader.
+/// Buffers to bind, each with its binding number in the shader.
 pub(super) type Bindings = Vec<(u32, Binding)>;
 
-/// Collects the steps of a stage at a level.
+/// Collects the commands of a stage at a level.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a mut Device,
     pub(super) pipelines: &'a mut Pipelines,
@@ -66,18 +67,18 @@ impl<'a> Recorder<'a> {
         &self.buffers.levels[self.level]
     }
 
-    /// Those of the next finer one.
+    /// The buffers of the next finer level.
     pub(super) fn finer(&self) -> &'a LevelBuffers {
         &self.buffers.levels[self.level - 1]
     }
 
-    /// The level as shaders are told of it.
+    /// The parameters of the level, as the shaders get them.
     pub(super) fn params(&self) -> LevelParams {
         self.here().params
     }
 
-    /// Dispatches `job` for all rows of the level, `threads` invocations a row, a dispatch a band. `bind` names the buffers for
-    /// rows of the level.
+    /// Dispatches `job` for all rows of the level, with `threads` invocations per row and one dispatch per
+    /// band. `bind` gives the buffers for a range of rows.
     pub(super) fn rows<U: Layout>(
         &mut self,
         job: &Job,
@@ -93,7 +94,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The same with one invocation for each row.
+    /// The same with one invocation per row.
     pub(super) fn one_a_row<U: Layout>(
         &mut self,
         job: &Job,
@@ -113,12 +114,13 @@ impl<'a> Recorder<'a> {
         self.steps.extend(copies.into_iter().map(Step::Copy));
     }
 
-    /// Renews what the parts of `written` hold of each other.
+    /// Updates the halos of `written`.
     pub(super) fn renew(&mut self, written: &Rows) {
         self.copies(written.exchange());
     }
 
-    /// Rows at which a band must end: where a part of the level's volumes or of the next finer one's starts, and the height.
+    /// Rows at which a band must end: the starts of the parts of the level's volumes and of those of the next
+    /// finer level, and the height.
     fn cuts(&self) -> Vec<u32> {
         let mut cuts: BTreeSet<u32> = self.here().belief.starts().collect();
         if self.level > 0 {
@@ -128,13 +130,13 @@ impl<'a> Recorder<'a> {
         cuts.into_iter().collect()
     }
 
-    /// Bands of all rows, as few as possible, for which no binding exceeds what the device lets a shader see; volumes are not
-    /// among what is bound.
+    /// Bands of all rows, as few as possible, such that no binding exceeds the device's largest. For bindings
+    /// that hold no volumes.
     pub(super) fn map_bands(&self, bind: impl Fn(&Range<u32>) -> Bindings) -> Result<Vec<Range<u32>>> {
         self.bands(&[0, self.params().height], bind)
     }
 
-    /// The same between `cuts`.
+    /// The same between given `cuts`.
     fn bands(&self, cuts: &[u32], bind: impl Fn(&Range<u32>) -> Bindings) -> Result<Vec<Range<u32>>> {
         let largest = |rows: &Range<u32>| bind(rows).iter().map(|(_, b)| b.size()).max().unwrap_or(0);
         let mut bands = Vec::new();
@@ -163,7 +165,7 @@ impl<'a> Recorder<'a> {
         Ok(bands)
     }
 
-    /// Dispatches `job` for the band `rows`, as invocations in `size.1` rows of `size.0`.
+    /// Dispatches `job` for the band `rows`, with `size.0` invocations in each of `size.1` rows.
     pub(super) fn dispatch<U: Layout>(
         &mut self,
         job: &Job,
@@ -208,7 +210,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// The compiled kernel of `job`, compiled on first use.
+    /// The pipeline of `job`, compiled on first use.
     fn pipeline(&mut self, job: &Job) -> Result<wgpu::ComputePipeline> {
         let Job { kernel, loops, .. } = job;
         if *loops > MAX_LOOP_ITERATIONS {

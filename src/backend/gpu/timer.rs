@@ -1,4 +1,4 @@
-//! The time of every stage by the device's own clock.
+//! The time of every stage, measured by the device's timestamps.
 
 use super::device::Device;
 use crate::backend::Stage;
@@ -8,19 +8,19 @@ use std::time::Duration;
 /// Passes recorded before they are submitted.
 pub(super) const PASSES_PER_SUBMIT: usize = 16;
 
-/// Takes the time of passes and adds up those of one run of a stage.
+/// Records the times of passes, and sums those of one run of a stage.
 pub(super) struct Timer {
     clock: Option<Clock>,
-    /// The runs so far, and what the host measured where the device has no clock.
+    /// The runs so far, with the host's measurement where the device has no timestamps.
     runs: Vec<(Stage, Duration)>,
 }
 
 struct Clock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    /// The run that each pass of the encoder at hand belongs to.
+    /// The run that each pass of the current encoder belongs to.
     passes: Vec<usize>,
-    /// The same of all submissions, and what the clock said.
+    /// The same for all submissions, with the buffers of their timestamps.
     logs: Vec<(Vec<usize>, wgpu::Buffer)>,
 }
 
@@ -47,7 +47,7 @@ impl Timer {
         Ok(Self { clock, runs: Vec::new() })
     }
 
-    /// Whether the device has a clock; else the host measures, waiting for every stage.
+    /// Whether the device has timestamps; otherwise the host measures, waiting for every stage.
     pub(super) fn has_clock(&self) -> bool {
         self.clock.is_some()
     }
@@ -56,14 +56,14 @@ impl Timer {
         self.runs.push((stage, Duration::ZERO));
     }
 
-    /// What the host measured of the run at hand.
+    /// Records the host's measurement of the current run.
     pub(super) fn measured(&mut self, time: Duration) {
         if let Some(run) = self.runs.last_mut() {
             run.1 = time;
         }
     }
 
-    /// Where the next pass writes when it begins and ends.
+    /// Where the next pass writes its begin and end.
     pub(super) fn pass(&mut self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         let clock = self.clock.as_mut()?;
         let first = 2 * clock.passes.len() as u32;
@@ -75,7 +75,7 @@ impl Timer {
         })
     }
 
-    /// Keeps the times of the passes in `encoder`, which is about to be submitted.
+    /// Saves the timestamps of the passes in `encoder`, which is about to be submitted.
     pub(super) fn submit(&mut self, device: &Device, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
         let Some(clock) = self.clock.as_mut().filter(|c| !c.passes.is_empty()) else { return Ok(()) };
         let passes = std::mem::take(&mut clock.passes);

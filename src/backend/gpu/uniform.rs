@@ -1,12 +1,14 @@
-//! What a kernel is told: one uniform buffer a dispatch. It begins alike for all; the rest is the stage's own.
+//! The parameters of a kernel: one uniform buffer per dispatch. All begin with the same header; the rest
+//! belongs to the stage.
 
 use crate::plan::{LABEL_BLOCK, LevelPlan, Plan};
 use bytemuck::{Pod, Zeroable};
 
-/// Rows of every buffer start at a multiple of this many 32-bit words: the alignment of bindings everywhere.
+/// Rows of every buffer start at a multiple of this many 32-bit words, the alignment of bindings on every
+/// device.
 pub(super) const ALIGN_WORDS: usize = 64;
 
-/// Declares fields with their names and offsets, for the tests that hold them against the shaders.
+/// Declares fields with their names and offsets, for the tests that compare them with the shaders.
 macro_rules! layout {
     ($type:ident: $($field:ident),*) => {
         impl $crate::backend::gpu::uniform::Layout for $type {
@@ -16,7 +18,7 @@ macro_rules! layout {
     };
 }
 
-/// Declares `Uniform`, the fields of a stage's own in the order of its shader.
+/// Declares `Uniform`, the stage's own fields in the order of its shader.
 macro_rules! uniform {
     ($( $field:ident: $type:ty ),* $(,)?) => {
         #[repr(C)]
@@ -31,7 +33,8 @@ macro_rules! uniform {
 
 pub(super) use {layout, uniform};
 
-/// Names and offsets of the fields of a struct, in bytes. Names that start with `padding` are no fields of the shader's.
+/// Names and offsets of the fields of a struct, in bytes. Fields whose names start with `padding` do not
+/// exist in the shader.
 pub(super) trait Layout: Pod {
     /// Every field.
     const FIELDS: &'static [(&'static str, usize)];
@@ -92,7 +95,7 @@ pub(super) struct Band {
 
 layout!(Band: first_row, rows, row_groups, grid);
 
-/// What every uniform begins with.
+/// The header of every uniform.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Header {
@@ -103,12 +106,12 @@ pub(super) struct Header {
 
 layout!(Header: level, padding, band);
 
-/// A uniform as a shader declares it.
+/// The layout of a uniform, as a shader declares it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UniformLayout {
     /// Its fields with their offsets in bytes.
     pub fields: Vec<(&'static str, usize)>,
-    /// The bytes of a uniform.
+    /// Size of the uniform in bytes.
     pub bytes: usize,
 }
 
@@ -123,7 +126,7 @@ impl UniformLayout {
         }
     }
 
-    /// Layouts of the structs inside: `Level` and `Band`.
+    /// Layouts of the structs in the header: `Level` and `Band`.
     #[must_use]
     pub fn inner() -> [(&'static str, Self); 2] {
         fn of<T: Layout>() -> UniformLayout {

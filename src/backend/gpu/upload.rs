@@ -18,7 +18,7 @@ pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
     words
 }
 
-/// Codes of the factors' neighbours, four a word.
+/// Codes of the factors' neighbours, four per word.
 pub(super) fn member_words(graph: &LevelGraph, params: &LevelParams) -> Vec<u32> {
     let neighbours = graph.slots() - 1;
     let (per_pixel, pitch) = (neighbours.div_ceil(4), params.member_pitch as usize);
@@ -36,12 +36,12 @@ pub(super) fn member_words(graph: &LevelGraph, params: &LevelParams) -> Vec<u32>
     words
 }
 
-/// The transposed table as the shader reads it.
+/// The transposed table, as the shader reads it.
 pub(super) struct Incoming {
-    /// Where each pixel's entries start, and one more a row.
+    /// Start of each pixel's entries, with one more per row.
     pub(super) starts: Vec<u32>,
     pub(super) entries: Vec<u32>,
-    /// Where each row's entries start, aligned so that any rows can be bound, and the end.
+    /// Start of each row's entries, aligned so that any range of rows can be bound, and the end.
     pub(super) rows: Vec<u32>,
 }
 
@@ -55,7 +55,7 @@ pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> Incoming {
             *start = entries.len() as u32;
             for &entry in graph.incoming_of(y * width + x) {
                 let (factor, slot) = (entry as usize / slots, entry as usize % slots);
-                // From the pixel to the factor: against the way from the factor to its member.
+                // From the pixel to the factor: the opposite of the offset from the factor to its member.
                 let dx = (factor % width) as i32 - x as i32;
                 let dy = (factor / width) as i32 - y as i32;
                 entries.push((dx + 3) as u32 | ((dy + 3) as u32) << 3 | (slot as u32) << 6);

@@ -1,14 +1,14 @@
 //! The bank of Gabor filters, in the frequency domain.
 //!
-//! The image is continued by reflection, which makes it periodic, with twice its size as the period, and leaves no
-//! step at its borders. One transform of that period serves all filters. A filter passes a Gaussian around its centre
-//! frequency; only that part of the spectrum is transformed back, moved to frequency 0, which changes the phase of the
-//! response but not its magnitude. So the magnitude comes at as few nodes as its bandwidth needs, about a fourth of
-//! them for each octave of wavelength.
+//! The image is continued by reflection. This makes it periodic with twice its size, and leaves no step at
+//! its borders. One transform of that period serves all filters. A filter passes a Gaussian around its centre
+//! frequency. Only that part of the spectrum is transformed back, shifted to frequency 0, which changes the
+//! phase of the response but not its magnitude. The magnitude is therefore sampled at only as many nodes as
+//! its bandwidth needs: about a fourth of them for each octave of wavelength.
 //!
-//! Numbers are single precision on purpose. The transforms are scalar code of additions and multiplications, the same
-//! on every CPU, but for their sines and cosines, which `rustfft` takes from the platform in double precision:
-//! rounded to single precision, what platforms do differently in the last place is gone.
+//! Single precision is deliberate. The transforms are scalar code of additions and multiplications, the same
+//! on every CPU except for their sines and cosines, which `rustfft` takes from the platform in double
+//! precision. Rounding to single precision removes the platforms' differences in the last place.
 
 use std::f64::consts::SQRT_2;
 use std::sync::Arc;
@@ -23,20 +23,20 @@ use crate::weights::exp_neg;
 
 /// The shortest wavelength, 4 / sqrt 2 pixels, squared (paper, section 3.1).
 const SHORTEST_SQUARED: usize = 8;
-/// Bandwidth: the standard deviation of the pass band as a part of its centre frequency. Half the peak at 2/3 and 4/3
-/// of the centre frequency, one octave, as Jain and Farrokhnia have it, so that neighbouring wavelengths join; the
-/// paper does not say. The band is round: half the peak at 18 degrees to either side, so that orientations 30 degrees
-/// apart join as well.
+/// Bandwidth: the standard deviation of the pass band as a fraction of its centre frequency. The response is
+/// half its maximum at 2/3 and 4/3 of the centre frequency, one octave, as in Jain and Farrokhnia, so that
+/// neighbouring wavelengths join; the paper does not say. The band is round: the response is half its maximum
+/// at 18 degrees to either side, so that orientations 30 degrees apart join as well.
 const BANDWIDTH: f64 = 0.283;
-/// How much of the band is kept to either side, in standard deviations.
+/// The part of the band that is kept on either side, in standard deviations.
 const BAND_REACH: f64 = 3.0;
-/// Standard deviation of the Gaussian that smooths a magnitude, in wavelengths: half a wavelength, that of the
-/// filter's envelope, times 3, as usual with this bank. The paper does not say.
+/// Standard deviation of the Gaussian that smooths a magnitude, in wavelengths: half a wavelength, which is
+/// that of the filter's envelope, times 3, as usual with this bank. The paper does not say.
 const SMOOTHING: f64 = 1.5;
-/// How far the smoothing reaches, in standard deviations.
+/// Radius of the smoothing, in standard deviations.
 const SMOOTHING_REACH: f64 = 3.0;
 
-/// The smoothed magnitude of a filter's response, in 8-bit levels: half the amplitude of a wave that it passes.
+/// The smoothed magnitude of a filter's response, in 8-bit levels: half the amplitude of a wave in its band.
 pub(super) struct Response {
     /// Width and height of the image.
     pub(super) pixels: [usize; 2],
@@ -52,8 +52,8 @@ fn orientations() -> [[f64; 2]; 6] {
     [[1.0, 0.0], [long, 0.5], [0.5, long], [0.0, 1.0], [-0.5, long], [-long, 0.5]]
 }
 
-/// The responses of a plane (in 8-bit levels, mean 0, at least one pixel) to all filters: wavelengths by octaves from
-/// 2.83 pixels to the diagonal, six orientations each.
+/// The responses of a plane (in 8-bit levels, mean 0, at least one pixel) to all filters: wavelengths in
+/// octaves from 2.83 pixels to the diagonal, with six orientations each.
 pub(super) fn bank(plane: &Plane<f32>) -> Vec<Response> {
     let (width, height) = plane.size();
     let diagonal_squared = width * width + height * height;
@@ -71,8 +71,8 @@ pub(super) fn bank(plane: &Plane<f32>) -> Vec<Response> {
     filters.par_iter().map(|filter| filter.response(&spectrum)).collect()
 }
 
-/// Nodes that a magnitude needs on a doubled side of `n` pixels: one for each frequency of the band, at least 4, and
-/// rounded up to a product of 2, 3 and 5; never more than pixels.
+/// Number of nodes that a magnitude needs on a doubled side of `n` pixels: one for each frequency of the
+/// band, at least 4, rounded up to a product of 2, 3 and 5, and never more than there are pixels.
 fn nodes_per_period(n: usize, wavelength: f64) -> usize {
     let band = (2.0 * BAND_REACH * BANDWIDTH * (2 * n) as f64 / wavelength).ceil() as usize;
     (band.max(4)..2 * n).find(|m| has_small_factors(*m)).unwrap_or(2 * n)
@@ -92,7 +92,7 @@ fn has_small_factors(mut n: usize) -> bool {
 struct Spectrum {
     /// Width and height of the image.
     pixels: [usize; 2],
-    /// Column by column: \[u\]\[v\].
+    /// By column: \[u\]\[v\].
     data: Vec<Complex<f32>>,
 }
 
@@ -122,7 +122,7 @@ impl Spectrum {
 
 /// One filter of the bank.
 struct Filter {
-    /// In pixels.
+    /// Wavelength in pixels.
     wavelength: f64,
     /// Cosine and sine of the orientation.
     direction: [f64; 2],
@@ -135,7 +135,7 @@ impl Filter {
         let [across, down] = &self.inverse;
         let nodes_per_period = [across.len(), down.len()];
         let bands = [0, 1].map(|axis| self.band(axis, spectrum.pixels[axis]));
-        // Nodes 0 to the one after the last pixel. Few nodes may end before it, and then start over.
+        // Nodes 0 to the one after the last pixel. If there are too few nodes for that, they wrap around.
         let [columns, lines] = [0, 1].map(|axis| {
             (spectrum.pixels[axis] - 1) * nodes_per_period[axis] / (2 * spectrum.pixels[axis]) + 2
         });
@@ -168,8 +168,8 @@ impl Filter {
         Response { pixels: spectrum.pixels, nodes_per_period, nodes: smoothed.map(|v| v[0]) }
     }
 
-    /// The frequencies of the band on one axis, as indices into the spectrum, and what the filter passes of each; the
-    /// transforms, which do not normalise, are normalised here.
+    /// The frequencies of the band on one axis, as indices into the spectrum, and the filter's gain at each.
+    /// The gain includes the normalisation, which the transforms leave out.
     fn band(&self, axis: usize, pixels: usize) -> Vec<(usize, f32)> {
         let (period, count) = (2 * pixels as isize, self.inverse[axis].len() as isize);
         let centre = self.direction[axis] / self.wavelength * period as f64;
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// A wave of amplitude 20 levels, an octave and an orientation of the bank.
+    /// A wave with an amplitude of 20 levels, at an octave and an orientation of the bank.
     fn wave(octave: usize, orientation: usize) -> Plane<f32> {
         let wavelength = 2.0 * SQRT_2 * f64::from(1 << octave);
         let [cos, sin] = orientations()[orientation];
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_wave_answers_in_its_own_filter_with_half_its_amplitude() {
-        // Longer waves feel the borders even in the centre.
+        // Longer waves are affected by the borders even at the centre.
         for octave in 0..3 {
             for orientation in 0..6 {
                 let answers: Vec<f64> = bank(&wave(octave, orientation)).iter().map(at_centre).collect();

@@ -1,16 +1,17 @@
 //! K-means in integers: exact, so the same everywhere.
 //!
-//! Lloyd's iteration from the random starts of Arthur and Vassilvitskii, *k-means++* (2007). `linfa-clustering` was
-//! considered and left: its default start depends on how threads share the work, its step counts the old centroid as
-//! one more point, and it brings 27 crates to a result that the next version of any of them might change.
+//! Lloyd's iteration from the random starts of Arthur and Vassilvitskii, *k-means++* (2007).
+//! `linfa-clustering` was considered and rejected: its default start depends on how threads share the work,
+//! its update counts the old centroid as one more point, and it brings 27 crates for a result that the next
+//! version of any of them might change.
 
 use rayon::prelude::*;
 
 use super::Options;
 
-/// Centroids of the points, all of `dimensions` values up to 512 in size, one after the other. At most `count` of
-/// them, fewer where there are fewer different points. Of all replicates the one with the least sum of squared
-/// distances, the first of equals.
+/// The centroids of the points, whose `dimensions` values are up to 512 in size, one after the other. There
+/// are at most `count` of them, and fewer where there are fewer different points. The replicate with the
+/// smallest sum of squared distances is taken, the first one on a tie.
 pub(super) fn cluster(points: &[i16], dimensions: usize, count: usize, options: &Options) -> Vec<Vec<i16>> {
     let points: Vec<&[i16]> = points.chunks_exact(dimensions).collect();
     (0..options.replicates.max(1) as u64)
@@ -26,7 +27,7 @@ pub(super) fn cluster(points: &[i16], dimensions: usize, count: usize, options: 
         .unwrap_or_default()
 }
 
-/// Index of the centroid nearest to a point, the first of equals, and the squared distance to it.
+/// Index of the centroid nearest to a point, the first one on a tie, and the squared distance to it.
 pub(super) fn nearest(point: &[i16], centroids: &[Vec<i16>]) -> (usize, u32) {
     let mut best = (0, u32::MAX);
     for (i, centroid) in centroids.iter().enumerate() {
@@ -38,18 +39,18 @@ pub(super) fn nearest(point: &[i16], centroids: &[Vec<i16>]) -> (usize, u32) {
     best
 }
 
-/// Values up to 512 in size: a square fits 20 bits.
+/// For values up to 512 in size: a square fits in 20 bits.
 fn squared_distance(a: &[i16], b: &[i16]) -> u32 {
     let square = |(a, b): (&i16, &i16)| {
-        // Two 16-bit factors, which the multiply-add of every vector unit takes.
+        // Two 16-bit factors, for the multiply-add that every vector unit has.
         let difference = a - b;
         (i32::from(difference) * i32::from(difference)) as u32
     };
     a.iter().zip(b).map(square).sum()
 }
 
-/// Points to start from: each next one is drawn with a probability in proportion to its squared distance from those
-/// drawn before.
+/// Starting points: each next one is drawn with a probability proportional to its squared distance from those
+/// already drawn.
 fn starts(points: &[&[i16]], count: usize, random: &mut Random) -> Vec<Vec<i16>> {
     let mut centroids = vec![points[random.below(points.len() as u64) as usize].to_vec()];
     let mut distances = vec![u32::MAX; points.len()];
@@ -73,7 +74,8 @@ fn starts(points: &[&[i16]], count: usize, random: &mut Random) -> Vec<Vec<i16>>
     centroids
 }
 
-/// Assigns and averages until nothing changes. The sum of squared distances, and the centroids, rounded to integers.
+/// Assigns and averages until nothing changes. Returns the sum of squared distances, and the centroids
+/// rounded to integers.
 fn lloyd(points: &[&[i16]], mut centroids: Vec<Vec<i16>>, iterations: usize) -> (u64, Vec<Vec<i16>>) {
     let dimensions = points[0].len();
     let mut assigned = vec![usize::MAX; points.len()];
@@ -94,7 +96,7 @@ fn lloyd(points: &[&[i16]], mut centroids: Vec<Vec<i16>>, iterations: usize) -> 
         if !changed {
             break;
         }
-        // A centroid that no point is nearest to stays where it is.
+        // A centroid without points stays where it is.
         for ((centroid, sum), n) in centroids.iter_mut().zip(&sums).zip(&counts).filter(|(_, n)| **n > 0) {
             for (v, sum) in centroid.iter_mut().zip(sum) {
                 *v = (2 * sum + n).div_euclid(2 * n) as i16;
@@ -116,7 +118,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// From 0 to below `n`.
+    /// A number from 0 to below `n`.
     fn below(&mut self, n: u64) -> u64 {
         ((u128::from(self.next()) * u128::from(n)) >> 64) as u64
     }
@@ -126,7 +128,7 @@ impl Random {
 mod tests {
     use super::*;
 
-    /// Three heaps of 50 points each, far apart.
+    /// Three clusters of 50 points each, far apart.
     fn heaps() -> Vec<i16> {
         let mut random = Random(7);
         let mut near = |centre: i16| centre + random.below(21) as i16 - 10;

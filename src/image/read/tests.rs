@@ -110,7 +110,7 @@ fn an_8_bit_pair_times_257_is_the_same_pair() {
         assert_eq!(pair(&byte, &word, None).unwrap(), expected);
         assert_eq!(pair(&word, &byte, None).unwrap(), expected);
     }
-    // Negative control: 256 is no stretching, and one more is another picture.
+    // Negative control: 256 is no stretching, and one more is a different picture.
     let byte = f.grey8("byte.png", RAMP);
     let mut values = RAMP.map(stretched);
     values[4] += 1;
@@ -244,7 +244,7 @@ fn floats_are_spread_jointly() {
     assert_eq!(greys(both.right())[..5], [0, 65280, 0, 0, 32640]);
     assert_eq!((masked(both.left()), masked(both.right())), (vec![3], vec![2, 3]));
 
-    // Doubles beyond the range of floats, whose difference is beyond that of doubles.
+    // Doubles beyond the range of floats, whose difference exceeds the range of doubles.
     let wide = f.tiff::<colortype::Gray64Float>(
         "d.tif",
         &[-1.7e308, 1.7e308, 0.0, f64::NAN, 0., 0., 0., 0., 0., 0., 0., 0.],
@@ -378,7 +378,7 @@ fn files_that_are_no_images_are_refused() {
     bad(&f.bytes("huge.pfm", b"Pf\n2000000000 2000000000\n-1\n"), &["huge.pfm", "at most"]);
     #[cfg(target_os = "linux")]
     bad(Path::new("/dev/zero"), &["not an image"]);
-    // A PNG whose header claims much.
+    // A PNG whose header claims too much.
     let mut png = fs::read(&good).unwrap();
     png[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
     bad(&f.bytes("huge.png", &png), &["huge.png"]);

@@ -1,8 +1,9 @@
-//! Strips and tiles of TIFF files: from the bytes in the file to rows of samples, unpacked and without predictor.
+//! Strips and tiles of TIFF files: converts their bytes to rows of samples, unpacked and with the predictor
+//! undone.
 //!
-//! The `tiff` crate unpacks them, one at a time, as grey rows of bytes that it need not understand. (What it makes of whole
-//! images is not enough here, as of 0.11: samples of 12 bits, palettes and bits in reversed order are refused or misread, and
-//! planes in tiles panic.)
+//! The `tiff` crate unpacks them, one at a time, as grey rows of bytes that it need not understand. (Its
+//! reader for whole images is not enough here, as of 0.11: it rejects or misreads samples of 12 bits,
+//! palettes and reversed bits, and panics at planes in tiles.)
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -24,15 +25,15 @@ pub(super) struct Packing<'a> {
     /// The value of the tag.
     pub(super) compression: u64,
     pub(super) predictor: u64,
-    /// Whether the first bit of a byte is the least.
+    /// Whether the first bit of a byte is the lowest.
     pub(super) reversed: bool,
-    /// Tables that all strips or tiles share.
+    /// Tables shared by all strips or tiles.
     pub(super) jpeg_tables: Option<&'a [u8]>,
     pub(super) order: Order,
     pub(super) bits: u32,
-    /// Samples of a pixel in a row: one where planes are apart.
+    /// Samples of a pixel in a row: one where each channel has its own plane.
     pub(super) samples: usize,
-    /// Width in pixels, what lies beyond the image included.
+    /// Width in pixels, including the part beyond the image.
     pub(super) width: usize,
     /// Bytes of a row.
     pub(super) row_bytes: usize,
@@ -42,7 +43,7 @@ impl Packing<'_> {
     /// The first `rows` rows of a strip or tile.
     ///
     /// # Errors
-    /// What is wrong with it, in one line.
+    /// A description of the damage, in one line.
     pub(super) fn rows<'a>(&self, data: &'a [u8], rows: usize) -> Result<Cow<'a, [u8]>, ReadError> {
         let bytes = self.row_bytes * rows;
         let data = if self.reversed && self.compression != JPEG {
@@ -69,18 +70,18 @@ impl Packing<'_> {
         Ok(rows)
     }
 
-    /// What the `tiff` crate makes of compressed data: a file with nothing else in it, grey, in one strip.
+    /// Unpacks data with the `tiff` crate, as a file that holds nothing but one grey strip.
     fn unpacked(&self, data: &[u8], rows: usize) -> Result<Vec<u8>, ReadError> {
         if self.compression == JPEG {
             let frame =
                 jpeg_frame(data).ok_or_else(|| damaged("a JPEG strip or tile does not say its size"))?;
             let [height, width, components] = frame;
-            // The decoder believes the frame.
+            // The decoder trusts the frame.
             if (width, components) != (self.width, self.samples) || height < rows {
                 return Err(damaged("a JPEG strip or tile does not have the size that its header says"));
             }
         }
-        // The fax decoder counts pixels.
+        // The fax decoder counts in pixels.
         let (width, bits) = if self.compression == FAX4 { (self.width, 1) } else { (self.row_bytes, 8) };
         let tables = self.jpeg_tables.unwrap_or_default();
         let count = if tables.is_empty() { 9 } else { 10 };
@@ -122,7 +123,7 @@ impl Packing<'_> {
         Ok(out)
     }
 
-    /// Turns the differences in a row into what they are differences of.
+    /// Replaces the differences in a row by the values.
     fn undo_predictor(&self, row: &mut [u8]) {
         let size = self.bits as usize / 8;
         let store = |to: &mut [u8], value: u64| match self.order {
@@ -130,7 +131,8 @@ impl Packing<'_> {
             Order::Big => to.copy_from_slice(&value.to_be_bytes()[8 - size..]),
         };
         let floats = self.predictor == 3;
-        // Differences are of samples, or, of floats, of their bytes in planes, the highest first.
+        // Differences are between samples or, for floats, between their bytes in planes, the highest byte
+        // first.
         let step = if floats { 1 } else { size };
         let distance = self.samples * step;
         if step == 1 {
@@ -162,7 +164,7 @@ fn jpeg_frame(data: &[u8]) -> Option<[usize; 3]> {
         let &[0xff, mark, a, b, ..] = data.get(at..)? else { return None };
         match mark {
             0xff => at += 1,
-            // Marks without a segment.
+            // Markers without a segment.
             0x01 | 0xd0..=0xd8 => at += 2,
             0xc0..=0xcf if !matches!(mark, 0xc4 | 0xc8 | 0xcc) => {
                 let [_, h, i, w, j, components] = *data.get(at + 4..at + 10)?.first_chunk()?;
@@ -178,7 +180,7 @@ fn jpeg_frame(data: &[u8]) -> Option<[usize; 3]> {
 mod tests {
     use super::*;
 
-    /// The differences that the predictor of a row of 16-bit or wider samples stores.
+    /// The packing of a row of four samples of 16 bits or more.
     fn packing(bits: u32, samples: usize, predictor: u64, order: Order) -> Packing<'static> {
         let (width, row_bytes) = (4, 4 * samples * bits as usize / 8);
         Packing {

@@ -1,4 +1,4 @@
-//! What the samples of a TIFF file mean: grey, colours, palettes, inks and alpha.
+//! The meaning of the samples of a TIFF file: grey, colours, palettes, inks and alpha.
 
 use super::directory::Directory;
 use super::tag;
@@ -7,7 +7,7 @@ use crate::image::file::{damaged, unsupported};
 use crate::image::raster::Samples;
 use crate::memory;
 
-/// What the colours of a pixel are.
+/// The colour model of a pixel.
 enum Model {
     Grey {
         white_is_zero: bool,
@@ -22,13 +22,13 @@ enum Model {
     },
 }
 
-/// What comes with the colours.
+/// The kind of alpha, if any.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Alpha {
     None,
-    /// The colours are as they are.
+    /// The colours are not premultiplied.
     Plain,
-    /// The colours have been multiplied by it.
+    /// The colours are premultiplied by it.
     Premultiplied,
 }
 
@@ -38,17 +38,17 @@ pub(super) struct Colours {
     alpha: Alpha,
     /// Bits of a sample.
     pub(super) bits: u32,
-    /// Samples of a pixel, those included that are not read.
+    /// Samples of a pixel, including those that are not read.
     pub(super) samples: usize,
     /// Columns and rows that share a pair of chroma samples.
     pub(super) subsampling: Option<(usize, usize)>,
 }
 
 impl Colours {
-    /// What the directory says.
+    /// The meaning that the directory declares.
     ///
     /// # Errors
-    /// What of it is not understood.
+    /// A description of what is not supported.
     pub(super) fn of(directory: &Directory) -> Result<Self, ReadError> {
         let samples = directory.first(tag::SAMPLES, 1)? as usize;
         let bits = directory.equal(tag::BITS, 1, "depths")?;
@@ -57,7 +57,7 @@ impl Colours {
         }
         let bits = bits as u32;
         let extra = directory.unsigned(tag::EXTRA_SAMPLES)?;
-        // Which is required, but some forget it.
+        // The tag is required, but some programs forget it.
         let guess = if samples >= 3 { 2 } else { 1 };
         let photometric = directory.first(tag::PHOTOMETRIC, guess)?;
         let model = match photometric {
@@ -84,7 +84,7 @@ impl Colours {
         let alpha = match extra.as_deref().and_then(|extra| extra.first()) {
             Some(1) => Alpha::Premultiplied,
             Some(2) => Alpha::Plain,
-            // Many programs write alpha without saying so.
+            // Many programs write alpha without declaring it.
             None if photometric == 2 && samples == 4 => Alpha::Plain,
             _ => Alpha::None,
         };
@@ -112,7 +112,7 @@ impl Colours {
         Ok(Self { model, alpha, bits, samples, subsampling })
     }
 
-    /// Samples of a pixel's colour.
+    /// Samples of a pixel's colour, as stored.
     pub(super) fn stored(&self) -> usize {
         self.model.stored()
     }
@@ -122,11 +122,12 @@ impl Colours {
         self.stored() + usize::from(self.alpha != Alpha::None)
     }
 
-    /// Grey or red, green and blue, with alpha where there is one, and how many they are. Unsigned samples of fewer than 8 bits span
-    /// all levels of 8; those of 9 to 15 stay as they are.
+    /// Grey or red, green and blue, with alpha where there is one, and the number of channels. Unsigned
+    /// samples of fewer than 8 bits are stretched to all 8-bit levels; those of 9 to 15 bits stay as they
+    /// are.
     pub(super) fn levels(&self, samples: Samples<'static>) -> Result<(usize, Samples<'static>), ReadError> {
         let n = self.read();
-        // White.
+        // The value of white.
         let most = if self.bits < 64 { (1_u64 << self.bits) - 1 } else { u64::MAX };
         let samples = match samples {
             Samples::Byte(mut v) if self.bits < 8 && !matches!(self.model, Model::Palette(_)) => {
@@ -145,7 +146,7 @@ impl Colours {
                 (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
             }
             (Model::Palette(colours), Samples::Word(v)) => {
-                // Alpha goes to the bits of the colours.
+                // Alpha is scaled to the bits of the colours.
                 let alpha = |a: u16| (u64::from(a) * 255 / most) as u8;
                 let rgb = |p: &[u16]| colours.get(usize::from(p[0])).copied();
                 (3, Samples::Byte(self.replaced(&v, rgb, alpha)?.into()))
@@ -176,7 +177,8 @@ impl Colours {
         Ok((channels + 1, samples))
     }
 
-    /// Red, green and blue in place of the colour of each pixel, alpha kept; `rgb` has none for an index beyond a palette.
+    /// Replaces the colour of each pixel by red, green and blue, and keeps alpha; `rgb` returns `None` for an
+    /// index beyond the palette.
     fn replaced<S: Copy, T>(
         &self,
         samples: &[S],
@@ -195,7 +197,7 @@ impl Colours {
 }
 
 impl Model {
-    /// Samples of a pixel's colour, as they are stored.
+    /// Samples of a pixel's colour, as stored.
     fn stored(&self) -> usize {
         match self {
             Self::Grey { .. } | Self::Palette(_) => 1,
@@ -231,12 +233,12 @@ fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, ReadError> 
     let Some(map) = map.filter(|map| map.len() >= 3 * count) else {
         return Err(damaged("the TIFF palette is missing, or too short"));
     };
-    // 16 bits by the book, but some programs write 8.
+    // The standard says 16 bits, but some programs write 8.
     let shift = if map[..3 * count].iter().any(|v| *v > 255) { 8 } else { 0 };
     Ok((0..count).map(|i| [0, 1, 2].map(|c| (map[c * count + i] >> shift) as u8)).collect())
 }
 
-/// White for black and black for white, alpha left as it is.
+/// Inverts black and white, and leaves alpha as it is.
 fn inverted(samples: Samples<'static>, n: usize, most: u64) -> Samples<'static> {
     fn each<S: Copy>(samples: &mut [S], n: usize, f: impl Fn(S) -> S) {
         samples.iter_mut().step_by(n).for_each(|v| *v = f(*v));
@@ -250,7 +252,7 @@ fn inverted(samples: Samples<'static>, n: usize, most: u64) -> Samples<'static> 
             each(v.to_mut(), n, |v| most as u16 - v);
             Samples::Word(v)
         }
-        // These are spread from the least to the largest.
+        // Floats are scaled from their smallest to their largest value anyway.
         Samples::Float(mut v) => {
             each(v.to_mut(), n, |v| -v);
             Samples::Float(v)
@@ -262,7 +264,7 @@ fn inverted(samples: Samples<'static>, n: usize, most: u64) -> Samples<'static> 
     }
 }
 
-/// Divides the colours by the alpha that they were multiplied by; where it is 0 there is nothing to divide.
+/// Divides the colours by the alpha that they were multiplied by; pixels with alpha 0 stay as they are.
 fn divide(samples: &mut Samples<'static>, n: usize, most: u64) {
     fn each<S: Copy>(samples: &mut [S], n: usize, f: impl Fn(S, S) -> S) {
         for pixel in samples.chunks_exact_mut(n) {
@@ -280,7 +282,8 @@ fn divide(samples: &mut Samples<'static>, n: usize, most: u64) {
     }
 }
 
-/// Y, Cb and Cr of every pixel of `rows` rows, from units in which `across` x `down` pixels share a pair of chroma samples.
+/// Y, Cb and Cr of every pixel of `rows` rows, from units in which `across` x `down` pixels share a pair of
+/// chroma samples.
 pub(super) fn spread(
     stored: &[u8],
     width: usize,

@@ -1,4 +1,4 @@
-//! Directories of TIFF files: tags and their values, as they stand in the file.
+//! Directories of TIFF files: tags and their values, as stored.
 
 use std::collections::HashSet;
 
@@ -6,7 +6,7 @@ use super::tag;
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 
-/// Directories that are looked at, at most: a file with more has no end.
+/// Largest number of directories that are read: a file with more is endless.
 const MOST: usize = 1 << 12;
 
 /// How numbers are stored.
@@ -17,7 +17,7 @@ pub(super) enum Order {
 }
 
 impl Order {
-    /// The number in `bytes`, at most eight of them.
+    /// The number in `bytes`, which are at most eight.
     pub(super) fn number(self, bytes: &[u8]) -> u64 {
         let append = |n: u64, byte: &u8| n << 8 | u64::from(*byte);
         match self {
@@ -27,13 +27,13 @@ impl Order {
     }
 }
 
-/// A tag, and where its values are.
+/// A tag, and the position of its values.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     tag: u16,
     kind: u16,
     count: u64,
-    /// Place in the file; the file may end before it.
+    /// Position in the file; the file may end before it.
     place: u64,
 }
 
@@ -42,15 +42,15 @@ pub(super) struct Directory<'a> {
     file: &'a [u8],
     pub(super) order: Order,
     entries: Vec<Entry>,
-    /// Place of the next directory; 0 after the last.
+    /// Position of the next directory; 0 after the last.
     next: u64,
 }
 
 impl<'a> Directory<'a> {
-    /// The directory of the first image that is no reduced copy and no mask of another one.
+    /// The directory of the first image that is neither a reduced copy nor a mask of another one.
     ///
     /// # Errors
-    /// What is wrong with the file, in one line.
+    /// A description of the damage, in one line.
     pub(super) fn of(file: &'a [u8]) -> Result<Self, ReadError> {
         let (order, big) = match file {
             [b'I', b'I', kind, 0, ..] => (Order::Little, *kind == 43),
@@ -81,7 +81,7 @@ impl<'a> Directory<'a> {
     }
 
     fn read(file: &'a [u8], order: Order, big: bool, place: u64) -> Result<Self, ReadError> {
-        // Sizes of the number of entries, of an entry, and of counts and places.
+        // Sizes of the number of entries, of an entry, and of counts and positions.
         let (head, size, wide) = if big { (8, 20, 8) } else { (2, 12, 4) };
         let ends = || damaged("the TIFF file ends within its directory");
         let count = number(file, order, place, head as usize).ok_or_else(ends)?;
@@ -104,9 +104,9 @@ impl<'a> Directory<'a> {
         Ok(Self { file, order, entries, next })
     }
 
-    /// Whether it is of an image in full size.
+    /// Whether it belongs to an image in full size.
     fn is_image(&self) -> Result<bool, ReadError> {
-        // Bit 0 tells a reduced copy, bit 2 a mask. The older tag has 2 for a reduced copy.
+        // Bit 0 marks a reduced copy, bit 2 a mask. The older tag has 2 for a reduced copy.
         Ok(self.first(tag::NEW_SUBFILE_TYPE, 0)? & 5 == 0 && self.first(tag::SUBFILE_TYPE, 1)? != 2)
     }
 
@@ -115,7 +115,7 @@ impl<'a> Directory<'a> {
         self.entries.iter().any(|entry| entry.tag == tag)
     }
 
-    /// The values of a tag as they stand, with their kind.
+    /// The values of a tag as stored, with their type.
     fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, ReadError> {
         let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };
         let bytes = entry.count.checked_mul(size_of_kind(entry.kind) as u64);
@@ -133,7 +133,7 @@ impl<'a> Directory<'a> {
         }
     }
 
-    /// The value of a tag that has one for every sample, all alike.
+    /// The value of a tag that has one for every sample, where all are equal.
     pub(super) fn equal(&self, tag: u16, default: u64, what: &str) -> Result<u64, ReadError> {
         let values = self.unsigned(tag)?.unwrap_or_default();
         let first = values.first().copied().unwrap_or(default);
@@ -157,13 +157,13 @@ impl<'a> Directory<'a> {
         Ok(self.unsigned(tag)?.and_then(|values| values.first().copied()).unwrap_or(default))
     }
 
-    /// The first value of a tag that must be there.
+    /// The first value of a required tag.
     pub(super) fn required(&self, tag: u16, what: &str) -> Result<u64, ReadError> {
         let value = self.unsigned(tag)?.and_then(|values| values.first().copied());
         value.ok_or_else(|| damaged(format!("the TIFF directory does not say the {what}")))
     }
 
-    /// The bytes of a tag, whatever they are.
+    /// The bytes of a tag of any type.
     pub(super) fn bytes(&self, tag: u16) -> Result<Option<&'a [u8]>, ReadError> {
         Ok(self.values(tag)?.map(|(_, values)| values))
     }
@@ -180,7 +180,7 @@ impl<'a> Directory<'a> {
         Ok(Some(values.chunks_exact(size_of_kind(kind)).map(real).collect()))
     }
 
-    /// The text of a tag, up to where it ends.
+    /// The text of a tag, up to its end.
     pub(super) fn text(&self, tag: u16) -> Result<Option<String>, ReadError> {
         let text = self.bytes(tag)?.and_then(|bytes| bytes.split(|byte| *byte == 0).next());
         Ok(text.map(|bytes| String::from_utf8_lossy(bytes).trim().to_owned()))
@@ -193,7 +193,7 @@ fn number(file: &[u8], order: Order, place: u64, size: usize) -> Option<u64> {
     Some(order.number(file.get(start..start.checked_add(size)?)?))
 }
 
-/// Bytes of a value of a kind of field.
+/// Bytes per value of a field type.
 fn size_of_kind(kind: u16) -> usize {
     match kind {
         3 | 8 => 2,

@@ -1,8 +1,8 @@
-//! TIFF files: which image of a file is read, and its samples as levels.
+//! TIFF files: selects one image of a file, and converts its samples to levels.
 //!
-//! Tags are those of TIFF 6.0 and its technical notes, and of GDAL for what holds no data. What changes the meaning of samples
-//! is either understood here or refused; orientation, resolution, colour profiles and response curves are neither, as
-//! everywhere in [`Reader::pair`](super::read::Reader::pair).
+//! Tags are those of TIFF 6.0 and its technical notes, and GDAL's tag for no data. A tag that changes the
+//! meaning of the samples is either supported or rejected. Orientation, resolution, colour profiles and
+//! response curves are ignored, as everywhere in [`Reader::pair`](super::read::Reader::pair).
 
 mod chunks;
 mod colours;
@@ -30,29 +30,30 @@ enum Format {
     Float,
 }
 
-/// Where the pixels of an image are, and what they are.
+/// The location of an image's pixels, and their format.
 struct Layout<'a> {
     width: usize,
     height: usize,
     format: Format,
-    /// Samples of a pixel that are read; extra ones behind are not.
+    /// Samples of a pixel that are read; extra samples after them are skipped.
     read: usize,
     /// Whether each sample has a plane of its own.
     planar: bool,
     /// Width and height of a strip or tile.
     chunk: (usize, usize),
-    /// Where each strip or tile begins, and its bytes where the file says.
+    /// Position of each strip or tile, and its size where the file gives one.
     offsets: Vec<u64>,
     byte_counts: Option<Vec<u64>>,
-    /// Columns and rows that share a pair of chroma samples, where those are stored more sparsely.
+    /// Columns and rows that share a pair of chroma samples, where chroma is subsampled.
     subsampling: Option<(usize, usize)>,
     packing: Packing<'a>,
 }
 
-/// Decodes a file of at most `max_pixels` pixels. Pixels whose every sample is `no_data`, or else what the file says, are marked.
+/// Decodes a file of at most `max_pixels` pixels. Pixels whose samples are all `no_data`, or else the no-data
+/// value of the file, are marked.
 ///
 /// # Errors
-/// What is wrong with the file, in one line.
+/// A description of the damage, in one line.
 pub(super) fn decode(
     file: &[u8],
     max_pixels: u64,
@@ -68,12 +69,12 @@ pub(super) fn decode(
     Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data })
 }
 
-/// The value that GDAL says stands for no data.
+/// The no-data value that GDAL's tag declares.
 fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
     let Some(text) = directory.text(tag::NO_DATA)? else { return Ok(None) };
     match text.parse() {
         Ok(value) => Ok(Some(value)),
-        // Written so by some.
+        // Some programs write it like this.
         Err(_) if text.is_empty() => Ok(None),
         Err(_) => Err(ReadError::NoData { value: quoted(&text) }),
     }
@@ -92,7 +93,7 @@ impl<'a> Layout<'a> {
 
         let bits = colours.bits;
         let format = match directory.equal(tag::SAMPLE_FORMAT, 1, "formats")? {
-            // 4 is undefined: there are bits, and nothing better to take them for.
+            // 4 is undefined: there are bits, and unsigned is the best guess.
             1 | 4 => Format::Unsigned,
             2 => Format::Signed,
             3 => Format::Float,
@@ -136,7 +137,7 @@ impl<'a> Layout<'a> {
         let predictor = match directory.first(tag::PREDICTOR, 1)? {
             1 => 1,
             _ if compression == chunks::JPEG => 1,
-            // Some readers pass over it then, as libtiff does, and others do not.
+            // Some readers ignore the predictor then, as libtiff does, and others do not.
             _ if !matches!(compression, 5 | 8 | 32_946) => {
                 return Err(unsupported("names a predictor, and is not packed by LZW or Deflate"));
             }
@@ -168,7 +169,7 @@ impl<'a> Layout<'a> {
             let rows = directory.first(tag::ROWS_PER_STRIP, size.1)?.clamp(1, size.1);
             ((size.0, rows), tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS)
         };
-        // Some programs name their tiles strips.
+        // Some programs use the tags of strips for their tiles.
         let either =
             |tag, other| if directory.has(tag) { directory.unsigned(tag) } else { directory.unsigned(other) };
         let offsets = either(offsets, tag::STRIP_OFFSETS)?;
@@ -179,14 +180,14 @@ impl<'a> Layout<'a> {
         // Samples of a pixel in a row.
         let samples = if planar { 1 } else { colours.samples };
         let row_bits = match subsampling {
-            // Rows are units then, of as many pixels and the two samples that they share.
+            // A row then consists of units: this many pixels, and the two samples that they share.
             Some((across, down)) => {
                 u128::from(chunk.0.div_ceil(across as u64)) * (across * down + 2) as u128 * 8
             }
             None => u128::from(chunk.0) * samples as u128 * u128::from(bits),
         };
         let row_bytes = row_bits.div_ceil(8);
-        // Sixteen samples of the widest kind for a pixel, and room for a tile of a small picture.
+        // Sixteen samples of the widest kind per pixel, and room for a tile of a small picture.
         let most = u128::from(size.0 * size.1) * 128 + (1 << 26);
         if row_bytes * u128::from(chunk.1) > most {
             return Err(damaged(format!(
@@ -219,7 +220,7 @@ impl<'a> Layout<'a> {
         Ok(Self { width, height, format, read, planar, chunk, offsets, byte_counts, subsampling, packing })
     }
 
-    /// The samples that are read of all pixels; `missing` where the file leaves a strip or tile out.
+    /// The samples that are read, of all pixels; `missing` where the file leaves out a strip or tile.
     fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, ReadError> {
         let (order, bits) = (self.packing.order, self.packing.bits);
         let size = bits as usize / 8;
@@ -269,7 +270,7 @@ impl<'a> Layout<'a> {
         })
     }
 
-    /// Puts strips or tiles together; `read` takes sample `i` of a row.
+    /// Assembles strips or tiles; `read` extracts sample `i` of a row.
     fn assembled<S: Copy>(
         &self,
         file: &[u8],
@@ -286,7 +287,7 @@ impl<'a> Layout<'a> {
             }
             let bytes = self.byte_counts.as_ref().map(|counts| counts[i]);
             if bytes == Some(0) {
-                // GDAL leaves out tiles of nothing but no data.
+                // GDAL leaves out tiles that hold only no data.
                 continue;
             }
             let (left, top) = (place % across * self.chunk.0, place / across * self.chunk.1);
@@ -298,7 +299,7 @@ impl<'a> Layout<'a> {
             if end > data.len() {
                 return Err(damaged("the TIFF pixels end behind the end of the file"));
             }
-            // Without compression what is needed is known, and byte counts may be wrong.
+            // Without compression the size is known, and the file's byte counts may be wrong.
             let data = if self.packing.compression == chunks::UNCOMPRESSED { data } else { &data[..end] };
             let stored =
                 self.packing.rows(data, rows.div_ceil(self.subsampling.map_or(1, |(_, down)| down)))?;
@@ -321,7 +322,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Number `i` of `bits` bits in a row, the highest bit first.
+/// Number `i` of `bits` bits in a row, highest bit first.
 fn packed(row: &[u8], i: usize, bits: u32) -> u64 {
     let (start, bits) = (i * bits as usize, bits as usize);
     let (first, last) = (start / 8, (start + bits).div_ceil(8));

@@ -2,12 +2,12 @@ use super::{members, most};
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 
-/// The largest belief: a message less than the largest value.
+/// The largest belief: one message below the largest value.
 pub fn belief_most(plan: &Plan) -> u32 {
     most(plan) - u32::from(plan.dependency.tau.max(plan.resolution.tau))
 }
 
-/// Beliefs of `level`; `down` and `up` are empty where there is no level above or below.
+/// Beliefs of `level`; `down` and `up` are empty where there is no coarser or finer level.
 pub fn belief(
     plan: &Plan,
     level: usize,

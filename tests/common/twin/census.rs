@@ -1,6 +1,6 @@
 use mrfgs::image::Image;
 
-/// For each pixel, whether each other place of its 9 x 7 window is darker.
+/// For each pixel, whether each other pixel of its 9 x 7 window is darker.
 pub fn census(image: &Image) -> Vec<Vec<bool>> {
     let (width, height) = (image.width() as i64, image.height() as i64);
     let mut out = Vec::new();

@@ -14,7 +14,7 @@ pub fn labels(belief: &[u32], labels: usize) -> Vec<i64> {
         .collect()
 }
 
-/// Replaces `map` by the map of these beliefs; the sum of squared differences.
+/// Replaces `map` by the label map of these beliefs; returns the sum of squared differences.
 pub fn change(belief: &[u32], label_count: usize, map: &mut Vec<i64>) -> u64 {
     let new = labels(belief, label_count);
     let sum: i64 = new.iter().zip(map.iter()).map(|(a, b)| (a - b) * (a - b)).sum();

@@ -3,7 +3,7 @@ use super::fill::invalid;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 
-/// Confidence of each pixel: 16 for every 8 units that the runner-up is behind.
+/// Confidence of each pixel: 16 for every 8 units of margin between the optimum and its runner-up.
 pub fn confidence(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     for y in 0..height {

@@ -38,7 +38,7 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
     out
 }
 
-/// How much colour counts, 0 to 48: by the variance of grey, in 8-bit levels, in the window of the census.
+/// Weight of colour, 0 to 48, from the variance of grey, in 8-bit levels, in the window of the census.
 fn weight(plan: &Plan, image: &Image, x: i64, y: i64) -> i64 {
     let enough =
         (3969.0 * plan.method.cost.colour_contrast * plan.method.cost.colour_contrast).round() as i64;
@@ -58,7 +58,7 @@ fn weight(plan: &Plan, image: &Image, x: i64, y: i64) -> i64 {
     if variance >= enough { 48 } else { 48 * variance / enough }
 }
 
-/// Mean over the valid places of the window and the three channels, in 8-bit levels, ties up.
+/// Mean over the valid pixels of the window and the three channels, in 8-bit levels, ties up.
 fn sad(left: &Image, right: &Image, x: i64, y: i64, d: i64, window: i64) -> i64 {
     let radius = window / 2;
     let (mut sum, mut places) = (0, 0);
@@ -79,7 +79,7 @@ fn usable(image: &Image, x: i64, y: i64) -> bool {
     inside && !image.masked[(x as usize, y as usize)]
 }
 
-/// |dr| + |dg| + |db|, each channel seen as `level` of it.
+/// |dr| + |dg| + |db|, with `level` applied to each channel.
 fn difference(left: &Image, xl: i64, right: &Image, xr: i64, y: i64, level: fn(i64) -> i64) -> i64 {
     let l = left.pixels[(xl as usize, y as usize)];
     let r = right.pixels[(xr as usize, y as usize)];

@@ -1,19 +1,19 @@
 use super::Finest;
 use mrfgs::maps::flag;
 
-/// Whether a pixel's disparity is given up before the fill.
+/// Whether a pixel's disparity is rejected before the fill.
 pub fn invalid(validity: i32) -> bool {
     [flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::MASKED]
         .iter()
         .any(|&bit| validity & i32::from(bit) != 0)
 }
 
-/// Fills what is invalid and not masked.
+/// Fills the invalid pixels that are not masked.
 pub fn fill(maps: &mut Finest) {
     let (width, height) = maps.disparity.size();
     let (old, old_flags) = (maps.disparity.clone(), maps.validity.clone());
     let valid = |x: usize, y: usize| !invalid(old_flags[(x, y)]);
-    // What place x of row y holds once the row is filled from its own valid pixels.
+    // The value at column x of row y once the row is filled from its own valid pixels.
     let on_row = |x: usize, y: usize| {
         let left = (0..=x).rev().find(|&x| valid(x, y)).map(|x| old[(x, y)]);
         let right = (x..width).find(|&x| valid(x, y)).map(|x| old[(x, y)]);
@@ -24,7 +24,7 @@ pub fn fill(maps: &mut Finest) {
             if valid(x, y) || old_flags[(x, y)] & i32::from(flag::MASKED) != 0 {
                 continue;
             }
-            // Rows by distance, the upper of two equals first.
+            // Rows by distance, the upper one first on a tie.
             let value = (0..height)
                 .flat_map(|step| [y.checked_sub(step), Some(y + step)])
                 .flatten()

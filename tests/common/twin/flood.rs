@@ -3,8 +3,8 @@ use super::dependency::dependency;
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 
-/// New dependency messages of `level` and the beliefs that follow from them, from old ones of both; `others` are the evidence and
-/// the messages from above and from below.
+/// New dependency messages of `level` and the beliefs that follow from them, from the old messages and
+/// beliefs; `others` are the evidence and the messages from the coarser and the finer level.
 pub fn flood(
     plan: &Plan,
     level: usize,

@@ -27,14 +27,14 @@ fn colour_distance(a: [u16; 4], b: [u16; 4]) -> i64 {
 
 fn codes(image: &Image, plan: &Plan) -> Vec<u8> {
     let (width, height) = (image.width() as i64, image.height() as i64);
-    // exp(-r^2 / 2 sd^2 - c^2 / 2 sr^2) is the greater, the smaller c^2 + (sr / sd)^2 r^2 is; c in quarters of an
-    // 8-bit level, of which the range 0 to 1 has 1020.
+    // exp(-r^2 / 2 sd^2 - c^2 / 2 sr^2) grows as c^2 + (sr / sd)^2 r^2 shrinks; c is in quarters of an 8-bit
+    // level, and the range 0 to 1 has 1020 of these.
     let ratio = plan.method.graph.sigma_range * 1020.0 / plan.method.graph.sigma_space;
     let weight = (ratio * ratio).round().min(f64::from(1 << 20)) as i64;
     let mut out = Vec::new();
     for y in 0..height {
         for x in 0..width {
-            // (exponent, squared distance, code): what neighbours are ordered by.
+            // (exponent, squared distance, code): the keys by which neighbours are sorted.
             let mut around = Vec::new();
             for code in 0..49 {
                 let (dx, dy) = (code % 7 - 3, code / 7 - 3);

@@ -5,7 +5,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::LeftRightCheck;
 
-/// Validity of each pixel by the mask and the map of the right view.
+/// Validity of each pixel, from the mask and the label map of the right view.
 pub fn left_right_check(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let (width, height) = pair.size();
     for y in 0..height {

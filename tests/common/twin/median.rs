@@ -5,15 +5,15 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Median;
 
-/// What distance takes off the weight of a pixel at (dx, dy).
+/// The weight that distance subtracts from a pixel at (dx, dy).
 pub fn space(dx: i64, dy: i64, sigma_space: f64) -> i64 {
     let e = (dx * dx + dy * dy) as f64 / (2.0 * sigma_space * sigma_space);
     (96.0 * (1.0 - (-e).exp())).round() as i64
 }
 
-/// What the difference of two colours takes off it.
+/// The weight that the difference of two colours subtracts from it.
 pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
-    // How steep it is, as at most 1 and a number of doublings.
+    // Its slope, as a number up to 1 and a number of doublings.
     let slope = 0.1 / sigma_range;
     let doublings = (0..7).find(|&k| slope / f64::from(1 << k) <= 1.0).unwrap_or(7);
     let scale = (256.0 * slope / f64::from(1 << doublings)).round().clamp(1.0, 256.0) as i64;
@@ -31,7 +31,7 @@ pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     });
 }
 
-/// Whether a pixel was filled in.
+/// Whether a pixel was filled.
 pub fn filled(validity: i32) -> bool {
     validity & i32::from(flag::FILLED) != 0
 }
@@ -40,7 +40,7 @@ fn known(validity: i32) -> bool {
     !invalid(validity) || filled(validity)
 }
 
-/// The median at places `step` apart, in every `every`-th row of them.
+/// The median over samples `step` apart, in every `every`-th row of them.
 pub fn smooth(
     plan: &Plan,
     pair: &Pair,

@@ -1,6 +1,6 @@
-//! A naive twin of every stage, a stage a file, written from the definitions in `src/backend/stage.rs` and from nothing
-//! else: one cell at a time, wide integers, no padding, no table, nothing clever. It shares data types and documented
-//! constants with the library, and no function that computes.
+//! A naive twin of every stage, one file per stage, written only from the definitions in
+//! `src/backend/stage.rs`: one cell at a time, wide integers, no padding, no tables, no tricks. It shares
+//! data types and documented constants with the library, but no function that computes.
 //!
 //! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::probe::Volume`]: \[y\]\[x\]\[slot\]\[label\].
 
@@ -24,7 +24,7 @@ use mrfgs::low_level::backend::{Backend, Map};
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{Plan, Truncation, TruncationRule, VolumeWidth};
 
-/// What the finest level knows of each pixel: the plane of every [`Map`].
+/// The maps of the finest level: the plane of every [`Map`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finest {
     pub label: Plane<i32>,
@@ -55,7 +55,7 @@ impl Finest {
         }
     }
 
-    /// Every map with its plane.
+    /// Every map, with its plane.
     pub fn planes(&self) -> [(Map, &Plane<i32>); 9] {
         [
             (Map::Label, &self.label),
@@ -70,7 +70,7 @@ impl Finest {
         ]
     }
 
-    /// Puts all maps into `backend`.
+    /// Writes all maps to `backend`.
     pub fn write(&self, backend: &mut dyn Backend) {
         for (map, plane) in self.planes() {
             backend.probe().write_map(map, plane).unwrap();
@@ -78,7 +78,7 @@ impl Finest {
     }
 }
 
-/// The 1 4 6 4 1 of the binomial filter, for places -2 ..= 2.
+/// The 1 4 6 4 1 of the binomial filter, at -2 ..= 2.
 pub fn binomial(place: i64) -> i64 {
     match place.abs() {
         0 => 6,
@@ -88,7 +88,8 @@ pub fn binomial(place: i64) -> i64 {
     }
 }
 
-/// The largest value of messages and beliefs, where their sums saturate; "no label agrees", too.
+/// The largest value of messages and beliefs, where their sums saturate; it also stands for "no label
+/// agrees".
 pub fn most(plan: &Plan) -> u32 {
     match plan.volume_width {
         VolumeWidth::Narrow => 255,
@@ -96,7 +97,7 @@ pub fn most(plan: &Plan) -> u32 {
     }
 }
 
-/// Cuts the sums `s` into a message.
+/// Truncates the sums `s` to a message.
 pub fn cut(s: &[i64], cut: Truncation) -> Vec<u32> {
     let tau = i64::from(cut.tau);
     let smallest = *s.iter().min().unwrap();
@@ -109,8 +110,8 @@ pub fn cut(s: &[i64], cut: Truncation) -> Vec<u32> {
         .collect()
 }
 
-/// What a variable says to a factor: its belief less the factor's old message, and where the cut is absolute less
-/// the minimum of that.
+/// The message of a variable to a factor: its belief minus the factor's old message and, where truncation is
+/// absolute, minus the minimum of that.
 pub fn variable_message(belief: &[u32], old: &[u32], cut: Truncation) -> Vec<i64> {
     let q: Vec<i64> = belief.iter().zip(old).map(|(&b, &m)| i64::from(b) - i64::from(m)).collect();
     assert!(q.iter().all(|&q| q >= 0), "a belief below a message that is part of it");
@@ -123,8 +124,8 @@ pub fn variable_message(belief: &[u32], old: &[u32], cut: Truncation) -> Vec<i64
     }
 }
 
-/// The pixel in each slot of `factor`, decoded from the graph's codes: a place in the 7 x 7 window in raster
-/// order, 255 for none.
+/// The pixel in each slot of `factor`, decoded from the graph's codes: a position in the 7 x 7 window in
+/// raster order, 255 for none.
 pub fn members(graph: &LevelGraph, factor: usize) -> Vec<Option<usize>> {
     let (width, neighbours) = (graph.width(), graph.slots() - 1);
     let mut members = vec![Some(factor)];

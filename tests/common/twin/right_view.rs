@@ -3,7 +3,7 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::backend::NO_LABEL;
 use mrfgs::low_level::plan::Plan;
 
-/// The map of the right view.
+/// The label map of the right view.
 pub fn right_view(plan: &Plan, belief: &[u32], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, height, count) = (level.width, level.height, level.labels as i64);

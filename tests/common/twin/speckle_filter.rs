@@ -3,8 +3,8 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 
-/// Flags small regions. Every pixel starts as its own region; regions that touch take the smaller number until
-/// nothing changes.
+/// Flags small regions. Every pixel starts as its own region; regions that touch take the smaller number,
+/// until nothing changes.
 pub fn speckle_filter(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     let mut region = Plane::from_fn(width, height, |x, y| y * width + x);

@@ -30,8 +30,8 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
         if s <= 0 {
             return 0;
         }
-        // Floats hold these fractions exactly enough, as a quotient by 2 s is never closer to a whole number than
-        // 1 / (2 s) unless it is one.
+        // Floats represent these fractions exactly enough, because a quotient by 2 s is never closer to a
+        // whole number than 1 / (2 s), unless it is one.
         let exact = (256 * (a - c) + s) as f64 / (2 * s) as f64;
         exact.floor().clamp(-128.0, 128.0) as i32
     };

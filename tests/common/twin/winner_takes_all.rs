@@ -3,7 +3,7 @@ use super::change::labels;
 use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 
-/// The optimum of every pixel and its best runner-up.
+/// The optimum of every pixel, and its runner-up.
 pub fn winner_takes_all(plan: &Plan, belief: &[u32], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, height, count) = (level.width, level.height, level.labels as i64);
