@@ -350,7 +350,6 @@ impl Plan {
         self.method.front.zone_sigmas > 0.0
     }
 
-<<<<<<< HEAD
     /// Whether the labels of the right view are read off the beliefs.
     #[must_use]
     pub fn reads_right_view(&self) -> bool {
@@ -362,10 +361,7 @@ impl Plan {
         }
     }
 
-    /// Cost units of the largest colour difference where colour counts in full: [`COLOUR_WEIGHT`], or 0 without colour.
-=======
     /// Cost units of the largest colour difference at full weight: [`COLOUR_WEIGHT`], or 0 without colour.
->>>>>>> house-words
     #[must_use]
     pub fn colour_weight(&self) -> u32 {
         if self.method.cost.matching == MatchingCost::AdCensus { COLOUR_WEIGHT } else { 0 }

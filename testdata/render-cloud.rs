@@ -1,4 +1,4 @@
-//! Renders a point cloud that `mrfgs match --point-cloud` has written, seen from beside and above the camera that took it:
+//! Renders a point cloud that `mrfgs match --also points` has written, seen from beside and above the camera that took it:
 //! `cargo run --release --example render-cloud FILE.ply PICTURE.png [RIGHT UP]`.
 //!
 //! RIGHT and UP say how far the viewer goes around the middle of the cloud, in degrees [default: 20 10]. Each point is a

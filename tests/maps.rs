@@ -36,7 +36,6 @@ fn finished(finest: &mut Finest, plan: &Plan, pair: &Pair) -> Maps {
     }
 }
 
-<<<<<<< HEAD
 /// The disparities of the right view before post-processing, mirrored, by the twins.
 fn right_raw(finest: &Finest, plan: &Plan, pair: &Pair) -> Finest {
     let mut right = finest.clone();
@@ -52,10 +51,7 @@ fn right_map(right: &mut Finest, plan: &Plan, pair: &Pair) -> RightMap {
     RightMap { disparity: maps.disparity.mirrored(), validity: validity.mirrored() }
 }
 
-/// The maps by the twins, from the estimate on, in the order in which the stages are described.
-=======
 /// The maps of the twins from the estimate on, in the order in which the stages are described.
->>>>>>> house-words
 fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::left_right_check::left_right_check(plan, pair, maps);
     twin::speckle_filter::speckle_filter(plan, maps);

@@ -76,7 +76,7 @@ fn budget(cause: &BudgetError) -> String {
             format!("--memory: {cause}; give at least {needed}MiB, or a smaller image or range")
         }
         BudgetError::StepsOfTiles { needed, .. } => {
-            format!("--intermediates: {cause}; give --memory {needed}MiB")
+            format!("DIR: {cause}; give --memory {needed}MiB")
         }
         _ => format!("--memory: {cause}"),
     }
@@ -165,7 +165,7 @@ mod tests {
             ),
             (
                 said(Error::Preset { name: "best".into(), known: vec!["default", "paper"] }),
-                ["--preset", "default, paper"],
+                ["--method", "default, paper"],
             ),
             (
                 said(RangeError::Empty { min: 5, max: 4 }),
@@ -189,7 +189,7 @@ mod tests {
             (said(ExecutionError::NoThreads), ["--threads", "at least 1"]),
             (said(ExecutionError::Threads("limit".into())), ["--threads", "limit"]),
             (said(too_small), ["--memory: 1 MiB", "give at least 7MiB"]),
-            (said(BudgetError::StepsOfTiles { tiles: 4, needed: 70 }), ["--intermediates", "--memory 70MiB"]),
+            (said(BudgetError::StepsOfTiles { tiles: 4, needed: 70 }), ["DIR", "--memory 70MiB"]),
             (
                 said(read(ReadError::TooManyPixels { width: 9, height: 9, limit: 5 })),
                 ["a.png", "raise --max-pixels"],

@@ -5,7 +5,7 @@ use mrfgs::check::Warning;
 use mrfgs::error::{BudgetError, DeviceError, ExecutionError, MemoryError, Purpose, RangeError};
 
 /// What to do where the device does not serve.
-const CPU: &str = "use backend=\"cpu\"";
+const CPU: &str = "use device=\"cpu\"";
 
 /// An error with its remedy.
 pub(crate) fn error(error: &Error) -> String {

@@ -31,7 +31,7 @@ macro_rules! for_every_stage {
                 ///
                 /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
                 /// [`crate::plan::TruncationRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
-                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), cut by [`Plan::dependency`](crate::plan::Plan::dependency) with its bounds for the smallest s. A factor of
+                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), truncated by [`Plan::dependency`](crate::plan::Plan::dependency) with its bounds for the smallest s. A factor of
                 /// one member, and a slot without one, keep the message they have: 0, from the start.
                 Dependency dependency;
                 /// Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both directions,
@@ -42,7 +42,7 @@ macro_rules! for_every_stage {
                 /// and z agree when |d - 2 z| is at most 1 (interpolating) or 0 (strict). U\[c\](z) is the smallest q\[c\](d) of
                 /// the d that agree with z, infinite if none does. To the parent: s(z) = the sum of U\[c\](z). To child c:
                 /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
-                /// infinite if none does. Each s is cut by [`Plan::resolution`](crate::plan::Plan::resolution) with its bounds for the smallest s. Infinite is
+                /// infinite if none does. Each s is truncated by [`Plan::resolution`](crate::plan::Plan::resolution) with its bounds for the smallest s. Infinite is
                 /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), and sums saturate there; where every s is infinite, the message is 0.
                 Resolution resolution;
                 /// Beliefs of a level: evidence, plus every dependency message to the pixel, plus the resolution messages from
@@ -82,7 +82,7 @@ macro_rules! for_every_stage {
                 /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 3 x 3
                 /// neighbourhood, as far as it is inside, whose own label is at most one away. With s = max(a, c) - b it is
                 /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0, at an end of the range, or without a label. (The cost and
-                /// not the belief: the cut of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
+                /// not the belief: the truncation of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
                 SubPixel sub_pixel;
                 /// The views exchange roles, both mirrored, so that the right view becomes the left one and its matches lie to the
                 /// left again. Each image takes the place of the other, and with x counted from the other side

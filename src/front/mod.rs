@@ -69,6 +69,7 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     if plan.limits_labels() {
         let options = zones::Options { zones: method.front.zones as usize, ..zones::Options::default() };
         let zones = watch.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
+        matches::check_memory(&pair)?;
         let split = Some((&zones.map, zones.count));
         let matches = watch.host("matches", || Ok(matches::find(&pair, split, Some(plan.range))))?;
         prepared.label_ranges =

@@ -14,6 +14,7 @@ use crate::console;
 use crate::failure::Result;
 use crate::outputs::record::Files;
 use crate::pairs::folder::CALIBRATION;
+use crate::remedy;
 
 /// The files of a pair, and how they are read.
 #[derive(clap::Args)]
@@ -107,6 +108,6 @@ impl Input {
 /// Says on standard error what is probably wrong.
 pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
     for warning in warnings {
-        console::say(&format!("warning: {warning}"));
+        console::say(&format!("warning: {}", remedy::warning(&warning, &remedy::FLAGS)));
     }
 }

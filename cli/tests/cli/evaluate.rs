@@ -181,7 +181,7 @@ fn scales_and_incomplete_folders_are_refused() {
     let word = ["--truth-scale", "leave it out"];
     refused(folder.path(), &["new", "--truth-scale", "3"], 2, &word);
     let args = ["map", "map.pfm", "--truth", "map.pfm", "--truth-scale", "3"];
-    refused(folder.path(), &args, 1, &["map.pfm", "8-bit PNG", "leave --truth-scale out"]);
+    refused(folder.path(), &args, 1, &["map.pfm", "8-bit PNG", "remove --truth-scale"]);
     refused(folder.path(), &[&args[..3], &["old/disp2.png"]].concat(), 1, &["disp2.png", "--truth-scale"]);
     refused(folder.path(), &[&args[..3], &["old/im2.png"], &args[4..]].concat(), 1, &["im2.png", "grey"]);
 

@@ -103,7 +103,7 @@ impl Gpu {
         Self::with_faults(wanted, FaultInjection::default())
     }
 
-    /// As [`Gpu::new`], with a faults.
+    /// As [`Gpu::new`], with faults.
     ///
     /// # Errors
     /// As [`Gpu::new`].
