@@ -45,14 +45,14 @@ def read_pfm(path):
         return np.frombuffer(file.read(), "<f4").reshape(height, width)[::-1]
 
 
-def by_program(left, right, *arguments):
+def by_program(left, right, *arguments, file="out.pfm"):
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         write_ppm(folder / "left.ppm", left)
         write_ppm(folder / "right.ppm", right)
         subprocess.run([PROGRAM, "match", folder / "left.ppm", folder / "right.ppm", folder / "out.pfm", "--quiet",
                         "--device", "cpu", *arguments], check=True)
-        return read_pfm(folder / "out.pfm")
+        return read_pfm(folder / file)
 
 
 class Match(unittest.TestCase):
@@ -232,6 +232,17 @@ class Match(unittest.TestCase):
         self.assertTrue(np.isinf(matched.disparity[:, :10]).all() and np.isfinite(matched.disparity[:, 10:]).all())
         self.assertTrue((matched.validity[:, :10] == 32).all())
 
+    def test_the_map_of_the_right_view(self):
+        left, right = pair()
+        self.assertIsNone(mrfgs.match(left, right, 15, device="cpu").right)
+        matched = mrfgs.match(left, right, 15, device="cpu", options={"right-map": True})
+        self.assertEqual((matched.right.shape, matched.right.dtype), (left.shape[:2], np.float32))
+        expected = by_program(left, right, "--max-disparity", "15", "--also", "right", file="out.right.pfm")
+        self.assertTrue(np.array_equal(matched.right, expected))
+        # Control: it is not the map of the left view.
+        self.assertFalse(np.array_equal(matched.right, matched.disparity))
+        self.assertTrue(np.array_equal(pickle.loads(pickle.dumps(matched)).right, matched.right))
+
     def test_options_are_described(self):
         described = mrfgs.options()
         window = described["cost"]["sad-window"]
@@ -241,7 +252,7 @@ class Match(unittest.TestCase):
         # What a preset sets is an option as it stands.
         left, right = pair()
         paper = {group: {key: option["paper"] for key, option in keys.items()} for group, keys in described.items()}
-        self.same(left, right, "--preset", "paper", options=paper)
+        self.same(left, right, "--method", "paper", options=paper)
 
     def test_a_matcher_matches_again_and_again(self):
         matcher = mrfgs.Matcher(device="cpu", threads=1)
