@@ -1,10 +1,11 @@
 //! A pair through a backend: in one piece, or tile by tile.
 
 use crate::backend::{Backend, Map, Stage, Ticket, Traffic};
-use crate::error::{Error, Result};
+use crate::error::{Error, Purpose, Result};
 use crate::front;
 use crate::image::Pair;
 use crate::maps::{Maps, RightMap, flag};
+use crate::memory;
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
 use crate::solver::{self, Inspector, Run};
@@ -119,13 +120,20 @@ fn right_map(maps: Maps) -> RightMap {
     }
 }
 
+/// What `make` makes of a pair: a pair for `plan`, if the memory holds one more.
+fn copy(plan: &Plan, make: impl FnOnce() -> Pair) -> Result<Pair> {
+    memory::check(plan.pair_bytes(), Purpose::Match)?;
+    Ok(make())
+}
+
 /// All stages of a match in one piece; the number of iterations, and its maps.
 fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<(u32, Tickets)> {
     let mut right_labels = None;
     if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = run.inspector.take();
-        let mirrored = front::prepare(pair.mirrored(), plan, &mut run.watch)?;
+        let mirrored = copy(plan, || pair.mirrored())?;
+        let mirrored = front::prepare(mirrored, plan, &mut run.watch)?;
         solver::estimate(backend, plan, mirrored, run)?;
         run.inspector = inspector;
         right_labels = Some(backend.map(Map::Label)?.mirrored());
@@ -169,7 +177,9 @@ pub fn solve_tiles(
     if matchings(whole) == 2 {
         for tile in tiles.list() {
             run.watch.next_tile();
-            let mirrored = pair.crop(&tile.crop.mirrored(pair.size().0)).mirrored();
+            let crop = copy(&tile.plan, || pair.crop(&tile.crop.mirrored(pair.size().0)))?;
+            let mirrored = copy(&tile.plan, || crop.mirrored())?;
+            drop(crop);
             let prepared = front::prepare(mirrored, &tile.plan, &mut run.watch)?;
             solver::estimate(backend, &tile.plan, prepared, &mut run)?;
             backend.wait()?;
@@ -179,7 +189,8 @@ pub fn solve_tiles(
     }
     for tile in tiles.list() {
         run.watch.next_tile();
-        let prepared = front::prepare(pair.crop(&tile.crop), &tile.plan, &mut run.watch)?;
+        let crop = copy(&tile.plan, || pair.crop(&tile.crop))?;
+        let prepared = front::prepare(crop, &tile.plan, &mut run.watch)?;
         let matched = prepared.pair.clone();
         iterations = iterations.max(solver::estimate(backend, &tile.plan, prepared, &mut run)?);
         backend.wait()?;

@@ -146,15 +146,21 @@ impl<T: Clone> Plane<T> {
     /// The plane with left and right exchanged.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        let data = self.data.chunks(self.width.max(1)).flat_map(|row| row.iter().rev().cloned());
-        Self { width: self.width, height: self.height, data: data.collect() }
+        let mut data = Vec::with_capacity(self.data.len());
+        for row in self.data.chunks(self.width.max(1)) {
+            data.extend(row.iter().rev().cloned());
+        }
+        Self { width: self.width, height: self.height, data }
     }
 
     /// The plane with top and bottom exchanged.
     #[must_use]
     pub fn flipped(&self) -> Self {
-        let data = self.data.chunks(self.width.max(1)).rev().flat_map(|row| row.iter().cloned());
-        Self { width: self.width, height: self.height, data: data.collect() }
+        let mut data = Vec::with_capacity(self.data.len());
+        for row in self.data.chunks(self.width.max(1)).rev() {
+            data.extend_from_slice(row);
+        }
+        Self { width: self.width, height: self.height, data }
     }
 
     /// The values in `part`.

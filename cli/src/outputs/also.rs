@@ -268,9 +268,17 @@ mod tests {
         let names = |output: &str| -> Vec<String> {
             all_beside(Path::new(output)).map(|path| path.to_str().unwrap().to_owned()).collect()
         };
-        let of_pfm = ["raw.pfm", "depth.pfm", "points.ply", "confidence.png", "validity.png", "preview.png"];
-        assert_eq!(names("a/b.c.pfm")[..6], of_pfm.map(|end| format!("a/b.c.{end}")));
-        assert_eq!(names("d.png")[..2], ["d.raw.png", "d.depth.pfm"]);
-        assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.depth.TIFF", "d.points.ply"]);
+        let of_pfm = [
+            "raw.pfm",
+            "right.pfm",
+            "depth.pfm",
+            "points.ply",
+            "confidence.png",
+            "validity.png",
+            "preview.png",
+        ];
+        assert_eq!(names("a/b.c.pfm")[..7], of_pfm.map(|end| format!("a/b.c.{end}")));
+        assert_eq!(names("d.png")[..2], ["d.raw.png", "d.right.png"]);
+        assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.right.TIFF", "d.depth.TIFF"]);
     }
 }

@@ -41,7 +41,7 @@ const FAILURES: &[Failure] = &[
     ("match left.png empty.png out.pfm --max-disparity 9", 1, &["empty.png", "empty", "get it again"]),
     ("match text.png right.png out.pfm --max-disparity 9", 1, &["text.png", "not an image", "give PNG"]),
     ("match a.gif right.png out.pfm --max-disparity 9", 1, &["a.gif", "is a gif file", "give PNG"]),
-    ("match left.png a.jpg out.pfm --max-disparity 9", 1, &["a.jpg", "no end", "get the file again"]),
+    ("match left.png a.jpg out.pfm --max-disparity 9", 1, &["a.jpg", "ends too early", "get the file again"]),
     ("match left.png a.pgm out.pfm --max-disparity 9", 1, &["a.pgm", "truncated", "get the file again"]),
     ("match left.png a.pfm out.pfm --max-disparity 9", 1, &["a.pfm", "the scale", "no number other than 0"]),
     ("match left.png a.tif out.pfm --max-disparity 9", 1, &["a.tif", "get the file again"]),
