@@ -6,9 +6,9 @@ use crate::error::{MemoryError, Purpose, Result};
 
 /// Bytes that can be had without swapping, where the system says so.
 fn available() -> Option<u64> {
-    let info = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = info.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
+    let mut system = sysinfo::System::new();
+    system.refresh_memory_specifics(sysinfo::MemoryRefreshKind::nothing().with_ram());
+    Some(system.available_memory()).filter(|_| sysinfo::IS_SUPPORTED_SYSTEM)
 }
 
 /// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end the process

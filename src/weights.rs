@@ -1,53 +1,6 @@
-//! Exponentials, logarithms and integer tables of them: the transcendental functions of the method. They use
-//! IEEE additions, multiplications and divisions only, so they are the same on every machine.
-
-use std::f64::consts::{LN_2, SQRT_2};
+//! The weights of the median's window, as tables of integers.
 
 use crate::options::Method;
-
-/// exp(-x) for x >= 0, by a Taylor series of exp(x / 2^k) and k squarings; to a relative 1e-11.
-#[must_use]
-pub fn exp_neg(x: f64) -> f64 {
-    if x > 700.0 {
-        return 0.0;
-    }
-    let mut reduced = x;
-    let mut squarings = 0;
-    while reduced > 0.125 {
-        reduced /= 2.0;
-        squarings += 1;
-    }
-    let (mut term, mut sum) = (1.0, 1.0);
-    for n in 1..=12 {
-        term *= reduced / f64::from(n);
-        sum += term;
-    }
-    for _ in 0..squarings {
-        sum *= sum;
-    }
-    1.0 / sum
-}
-
-/// The natural logarithm of a positive, normal x, to a relative 1e-11: x = m 2^e with m from 1/sqrt 2 to sqrt 2, and
-/// ln m = 2 artanh((m - 1) / (m + 1)) by its series.
-#[must_use]
-pub fn ln(x: f64) -> f64 {
-    const MANTISSA_BITS: u32 = 52;
-    const MANTISSA: u64 = (1 << MANTISSA_BITS) - 1;
-    let mut exponent = (x.to_bits() >> MANTISSA_BITS) as i32 - 1023;
-    let mut m = f64::from_bits(x.to_bits() & MANTISSA | 1.0f64.to_bits());
-    if m > SQRT_2 {
-        m /= 2.0;
-        exponent += 1;
-    }
-    let s = (m - 1.0) / (m + 1.0);
-    let (mut power, mut sum) = (s, 0.0);
-    for n in 0..8 {
-        sum += power / f64::from(2 * n + 1);
-        power *= s * s;
-    }
-    f64::from(exponent) * LN_2 + 2.0 * sum
-}
 
 /// Weight of the centre of the median's window, the largest there is.
 pub const MEDIAN_WEIGHT: u8 = 127;
@@ -109,7 +62,7 @@ impl MedianWeights {
     pub fn new(window: usize, sigma_space: f64, sigma_range: f64) -> Self {
         let radius = window / 2;
         let taken =
-            |d: f64| (MEDIAN_SPACE * (1.0 - exp_neg(d / (2.0 * sigma_space * sigma_space))) + 0.5) as u8;
+            |d: f64| (MEDIAN_SPACE * (1.0 - libm::exp(-d / (2.0 * sigma_space * sigma_space))) + 0.5) as u8;
         let space = (0..=radius)
             .flat_map(|dy| (0..=2 * radius).map(move |x| (x.abs_diff(radius).pow(2) + dy * dy) as f64))
             .map(taken)
@@ -166,31 +119,5 @@ impl MedianWeights {
     pub fn space_row(&self, dy: usize) -> &[u8] {
         let side = 2 * self.radius + 1;
         &self.space[dy * side..][..side]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn exponentials_agree_with_the_platform() {
-        for i in 0..7000 {
-            let x = f64::from(i) / 10.0;
-            let (ours, libm) = (exp_neg(x), (-x).exp());
-            assert!((ours - libm).abs() <= 1e-11 * libm, "exp(-{x}): {ours} against {libm}");
-        }
-        assert!(exp_neg(1e6) < f64::MIN_POSITIVE);
-    }
-
-    #[test]
-    fn logarithms_agree_with_the_platform() {
-        let grid = (1..=65536).map(|i| f64::from(i) / 64.0);
-        let edges = [f64::MIN_POSITIVE, f64::MAX, SQRT_2, 0.5 * SQRT_2, 1.0 - 1e-9, 1.0 + 1e-9];
-        for x in grid.chain(edges) {
-            let (ours, libm) = (ln(x), x.ln());
-            assert!((ours - libm).abs() <= 1e-11 * libm.abs(), "ln {x}: {ours} against {libm}");
-        }
-        assert!(ln(1.0).abs() < f64::MIN_POSITIVE);
     }
 }

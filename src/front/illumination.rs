@@ -7,7 +7,6 @@
 use rayon::prelude::*;
 
 use crate::image::{Image, Pixel, Plane, grey};
-use crate::weights::{exp_neg, ln};
 
 /// Radius of the filter in pixels: 21 x 21 in all, as in the paper.
 const RADIUS: usize = 10;
@@ -46,7 +45,7 @@ pub fn homomorphic(image: &Image) -> Image {
     let darkest = DARKEST * sum as f64 / count as f64;
     // Weighted logarithm and weight: the quotient of their low-passes is the mean over unmasked pixels.
     let log = |(p, masked): (&Pixel, &bool)| {
-        if *masked { [0.0; 2] } else { [ln(f64::from(p[3]).max(darkest) / darkest), 1.0] }
+        if *masked { [0.0; 2] } else { [libm::log(f64::from(p[3]).max(darkest) / darkest), 1.0] }
     };
     let logs = pixels.par_iter().zip(masked).map(log).collect();
     let kernel = gaussian(SIGMA, RADIUS);
@@ -55,7 +54,7 @@ pub fn homomorphic(image: &Image) -> Image {
         if *masked {
             return *p;
         }
-        let gain = MID_GREY / darkest * exp_neg(log / weight);
+        let gain = MID_GREY / darkest * libm::exp(-log / weight);
         let [r, g, b] = [p[0], p[1], p[2]].map(|v| (f64::from(v) * gain).round() as u16);
         [r, g, b, grey(r, g, b)]
     };
@@ -67,7 +66,7 @@ pub fn homomorphic(image: &Image) -> Image {
 pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
     let weight = |i: usize| {
         let x = i.abs_diff(radius) as f64 / sigma;
-        exp_neg(x * x / 2.0)
+        libm::exp(-x * x / 2.0)
     };
     let weights: Vec<f64> = (0..=2 * radius).map(weight).collect();
     let sum: f64 = weights.iter().sum();

@@ -19,7 +19,6 @@ use rustfft::{Fft, FftPlannerScalar};
 
 use crate::front::illumination::{gaussian, smooth};
 use crate::image::Plane;
-use crate::weights::exp_neg;
 
 /// The shortest wavelength, 4 / sqrt 2 pixels, squared (paper, section 3.1).
 const SHORTEST_SQUARED: usize = 8;
@@ -178,7 +177,7 @@ impl Filter {
         (first..first + count)
             .map(|u| {
                 let x = (u as f64 - centre) / sigma;
-                (u.rem_euclid(period) as usize, (exp_neg(x * x / 2.0) / period as f64) as f32)
+                (u.rem_euclid(period) as usize, (libm::exp(-x * x / 2.0) / period as f64) as f32)
             })
             .collect()
     }
