@@ -2,7 +2,7 @@
 
 use crate::backend::{Backend, Map, Stage, Ticket, Traffic};
 use crate::error::{Error, Purpose, Result};
-use crate::front;
+use crate::front::{self, Prepared};
 use crate::image::Pair;
 use crate::maps::{Maps, RightMap, flag};
 use crate::memory;
@@ -126,6 +126,12 @@ fn copy(plan: &Plan, make: impl FnOnce() -> Pair) -> Result<Pair> {
     Ok(make())
 }
 
+/// What a match of `pair` needs, in the place of what the last match needed.
+fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: Pair, run: &mut Run) -> Result<Prepared> {
+    backend.release();
+    front::prepare(pair, plan, &mut run.watch)
+}
+
 /// All stages of a match in one piece; the number of iterations, and its maps.
 fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<(u32, Tickets)> {
     let mut right_labels = None;
@@ -133,12 +139,12 @@ fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> 
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = run.inspector.take();
         let mirrored = copy(plan, || pair.mirrored())?;
-        let mirrored = front::prepare(mirrored, plan, &mut run.watch)?;
+        let mirrored = prepare(backend, plan, mirrored, run)?;
         solver::estimate(backend, plan, mirrored, run)?;
         run.inspector = inspector;
         right_labels = Some(backend.map(Map::Label)?.mirrored());
     }
-    let prepared = front::prepare(pair.clone(), plan, &mut run.watch)?;
+    let prepared = prepare(backend, plan, pair.clone(), run)?;
     let iterations = solver::estimate(backend, plan, prepared, run)?;
     if let Some(labels) = right_labels {
         backend.set_right_labels(&labels)?;
@@ -180,7 +186,7 @@ pub fn solve_tiles(
             let crop = copy(&tile.plan, || pair.crop(&tile.crop.mirrored(pair.size().0)))?;
             let mirrored = copy(&tile.plan, || crop.mirrored())?;
             drop(crop);
-            let prepared = front::prepare(mirrored, &tile.plan, &mut run.watch)?;
+            let prepared = prepare(backend, &tile.plan, mirrored, &mut run)?;
             solver::estimate(backend, &tile.plan, prepared, &mut run)?;
             backend.wait()?;
             run.watch.host("download", || mosaic.place_mirrored(tile, backend))?;
@@ -190,7 +196,7 @@ pub fn solve_tiles(
     for tile in tiles.list() {
         run.watch.next_tile();
         let crop = copy(&tile.plan, || pair.crop(&tile.crop))?;
-        let prepared = front::prepare(crop, &tile.plan, &mut run.watch)?;
+        let prepared = prepare(backend, &tile.plan, crop, &mut run)?;
         let matched = prepared.pair.clone();
         iterations = iterations.max(solver::estimate(backend, &tile.plan, prepared, &mut run)?);
         backend.wait()?;

@@ -20,7 +20,7 @@ const RADIUS: i32 = GRAPH_WINDOW as i32 / 2;
 const BAND: usize = 64;
 
 /// The dependency factors of one level.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LevelGraph {
     width: usize,
     height: usize,

@@ -60,6 +60,10 @@ pub trait Backend {
         None
     }
 
+    /// Frees what the host holds for the last match alone, so that the next one can be [prepared](crate::front::prepare) in its
+    /// place. No stage runs before [`Self::prepare`] is called again.
+    fn release(&mut self) {}
+
     /// Takes what a match by `plan` needs, and sets all messages, and the map that [`Stage::Change`] compares with, to 0. All
     /// that the stages need is allocated here, from the plan alone; a second pair whose plan [fits](Plan::fits) goes into the same
     /// buffers.

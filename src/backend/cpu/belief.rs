@@ -1,11 +1,10 @@
 //! Beliefs: see [`crate::backend::Stage::Belief`].
 
-use super::units::{Blocks, Units, block, block_mut, padding};
+use super::units::{Blocks, Units, block, block_mut, each_lane, padding};
 use super::volumes::{Level, Volumes};
 use crate::graph::LevelGraph;
 use crate::plan::Plan;
 use rayon::prelude::*;
-use std::array::from_fn;
 
 /// The terms of the beliefs of a level.
 pub(super) struct Summands<'a, U> {
@@ -103,7 +102,8 @@ impl<U: Units> Blocks for Sum<'_, U> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
         let stride = self.evidence.len();
-        let mut sum = block::<u8, N>(self.evidence, at).map(U::from);
+        let evidence = block::<u8, N>(self.evidence, at);
+        let mut sum: [U; N] = each_lane(|i| U::from(evidence[i]));
         for message in [self.down, self.up].into_iter().flatten() {
             sum = plus(sum, block(message, at));
         }
@@ -111,11 +111,11 @@ impl<U: Units> Blocks for Sum<'_, U> {
             sum = plus(sum, block(self.dependency, (entry as usize - self.base) * stride + at));
         }
         let padding = block::<U, N>(self.padding, at);
-        *block_mut(self.belief, at) = from_fn::<U, N, _>(|i| sum[i].min(self.most).max(padding[i]));
+        *block_mut(self.belief, at) = each_lane::<U, N>(|i| sum[i].min(self.most).max(padding[i]));
     }
 }
 
 #[inline(always)]
 fn plus<U: Units, const N: usize>(sum: [U; N], message: &[U; N]) -> [U; N] {
-    from_fn(|i| sum[i].plus(message[i]))
+    each_lane(|i| sum[i].plus(message[i]))
 }

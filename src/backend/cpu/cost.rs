@@ -1,6 +1,6 @@
 //! Matching cost of level 0: see [`crate::backend::Stage::Cost`].
 
-use super::units::{Blocks, Units, block, block_mut};
+use super::units::{Blocks, Units, block, block_mut, each_lane};
 use super::volumes::Volumes;
 use crate::image::{Image, Pair, Pixel};
 use crate::options::MatchingCost;
@@ -9,7 +9,6 @@ use crate::plan::{
     Plan,
 };
 use rayon::prelude::*;
-use std::array::from_fn;
 
 const CENSUS_X: usize = CENSUS_RADIUS_X as usize;
 const CENSUS_Y: isize = CENSUS_RADIUS_Y as isize;
@@ -98,18 +97,18 @@ impl Blocks for PixelCosts<'_> {
         let mut bits = [0u8; N];
         for (here, there) in self.here.census.iter().zip(&self.there.census) {
             let (here, there) = (here[self.at], block::<u8, N>(there, self.place + label));
-            bits = from_fn(|i| bits[i] + (here ^ there[i]).count_ones() as u8);
+            bits = each_lane(|i| bits[i] + (here ^ there[i]).count_ones() as u8);
         }
-        let mut costs: [u8; N] = from_fn(|i| CENSUS_BIT_COST as u8 * bits[i].min(CENSUS_BITS as u8));
+        let mut costs: [u8; N] = each_lane(|i| CENSUS_BIT_COST as u8 * bits[i].min(CENSUS_BITS as u8));
         if self.weight > 0 {
             let mut apart = [0u8; N];
             for (here, there) in self.here.channels.iter().zip(&self.there.channels) {
                 let (here, there) = (here[self.at], block::<u8, N>(there, self.place + label));
-                apart = from_fn(|i| apart[i].saturating_add(here.abs_diff(there[i])));
+                apart = each_lane(|i| apart[i].saturating_add(here.abs_diff(there[i])));
             }
-            let weighted: [u16; N] = from_fn(|i| self.weight * u16::from(apart[i].min(COLOUR_MOST as u8)));
+            let weighted: [u16; N] = each_lane(|i| self.weight * u16::from(apart[i].min(COLOUR_MOST as u8)));
             costs =
-                from_fn(|i| costs[i] + ((weighted[i] + COLOUR_MOST as u16 / 2) / COLOUR_MOST as u16) as u8);
+                each_lane(|i| costs[i] + ((weighted[i] + COLOUR_MOST as u16 / 2) / COLOUR_MOST as u16) as u8);
         }
         *block_mut(self.costs, label) = costs;
     }

@@ -4,7 +4,7 @@
 //! is exact. Padding labels go through the same arithmetic as real labels. Their belief is the largest value,
 //! and no real label exceeds [`Plan::belief_most`], so a minimum never comes from padding alone.
 
-use super::units::{Blocks, Least, Truncating, Units, block, block_mut, keep_least, smallest};
+use super::units::{Blocks, Least, Truncating, Units, block, block_mut, each_lane, keep_least, smallest};
 use super::volumes::{Level, Volumes};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, Truncation, TruncationRule};
@@ -142,13 +142,13 @@ impl<U: Units> Three<'_, U> {
     fn q<const N: usize>(&self, slot: usize, at: usize) -> [U; N] {
         let b = block::<U, N>(self.beliefs[slot], at);
         let m = block::<U, N>(self.messages, slot * self.beliefs[0].len() + at);
-        from_fn(|i| b[i].less(m[i]))
+        each_lane(|i| b[i].less(m[i]))
     }
 
     /// The sum for the member in `slot`: the q of the other two.
     #[inline(always)]
     fn sum<const N: usize>(&mut self, slot: usize, at: usize, a: &[U; N], b: &[U; N]) {
-        let sums: [U; N] = from_fn(|i| a[i].plus(b[i]));
+        let sums: [U; N] = each_lane(|i| a[i].plus(b[i]));
         keep_least(&mut self.least[slot], &sums);
         *block_mut(self.sums, slot * self.beliefs[0].len() + at) = sums;
     }
@@ -163,18 +163,21 @@ fn three<U: Units>(cut: Truncation, beliefs: [&[U]; 3], messages: &mut [U], sums
     let (least, tau) = (factor.least, U::of(cut.tau.into()));
     for ((out, sums), least) in messages.chunks_exact_mut(stride).zip(sums.chunks_exact(stride)).zip(least) {
         let least = least_in_all(least);
-        RelativeCutting { sums, least, high: least.map(|least| least.plus(tau)), out }.all(stride);
+        RelativeCutting { sums, least, high: each_lane(|i| least[i].plus(tau)), out }.all(stride);
     }
 }
 
 /// The smallest of all lanes, in each of them. This keeps the bounds of a message in vectors. When they
 /// passed through single bytes, a factor waited longer than it computed.
 #[inline(always)]
-fn least_in_all<U: Units>(mut lanes: Least<U>) -> Least<U> {
-    for apart in [8, 4, 2, 1] {
-        lanes = from_fn(|i| lanes[i].min(lanes[i ^ apart]));
-    }
-    lanes
+fn least_in_all<U: Units>(lanes: Least<U>) -> Least<U> {
+    least_of_pairs::<U, 1>(least_of_pairs::<U, 2>(least_of_pairs::<U, 4>(least_of_pairs::<U, 8>(lanes))))
+}
+
+/// The smaller of each lane and the one `APART` from it. (A constant, so that it becomes a shuffle.)
+#[inline(always)]
+fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
+    each_lane(|i| lanes[i].min(lanes[i ^ APART]))
 }
 
 /// [`Truncating`] by [`TruncationRule::Relative`], with bounds in vectors.
@@ -188,11 +191,11 @@ struct RelativeCutting<'a, U> {
 impl<U: Units> Blocks for RelativeCutting<'_, U> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
-        let sums = block::<U, N>(self.sums, at);
-        *block_mut(self.out, at) = from_fn::<U, N, _>(|i| {
-            let lane = i % LABEL_BLOCK;
-            sums[i].min(self.high[lane]).less(self.least[lane])
-        });
+        let out = block_mut::<U, N>(self.out, at).as_chunks_mut().0;
+        for (out, sums) in out.iter_mut().zip(block::<U, N>(self.sums, at).as_chunks().0) {
+            let (out, sums): (&mut Least<U>, &Least<U>) = (out, sums);
+            *out = each_lane(|i| sums[i].min(self.high[i]).less(self.least[i]));
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The weighted median of the disparities: see [`crate::backend::Stage::Median`].
 
 use super::finest::Finest;
-use super::units::block;
+use super::units::{block, each_lane};
 use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
@@ -235,18 +235,18 @@ impl<const LANES: usize> Contents<LANES> {
             let mut apart = [0u8; LANES];
             for (guide, centre) in seen.guides.iter().zip(centres) {
                 let guide: &[u8; LANES] = block(guide, at);
-                let above: [u8; LANES] = from_fn(|i| guide[i].saturating_sub(centre));
-                let below: [u8; LANES] = from_fn(|i| centre.saturating_sub(guide[i]));
-                apart = from_fn(|i| apart[i].saturating_add(above[i] | below[i]));
+                let above: [u8; LANES] = each_lane(|i| guide[i].saturating_sub(centre));
+                let below: [u8; LANES] = each_lane(|i| centre.saturating_sub(guide[i]));
+                apart = each_lane(|i| apart[i].saturating_add(above[i] | below[i]));
             }
             let known: &[u8; LANES] = block(&seen.known, at);
-            let mut colour: [u8; LANES] = from_fn(|i| apart[i].min(most));
+            let mut colour: [u8; LANES] = each_lane(|i| apart[i].min(most));
             for _ in 0..doublings {
-                colour = from_fn(|i| colour[i].wrapping_add(colour[i]));
+                colour = each_lane(|i| colour[i].wrapping_add(colour[i]));
             }
-            let left: [u8; LANES] = from_fn(|i| MEDIAN_WEIGHT.saturating_sub(colour[i]));
-            let left: [u8; LANES] = from_fn(|i| left[i].saturating_sub(space[i]) & known[i]);
-            *weights = from_fn(|i| left[i].into());
+            let left: [u8; LANES] = each_lane(|i| MEDIAN_WEIGHT.saturating_sub(colour[i]));
+            let left: [u8; LANES] = each_lane(|i| left[i].saturating_sub(space[i]) & known[i]);
+            *weights = each_lane(|i| left[i].into());
         }
     }
 
@@ -255,7 +255,7 @@ impl<const LANES: usize> Contents<LANES> {
     fn open(&mut self, seen: &Seen, rows: &[usize]) {
         for (values, &row) in self.values.iter_mut().zip(rows) {
             let seen: &[i32; LANES] = block(&seen.values, row + self.column);
-            *values = from_fn(|i| (seen[i] - self.guess).clamp(-FAR, FAR) as i16);
+            *values = each_lane(|i| (seen[i] - self.guess).clamp(-FAR, FAR) as i16);
         }
         let [below_near, below_far, total] = self.below([-NEAR, NEAR, FAR]);
         self.total = total;

@@ -85,6 +85,12 @@ impl Backend for Cpu {
         format!("the CPU path, {threads} thread{}", if threads == 1 { "" } else { "s" })
     }
 
+    fn release(&mut self) {
+        if self.state.is_some() {
+            on_volumes!(self, v => v.release());
+        }
+    }
+
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
         match self.state.as_mut() {
             Some(State::Narrow(volumes)) if plan.fits(&volumes.plan) => volumes.reset(plan, prepared),

@@ -2,11 +2,12 @@
 //!
 //! Rows of labels are processed with their padding; values that belong to no label count as infinite.
 
-use super::units::{Blocks, Truncating, Units, block, block_mut, keep_least, least_of, padding, smallest};
+use super::units::{
+    Blocks, Truncating, Units, block, block_mut, each_lane, keep_least, least_of, padding, smallest,
+};
 use super::volumes::{Level, Volumes};
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
-use std::array::from_fn;
 use std::mem;
 
 struct Scratch<U> {
@@ -124,7 +125,7 @@ fn factor<U: Units>(
         let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
         let parent = *block::<U, LABEL_BLOCK>(parent, z);
         let add =
-            |a: [U; LABEL_BLOCK], b: [U; LABEL_BLOCK]| -> [U; LABEL_BLOCK] { from_fn(|i| a[i].plus(b[i])) };
+            |a: [U; LABEL_BLOCK], b: [U; LABEL_BLOCK]| -> [U; LABEL_BLOCK] { each_lane(|i| a[i].plus(b[i])) };
         let (upper, lower) = (add(u0, u1), add(u2, u3));
         let (with_upper, with_lower) = (add(parent, upper), add(parent, lower));
         let all = [
@@ -154,7 +155,7 @@ fn factor<U: Units>(
         let padding = block::<U, LABEL_BLOCK>(&between.fine_padding, d);
         for (least, fine) in least.iter_mut().zip(fine) {
             let sums = block::<U, LABEL_BLOCK>(fine, d);
-            keep_least(least, &from_fn::<U, LABEL_BLOCK, _>(|i| sums[i].max(padding[i])));
+            keep_least(least, &each_lane::<U, LABEL_BLOCK>(|i| sums[i].max(padding[i])));
         }
     }
     for ((place, fine), least) in children.into_iter().zip(fine).zip(least_of(&least)) {
@@ -170,7 +171,7 @@ fn agreeing<U: Units>(around: &[U; 2 * LABEL_BLOCK + 1], interpolating: bool, be
     let [below, at] = U::deinterleave(block(around, 0));
     if interpolating {
         let [_, above] = U::deinterleave(block(around, 1));
-        *best = from_fn(|i| below[i].min(at[i]).min(above[i]));
+        *best = each_lane(|i| below[i].min(at[i]).min(above[i]));
     } else {
         *best = at;
     }
@@ -182,7 +183,7 @@ fn spread<U: Units>(t: &[U; LABEL_BLOCK + 1], interpolating: bool, fine: &mut [U
     let at = *block(t, 0);
     if interpolating {
         let above: &[U; LABEL_BLOCK] = block(t, 1);
-        U::interleave(at, from_fn(|i| at[i].min(above[i])), fine);
+        U::interleave(at, each_lane(|i| at[i].min(above[i])), fine);
     } else {
         U::interleave(at, [U::MOST; LABEL_BLOCK], fine);
     }
@@ -194,7 +195,7 @@ fn variable_message<U: Units>(belief: &[U], message: &[U], q: &mut [U], padding:
     for at in (0..belief.len()).step_by(LABEL_BLOCK) {
         let (b, m) = (block::<U, LABEL_BLOCK>(belief, at), block::<U, LABEL_BLOCK>(message, at));
         let padding = block::<U, LABEL_BLOCK>(padding, at);
-        *block_mut(q, at) = from_fn::<U, LABEL_BLOCK, _>(|i| b[i].less(m[i]).max(padding[i]));
+        *block_mut(q, at) = each_lane::<U, LABEL_BLOCK>(|i| b[i].less(m[i]).max(padding[i]));
     }
     if cut.rule == TruncationRule::Absolute {
         let least = smallest(q);

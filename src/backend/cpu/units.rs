@@ -1,7 +1,6 @@
 //! Cost values in the two widths of volumes, and operations on rows of them.
 
 use crate::plan::{LABEL_BLOCK, Truncation};
-use std::array::from_fn;
 
 /// A cost in units, as a volume stores it. Sums saturate, and differences stop at 0.
 pub(super) trait Units:
@@ -50,8 +49,8 @@ macro_rules! units {
             fn deinterleave(values: &[Self; 2 * LABEL_BLOCK]) -> [[Self; LABEL_BLOCK]; 2] {
                 let pairs: &[[Self; 2]] = values.as_chunks().0;
                 let words: [$word; LABEL_BLOCK] =
-                    from_fn(|i| <$word>::from(pairs[i][0]) | <$word>::from(pairs[i][1]) << Self::BITS);
-                [words.map(|word| word as Self), words.map(|word| (word >> Self::BITS) as Self)]
+                    each_lane(|i| <$word>::from(pairs[i][0]) | <$word>::from(pairs[i][1]) << Self::BITS);
+                [each_lane(|i| words[i] as Self), each_lane(|i| (words[i] >> Self::BITS) as Self)]
             }
 
             #[inline(always)]
@@ -61,7 +60,7 @@ macro_rules! units {
                 out: &mut [Self; 2 * LABEL_BLOCK],
             ) {
                 let words: [$word; LABEL_BLOCK] =
-                    from_fn(|i| <$word>::from(even[i]) | <$word>::from(odd[i]) << Self::BITS);
+                    each_lane(|i| <$word>::from(even[i]) | <$word>::from(odd[i]) << Self::BITS);
                 for (out, word) in out.as_chunks_mut().0.iter_mut().zip(words) {
                     *out = [word as Self, (word >> Self::BITS) as Self];
                 }
@@ -97,6 +96,17 @@ pub(super) fn block_mut<T, const N: usize>(row: &mut [T], at: usize) -> &mut [T;
     row[at..].first_chunk_mut().expect("rows are whole blocks")
 }
 
+/// The values of `lane` at 0 .. `N`. Unlike `std::array::from_fn`, it is always inlined: where a compiler left
+/// the calls inside `from_fn` standing, nothing became a vector, and a stage took three times as long.
+#[inline(always)]
+pub(super) fn each_lane<T: Copy + Default, const N: usize>(mut lane: impl FnMut(usize) -> T) -> [T; N] {
+    let mut lanes = [T::default(); N];
+    for (i, out) in lanes.iter_mut().enumerate() {
+        *out = lane(i);
+    }
+    lanes
+}
+
 /// The smallest values in each of `LABEL_BLOCK` lanes.
 pub(super) type Least<U> = [U; LABEL_BLOCK];
 
@@ -111,7 +121,7 @@ pub(super) fn least_of<U: Units, const N: usize>(each: &[Least<U>; N]) -> [U; N]
 pub(super) fn keep_least<U: Units, const N: usize>(least: &mut Least<U>, values: &[U; N]) {
     for values in values.as_chunks().0 {
         let values: &Least<U> = values;
-        *least = from_fn(|i| least[i].min(values[i]));
+        *least = each_lane(|i| least[i].min(values[i]));
     }
 }
 
@@ -161,7 +171,7 @@ impl<U: Units> Blocks for Truncating<'_, U> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
         let sums = block::<U, N>(self.sums, at);
-        *block_mut(self.out, at) = from_fn::<U, N, _>(|i| sums[i].min(self.high).less(self.low));
+        *block_mut(self.out, at) = each_lane::<U, N>(|i| sums[i].min(self.high).less(self.low));
     }
 }
 

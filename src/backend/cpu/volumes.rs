@@ -81,6 +81,14 @@ impl<U: Units> Volumes<U> {
         })
     }
 
+    /// Frees the graphs and the label ranges.
+    pub(super) fn release(&mut self) {
+        self.label_ranges = Vec::new();
+        for level in &mut self.levels {
+            level.graph = LevelGraph::default();
+        }
+    }
+
     /// Resets everything for another pair whose plan fits, to the state that [`Self::new`] gives.
     pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
         let Prepared { pair, graphs, label_ranges, .. } = prepared;

@@ -97,7 +97,7 @@ impl Gpu {
     /// Opens the device that `wanted` names, by its index or a part of its name, or the best there is.
     ///
     /// # Errors
-    /// [`Error::Device`] when there is no driver or the device cannot be opened, [`Error::Option`] when no device has
+    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Option`] when no device has
     /// that name.
     pub fn new(wanted: Option<&str>) -> Result<Self> {
         Self::with_faults(wanted, FaultInjection::default())
