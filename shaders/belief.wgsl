@@ -1,6 +1,6 @@
 // Beliefs: evidence plus all messages. One invocation per pixel and block of 16 labels.
 
-#import band volume messages
+#import band volume windows messages
 
 struct Params {
     level: Level,
@@ -20,6 +20,7 @@ struct Params {
 @group(0) @binding(5) var<storage, read> down: array<Quad>;
 @group(0) @binding(6) var<storage, read> up: array<Quad>;
 @group(0) @binding(7) var<storage, read_write> belief: array<Quad>;
+@group(0) @binding(8) var<storage, read> windows: array<u32>;
 
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -59,8 +60,9 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             sums[i] += unpack(dependency[message + i * width]);
         }
     }
+    let window = window_of(x, y);
     for (var i = 0u; i < QUADS; i++) {
         let sum = min(sums[i], vec4(params.most));
-        belief[row + place_of(first + i, x)] = pack(select(vec4(MOST), sum, are_labels(first + i)));
+        belief[row + place_of(first + i, x)] = pack(select(vec4(MOST), sum, are_in(window, first + i)));
     }
 }

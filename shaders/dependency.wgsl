@@ -18,14 +18,15 @@ struct Params {
 
 const ABSENT: u32 = 0xffffffffu;
 
-// A member's message to the factor: its belief minus the factor's old message, and minus its own minimum
-// where truncation is absolute.
+// A member's message to the factor: its belief minus the factor's old message, and minus `least` where
+// truncation is absolute; infinite at labels that the member does not have.
 fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
-    let q = unpack(belief[member]) - unpack(messages[message]);
+    let b = unpack(belief[member]);
+    var q = b - unpack(messages[message]);
     if ABSOLUTE {
-        return q - vec4(least);
+        q = max(q, vec4(least)) - vec4(least);
     }
-    return q;
+    return select(q, vec4(MOST), b == vec4(MOST));
 }
 
 @compute @workgroup_size(GROUP)
@@ -58,7 +59,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
 
-    // Where truncation is absolute, the minimum of each member's message to the factor is subtracted from it.
+    // Where truncation is absolute, the minimum of each member's message to the factor, over the labels that the
+    // factor's own pixel has, is subtracted from it.
     var floors: array<u32, SLOTS>;
     if ABSOLUTE {
         for (var slot = 0u; slot < SLOTS; slot++) {
@@ -66,7 +68,9 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             if bases[slot] != ABSENT {
                 var least = vec4(MOST);
                 for (var quad = 0u; quad < quads; quad++) {
-                    least = min(least, to_factor(bases[slot] + quad * width, own + (slot * quads + quad) * width, 0u));
+                    let q = to_factor(bases[slot] + quad * width, own + (slot * quads + quad) * width, 0u);
+                    let has = unpack(belief[bases[0] + quad * width]) != vec4(MOST);
+                    least = min(least, select(vec4(MOST), q, has));
                 }
                 floors[slot] = smallest(least);
             }
@@ -89,7 +93,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                least[slot] = min(least[slot], total - q[slot]);
+                least[slot] = min(least[slot], select(total - q[slot], vec4(MOST), q[slot] == vec4(MOST)));
             }
         }
     }
@@ -98,8 +102,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var low: array<u32, SLOTS>;
     for (var slot = 0u; slot < SLOTS; slot++) {
         let m = smallest(least[slot]);
-        high[slot] = select(min(m + params.tau, MOST), params.tau, ABSOLUTE);
-        low[slot] = select(m, min(m, params.tau), ABSOLUTE);
+        low[slot] = select(min(m, MOST - params.tau), 0u, ABSOLUTE);
+        high[slot] = low[slot] + params.tau;
     }
 
     for (var quad = 0u; quad < quads; quad++) {

@@ -1,6 +1,6 @@
 // Evidence from cost, and the initial beliefs. One invocation per pixel.
 
-#import band volume messages
+#import band volume windows messages
 
 struct Params {
     level: Level,
@@ -17,16 +17,17 @@ struct Params {
 @group(0) @binding(1) var<storage, read> cost: array<u32>;
 @group(0) @binding(2) var<storage, read_write> evidence: array<u32>;
 @group(0) @binding(3) var<storage, read_write> belief: array<Quad>;
+@group(0) @binding(4) var<storage, read> windows: array<u32>;
 
-// Costs of a quad in 1/256 cost units; the cost of padding is above every other cost.
-fn load_cost(row: u32, index: u32, quad: u32) -> vec4<u32> {
+// Costs of a quad in 1/256 cost units.
+fn load_cost(row: u32, index: u32) -> vec4<u32> {
     var c: vec4<u32>;
     if FINE_NARROW {
         c = unpack_narrow(cost[row + index]) << vec4(COST_FRACTION_BITS);
     } else {
         c = unpack_wide(vec2(cost[row + 2u * index], cost[row + 2u * index + 1u]));
     }
-    return select(vec4(1u << 16u), c, are_labels(quad));
+    return c;
 }
 
 @compute @workgroup_size(GROUP)
@@ -38,18 +39,21 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let quads = params.level.quads;
     let pitch = params.level.pitch;
     let row = id.y * select(2u * pitch, pitch, FINE_NARROW);
+    let window = window_of(id.x, params.band.first_row + id.y);
     var least = vec4(1u << 16u);
     for (var quad = 0u; quad < quads; quad++) {
-        least = min(least, load_cost(row, place_of(quad, id.x), quad));
+        let c = load_cost(row, place_of(quad, id.x));
+        least = min(least, select(vec4(1u << 16u), c, are_in(window, quad)));
     }
     let base = vec4(smallest(least));
     for (var quad = 0u; quad < quads; quad++) {
         let index = place_of(quad, id.x);
-        let difference = min(load_cost(row, index, quad) - base, vec4(params.limit));
+        let c = load_cost(row, index);
+        let difference = min(max(c, base) - base, vec4(params.limit));
         let product = ((difference << vec4(params.up)) * params.multiplier) >> vec4(16u);
         let scaled = (product + vec4((1u << params.down) >> 1u)) >> vec4(params.down);
         let e = min(scaled, vec4(params.cap));
-        evidence[id.y * pitch + index] = pack_narrow(select(vec4(PADDING), e, are_labels(quad)));
-        belief[id.y * pitch + index] = pack(select(vec4(MOST), e, are_labels(quad)));
+        evidence[id.y * pitch + index] = pack_narrow(select(vec4(PADDING), e, are_in(window, quad)));
+        belief[id.y * pitch + index] = pack(select(vec4(MOST), e, are_in(window, quad)));
     }
 }

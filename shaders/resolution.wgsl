@@ -40,18 +40,23 @@ fn from_children(index: i32) -> vec4<u32> {
         pick(fine_belief[at.z], label), pick(fine_belief[at.w], label));
     let messages = vec4(
         pick(down[at.x], label), pick(down[at.y], label), pick(down[at.z], label), pick(down[at.w], label));
-    return beliefs - messages - child_floor;
+    let q = max(beliefs - messages, child_floor) - child_floor;
+    return select(q, vec4(MOST), beliefs == vec4(MOST));
 }
 
 fn from_parent(label: u32) -> u32 {
     let at = parent_at + word_of(label, params.level.width);
-    return pick(coarse_belief[at], label) - pick(up[at], label) - parent_floor;
+    let b = pick(coarse_belief[at], label);
+    return select(max(b - pick(up[at], label), parent_floor) - parent_floor, MOST, b == MOST);
 }
 
 // One step over the coarse labels: sums to the parent and to the children for the label with index z.
 struct Sums {
     parent: u32,
     children: vec4<u32>,
+    // Whether the parent has the label, and which children have one that agrees with it.
+    parent_has: bool,
+    children_have: vec4<bool>,
 }
 
 // The children's messages at the fine label just above the last coarse label's centre.
@@ -65,18 +70,20 @@ fn advance(z: u32) -> Sums {
         best = min(min(best, between), above);
         between = above;
     }
+    let have = best != vec4(MOST);
     best = select(vec4<u32>(), best, exists);
     let q = from_parent(z);
     let sum = best.x + best.y + best.z + best.w;
-    return Sums(min(sum, MOST), min(vec4(q + sum) - best, vec4(MOST)));
+    return Sums(min(sum, MOST), min(vec4(q + sum) - best, vec4(MOST)), q != MOST, have);
 }
 
 // The message for a sum, truncated; `least` is the smallest sum.
 fn cut_message(sum: u32, least: u32) -> u32 {
     if ABSOLUTE {
-        return min(sum, params.tau) - min(least, params.tau);
+        return min(sum, params.tau);
     }
-    return min(sum, least + params.tau) - least;
+    let low = min(least, MOST - params.tau);
+    return min(sum, low + params.tau) - low;
 }
 
 var<private> up_word: u32;
@@ -153,17 +160,14 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         parent_floor = parent;
     }
 
-    // The smallest sums over the labels that agree with at least one other.
+    // The smallest sums, over the labels that the pixel has.
     var least_up = MOST;
     var least_down = vec4(MOST);
     between = from_children(params.label_offset - 1);
     for (var z = 0u; z < labels; z++) {
         let sums = advance(z);
-        least_up = min(least_up, sums.parent);
-        let centre = 2 * i32(z) + params.label_offset;
-        if INTERPOLATING || (centre >= 0 && centre < i32(fine.labels)) {
-            least_down = min(least_down, sums.children);
-        }
+        least_up = min(least_up, select(MOST, sums.parent, sums.parent_has));
+        least_down = min(least_down, select(vec4(MOST), sums.children, sums.children_have));
     }
 
     up_word = 0u;
@@ -173,7 +177,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     // Two fine labels per coarse label, until the padding of both levels is written.
     let steps = max(4u * params.level.quads, 2u * fine.quads + 1u);
     for (var z = 0u; z < steps; z++) {
-        var sums = Sums(MOST, vec4(MOST));
+        var sums = Sums(MOST, vec4(MOST), false, vec4<bool>());
         if z < labels {
             sums = advance(z);
         }

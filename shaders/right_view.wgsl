@@ -32,7 +32,9 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var j = start; j < end; j++) {
         let label = u32(j);
         let b = pick(belief[row + QUAD_WORDS * u32(shift + j) + word_of(label, params.level.width)], label);
-        least = min(least, (b << 16u) | label);
+        if b != MOST {
+            least = min(least, (b << 16u) | label);
+        }
     }
     labels[id.y * params.level.pixel_pitch + id.x] = least;
 }

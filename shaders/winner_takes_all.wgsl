@@ -13,7 +13,8 @@ struct Params {
 @group(0) @binding(2) var<storage, read_write> optima: array<vec2<u32>>;
 
 fn load(index: u32, quad: u32) -> vec4<u32> {
-    return select(vec4(NO_RUNNER_UP), unpack(belief[index]), are_labels(quad));
+    let b = unpack(belief[index]);
+    return select(vec4(NO_RUNNER_UP), b, are_labels(quad) & (b != vec4(MOST)));
 }
 
 @compute @workgroup_size(GROUP)

@@ -29,7 +29,35 @@ pub struct LevelGraph {
     /// Offset of a member from its factor, in raster indices, by code.
     steps: Vec<isize>,
     starts: Vec<u32>,
-    incoming: Vec<u32>,
+    incoming: Vec<Incoming>,
+}
+
+/// A slot that holds a pixel: the factor's place relative to the pixel, and the slot.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Incoming(u16);
+
+impl Incoming {
+    /// `slot` of the factor at (dx, dy) from the pixel, each in -3 ..= 3.
+    #[must_use]
+    #[inline]
+    pub fn new(dx: i32, dy: i32, slot: usize) -> Self {
+        Self(((dx + RADIUS) | (dy + RADIUS) << 3 | (slot as i32) << 6) as u16)
+    }
+
+    /// (dx, dy, slot) of [`Self::new`].
+    #[must_use]
+    #[inline(always)]
+    pub fn parts(self) -> (isize, isize, usize) {
+        let (bits, radius) = (isize::from(self.0.cast_signed()), RADIUS as isize);
+        ((bits & 7) - radius, (bits >> 3 & 7) - radius, (bits >> 6).cast_unsigned())
+    }
+
+    /// dx + 3 | (dy + 3) << 3 | slot << 6.
+    #[must_use]
+    pub fn bits(self) -> u16 {
+        self.0
+    }
 }
 
 /// (dx, dy) of the member with this `code`: its position in the window, in raster order.
@@ -96,7 +124,7 @@ impl LevelGraph {
 
     /// The transposed table: where the entries of each pixel start ([`Self::starts`]), and the entries
     /// ([`Self::incoming`]).
-    fn transposed(&self) -> (Vec<u32>, Vec<u32>) {
+    fn transposed(&self) -> (Vec<u32>, Vec<Incoming>) {
         let (pixels, band) = (self.width * self.height, BAND * self.width);
         let of_band = |i: usize| i * band..((i + 1) * band).min(pixels);
         let mut starts = vec![0; pixels + 1];
@@ -106,7 +134,7 @@ impl LevelGraph {
         for pixel in 0..pixels {
             starts[pixel + 1] += starts[pixel];
         }
-        let mut incoming = vec![0; starts[pixels] as usize];
+        let mut incoming = vec![Incoming::default(); starts[pixels] as usize];
         let mut rest = &mut incoming[..];
         let mut bands = Vec::new();
         for own in (0..pixels.div_ceil(band)).map(of_band) {
@@ -125,21 +153,20 @@ impl LevelGraph {
         (starts, incoming)
     }
 
-    /// Calls `with` for every slot that holds one of `pixels`, with the index of the pixel among them and
-    /// factor * slots + slot.
+    /// Calls `with` for every slot that holds one of `pixels`, with the index of the pixel among them.
     #[inline(always)]
-    fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, u32)) {
+    fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, Incoming)) {
         let reach = RADIUS as usize * self.width;
         let factors = pixels.start.saturating_sub(reach)..(pixels.end + reach).min(self.width * self.height);
         for factor in factors {
-            let entry = (factor * self.slots()) as u32;
             if pixels.contains(&factor) {
-                with(factor - pixels.start, entry);
+                with(factor - pixels.start, Incoming::new(0, 0, 0));
             }
             let codes = &self.codes[factor * self.neighbours..][..self.neighbours];
             for (slot, &code) in (1..).zip(codes) {
                 if let Some(pixel) = self.pixel(factor, code).filter(|pixel| pixels.contains(pixel)) {
-                    with(pixel - pixels.start, entry + slot);
+                    let (dx, dy) = offset(code);
+                    with(pixel - pixels.start, Incoming::new(-dx, -dy, slot));
                 }
             }
         }
@@ -197,16 +224,16 @@ impl LevelGraph {
         &self.starts
     }
 
-    /// The transposed table: for each pixel the slots that hold it, as factor * slots + slot, in ascending
-    /// order.
+    /// The transposed table: for each pixel the slots that hold it, factors in raster order.
     #[must_use]
-    pub fn incoming(&self) -> &[u32] {
+    pub fn incoming(&self) -> &[Incoming] {
         &self.incoming
     }
 
-    /// The slots that hold `pixel`, as factor * slots + slot.
+    /// The slots that hold `pixel`.
     #[must_use]
-    pub fn incoming_of(&self, pixel: usize) -> &[u32] {
+    #[inline]
+    pub fn incoming_of(&self, pixel: usize) -> &[Incoming] {
         &self.incoming[self.starts[pixel] as usize..self.starts[pixel + 1] as usize]
     }
 }

@@ -45,6 +45,14 @@ pub const COST_FRACTION_BITS: u32 = 8;
 pub const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
 pub const LABEL_BLOCK: usize = 16;
+/// Pixels of a row that share a label window.
+pub const WINDOW_RUN: usize = 8;
+/// The first label of a label window is a multiple of this.
+pub const WINDOW_STEP: usize = 4;
+/// How far from its own coarse pixels a label window looks for winners, in coarse pixels.
+pub const WINDOW_REACH: usize = 2;
+/// Labels that a label window holds at least on either side of each winner.
+pub const WINDOW_MARGIN: i32 = 2;
 
 // The largest costs of a label match what the options state.
 const _: () = assert!(MatchingCost::Sad.most() as u32 == COST_MAX as u32);
@@ -87,6 +95,12 @@ impl LevelPlan {
     #[must_use]
     pub fn max(&self) -> i32 {
         self.min + self.labels as i32 - 1
+    }
+
+    /// Label windows of the level: those of a row, and rows of them.
+    #[must_use]
+    pub fn windows(&self) -> (usize, usize) {
+        (self.width.div_ceil(WINDOW_RUN), self.height.div_ceil(2))
     }
 }
 
@@ -162,7 +176,8 @@ impl VolumeWidth {
     }
 }
 
-/// Truncation of a sum of messages s to a message m(d) = min(s(d), high) - low.
+/// Truncation of a sum of messages s to a message m(d) = min(s(d), high) - low. Where the sum is infinite, the
+/// message is tau.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Truncation {
     /// Cost of disagreement, in units.
@@ -174,20 +189,23 @@ pub struct Truncation {
 /// Where a message is truncated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TruncationRule {
-    /// At tau above the smallest sum: high = min s + tau, low = min s.
+    /// At tau above the smallest sum, which counts as at most infinity less tau: high = min s + tau, low = min s.
     Relative,
-    /// At tau, given that the members' messages have minimum 0: high = tau, low = min(min s, tau).
+    /// At tau, given that the members' messages have minimum 0: high = tau, low = 0.
     Absolute,
 }
 
 impl Truncation {
-    /// (high, low) for the smallest sum `min`.
+    /// (high, low) for the smallest sum `min`, where `most` is infinite.
     #[must_use]
-    pub fn bounds(self, min: u32) -> (u32, u32) {
+    pub fn bounds(self, min: u32, most: u32) -> (u32, u32) {
         let tau = u32::from(self.tau);
         match self.rule {
-            TruncationRule::Relative => (min + tau, min),
-            TruncationRule::Absolute => (tau, min.min(tau)),
+            TruncationRule::Relative => {
+                let low = min.min(most - tau);
+                (low + tau, low)
+            }
+            TruncationRule::Absolute => (tau, 0),
         }
     }
 }
@@ -350,6 +368,12 @@ impl Plan {
         self.method.front.zone_sigmas > 0.0
     }
 
+    /// Whether the label windows of `level` follow the winners of the next coarser one.
+    #[must_use]
+    pub fn windows_follow_winners(&self, level: usize) -> bool {
+        self.method.schedule.order == Order::CoarseFirst && level + 1 < self.levels.len()
+    }
+
     /// Whether the labels of the right view are read off the beliefs.
     #[must_use]
     pub fn reads_right_view(&self) -> bool {
@@ -424,7 +448,7 @@ impl Plan {
     #[must_use]
     pub fn front_bytes(&self) -> u64 {
         let graphs =
-            self.levels.iter().map(|l| l.pixels() * (self.neighbours + 4 * self.slots() + 4)).sum::<usize>();
+            self.levels.iter().map(|l| l.pixels() * (self.neighbours + 2 * self.slots() + 4)).sum::<usize>();
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
         let zones = if self.limits_labels() { 200 } else { 0 };
         (17 + corrected + zones) * self.levels[0].pixels() as u64 + graphs as u64

@@ -55,30 +55,48 @@ impl Run<'_, '_> {
 pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run: &mut Run) -> Result<u32> {
     run.inspect(&mut Inspection::Prepared(&prepared))?;
     run.watch.host("upload", || backend.prepare(plan, prepared))?;
-    let levels = 0..plan.levels.len();
-    let costs = levels.clone().flat_map(|z| {
+    let costs = (0..plan.levels.len()).flat_map(|z| {
         let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
         iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
     });
-    for stage in costs.chain(levels.clone().map(Stage::Evidence)) {
+    for stage in costs {
         run.stage(backend, plan, stage)?;
     }
-    let iterations = flood(backend, plan, run)?;
+    let iterations = flood(backend, plan, run, |backend, run, z| join(backend, plan, run, z))?;
     for stage in read_out(plan) {
         run.stage(backend, plan, stage)?;
     }
     Ok(iterations)
 }
 
-/// Runs the flooding of `plan` on the evidence that `backend` holds; returns the number of iterations.
+/// What happens when level `z` joins the flooding: it gets its labels and their evidence.
 ///
 /// # Errors
-/// Those of [`estimate`].
-pub fn flood(backend: &mut dyn Backend, plan: &Plan, run: &mut Run) -> Result<u32> {
+/// Those of [`Run::stage`].
+pub fn join(backend: &mut dyn Backend, plan: &Plan, run: &mut Run, z: usize) -> Result<()> {
+    run.stage(backend, plan, Stage::LabelWindow(z))?;
+    run.stage(backend, plan, Stage::Evidence(z))
+}
+
+/// Runs the flooding of `plan`; `join` is called for each level that joins, coarsest first. Returns the number of iterations.
+///
+/// # Errors
+/// Those of [`estimate`] and of `join`.
+pub fn flood<'a, 'b>(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    run: &mut Run<'a, 'b>,
+    join: impl Fn(&mut dyn Backend, &mut Run<'a, 'b>, usize) -> Result<()>,
+) -> Result<u32> {
     let coarsest = plan.levels.len() - 1;
     let tolerance = plan.method.schedule.tolerance;
     let mut iterations = 0;
+    let mut joined = plan.levels.len();
     for phase in &plan.phases {
+        for z in (phase.finest..joined).rev() {
+            join(backend, run, z)?;
+        }
+        joined = phase.finest;
         if phase.finest < coarsest && plan.phases.len() > 1 {
             // What the coarser levels know reaches the new one before its own messages start. The coarser level's
             // beliefs take in what came up, or the next resolution would take off a message that they do not hold.

@@ -269,10 +269,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
     for z in 1..plan.levels.len() {
         backend.run(Stage::Pyramid(z)).unwrap();
     }
-    for z in 0..plan.levels.len() {
-        backend.run(Stage::Evidence(z)).unwrap();
-    }
-    let iterations = common::flood(backend, plan).unwrap();
+    let iterations = common::flood_on_costs(backend, plan).unwrap();
     for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
         backend.run(stage).unwrap();
     }

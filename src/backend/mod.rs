@@ -64,7 +64,7 @@ pub trait Backend {
     /// place. No stage runs before [`Self::prepare`] is called again.
     fn release(&mut self) {}
 
-    /// Takes what a match by `plan` needs, and sets all messages, and the map that [`Stage::Change`] compares with, to 0. All
+    /// Takes what a match by `plan` needs, gives every pixel all labels, and sets all messages, and the map that [`Stage::Change`] compares with, to 0. All
     /// that the stages need is allocated here, from the plan alone; a second pair whose plan [fits](Plan::fits) goes into the same
     /// buffers.
     ///

@@ -8,11 +8,19 @@ use crate::image::Plane;
 /// device does.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Probe {
-    /// The values of `volume`.
+    /// The values of `volume`. Labels outside the window of their pixel have the belief that stands for infinity, and as
+    /// messages the truncation.
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>>;
 
     /// Replaces the values of `volume`.
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()>;
+
+    /// The label windows of `level`, as [`Stage::LabelWindow`](super::Stage::LabelWindow) defines them: first label and number
+    /// of labels with padding, of each run in each row of windows.
+    fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>>;
+
+    /// Replaces the label windows of `level`; what its volumes hold is lost.
+    fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()>;
 
     /// Replaces the values of `map`.
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()>;

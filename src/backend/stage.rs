@@ -24,26 +24,45 @@ macro_rules! for_every_stage {
                 /// Costs of a level at labels outside the pixel's label range, become the highest there
                 /// is: [`crate::plan::COST_MAX`] (256 times that at coarser levels).
                 LabelRange label_range;
-                /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), and
-                /// beliefs equal to the evidence.
+                /// The label windows of a level: the labels that each pixel has. The pixels of a run of
+                /// [`WINDOW_RUN`](crate::plan::WINDOW_RUN) columns from a multiple of it on, in the rows 2 r and 2 r + 1, share a window.
+                /// It holds `count` labels from `first` on, a multiple of [`WINDOW_STEP`](crate::plan::WINDOW_STEP); `count` is
+                /// what is needed, rounded up to whole blocks of [`LABEL_BLOCK`](crate::plan::LABEL_BLOCK), and `first` is reduced where
+                /// the window would end behind the level's last block.
+                ///
+                /// - Where the levels join one after the other, and this is not the coarsest: what is needed are the labels 2 w - 2 to 2 w + 2
+                ///   for the winners w (labels with the smallest belief, the lowest on ties) of all pixels of the next coarser level that
+                ///   are at most [`WINDOW_REACH`](crate::plan::WINDOW_REACH) rows and columns away from the run's: rows r - 2 to r + 2,
+                ///   columns 4 i - 2 to 4 i + 5 for run i.
+                /// - Otherwise, where zones limit the labels: the label ranges of the run's pixels.
+                /// - Otherwise all labels.
+                ///
+                /// For every stage, the belief of a label outside its pixel's window is infinite: [`VolumeWidth::most`](crate::plan::VolumeWidth::most).
+                LabelWindow label_window;
+                /// Evidence of a level from its cost by its [`crate::plan::EvidenceScale`] (costs of level 0 count 256 times), within
+                /// the label windows alone, and beliefs equal to the evidence.
                 Evidence evidence;
                 /// Messages of the dependency factors of a level, from the beliefs and their own old messages.
                 ///
-                /// With q of each member, its belief less the factor's old message to it (less its minimum over d where the rule is
-                /// [`crate::plan::TruncationRule::Absolute`]), the message to a member is s = the sum of q over the other members, at most
-                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), truncated by [`Plan::dependency`](crate::plan::Plan::dependency) with its bounds for the smallest s. A factor of
-                /// one member, and a slot without one, keep the message they have: 0, from the start.
+                /// With q of each member, its belief less the factor's old message to it, infinite where the belief is (and, where
+                /// the rule is [`crate::plan::TruncationRule::Absolute`], less its minimum over the labels that the factor's own pixel has
+                /// too), the message to a member is s = the sum of q over the other members, at most
+                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), truncated by [`Plan::dependency`](crate::plan::Plan::dependency) with its bounds for the smallest s
+                /// over the labels that the member and the factor's own pixel have. A factor of one member, and a slot without one, keep
+                /// the message they have: 0, from the start. Messages at labels that the member does not have are not defined.
                 Dependency dependency;
                 /// Messages of the resolution factors between a level (1 or coarser) and the next finer one, in both directions,
                 /// from the beliefs and their own old messages.
                 ///
                 /// Each coarse pixel (x, y) has one factor with its children (2 x, 2 y) to (2 x + 1, 2 y + 1), as far as they are
-                /// inside. q is the belief less the factor's old message (less its minimum where the rule is absolute). Labels d
+                /// inside. q is the belief less the factor's old message, infinite where the belief is (and less its minimum where the
+                /// rule is absolute). Labels d
                 /// and z agree when |d - 2 z| is at most 1 (interpolating) or 0 (strict). U\[c\](z) is the smallest q\[c\](d) of
                 /// the d that agree with z, infinite if none does. To the parent: s(z) = the sum of U\[c\](z). To child c:
                 /// t(z) = q\[p\](z) + the sum of the other children's U(z), and s(d) = the smallest t(z) of the z that agree with d,
-                /// infinite if none does. Each s is truncated by [`Plan::resolution`](crate::plan::Plan::resolution) with its bounds for the smallest s. Infinite is
-                /// [`VolumeWidth::most`](crate::plan::VolumeWidth::most), and sums saturate there; where every s is infinite, the message is 0.
+                /// infinite if none does. Each s is truncated by [`Plan::resolution`](crate::plan::Plan::resolution) with its bounds for the smallest s over the labels
+                /// that the pixel has. Infinite is [`VolumeWidth::most`](crate::plan::VolumeWidth::most), and sums saturate there. Messages at labels that
+                /// the pixel does not have are not defined.
                 Resolution resolution;
                 /// Beliefs of a level: evidence, plus every dependency message to the pixel, plus the resolution messages from
                 /// above and from below; at most [`Plan::belief_most`](crate::plan::Plan::belief_most).
@@ -70,7 +89,8 @@ macro_rules! for_every_stage {
                 /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
                 /// time (of label indices; from 0 the first time), which [`Backend::change`](super::Backend::change) returns.
                 Change change;
-                /// [`Map::Label`](super::Map::Label), [`Map::Best`](super::Map::Best) and [`Map::RunnerUp`](super::Map::RunnerUp) of level 0.
+                /// [`Map::Label`](super::Map::Label), [`Map::Best`](super::Map::Best) and [`Map::RunnerUp`](super::Map::RunnerUp) of level 0, among the labels
+                /// that the pixel has.
                 WinnerTakesAll winner_takes_all;
                 /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest): at (x, y) the label with the smallest belief of left pixel (x + d, y) among
                 /// those in the columns [`Plan::core`](crate::plan::Plan::core), the lowest on ties, and that belief.

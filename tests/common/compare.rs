@@ -1,13 +1,13 @@
 //! Comparison of volumes and maps that reports where they first differ.
 
-use super::twin::Finest;
+use super::twin::{Finest, UNDEFINED};
 use mrfgs::image::Plane;
 use mrfgs::low_level::backend::{Backend, Volume, volume_shape};
 use mrfgs::low_level::plan::Plan;
 use std::fmt::Debug;
 
 /// Where `actual` first differs from `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and how often
-/// they differ.
+/// they differ. Where the expected value is [`UNDEFINED`], any value will do.
 pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) -> Result<(), String> {
     let (rows, labels, _) = volume_shape(plan, volume);
     let (level, slots) = match volume {
@@ -19,7 +19,8 @@ pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) ->
         let (a, e) = (actual.len(), expected.len());
         return Err(format!("{volume:?}: {a} values, the twin has {e}, the plan says {}", rows * labels));
     }
-    let differ: Vec<usize> = (0..actual.len()).filter(|&i| actual[i] != expected[i]).collect();
+    let differ: Vec<usize> =
+        (0..actual.len()).filter(|&i| expected[i] != UNDEFINED && actual[i] != expected[i]).collect();
     let Some(&first) = differ.first() else { return Ok(()) };
     let (label, slot, pixel) = (first % labels, first / labels % slots, first / labels / slots);
     Err(format!(

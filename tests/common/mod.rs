@@ -20,5 +20,13 @@ use std::ops::ControlFlow;
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     let mut go_on = |_| ControlFlow::Continue(());
     let watch = Watch::new(&mut go_on, 1.0);
-    solver::flood(backend, plan, &mut Run { watch, inspector: None })
+    solver::flood(backend, plan, &mut Run { watch, inspector: None }, |_, _, _| Ok(()))
+}
+
+/// The same on the costs that `backend` holds.
+pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
+    let mut go_on = |_| ControlFlow::Continue(());
+    let watch = Watch::new(&mut go_on, 1.0);
+    let join = |backend: &mut dyn Backend, run: &mut Run, z| solver::join(backend, plan, run, z);
+    solver::flood(backend, plan, &mut Run { watch, inspector: None }, join)
 }

@@ -1,7 +1,7 @@
 //! Seeded random input: images, pairs, methods, graphs, and states of the volumes that respect the
 //! invariants.
 
-use super::twin::{self, Finest};
+use super::twin::{self, Finest, UNDEFINED};
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::low_level::backend::{Backend, NO_LABEL, Volume};
 use mrfgs::low_level::graph::LevelGraph;
@@ -10,6 +10,26 @@ use mrfgs::maps::flag;
 use mrfgs::options::{
     Agreement, DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential, Pyramid,
 };
+use std::ops::Range;
+
+/// Random label windows for a level of `plan`: all labels, or some everywhere, or others from run to run.
+pub fn windows(random: &mut Random, plan: &Plan, level: usize) -> Plane<[u16; 2]> {
+    let l = &plan.levels[level];
+    let all = l.stride as u16;
+    let style = random.within(0, 3);
+    let any = |random: &mut Random| {
+        let count = 16 * random.within(1, u32::from(all) / 16);
+        let most = (u32::from(all) - count).min(l.labels as u32 - 1) / 4;
+        [4 * random.within(0, most) as u16, count as u16]
+    };
+    let common = any(random);
+    Plane::from_fn(l.width.div_ceil(8), l.height.div_ceil(2), |_, _| match style {
+        0 => [0, all],
+        1 => common,
+        2 if random.one_in(2) => common,
+        _ => any(random),
+    })
+}
 
 /// The splitmix64 generator (Steele, Lea and Flood 2014).
 pub struct Random(u64);
@@ -201,10 +221,12 @@ pub struct State {
     pub up: Vec<Vec<u32>>,
     /// Beliefs.
     pub belief: Vec<Vec<u32>>,
+    /// The labels of every pixel.
+    pub has: Vec<Vec<Range<usize>>>,
 }
 
 impl State {
-    /// Random evidence, messages 0, beliefs equal to the evidence.
+    /// This evidence, messages 0, beliefs equal to the evidence, and all labels for every pixel.
     pub fn fresh(plan: &Plan, evidence: Vec<Vec<u32>>) -> Self {
         let last = plan.levels.len() - 1;
         let cells = |z: usize| plan.levels[z].pixels() * plan.levels[z].labels;
@@ -213,6 +235,7 @@ impl State {
             down: (0..=last).map(|z| vec![0; if z == last { 0 } else { cells(z) }]).collect(),
             up: (0..=last).map(|z| vec![0; if z == 0 { 0 } else { cells(z) }]).collect(),
             belief: evidence.clone(),
+            has: (0..=last).map(|z| twin::label_window::all(plan, z)).collect(),
             evidence,
         }
     }
@@ -234,11 +257,40 @@ impl State {
         all
     }
 
-    /// Writes all of it to `backend`.
+    /// Writes all of it to `backend`, some value where none is defined.
     pub fn write(&self, backend: &mut dyn Backend) {
         for (volume, values) in self.volumes() {
-            backend.probe().write(volume, values).unwrap();
+            let values: Vec<u32> = values.iter().map(|&v| if v == UNDEFINED { 77 } else { v }).collect();
+            backend.probe().write(volume, &values).unwrap();
         }
+    }
+
+    /// The same state where pixels have only the labels `has`.
+    pub fn within(mut self, plan: &Plan, graphs: &[LevelGraph], has: Vec<Vec<Range<usize>>>) -> Self {
+        for z in 0..has.len() {
+            let labels = plan.levels[z].labels;
+            let of_level = [&mut self.evidence[z], &mut self.down[z], &mut self.up[z]];
+            for volume in of_level.into_iter().chain([&mut self.belief[z]]) {
+                for (i, value) in volume.iter_mut().enumerate() {
+                    if !has[z][i / labels].contains(&(i % labels)) {
+                        *value = UNDEFINED;
+                    }
+                }
+            }
+            let slots = plan.slots();
+            for (i, row) in self.dependency[z].chunks_mut(labels).enumerate() {
+                let factor = i / slots;
+                if twin::members(&graphs[z], factor).iter().flatten().count() > 1 {
+                    for d in (0..labels).filter(|d| !has[z][factor].contains(d)) {
+                        row[d] = plan.dependency.tau.into();
+                    }
+                }
+            }
+            twin::dependency::undefine(plan, z, &graphs[z], &has[z], &mut self.dependency[z]);
+            self.belief[z] = twin::evidence::beliefs(plan, &self.belief[z]);
+        }
+        self.has = has;
+        self
     }
 
     /// The twin's new beliefs of every level.
@@ -254,6 +306,7 @@ impl State {
             plan,
             z,
             &graphs[z],
+            &self.has[z],
             &self.evidence[z],
             &self.dependency[z],
             &self.down[z],
@@ -294,6 +347,18 @@ pub fn evidence(random: &mut Random, plan: &Plan) -> Vec<Vec<u32>> {
 /// are 0 where a slot has no member or a factor has only one. Beliefs are the sums of their terms or, where
 /// `loose`, any values that are at most the largest belief and not below any message that is a term of them.
 pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: bool) -> State {
+    let has = (0..plan.levels.len()).map(|z| twin::label_window::all(plan, z)).collect();
+    state_within(random, plan, graphs, has, loose)
+}
+
+/// The same where pixels have only the labels `has`.
+pub fn state_within(
+    random: &mut Random,
+    plan: &Plan,
+    graphs: &[LevelGraph],
+    has: Vec<Vec<Range<usize>>>,
+    loose: bool,
+) -> State {
     let mut state = State::fresh(plan, evidence(random, plan));
     for (z, level) in plan.levels.iter().enumerate() {
         let labels = level.labels;
@@ -315,6 +380,7 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
             }
         }
     }
+    state = state.within(plan, graphs, has);
     state.believe(plan, graphs);
     if loose {
         let bound = twin::belief::belief_most(plan);
@@ -323,14 +389,14 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
             let mut least = vec![0; state.belief[z].len()];
             for volume in [&state.down[z], &state.up[z]] {
                 for (least, &m) in least.iter_mut().zip(volume) {
-                    *least = m.max(*least);
+                    *least = if m == UNDEFINED { *least } else { m.max(*least) };
                 }
             }
             for factor in 0..plan.levels[z].pixels() {
                 for (slot, member) in twin::members(&graphs[z], factor).into_iter().enumerate() {
                     if let Some(pixel) = member {
                         let at = (factor * plan.slots() + slot) * labels;
-                        for d in 0..labels {
+                        for d in state.has[z][pixel].clone() {
                             let least = &mut least[pixel * labels + d];
                             *least = state.dependency[z][at + d].max(*least);
                         }
@@ -339,7 +405,8 @@ pub fn state(random: &mut Random, plan: &Plan, graphs: &[LevelGraph], loose: boo
             }
             for row in 0..plan.levels[z].pixels() {
                 let style = random.within(0, 3);
-                for i in row * labels..(row + 1) * labels {
+                let has = state.has[z][row].clone();
+                for i in row * labels + has.start..row * labels + has.end {
                     state.belief[z][i] = match style {
                         0 => random.within(least[i], bound),
                         1 => least[i] + random.within(0, (bound - least[i]).min(9)),

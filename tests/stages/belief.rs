@@ -1,13 +1,13 @@
 //! The beliefs.
 
-use crate::common::{random, twin};
+use crate::common::twin;
 use crate::{cells, on_all, same};
 use mrfgs::low_level::backend::{Stage, Volume};
 
 #[test]
 fn belief() {
     on_all(|case, backend, random| {
-        let state = random::state(random, &case.plan, &case.graphs, false);
+        let state = case.state(random, false);
         state.write(backend);
         for z in 0..case.plan.levels.len() {
             let poison = vec![twin::most(&case.plan); cells(&case.plan, z)];

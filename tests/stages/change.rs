@@ -2,7 +2,7 @@
 
 use crate::common::twin;
 use crate::common::twin::belief::belief_most;
-use crate::{cells, on_all};
+use crate::on_all;
 use mrfgs::low_level::backend::Volume;
 
 #[test]
@@ -12,7 +12,7 @@ fn change() {
         let mut map = vec![0; case.plan.levels[0].pixels()];
         for _ in 0..4 {
             let most = random.pick(&[0, 2, belief_most(&case.plan)]);
-            let belief: Vec<u32> = (0..cells(&case.plan, 0)).map(|_| random.within(0, most)).collect();
+            let belief = case.beliefs(random, most);
             backend.probe().write(Volume::Belief(0), &belief).unwrap();
             let (actual, expected) =
                 (backend.change().unwrap(), twin::change::change(&belief, labels, &mut map));

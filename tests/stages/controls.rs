@@ -63,7 +63,7 @@ fn control_one_wrong_element_is_found() {
 /// A case in which every parameter of every stage matters, and the volumes of a twin that follows `plan`.
 fn twin_of_the_control(plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) -> Vec<(String, Vec<u32>)> {
     let (costs, mut state) = twin_start(plan, pair);
-    twin_flood(plan, graphs, &mut state);
+    twin_flood(plan, graphs, &mut state, Some(&costs));
     let mut all: Vec<(String, Vec<u32>)> =
         costs.into_iter().enumerate().map(|(z, cost)| (format!("{:?}", Volume::Cost(z)), cost)).collect();
     all.extend(state.volumes().into_iter().map(|(volume, v)| (format!("{volume:?}"), v.to_vec())));

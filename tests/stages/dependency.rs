@@ -1,6 +1,6 @@
 //! The messages of the dependency factors.
 
-use crate::common::{random, twin};
+use crate::common::twin;
 use crate::{on_all, same};
 use mrfgs::low_level::backend::{Stage, Volume};
 
@@ -8,7 +8,7 @@ use mrfgs::low_level::backend::{Stage, Volume};
 fn dependency() {
     on_all(|case, backend, random| {
         for loose in [false, true] {
-            let state = random::state(random, &case.plan, &case.graphs, loose);
+            let state = case.state(random, loose);
             state.write(backend);
             for (z, graph) in case.graphs.iter().enumerate() {
                 backend.run(Stage::Dependency(z)).unwrap();
@@ -16,6 +16,7 @@ fn dependency() {
                     &case.plan,
                     z,
                     graph,
+                    &state.has[z],
                     &state.belief[z],
                     &state.dependency[z],
                 );

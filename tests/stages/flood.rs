@@ -12,13 +12,13 @@ use mrfgs::options::Method;
 #[test]
 fn flood() {
     on_all(|case, backend, random| {
-        let state = random::state(random, &case.plan, &case.graphs, true);
+        let state = case.state(random, true);
         for (z, graph) in case.graphs.iter().enumerate() {
             state.write(backend);
             backend.run(Stage::Flood(z)).unwrap();
             let others = [&state.evidence[z][..], &state.down[z], &state.up[z]];
             let old = (&state.belief[z][..], &state.dependency[z][..]);
-            let (beliefs, messages) = twin::flood::flood(&case.plan, z, graph, old, others);
+            let (beliefs, messages) = twin::flood::flood(&case.plan, z, graph, &state.has[z], old, others);
             same(&case.plan, backend, Volume::Dependency(z), &messages)?;
             same(&case.plan, backend, Volume::Belief(z), &beliefs)?;
         }

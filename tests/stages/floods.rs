@@ -19,7 +19,7 @@ use std::collections::HashSet;
 fn a_flood_goes_on_from_a_written_state() {
     on_all(|case, backend, random| {
         for loose in [false, true] {
-            let mut state = random::state(random, &case.plan, &case.graphs, loose);
+            let mut state = case.state(random, loose);
             state.write(backend);
             for _ in 0..2 {
                 for (z, graph) in case.graphs.iter().enumerate() {
@@ -28,6 +28,7 @@ fn a_flood_goes_on_from_a_written_state() {
                         &case.plan,
                         z,
                         graph,
+                        &state.has[z],
                         &state.belief[z],
                         &state.dependency[z],
                     );
@@ -53,7 +54,14 @@ fn a_flood_goes_on_from_a_written_state() {
 /// added, it exchanges resolution messages with the next coarser one before its own dependency messages
 /// start, so the first iteration needs no exchange. At level 0 the coarser levels send messages in every
 /// other iteration only, and levels whose messages can no longer reach level 0 send none.
-pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) -> u32 {
+///
+/// A level that joins gets its windows and evidence from `costs`; without them, it has what `state` says.
+pub(super) fn twin_flood(
+    plan: &Plan,
+    graphs: &[LevelGraph],
+    state: &mut State,
+    costs: Option<&[Vec<u32>]>,
+) -> u32 {
     let last = plan.levels.len() - 1;
     let method = &plan.method;
     let additions: Vec<(usize, u32)> = match method.schedule.order {
@@ -65,7 +73,18 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
     };
     let mut total = 0;
     let mut map = vec![0; plan.levels[0].pixels()];
+    let mut joined = last + 1;
     for (finest, iterations) in additions {
+        for z in (finest..joined).rev() {
+            if let Some(costs) = costs {
+                let coarse = state.belief.get(z + 1).map(Vec::as_slice);
+                let windows = twin::label_window::label_window(plan, z, coarse, None);
+                state.has[z] = twin::label_window::ranges(plan, z, &windows);
+                state.evidence[z] = twin::evidence::evidence(plan, z, &state.has[z], &costs[z]);
+                state.belief[z] = twin::evidence::beliefs(plan, &state.evidence[z]);
+            }
+        }
+        joined = finest;
         if method.schedule.order == Order::CoarseFirst && finest < last {
             resolve(plan, state, finest + 1);
             state.believe_at(plan, graphs, finest);
@@ -92,8 +111,14 @@ pub(super) fn twin_flood(plan: &Plan, graphs: &[LevelGraph], state: &mut State) 
                 }
             }
             for &z in &speak {
-                state.dependency[z] =
-                    twin::dependency::dependency(plan, z, &graphs[z], &state.belief[z], &state.dependency[z]);
+                state.dependency[z] = twin::dependency::dependency(
+                    plan,
+                    z,
+                    &graphs[z],
+                    &state.has[z],
+                    &state.belief[z],
+                    &state.dependency[z],
+                );
             }
             for &z in &hear {
                 resolve(plan, state, z);
@@ -123,7 +148,7 @@ fn twin_read_out(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Fin
 pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
     let graphs = graph::build(pair.left(), plan);
     let (costs, mut state) = twin_start(plan, pair);
-    let iterations = twin_flood(plan, &graphs, &mut state);
+    let iterations = twin_flood(plan, &graphs, &mut state, Some(&costs));
     let mut maps = twin::Finest::zero(plan.size());
     twin_read_out(plan, &costs[0], &state.belief[0], &mut maps);
     for (name, mut backend) in backends() {
@@ -133,11 +158,8 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
         for z in 1..plan.levels.len() {
             backend.run(Stage::Pyramid(z)).unwrap();
         }
-        for z in 0..plan.levels.len() {
-            backend.run(Stage::Evidence(z)).unwrap();
-        }
         let check = |backend: &mut dyn Backend| -> Result<(), String> {
-            let actual = crate::common::flood(backend, plan).unwrap();
+            let actual = crate::common::flood_on_costs(backend, plan).unwrap();
             if actual != iterations {
                 return Err(format!("{actual} iterations but the twin did {iterations}"));
             }

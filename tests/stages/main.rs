@@ -28,12 +28,13 @@ use common::compare::{compare, compare_maps};
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
-use mrfgs::image::Pair;
+use mrfgs::image::{Pair, Plane};
 use mrfgs::low_level::backend::{Backend, Volume};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::{self, LevelGraph};
 use mrfgs::low_level::plan::{COST_MAX, Plan};
 use std::collections::HashSet;
+use std::ops::Range;
 
 /// One pixel, one column, one row, odd, divisible by no power of two, and wider than any block.
 const SIZES: &[(usize, usize)] =
@@ -52,6 +53,35 @@ struct Case {
     plan: Plan,
     pair: Pair,
     graphs: Vec<LevelGraph>,
+    /// Label windows of every level.
+    windows: Vec<Plane<[u16; 2]>>,
+}
+
+impl Case {
+    /// The labels of every pixel, by level.
+    fn has(&self) -> Vec<Vec<Range<usize>>> {
+        let levels = self.windows.iter().enumerate();
+        levels.map(|(z, windows)| twin::label_window::ranges(&self.plan, z, windows)).collect()
+    }
+
+    /// A state in the middle of message passing within the windows.
+    fn state(&self, random: &mut Random, loose: bool) -> State {
+        random::state_within(random, &self.plan, &self.graphs, self.has(), loose)
+    }
+
+    /// Beliefs of level 0 up to `most`, infinite outside the windows.
+    fn beliefs(&self, random: &mut Random, most: u32) -> Vec<u32> {
+        let labels = self.plan.levels[0].labels;
+        let has = twin::label_window::ranges(&self.plan, 0, &self.windows[0]);
+        let value = |i: usize| {
+            if has[i / labels].contains(&(i % labels)) {
+                random.within(0, most)
+            } else {
+                twin::most(&self.plan)
+            }
+        };
+        (0..cells(&self.plan, 0)).map(value).collect()
+    }
 }
 
 /// Every size with every number of labels; everything else is drawn at random.
@@ -74,18 +104,23 @@ fn cases() -> Vec<Case> {
                 random::graphs(&mut random, &plan)
             };
             let name = format!("case {seed}: {size:?}, {labels} labels from {min}, {:?}", plan.method);
-            cases.push(Case { name, seed, plan, pair, graphs });
+            let windows = (0..plan.levels.len()).map(|z| random::windows(&mut random, &plan, z)).collect();
+            cases.push(Case { name, seed, plan, pair, graphs, windows });
         }
     }
     cases
 }
 
-/// Runs `check` for every case on every backend, prepared, with a separate generator for each case.
+/// Runs `check` for every case on every backend, prepared and within the case's label windows, with a separate generator
+/// for each case.
 fn on_all(check: impl Fn(&Case, &mut dyn Backend, &mut Random) -> Result<(), String>) {
     for case in cases() {
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
             backend.prepare(&case.plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
+            for (z, windows) in case.windows.iter().enumerate() {
+                backend.probe().set_windows(z, windows).unwrap();
+            }
             if let Err(e) = check(&case, backend, &mut Random::new(case.seed ^ 0xbeef)) {
                 panic!("{name}: {e}\n{}", case.name);
             }
@@ -125,6 +160,12 @@ fn the_cases_cover_what_they_should() {
         seen(&|p| format!("{} {}", p.range.min, p.levels[0].labels)).len(),
         MINIMA.len() * LABELS.len()
     );
+    // Windows that hold all labels, that are the same everywhere, and that differ.
+    let narrower =
+        |case: &&Case| case.windows[0].data().iter().any(|w| usize::from(w[1]) < case.plan.levels[0].stride);
+    let differ = |case: &&Case| case.windows[0].data().iter().any(|w| w != &case.windows[0].data()[0]);
+    let (narrower, differ) = (cases.iter().filter(narrower).count(), cases.iter().filter(differ).count());
+    assert!(narrower > 50 && differ > 30 && narrower + 20 < cases.len(), "{narrower}, {differ}");
     // Both alignments of the labels of two levels.
     assert_eq!(
         seen(&|p| (1..p.levels.len()).map(|z| p.label_offset(z)).min().unwrap_or(1).to_string()).len(),
@@ -146,12 +187,16 @@ fn graph() {
                 for (slot, member) in twin::members(graph, factor).into_iter().enumerate() {
                     assert_eq!(graph.member(factor, slot), member);
                     if let Some(pixel) = member {
-                        incoming[pixel].push((factor * graph.slots() + slot) as u32);
+                        incoming[pixel].push((factor, slot));
                     }
                 }
             }
             for (pixel, slots) in incoming.iter().enumerate() {
-                assert_eq!(graph.incoming_of(pixel), slots, "pixel {pixel} of {}", case.name);
+                let found = graph.incoming_of(pixel).iter().map(|entry| {
+                    let (dx, dy, slot) = entry.parts();
+                    (pixel.wrapping_add_signed(dy * graph.width() as isize + dx), slot)
+                });
+                assert_eq!(found.collect::<Vec<_>>(), *slots, "pixel {pixel} of {}", case.name);
             }
         }
     }
@@ -167,15 +212,14 @@ fn downsample() {
     }
 }
 
-/// The twins' costs of all levels, and their state before any messages are sent.
+/// The twins' costs of all levels, and their state before any level has joined.
 fn twin_start(plan: &Plan, pair: &Pair) -> (Vec<Vec<u32>>, State) {
     let mut costs = vec![twin::cost::cost(plan, pair)];
     for z in 1..plan.levels.len() {
         costs.push(twin::pyramid::pyramid(plan, z, &costs[z - 1]));
     }
-    let evidence =
-        costs.iter().enumerate().map(|(z, cost)| twin::evidence::evidence(plan, z, cost)).collect();
-    let state = State::fresh(plan, evidence);
+    let none = (0..plan.levels.len()).map(|z| vec![0; cells(plan, z)]).collect();
+    let state = State::fresh(plan, none);
     (costs, state)
 }
 
@@ -184,6 +228,7 @@ fn resolve(plan: &Plan, state: &mut State, z: usize) {
     let (down, up) = twin::resolution::resolution(
         plan,
         z,
+        [&state.has[z - 1], &state.has[z]],
         &state.belief[z - 1],
         &state.belief[z],
         &state.down[z - 1],

@@ -1,6 +1,5 @@
 //! The messages between levels.
 
-use crate::common::random;
 use crate::{on_all, resolve, same};
 use mrfgs::low_level::backend::{Stage, Volume};
 
@@ -8,7 +7,7 @@ use mrfgs::low_level::backend::{Stage, Volume};
 fn resolution() {
     on_all(|case, backend, random| {
         for loose in [false, true] {
-            let mut state = random::state(random, &case.plan, &case.graphs, loose);
+            let mut state = case.state(random, loose);
             state.write(backend);
             for z in 1..case.plan.levels.len() {
                 backend.run(Stage::Resolution(z)).unwrap();

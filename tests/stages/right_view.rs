@@ -3,7 +3,7 @@
 use crate::common::compare::compare_finest;
 use crate::common::twin::belief::belief_most;
 use crate::common::{random, twin};
-use crate::{cells, on_all};
+use crate::on_all;
 use mrfgs::low_level::backend::{Stage, Volume};
 use mrfgs::low_level::front::Prepared;
 use std::cell::Cell;
@@ -15,7 +15,7 @@ fn right_view() {
         let mut plan = case.plan.clone();
         let width = plan.levels[0].width;
         for most in [0, 2, belief_most(&plan)] {
-            let belief: Vec<u32> = (0..cells(&plan, 0)).map(|_| random.within(0, most)).collect();
+            let belief = case.beliefs(random, most);
             backend.probe().write(Volume::Belief(0), &belief).unwrap();
             let mut maps = random::finest(random, &plan, false);
             maps.write(backend);
@@ -30,6 +30,7 @@ fn right_view() {
             let start = random.within(0, width as u32 - 1) as usize;
             plan.core = start..random.within(start as u32 + 1, width as u32) as usize;
             backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
+            backend.probe().set_windows(0, &case.windows[0]).unwrap();
         }
         Ok(())
     });

@@ -2,20 +2,23 @@
 
 use super::units::{Blocks, Units, block, block_mut, each_lane, padding};
 use super::volumes::{Level, Volumes};
-use crate::graph::LevelGraph;
-use crate::plan::Plan;
+use super::windows::{Seen, Window, Windows};
+use crate::graph::{Incoming, LevelGraph};
+use crate::plan::{LABEL_BLOCK, Plan};
 use rayon::prelude::*;
 
 /// The terms of the beliefs of a level.
 pub(super) struct Summands<'a, U> {
     pub(super) graph: &'a LevelGraph,
+    pub(super) windows: &'a Windows,
     evidence: &'a [u8],
     /// Empty where the coarser level has sent no messages yet.
     down: &'a [U],
     /// Empty where the finer level has sent no messages yet.
     up: &'a [U],
-    stride: usize,
     most: U,
+    /// The message of a dependency factor at labels that its own pixel does not have.
+    tau: U,
     padding: Vec<U>,
 }
 
@@ -29,16 +32,27 @@ impl<'a, U: Units> Summands<'a, U> {
     ) -> (Self, [&'a mut [U]; 2], &'a mut bool) {
         let above = levels.get(z + 1).is_some_and(|above| above.resolution_sent);
         let l = &plan.levels[z];
-        let Level { graph, evidence, dependency, dependency_sent, resolution_sent, down, up, belief, .. } =
-            &mut levels[z];
+        let Level {
+            graph,
+            windows,
+            evidence,
+            dependency,
+            dependency_sent,
+            resolution_sent,
+            down,
+            up,
+            belief,
+            ..
+        } = &mut levels[z];
         let summands = Self {
             graph,
+            windows,
             evidence,
             // A volume without messages is left out of the sum.
             down: if above { down } else { &[] },
             up: if *resolution_sent { up } else { &[] },
-            stride: l.stride,
             most: U::of(plan.belief_most().into()),
+            tau: U::of(plan.dependency.tau.into()),
             padding: padding(l.labels, l.stride),
         };
         (summands, [dependency, belief], dependency_sent)
@@ -54,46 +68,96 @@ pub(super) fn row<U: Units>(
     dependency: Option<&[U]>,
     belief: &mut [U],
 ) {
-    let Summands { graph, evidence, down, up, stride, most, padding } = summands;
-    let width = graph.width();
-    let base = first * width * graph.slots();
-    for (x, belief) in belief.chunks_exact_mut(*stride).enumerate() {
-        let pixel = y * width + x;
-        let start = pixel * stride;
+    let Summands { graph, windows, evidence, down, up, .. } = summands;
+    let (width, row) = (graph.width(), windows.start(y));
+    for x in 0..width {
+        let window = windows.of(x, y);
+        let (at, stride) = (window.at(x), window.stride);
+        let cells = row + at..row + at + stride;
         let mut sum = Sum {
-            evidence: &evidence[start..][..*stride],
-            down: down.get(start..start + stride),
-            up: up.get(start..start + stride),
+            summands,
+            window,
+            place: (x, y),
+            evidence: &evidence[cells.clone()],
+            down: down.get(cells.clone()),
+            up: up.get(cells),
             dependency: dependency.unwrap_or_default(),
-            base,
-            incoming: if dependency.is_some() { graph.incoming_of(pixel) } else { &[] },
-            most: *most,
-            padding,
-            belief,
+            base: windows.start(first),
+            incoming: if dependency.is_some() { graph.incoming_of(y * width + x) } else { &[] },
+            belief: &mut belief[at..][..stride],
         };
-        sum.all(*stride);
+        if windows.are_full() {
+            sum.all(stride);
+        } else {
+            (0..stride).step_by(LABEL_BLOCK).for_each(|at| sum.block_in_window(at));
+        }
     }
 }
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (summands, [dependency, belief], sent) = Summands::of(&v.plan, &mut v.levels, level);
     let dependency = sent.then_some(&*dependency);
-    let cells = summands.graph.width() * summands.stride;
-    belief.par_chunks_mut(cells).enumerate().for_each(|(y, belief)| row(&summands, y, 0, dependency, belief));
+    let rows = summands.windows.rows_mut(belief, 1, 1).into_par_iter().enumerate();
+    rows.for_each(|(y, belief)| row(&summands, y, 0, dependency, belief));
 }
 
 /// A pixel's belief, and its terms.
 struct Sum<'a, U> {
+    summands: &'a Summands<'a, U>,
+    window: &'a Window,
+    place: (usize, usize),
     evidence: &'a [u8],
     down: Option<&'a [U]>,
     up: Option<&'a [U]>,
     dependency: &'a [U],
-    /// The slot that `dependency` starts at; it is subtracted from the entries of `incoming`.
+    /// The cell that `dependency` starts at, in a volume of one slot.
     base: usize,
-    incoming: &'a [u32],
-    most: U,
-    padding: &'a [U],
+    incoming: &'a [Incoming],
     belief: &'a mut [U],
+}
+
+impl<U: Units> Sum<'_, U> {
+    /// The window of the factor of an entry, and where its messages to the pixel start.
+    #[inline(always)]
+    fn factor(&self, entry: Incoming) -> (&Window, usize) {
+        let Summands { graph, windows, .. } = self.summands;
+        let (dx, dy, slot) = entry.parts();
+        let (x, y) = (self.place.0.wrapping_add_signed(dx), self.place.1.wrapping_add_signed(dy));
+        let window = windows.of(x, y);
+        let cells = windows.start(y) - self.base + window.at(x);
+        (window, graph.slots() * cells + slot * window.stride)
+    }
+
+    #[inline(always)]
+    fn own_terms<const N: usize>(&self, at: usize) -> [U; N] {
+        let evidence = block::<u8, N>(self.evidence, at);
+        let mut sum: [U; N] = each_lane(|i| U::from(evidence[i]));
+        for message in [self.down, self.up].into_iter().flatten() {
+            sum = plus(sum, block(message, at));
+        }
+        sum
+    }
+
+    #[inline(always)]
+    fn store<const N: usize>(&mut self, at: usize, sum: [U; N]) {
+        let Summands { most, padding, .. } = self.summands;
+        let padding = block::<U, N>(padding, self.window.first + at);
+        *block_mut(self.belief, at) = each_lane::<U, N>(|i| sum[i].min(*most) | padding[i]);
+    }
+
+    /// The block of labels at `at`, from factors whose windows differ.
+    #[inline(always)]
+    fn block_in_window(&mut self, at: usize) {
+        let tau = self.summands.tau;
+        let mut sum: [U; LABEL_BLOCK] = self.own_terms(at);
+        for &entry in self.incoming {
+            let (window, start) = self.factor(entry);
+            let seen = Seen::new(self.dependency, start, window, self.window.first);
+            let (m, outside) = seen.block::<false>(at);
+            sum = plus(sum, &each_lane(|i| m[i] & !outside[i] | tau & outside[i]));
+        }
+        self.store(at, sum);
+    }
 }
 
 impl<U: Units> Blocks for Sum<'_, U> {
@@ -101,17 +165,11 @@ impl<U: Units> Blocks for Sum<'_, U> {
 
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
-        let stride = self.evidence.len();
-        let evidence = block::<u8, N>(self.evidence, at);
-        let mut sum: [U; N] = each_lane(|i| U::from(evidence[i]));
-        for message in [self.down, self.up].into_iter().flatten() {
-            sum = plus(sum, block(message, at));
-        }
+        let mut sum: [U; N] = self.own_terms(at);
         for &entry in self.incoming {
-            sum = plus(sum, block(self.dependency, (entry as usize - self.base) * stride + at));
+            sum = plus(sum, block(self.dependency, self.factor(entry).1 + at));
         }
-        let padding = block::<U, N>(self.padding, at);
-        *block_mut(self.belief, at) = each_lane::<U, N>(|i| sum[i].min(self.most).max(padding[i]));
+        self.store(at, sum);
     }
 }
 

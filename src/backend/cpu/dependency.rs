@@ -1,13 +1,14 @@
 //! Messages of the dependency factors: see [`crate::backend::Stage::Dependency`].
 //!
 //! A factor reads old beliefs and its own old messages and writes only its own messages, so flooding in place
-//! is exact. Padding labels go through the same arithmetic as real labels. Their belief is the largest value,
-//! and no real label exceeds [`Plan::belief_most`], so a minimum never comes from padding alone.
+//! is exact. The messages to all members are stored for the labels of the factor's own pixel: at all others its
+//! belief is infinite, and the message is tau.
 
 use super::units::{Blocks, Least, Truncating, Units, block, block_mut, each_lane, keep_least, smallest};
 use super::volumes::{Level, Volumes};
+use super::windows::{Seen, Windows};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
-use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan, Truncation, TruncationRule};
+use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::array::from_fn;
 use std::mem;
@@ -17,23 +18,26 @@ pub(super) struct Scratch<U> {
     /// q of each member, \[member\]\[label\]; `after` has the sum of q over the members after it.
     q: Vec<U>,
     after: Vec<U>,
+    /// The largest value where the member does not have the label, else 0.
+    outside: Vec<U>,
     /// Sum of q over the members before.
     before: Vec<U>,
     /// Sums of q over the other members.
     sums: Vec<U>,
-    /// For each member its slot, the row that holds its belief (relative to the factor's), and its start in
-    /// that row.
-    members: Vec<(usize, usize, usize)>,
+    /// Slots of the members.
+    slots: Vec<usize>,
 }
 
 impl<U: Units> Scratch<U> {
     pub(super) fn new(stride: usize, slots: usize) -> Self {
+        let rows = |n: usize| vec![U::default(); n * stride];
         Self {
-            q: vec![U::default(); slots * stride],
-            after: vec![U::default(); slots * stride],
-            before: vec![U::default(); stride],
-            sums: vec![U::default(); 3 * stride],
-            members: Vec::with_capacity(slots),
+            q: rows(slots),
+            after: rows(slots),
+            outside: rows(slots),
+            before: rows(1),
+            sums: rows(3),
+            slots: Vec::with_capacity(slots),
         }
     }
 }
@@ -44,13 +48,20 @@ pub(super) const REACH: usize = GRAPH_WINDOW / 2;
 /// Beliefs of the rows around a factor, from [`REACH`] above to [`REACH`] below; empty outside the image.
 pub(super) type Around<'a, U> = [&'a [U]; GRAPH_WINDOW];
 
+/// The factors of a level.
+pub(super) struct Factors<'a> {
+    pub(super) graph: &'a LevelGraph,
+    pub(super) windows: &'a Windows,
+    pub(super) cut: Truncation,
+}
+
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let (plan, l) = (&v.plan, &v.plan.levels[level]);
-    let Level { graph, belief, dependency: messages, dependency_sent, .. } = &mut v.levels[level];
+    let Level { graph, windows, belief, dependency: messages, dependency_sent, .. } = &mut v.levels[level];
     // The first messages count as 0, whatever is stored.
     let initial = !mem::replace(dependency_sent, true);
-    let cells = l.width * l.stride;
-    messages.par_chunks_mut(cells * graph.slots()).enumerate().for_each_init(
+    let factors = Factors { graph, windows, cut: plan.dependency };
+    windows.rows_mut(messages, graph.slots(), 1).into_par_iter().enumerate().for_each_init(
         || Scratch::new(l.stride, graph.slots()),
         |scratch, (y, messages)| {
             if initial {
@@ -58,53 +69,67 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
             }
             let around: Around<U> = from_fn(|k| {
                 let ny = (y + k).checked_sub(REACH).filter(|&ny| ny < l.height);
-                ny.map_or(&[][..], |ny| &belief[ny * cells..][..cells])
+                ny.map_or(&[][..], |ny| windows.row_of(belief, ny))
             });
-            row(plan, level, graph, y, &around, messages, scratch);
+            row(&factors, y, &around, messages, scratch);
         },
     );
 }
 
 /// The messages of the factors of row `y`.
 pub(super) fn row<U: Units>(
-    plan: &Plan,
-    level: usize,
-    graph: &LevelGraph,
+    factors: &Factors,
     y: usize,
     around: &Around<U>,
     messages: &mut [U],
     scratch: &mut Scratch<U>,
 ) {
-    let (cut, stride, slots) = (plan.dependency, plan.levels[level].stride, graph.slots());
-    // Row and offset within the row, for every code.
-    let places: [(usize, isize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
+    if factors.windows.are_full() {
+        row_in::<U, true>(factors, y, around, messages, scratch);
+    } else {
+        row_in::<U, false>(factors, y, around, messages, scratch);
+    }
+}
+
+/// The same; `FULL` where every window holds all labels.
+fn row_in<U: Units, const FULL: bool>(
+    factors: &Factors,
+    y: usize,
+    around: &Around<U>,
+    messages: &mut [U],
+    scratch: &mut Scratch<U>,
+) {
+    let Factors { graph, windows, cut } = *factors;
+    let (width, slots) = (graph.width(), graph.slots());
+    let offsets: [(isize, isize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
         let (dx, dy) = offset(code as u8);
-        (REACH.wrapping_add_signed(dy as isize), dx as isize * stride as isize)
+        (dx as isize, dy as isize)
     });
     touch(around[2 * REACH]);
-    for (x, messages) in messages.chunks_exact_mut(slots * stride).enumerate() {
-        let own = x * stride;
-        let place = |code: u8| {
-            let (row, way) = places[usize::from(code)];
-            (row, own.wrapping_add_signed(way))
+    for x in 0..width {
+        let window = windows.of(x, y);
+        let messages = &mut messages[slots * window.at(x)..][..slots * window.stride];
+        let member = |(dx, dy): (isize, isize)| {
+            let (nx, row) = (x.wrapping_add_signed(dx), REACH.wrapping_add_signed(dy));
+            let theirs = windows.of(nx, y.wrapping_add_signed(dy));
+            Seen::new(around[row], theirs.at(nx), theirs, window.first)
         };
-        let belief = |(row, start): (usize, usize)| &around[row][start..][..stride];
+        let place = |code: u8| offsets[usize::from(code)];
         match *graph.neighbours_of(x, y) {
             [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == TruncationRule::Relative => {
-                let beliefs = [belief((REACH, own)), belief(place(a)), belief(place(b))];
-                three(cut, beliefs, messages, &mut scratch.sums);
+                let members = [member((0, 0)), member(place(a)), member(place(b))];
+                Three { members, stride: window.stride }.send::<FULL>(cut, messages, &mut scratch.sums);
             }
             ref codes => {
-                let members = &mut scratch.members;
-                members.clear();
-                members.push((0, REACH, own));
-                let slots = (1..).zip(codes).filter(|(_, code)| **code != NO_MEMBER);
-                members.extend(slots.map(|(slot, &code)| {
-                    let (row, start) = place(code);
-                    (slot, row, start)
-                }));
-                if members.len() > 1 {
-                    any(cut, stride, around, messages, scratch);
+                scratch.slots.clear();
+                scratch.slots.push(0);
+                scratch
+                    .slots
+                    .extend((1..).zip(codes).filter(|(_, code)| **code != NO_MEMBER).map(|(slot, _)| slot));
+                if scratch.slots.len() > 1 {
+                    let member =
+                        |slot: usize| member(if slot == 0 { (0, 0) } else { place(codes[slot - 1]) });
+                    any::<U, FULL>(cut, window.stride, member, messages, scratch);
                 }
             }
         }
@@ -119,56 +144,91 @@ fn touch<U: Units>(row: &[U]) {
     std::hint::black_box(row.iter().step_by(step).fold(U::default(), |most, &v| most.max(v)));
 }
 
+/// A block of labels.
+type Block<U> = [U; LABEL_BLOCK];
+
 /// A factor of three members. Each sum has two terms.
 struct Three<'a, U> {
-    beliefs: [&'a [U]; 3],
-    messages: &'a [U],
-    sums: &'a mut [U],
-    least: [Least<U>; 3],
-}
-
-impl<U: Units> Blocks for Three<'_, U> {
-    #[inline(always)]
-    fn block<const N: usize>(&mut self, at: usize) {
-        let q: [[U; N]; 3] = [self.q(0, at), self.q(1, at), self.q(2, at)];
-        self.sum(0, at, &q[1], &q[2]);
-        self.sum(1, at, &q[0], &q[2]);
-        self.sum(2, at, &q[0], &q[1]);
-    }
+    members: [Seen<'a, U>; 3],
+    stride: usize,
 }
 
 impl<U: Units> Three<'_, U> {
+    /// The sums for each member at the block of labels at `at`, and again with infinite ones where the member does not
+    /// have the label.
     #[inline(always)]
-    fn q<const N: usize>(&self, slot: usize, at: usize) -> [U; N] {
-        let b = block::<U, N>(self.beliefs[slot], at);
-        let m = block::<U, N>(self.messages, slot * self.beliefs[0].len() + at);
-        each_lane(|i| b[i].less(m[i]))
+    fn sums<const FULL: bool>(&self, messages: &[U], at: usize) -> ([Block<U>; 3], [Block<U>; 3]) {
+        let [(q0, out0), (q1, out1), (q2, out2)] = [
+            self.q::<FULL>(messages, 0, at),
+            self.q::<FULL>(messages, 1, at),
+            self.q::<FULL>(messages, 2, at),
+        ];
+        let sums = [plus(&q1, &q2), plus(&q0, &q2), plus(&q0, &q1)];
+        let own = [or(&sums[0], &out0), or(&sums[1], &out1), or(&sums[2], &out2)];
+        (sums, own)
     }
 
-    /// The sum for the member in `slot`: the q of the other two.
     #[inline(always)]
-    fn sum<const N: usize>(&mut self, slot: usize, at: usize, a: &[U; N], b: &[U; N]) {
-        let sums: [U; N] = each_lane(|i| a[i].plus(b[i]));
-        keep_least(&mut self.least[slot], &sums);
-        *block_mut(self.sums, slot * self.beliefs[0].len() + at) = sums;
+    fn q<const FULL: bool>(&self, messages: &[U], slot: usize, at: usize) -> (Block<U>, Block<U>) {
+        let (b, outside) = self.members[slot].block::<FULL>(at);
+        let m: &Block<U> = block(messages, slot * self.stride + at);
+        (each_lane(|i| b[i].less(m[i]) | outside[i]), outside)
+    }
+
+    /// Writes the messages of the factor.
+    #[inline(always)]
+    fn send<const FULL: bool>(&self, cut: Truncation, messages: &mut [U], scratch: &mut [U]) {
+        let (stride, tau) = (self.stride, U::of(cut.tau.into()));
+        if stride == LABEL_BLOCK {
+            let (sums, own) = self.sums::<FULL>(messages, 0);
+            for slot in 0..3 {
+                let (low, high) = bounds(own[slot], tau);
+                *block_mut(messages, slot * stride) = cut_block(&sums[slot], &low, &high);
+            }
+            return;
+        }
+        let mut least = [[U::MOST; LABEL_BLOCK]; 3];
+        for at in (0..stride).step_by(LABEL_BLOCK) {
+            let (sums, own) = self.sums::<FULL>(messages, at);
+            for slot in 0..3 {
+                keep_least(&mut least[slot], &own[slot]);
+                *block_mut(scratch, slot * stride + at) = sums[slot];
+            }
+        }
+        for slot in 0..3 {
+            let (low, high) = bounds(least[slot], tau);
+            for at in (slot * stride..(slot + 1) * stride).step_by(LABEL_BLOCK) {
+                *block_mut(messages, at) = cut_block(block(scratch, at), &low, &high);
+            }
+        }
     }
 }
 
-/// The messages of a factor of three.
 #[inline(always)]
-fn three<U: Units>(cut: Truncation, beliefs: [&[U]; 3], messages: &mut [U], sums: &mut [U]) {
-    let stride = beliefs[0].len();
-    let mut factor = Three { beliefs, messages: &*messages, sums, least: [[U::MOST; LABEL_BLOCK]; 3] };
-    factor.all(stride);
-    let (least, tau) = (factor.least, U::of(cut.tau.into()));
-    for ((out, sums), least) in messages.chunks_exact_mut(stride).zip(sums.chunks_exact(stride)).zip(least) {
-        let least = least_in_all(least);
-        RelativeCutting { sums, least, high: each_lane(|i| least[i].plus(tau)), out }.all(stride);
-    }
+fn plus<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
+    each_lane(|i| a[i].plus(b[i]))
 }
 
-/// The smallest of all lanes, in each of them. This keeps the bounds of a message in vectors. When they
-/// passed through single bytes, a factor waited longer than it computed.
+#[inline(always)]
+fn or<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
+    each_lane(|i| a[i] | b[i])
+}
+
+/// [`Truncation::bounds`] by [`TruncationRule::Relative`], (low, high), in every lane. This keeps the bounds of a
+/// message in vectors. When they passed through single values, a factor waited longer than it computed.
+#[inline(always)]
+fn bounds<U: Units>(least: Least<U>, tau: U) -> (Least<U>, Least<U>) {
+    let least = least_in_all(least);
+    let low = each_lane(|i| least[i].min(U::MOST.less(tau)));
+    (low, each_lane(|i| low[i].plus(tau)))
+}
+
+#[inline(always)]
+fn cut_block<U: Units>(sums: &Block<U>, low: &Least<U>, high: &Least<U>) -> Block<U> {
+    each_lane(|i| sums[i].min(high[i]).less(low[i]))
+}
+
+/// The smallest of all lanes, in each of them.
 #[inline(always)]
 fn least_in_all<U: Units>(lanes: Least<U>) -> Least<U> {
     least_of_pairs::<U, 1>(least_of_pairs::<U, 2>(least_of_pairs::<U, 4>(least_of_pairs::<U, 8>(lanes))))
@@ -180,63 +240,50 @@ fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
     each_lane(|i| lanes[i].min(lanes[i ^ APART]))
 }
 
-/// [`Truncating`] by [`TruncationRule::Relative`], with bounds in vectors.
-struct RelativeCutting<'a, U> {
-    sums: &'a [U],
-    least: Least<U>,
-    high: Least<U>,
-    out: &'a mut [U],
-}
-
-impl<U: Units> Blocks for RelativeCutting<'_, U> {
-    #[inline(always)]
-    fn block<const N: usize>(&mut self, at: usize) {
-        let out = block_mut::<U, N>(self.out, at).as_chunks_mut().0;
-        for (out, sums) in out.iter_mut().zip(block::<U, N>(self.sums, at).as_chunks().0) {
-            let (out, sums): (&mut Least<U>, &Least<U>) = (out, sums);
-            *out = each_lane(|i| sums[i].min(self.high[i]).less(self.least[i]));
-        }
-    }
-}
-
 /// The messages of a factor of any number of members.
-fn any<U: Units>(
+fn any<'a, U: Units, const FULL: bool>(
     cut: Truncation,
     stride: usize,
-    around: &Around<U>,
+    member: impl Fn(usize) -> Seen<'a, U>,
     messages: &mut [U],
     scratch: &mut Scratch<U>,
 ) {
-    let Scratch { q, after, before, sums, members } = scratch;
-    for (q, &(slot, row, start)) in q.chunks_exact_mut(stride).zip(members.iter()) {
-        let b = &around[row][start..][..stride];
-        let f = &messages[slot * stride..][..stride];
-        for ((q, &b), &f) in q.iter_mut().zip(b).zip(f) {
-            *q = b.less(f);
+    let Scratch { q, after, outside, before, sums, slots } = scratch;
+    for (i, &slot) in slots.iter().enumerate() {
+        let seen = member(slot);
+        let (q, outside) = (&mut q[i * stride..][..stride], &mut outside[i * stride..][..stride]);
+        for at in (0..stride).step_by(LABEL_BLOCK) {
+            let (b, out) = seen.block::<FULL>(at);
+            let m: &Block<U> = block(messages, slot * stride + at);
+            *block_mut(q, at) = each_lane::<U, LABEL_BLOCK>(|i| b[i].less(m[i]) | out[i]);
+            *block_mut(outside, at) = out;
         }
         if cut.rule == TruncationRule::Absolute {
             let least = smallest(q);
-            for q in q.iter_mut() {
-                *q = q.less(least);
+            for (q, &outside) in q.iter_mut().zip(&*outside) {
+                *q = q.less(least) | outside;
             }
         }
     }
     // Saturated sums cannot be undone by subtraction, so the sums of the members before and after are added
     // instead.
-    let last = (members.len() - 1) * stride;
+    let last = (slots.len() - 1) * stride;
     after[last..][..stride].fill(U::default());
     for at in (0..last).step_by(stride).rev() {
         let (here, next) = after[at..].split_at_mut(stride);
         here.copy_from_slice(&next[..stride]);
         add(here, &q[at + stride..][..stride]);
     }
-    let sum = &mut sums[..stride];
-    before.fill(U::default());
-    for (i, &(slot, ..)) in members.iter().enumerate() {
+    let (sum, own) = sums.split_at_mut(stride);
+    before[..stride].fill(U::default());
+    for (i, &slot) in slots.iter().enumerate() {
         sum.copy_from_slice(&after[i * stride..][..stride]);
         add(sum, before);
         add(before, &q[i * stride..][..stride]);
-        Truncating::new(sum, smallest(sum), cut, &mut messages[slot * stride..][..stride]).all(stride);
+        let outside = &outside[i * stride..][..stride];
+        own[..stride].iter_mut().zip(&*sum).zip(outside).for_each(|((own, &sum), &out)| *own = sum | out);
+        let least = smallest(&own[..stride]);
+        Truncating::new(sum, least, cut, &mut messages[slot * stride..][..stride]).all(stride);
     }
 }
 

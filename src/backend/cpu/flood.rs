@@ -6,13 +6,13 @@
 //! bands are done.
 
 use super::belief::{self, Summands};
-use super::dependency::{self, Around, REACH, Scratch};
+use super::dependency::{self, Around, Factors, REACH, Scratch};
 use super::units::Units;
 use super::volumes::Volumes;
-use crate::plan::Plan;
 use rayon::prelude::*;
 use std::array::from_fn;
 use std::mem;
+use std::ops::Range;
 
 /// Bands per thread, so that one slow thread does not delay all others.
 const BANDS: usize = 4;
@@ -21,9 +21,9 @@ const LEAST_ROWS: usize = 8 * REACH;
 
 /// A band of rows, with the beliefs that no other band changes.
 struct Band<'a, U> {
-    /// First row of its factors; `first_own` is the first row of its own beliefs.
-    first: usize,
-    first_own: usize,
+    /// Rows of its factors, and of its own beliefs.
+    rows: Range<usize>,
+    rows_own: Range<usize>,
     messages: &'a mut [U],
     own: &'a mut [U],
 }
@@ -35,10 +35,11 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     // The first messages count as 0, whatever is stored.
     let initial = !mem::replace(sent, true);
     let l = &plan.levels[level];
-    let (cells, height) = (l.width * l.stride, l.height);
+    let (height, windows) = (l.height, summands.windows);
     let slots = summands.graph.slots();
     let count = (BANDS * rayon::current_num_threads()).min(height / LEAST_ROWS).max(1);
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
+    let cells = |rows: Range<usize>| windows.start(rows.end) - windows.start(rows.start);
 
     // The beliefs alternate: those of one band alone, then those around the border to the next band, and so
     // on.
@@ -46,8 +47,8 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let mut rest = &mut *belief;
     let mut row = 0;
     for &start in &starts[1..count] {
-        let (alone, after) = rest.split_at_mut((start - REACH - row) * cells);
-        let (edge, after) = after.split_at_mut(2 * REACH * cells);
+        let (alone, after) = rest.split_at_mut(cells(row..start - REACH));
+        let (edge, after) = after.split_at_mut(cells(start - REACH..start + REACH));
         own.push(alone);
         edges.push(edge);
         (rest, row) = (after, start + REACH);
@@ -55,24 +56,29 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     own.push(rest);
 
     let shared: Vec<&[U]> = edges.iter().map(|edge| &**edge).collect();
-    let mut factors = &mut *messages;
+    let mut messages_left = &mut *messages;
     let mut bands: Vec<Band<U>> = Vec::new();
     for (i, own) in own.into_iter().enumerate() {
-        let (here, after) = factors.split_at_mut((starts[i + 1] - starts[i]) * cells * slots);
-        factors = after;
-        let first_own = if i == 0 { 0 } else { starts[i] + REACH };
-        bands.push(Band { first: starts[i], first_own, messages: here, own });
+        let rows = starts[i]..starts[i + 1];
+        let (here, after) = messages_left.split_at_mut(cells(rows.clone()) * slots);
+        messages_left = after;
+        let first_own = if i == 0 { 0 } else { rows.start + REACH };
+        let end_own = if i + 1 == count { height } else { rows.end - REACH };
+        bands.push(Band { rows, rows_own: first_own..end_own, messages: here, own });
     }
+    let factors = Factors { graph: summands.graph, windows, cut: plan.dependency };
     bands.into_par_iter().enumerate().for_each(|(i, mut band)| {
         let above = if i == 0 { &[][..] } else { shared[i - 1] };
         let below = shared.get(i).copied().unwrap_or_default();
-        band.sweep(plan, level, summands, [above, below], initial);
+        band.sweep(&factors, summands, Scratch::new(l.stride, slots), [above, below], initial);
     });
 
     let messages = &*messages;
     edges.into_par_iter().zip(&starts[1..count]).for_each(|(edge, &start)| {
-        for (i, belief) in edge.chunks_exact_mut(cells).enumerate() {
-            belief::row(summands, start - REACH + i, 0, Some(messages), belief);
+        for y in start - REACH..start + REACH {
+            let first = windows.start(start - REACH);
+            let belief = &mut edge[windows.start(y) - first..windows.start(y + 1) - first];
+            belief::row(summands, y, 0, Some(messages), belief);
         }
     });
 }
@@ -80,34 +86,45 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
 impl<U: Units> Band<'_, U> {
     /// Sweeps the band; `edges` are the beliefs around its borders. If the messages are `initial`, the old
     /// ones are 0 whatever is stored, and nothing has to be loaded from memory for them.
-    fn sweep(&mut self, plan: &Plan, level: usize, summands: &Summands<U>, edges: [&[U]; 2], initial: bool) {
-        let l = &plan.levels[level];
-        let (cells, slots) = (l.width * l.stride, summands.graph.slots());
-        let mut scratch = Scratch::new(l.stride, slots);
-        let rows = self.messages.len() / (cells * slots);
-        let end_own = self.first_own + self.own.len() / cells;
-        for y in self.first..self.first + rows + REACH {
-            if y < self.first + rows {
-                let around: Around<U> = from_fn(|k| match (y + k).checked_sub(REACH) {
-                    None => &[][..],
-                    Some(ny) if ny < self.first_own => {
-                        &edges[0][(ny + 2 * REACH - self.first_own) * cells..][..cells]
-                    }
-                    Some(ny) if ny < end_own => &self.own[(ny - self.first_own) * cells..][..cells],
-                    Some(ny) => edges[1]
-                        .get((ny - end_own) * cells..)
-                        .map_or(&[][..], |rows| rows.get(..cells).unwrap_or_default()),
+    fn sweep(
+        &mut self,
+        factors: &Factors,
+        summands: &Summands<U>,
+        mut scratch: Scratch<U>,
+        edges: [&[U]; 2],
+        initial: bool,
+    ) {
+        let (windows, slots) = (factors.windows, factors.graph.slots());
+        let (rows, rows_own) = (self.rows.clone(), self.rows_own.clone());
+        for y in rows.start..rows.end + REACH {
+            if y < rows.end {
+                let around: Around<U> = from_fn(|k| {
+                    let Some(ny) = (y + k).checked_sub(REACH).filter(|&ny| ny < windows.height()) else {
+                        return &[][..];
+                    };
+                    let (beliefs, first) = if ny < rows_own.start {
+                        (edges[0], rows_own.start - 2 * REACH)
+                    } else if ny < rows_own.end {
+                        (&*self.own, rows_own.start)
+                    } else {
+                        (edges[1], rows_own.end)
+                    };
+                    let start = windows.start(first);
+                    &beliefs[windows.start(ny) - start..windows.start(ny + 1) - start]
                 });
-                let messages = &mut self.messages[(y - self.first) * cells * slots..][..cells * slots];
+                let here = windows.start(y) - windows.start(rows.start);
+                let length = windows.start(y + 1) - windows.start(y);
+                let messages = &mut self.messages[slots * here..][..slots * length];
                 if initial {
                     messages.fill(U::default());
                 }
-                dependency::row(plan, level, summands.graph, y, &around, messages, &mut scratch);
+                dependency::row(factors, y, &around, messages, &mut scratch);
             }
             // All factors of this row's pixels have sent their messages.
-            if let Some(done) = y.checked_sub(REACH).filter(|done| (self.first_own..end_own).contains(done)) {
-                let belief = &mut self.own[(done - self.first_own) * cells..][..cells];
-                belief::row(summands, done, self.first, Some(&*self.messages), belief);
+            if let Some(done) = y.checked_sub(REACH).filter(|done| rows_own.contains(done)) {
+                let start = windows.start(rows_own.start);
+                let belief = &mut self.own[windows.start(done) - start..windows.start(done + 1) - start];
+                belief::row(summands, done, rows.start, Some(&*self.messages), belief);
             }
         }
     }

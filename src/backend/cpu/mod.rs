@@ -5,6 +5,7 @@ mod pages;
 mod probe;
 mod units;
 mod volumes;
+mod windows;
 
 use super::probe::Probe;
 use super::{Backend, Map, Requests, Stage, Ticket, Traffic};

@@ -2,12 +2,14 @@
 
 use super::units::Units;
 use super::volumes::Volumes;
+use super::windows::{Window, Windows};
 use super::{Cpu, on_volumes};
 use crate::backend::Map;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::error::Result;
 use crate::image::Plane;
+use crate::plan::LevelPlan;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::mem;
@@ -45,6 +47,15 @@ impl Probe for Cpu {
 
     fn write(&mut self, volume: Volume, values: &[u32]) -> Result<()> {
         on_volumes!(self, v => v.write(volume, values));
+        Ok(())
+    }
+
+    fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
+        Ok(on_volumes!(self, v => v.levels[level].windows.to_plane()))
+    }
+
+    fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
+        on_volumes!(self, v => v.levels[level].windows = Windows::new(&v.plan.levels[level], windows));
         Ok(())
     }
 
@@ -90,44 +101,99 @@ impl<U: Units> Volumes<U> {
 
     fn read(&self, volume: Volume) -> Vec<u32> {
         let (rows, labels, stride) = volume_shape(&self.plan, volume);
+        let z = volume.level();
+        let (l, [dependency, resolution]) =
+            (&self.levels[z], [self.plan.dependency, self.plan.resolution].map(|cut| u32::from(cut.tau)));
         match volume {
             Volume::Cost(0) => gather(&self.fine_cost, labels, stride),
-            Volume::Cost(z) => gather(&self.levels[z].cost, labels, stride),
-            Volume::Evidence(z) => gather(&self.levels[z].evidence, labels, stride),
-            Volume::Dependency(z) if self.levels[z].dependency_sent => {
-                gather(&self.levels[z].dependency, labels, stride)
+            Volume::Cost(_) => gather(&l.cost, labels, stride),
+            Volume::Evidence(_) => self.gather_windows(z, &l.evidence, 1, u8::MAX.into()),
+            Volume::Dependency(_) if l.dependency_sent => {
+                self.gather_windows(z, &l.dependency, l.graph.slots(), dependency)
             }
-            Volume::Down(z) if self.levels[z + 1].resolution_sent => {
-                gather(&self.levels[z].down, labels, stride)
+            Volume::Down(_) if self.levels[z + 1].resolution_sent => {
+                self.gather_windows(z, &l.down, 1, resolution)
             }
-            Volume::Up(z) if self.levels[z].resolution_sent => gather(&self.levels[z].up, labels, stride),
+            Volume::Up(_) if l.resolution_sent => self.gather_windows(z, &l.up, 1, resolution),
             Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => vec![0; rows * labels],
-            Volume::Belief(z) => gather(&self.levels[z].belief, labels, stride),
+            Volume::Belief(_) => self.gather_windows(z, &l.belief, 1, U::MOST.into()),
         }
     }
 
+    /// The rows of a volume of level `z`, with `outside` at labels that a pixel does not have.
+    fn gather_windows<T: Copy + Into<u32>>(
+        &self,
+        z: usize,
+        data: &[T],
+        slots: usize,
+        outside: u32,
+    ) -> Vec<u32> {
+        let (l, windows) = (&self.plan.levels[z], &self.levels[z].windows);
+        let mut out = vec![outside; l.pixels() * slots * l.labels];
+        let mut rows = out.chunks_exact_mut(l.labels);
+        each_row(l, windows, slots, |window, at| {
+            let out = rows.next().expect("a row a slot");
+            for (out, &value) in out[window.range()].iter_mut().zip(&data[at..]) {
+                *out = value.into();
+            }
+        });
+        out
+    }
+
     fn write(&mut self, volume: Volume, values: &[u32]) {
-        let rows = PaddedRows::new(&self.plan, volume, values);
         let z = volume.level();
         match volume {
-            Volume::Cost(0) => rows.fill(&mut self.fine_cost, |v| v as u8),
-            Volume::Cost(_) => rows.fill(&mut self.levels[z].cost, |v| v as u16),
-            Volume::Evidence(_) => rows.fill(&mut self.levels[z].evidence, |v| v as u8),
-            Volume::Dependency(_) => {
-                self.levels[z].dependency_sent = true;
-                rows.fill(&mut self.levels[z].dependency, U::of);
+            Volume::Dependency(_) => self.levels[z].dependency_sent = true,
+            Volume::Down(_) => self.store_resolution(z + 1),
+            Volume::Up(_) => self.store_resolution(z),
+            _ => {}
+        }
+        let padded = || PaddedRows::new(&self.plan, volume, values);
+        let (plan, l) = (&self.plan.levels[z], &mut self.levels[z]);
+        match volume {
+            Volume::Cost(0) => padded().fill(&mut self.fine_cost, |v| v as u8),
+            Volume::Cost(_) => padded().fill(&mut l.cost, |v| v as u16),
+            Volume::Evidence(_) => {
+                scatter(plan, &l.windows, (1, u8::MAX), values, |v| v as u8, &mut l.evidence)
             }
-            Volume::Down(_) => {
-                self.store_resolution(z + 1);
-                rows.fill(&mut self.levels[z].down, U::of);
+            Volume::Belief(_) => scatter(plan, &l.windows, (1, U::MOST), values, U::of, &mut l.belief),
+            Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => {
+                let (slots, messages) = match volume {
+                    Volume::Dependency(_) => (l.graph.slots(), &mut l.dependency),
+                    Volume::Down(_) => (1, &mut l.down),
+                    _ => (1, &mut l.up),
+                };
+                scatter(plan, &l.windows, (slots, U::default()), values, U::of, messages);
             }
-            Volume::Up(_) => {
-                self.store_resolution(z);
-                rows.fill(&mut self.levels[z].up, U::of);
-            }
-            Volume::Belief(_) => rows.fill(&mut self.levels[z].belief, U::of),
         }
     }
+}
+
+/// Calls `with` for every slot of every pixel, with the pixel's window and where the cells of the slot start.
+fn each_row(level: &LevelPlan, windows: &Windows, slots: usize, mut with: impl FnMut(&Window, usize)) {
+    for (x, y) in (0..level.height).flat_map(|y| (0..level.width).map(move |x| (x, y))) {
+        let window = windows.of(x, y);
+        let start = slots * (windows.start(y) + window.at(x));
+        (0..slots).for_each(|slot| with(window, start + slot * window.stride));
+    }
+}
+
+/// Writes the rows `values` of a level, `slots` a pixel, to a volume, and `padding` after them.
+fn scatter<T: Copy>(
+    level: &LevelPlan,
+    windows: &Windows,
+    (slots, padding): (usize, T),
+    values: &[u32],
+    convert: impl Fn(u32) -> T,
+    data: &mut [T],
+) {
+    let mut rows = values.chunks_exact(level.labels);
+    each_row(level, windows, slots, |window, at| {
+        let row = &rows.next().expect("a row a slot")[window.range()];
+        let (cells, after) = data[at..][..window.stride].split_at_mut(row.len());
+        cells.iter_mut().zip(row).for_each(|(cell, &value)| *cell = convert(value));
+        after.fill(padding);
+    });
 }
 
 /// The rows of a padded volume, without their padding.

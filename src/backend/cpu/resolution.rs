@@ -6,22 +6,24 @@ use super::units::{
     Blocks, Truncating, Units, block, block_mut, each_lane, keep_least, least_of, padding, smallest,
 };
 use super::volumes::{Level, Volumes};
+use super::windows::Window;
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::mem;
 
 struct Scratch<U> {
-    /// q of the parent, by coarse label.
+    /// First label and number of cells of the parent's window and of the children's; what lies outside them is infinite in
+    /// `child` and `fine`.
+    windows: Option<[(usize, usize); 2]>,
+    /// q of the parent, by label of its window.
     parent: Vec<U>,
-    /// q of each child, padded with infinity: the fine label that agrees best with coarse label z is at 2 z +
-    /// 1.
+    /// q of each child: the fine label that agrees best with label z of the parent's window is at `margin` + 2 z + 1.
     child: [Vec<U>; 4],
-    /// U of each child, \[child\]\[coarse label\]; 0 for a child outside the image.
+    /// U of each child, \[child\]\[label of the parent's window\]; 0 for a child outside the image.
     best: [Vec<U>; 4],
     /// The message to the parent before its truncation, and t of each child followed by an infinite value.
     sums: [Vec<U>; 5],
-    /// The message to each child before its truncation; the fine label that agrees best with coarse label z
-    /// is at 2 z.
+    /// The message to each child before its truncation; the fine label that agrees best with label z is at `margin` + 2 z.
     fine: [Vec<U>; 4],
 }
 
@@ -31,8 +33,8 @@ struct Between<U> {
     interpolating: bool,
     /// Fine label 2 z - `lead` agrees best with coarse label z; 0 or 1.
     lead: usize,
-    fine_stride: usize,
-    coarse_stride: usize,
+    /// Cells before the parent's window, enough for every window of a child.
+    margin: usize,
     fine_padding: Vec<U>,
     coarse_padding: Vec<U>,
 }
@@ -40,8 +42,9 @@ struct Between<U> {
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let plan = &v.plan;
     let (finer, coarser) = v.levels.split_at_mut(level);
-    let (Level { belief: fine_belief, down, .. }, coarse) = (&mut finer[level - 1], &mut coarser[0]);
-    let Level { belief: coarse_belief, up, resolution_sent, .. } = coarse;
+    let (Level { belief: fine_belief, down, windows: fine_windows, .. }, coarse) =
+        (&mut finer[level - 1], &mut coarser[0]);
+    let Level { belief: coarse_belief, up, resolution_sent, windows, .. } = coarse;
     // The first messages count as 0, whatever is stored.
     let initial = !mem::replace(resolution_sent, true);
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
@@ -49,25 +52,22 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
         cut: plan.resolution,
         interpolating: plan.interpolating(),
         lead: plan.label_offset(level).unsigned_abs() as usize,
-        fine_stride: fl.stride,
-        coarse_stride: cl.stride,
+        margin: 2 * cl.stride,
         fine_padding: padding(fl.labels, fl.stride),
         coarse_padding: padding(cl.labels, cl.stride),
     };
-    let rows = up
-        .par_chunks_mut(cl.width * cl.stride)
-        .zip(down.par_chunks_mut(2 * fl.width * fl.stride))
-        .enumerate();
+    let rows = windows.rows_mut(up, 1, 1).into_par_iter().zip(fine_windows.rows_mut(down, 1, 2)).enumerate();
     rows.for_each_init(
         || {
-            let coarse = || vec![U::MOST; cl.stride + 1];
+            let infinite = |n: usize| vec![U::MOST; n];
+            let fine = || infinite(between.margin + 2 * cl.stride + fl.stride + 4);
             Scratch {
-                parent: vec![U::MOST; cl.stride],
-                // Long enough for the padding of both levels.
-                child: [(); 4].map(|()| vec![U::MOST; (2 * cl.stride).max(fl.stride) + 4]),
-                best: [(); 4].map(|()| vec![U::MOST; cl.stride]),
-                sums: [(); 5].map(|()| coarse()),
-                fine: [(); 4].map(|()| vec![U::MOST; (2 * cl.stride).max(fl.stride) + 2]),
+                windows: None,
+                parent: infinite(cl.stride),
+                child: [(); 4].map(|()| fine()),
+                best: [(); 4].map(|()| infinite(cl.stride)),
+                sums: [(); 5].map(|()| infinite(cl.stride + 1)),
+                fine: [(); 4].map(|()| fine()),
             }
         },
         |scratch, (y, (up, down))| {
@@ -75,39 +75,62 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
                 up.fill(U::default());
                 down.fill(U::default());
             }
-            let coarse = coarse_belief[y * cl.width * cl.stride..].chunks_exact(cl.stride);
-            let fine = &fine_belief[2 * y * fl.width * fl.stride..];
-            for (x, (up, belief)) in up.chunks_exact_mut(cl.stride).zip(coarse).enumerate() {
-                // The position of each child in the rows of this factor.
+            let coarse = windows.row_of(coarse_belief, y);
+            let start = fine_windows.start(2 * y);
+            let fine = &fine_belief[start..][..down.len()];
+            for x in 0..cl.width {
+                // All children share a window.
+                let (own, theirs) = (windows.of(x, y), fine_windows.of(2 * x, 2 * y));
                 let children = [0, 1, 2, 3].map(|c| {
-                    let (fx, j) = (2 * x + c % 2, c / 2);
-                    let inside = fx < fl.width && 2 * y + j < fl.height;
-                    inside.then_some((j * fl.width + fx) * fl.stride)
+                    let (fx, fy) = (2 * x + c % 2, 2 * y + c / 2);
+                    let inside = fx < fl.width && fy < fl.height;
+                    inside.then(|| fine_windows.start(fy) - start + theirs.at(fx))
                 });
-                factor(&between, children, fine, belief, down, up, scratch);
+                let (at, stride) = (own.at(x), own.stride);
+                let (up, belief) = (&mut up[at..][..stride], &coarse[at..][..stride]);
+                factor(&between, [own, theirs], children, fine, belief, down, up, scratch);
             }
         },
     );
 }
 
+/// The messages of the factor between a pixel and its children, whose windows are `own` and `theirs`; `children` says where
+/// the cells of each start.
 #[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "volumes of both levels")]
 fn factor<U: Units>(
     between: &Between<U>,
+    [own, theirs]: [&Window; 2],
     children: [Option<usize>; 4],
     fine_belief: &[U],
     coarse_belief: &[U],
     down: &mut [U],
     up: &mut [U],
-    Scratch { parent, child, best, sums, fine }: &mut Scratch<U>,
+    Scratch { windows, parent, child, best, sums, fine }: &mut Scratch<U>,
 ) {
-    let Between { cut, interpolating, lead, fine_stride, coarse_stride, .. } = *between;
-    variable_message(coarse_belief, up, parent, &between.coarse_padding, cut);
+    let Between { cut, interpolating, lead, margin, .. } = *between;
+    let coarse_padding = &between.coarse_padding[own.first..][..own.stride];
+    let fine_padding = &between.fine_padding[theirs.first..][..theirs.stride];
+    let places = Some([(own.first, own.stride), (theirs.first, theirs.stride)]);
+    if *windows != places {
+        *windows = places;
+        for infinite in child.iter_mut().chain(fine.iter_mut()) {
+            infinite.fill(U::MOST);
+        }
+        for sums in sums.iter_mut() {
+            sums[own.stride] = U::MOST;
+        }
+    }
+    // Where the children's first label is in `fine`.
+    let first = margin + theirs.first + lead - 2 * own.first;
+    let parent = &mut parent[..own.stride];
+    variable_message(coarse_belief, up, parent, coarse_padding, cut);
     // Values written at one alignment and read at another go through memory, so everything is written before
     // it is read.
     for (place, child) in children.into_iter().zip(child.iter_mut()) {
         if let Some(at) = place {
-            let (belief, old) = (&fine_belief[at..][..fine_stride], &down[at..][..fine_stride]);
-            variable_message(belief, old, &mut child[1 + lead..][..fine_stride], &between.fine_padding, cut);
+            let (belief, old) = (&fine_belief[at..][..theirs.stride], &down[at..][..theirs.stride]);
+            variable_message(belief, old, &mut child[1 + first..][..theirs.stride], fine_padding, cut);
         }
     }
     for ((place, child), best) in children.into_iter().zip(child.iter()).zip(best.iter_mut()) {
@@ -115,15 +138,16 @@ fn factor<U: Units>(
             best.fill(U::default());
             continue;
         }
-        for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
-            agreeing(block(child, 2 * z), interpolating, block_mut(best, z));
+        for z in (0..own.stride).step_by(LABEL_BLOCK) {
+            agreeing(block(child, margin + 2 * z), interpolating, block_mut(best, z));
         }
     }
     // Saturated sums cannot be undone by subtraction, so each sum is taken over the others.
     let mut least = [U::MOST; LABEL_BLOCK];
-    for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
+    for z in (0..own.stride).step_by(LABEL_BLOCK) {
         let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
         let parent = *block::<U, LABEL_BLOCK>(parent, z);
+        let padding = block::<U, LABEL_BLOCK>(coarse_padding, z);
         let add =
             |a: [U; LABEL_BLOCK], b: [U; LABEL_BLOCK]| -> [U; LABEL_BLOCK] { each_lane(|i| a[i].plus(b[i])) };
         let (upper, lower) = (add(u0, u1), add(u2, u3));
@@ -135,32 +159,33 @@ fn factor<U: Units>(
             add(u3, with_upper),
             add(u2, with_upper),
         ];
-        keep_least(&mut least, &all[0]);
+        keep_least(&mut least, &each_lane::<U, LABEL_BLOCK>(|i| all[0][i] | padding[i]));
         for (sums, all) in sums.iter_mut().zip(all) {
             *block_mut(sums, z) = all;
         }
     }
-    // The padding of the sums to the parent is infinite, because everything that agrees with it is.
-    Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(coarse_stride);
+    Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(own.stride);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
-            for z in (0..coarse_stride).step_by(LABEL_BLOCK) {
-                spread(block(t, z), interpolating, block_mut(fine, 2 * z));
+            // The label below the parent's first agrees with it too.
+            fine[margin - 1] = if interpolating { t[0] } else { U::MOST };
+            for z in (0..own.stride).step_by(LABEL_BLOCK) {
+                spread(block(t, z), interpolating, block_mut(fine, margin + 2 * z));
             }
         }
     }
-    let fine = fine.each_ref().map(|fine| &fine[lead..][..fine_stride]);
+    let fine = fine.each_ref().map(|fine| &fine[first..][..theirs.stride]);
     let mut least = [[U::MOST; LABEL_BLOCK]; 4];
-    for d in (0..fine_stride).step_by(LABEL_BLOCK) {
-        let padding = block::<U, LABEL_BLOCK>(&between.fine_padding, d);
+    for d in (0..theirs.stride).step_by(LABEL_BLOCK) {
+        let padding = block::<U, LABEL_BLOCK>(fine_padding, d);
         for (least, fine) in least.iter_mut().zip(fine) {
             let sums = block::<U, LABEL_BLOCK>(fine, d);
-            keep_least(least, &each_lane::<U, LABEL_BLOCK>(|i| sums[i].max(padding[i])));
+            keep_least(least, &each_lane::<U, LABEL_BLOCK>(|i| sums[i] | padding[i]));
         }
     }
     for ((place, fine), least) in children.into_iter().zip(fine).zip(least_of(&least)) {
         let Some(at) = place else { continue };
-        Truncating::new(fine, least, cut, &mut down[at..][..fine_stride]).all(fine_stride);
+        Truncating::new(fine, least, cut, &mut down[at..][..theirs.stride]).all(theirs.stride);
     }
 }
 
@@ -195,12 +220,12 @@ fn variable_message<U: Units>(belief: &[U], message: &[U], q: &mut [U], padding:
     for at in (0..belief.len()).step_by(LABEL_BLOCK) {
         let (b, m) = (block::<U, LABEL_BLOCK>(belief, at), block::<U, LABEL_BLOCK>(message, at));
         let padding = block::<U, LABEL_BLOCK>(padding, at);
-        *block_mut(q, at) = each_lane::<U, LABEL_BLOCK>(|i| b[i].less(m[i]).max(padding[i]));
+        *block_mut(q, at) = each_lane::<U, LABEL_BLOCK>(|i| b[i].less(m[i]) | padding[i]);
     }
     if cut.rule == TruncationRule::Absolute {
         let least = smallest(q);
         for (q, &padding) in q.iter_mut().zip(padding) {
-            *q = q.less(least).max(padding);
+            *q = q.less(least) | padding;
         }
     }
 }

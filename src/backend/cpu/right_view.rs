@@ -1,24 +1,24 @@
 //! The map of the right view: see [`crate::backend::Stage::RightView`].
 
 use super::units::Units;
-use super::volumes::Volumes;
+use super::volumes::{Level, Volumes};
+use super::windows::Windows;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
-    let (plan, belief, maps) = (&v.plan, &v.levels[0].belief, &mut v.maps);
-    let level = &plan.levels[0];
-    let (width, labels, stride) = (level.width, level.labels, level.stride);
+    let (plan, maps, Level { belief, windows, .. }) = (&v.plan, &mut v.maps, &v.levels[0]);
+    let (width, labels) = (plan.levels[0].width, plan.levels[0].labels);
     let names: Vec<u32> = (0..labels as u32).collect();
     let rows =
         maps.right.data_mut().par_chunks_mut(width).zip(maps.right_best.data_mut().par_chunks_mut(width));
-    rows.zip(belief.par_chunks(width * stride)).for_each_init(
+    rows.enumerate().for_each_init(
         // By the right pixel's place from the right, so that ascending labels are side by side: belief and label of the best
         // so far, or as much as [`crate::backend::NO_LABEL`] says in both.
         || vec![u32::MAX; width],
-        |found, ((right, best), row)| {
+        |found, (y, (right, best))| {
             found.fill(u32::MAX);
-            right_row(plan, &names, row, found);
+            right_row(plan, windows, y, &names, windows.row_of(belief, y), found);
             for ((right, best), &found) in right.iter_mut().zip(best).zip(found.iter().rev()) {
                 (*right, *best) = (found as u16, (found >> 16) as u16);
             }
@@ -31,22 +31,27 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
 fn right_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,
     plan: &'a Plan,
+    windows: &'a Windows,
+    y: usize,
     names: &'a [u32],
     row: &'a [U],
     found: &'a mut [u32],
 ) {
     let level = &plan.levels[0];
-    let (width, labels) = (level.width, level.labels);
-    for (x, belief) in row.chunks_exact(level.stride).enumerate().take(plan.core.end).skip(plan.core.start) {
+    let width = level.width;
+    for x in plan.core.clone() {
+        let window = windows.of(x, y);
         // Label j of left pixel x is seen at right pixel x - min - j.
         let place = (width - 1 - x) as i64 + i64::from(level.min);
-        let first = (-place).clamp(0, labels as i64) as usize;
-        let end = (width as i64 - place).clamp(first as i64, labels as i64) as usize;
+        let labels = window.range();
+        let first = (-place).clamp(labels.start as i64, labels.end as i64) as usize;
+        let end = (width as i64 - place).clamp(first as i64, labels.end as i64) as usize;
         if first >= end {
             continue;
         }
         let seen = (place + first as i64) as usize..(place + end as i64) as usize;
-        let beliefs = belief[first..end].iter().zip(&names[first..end]);
+        let belief = &row[window.at(x) + first - window.first..][..end - first];
+        let beliefs = belief.iter().zip(&names[first..end]);
         for (found, (&b, &label)) in found[seen].iter_mut().zip(beliefs) {
             // The smallest belief, and of those the lowest label.
             let b: u32 = b.into();

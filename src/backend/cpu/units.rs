@@ -1,13 +1,27 @@
 //! Cost values in the two widths of volumes, and operations on rows of them.
 
 use crate::plan::{LABEL_BLOCK, Truncation};
+use std::ops::{BitAnd, BitOr, Not};
 
 /// A cost in units, as a volume stores it. Sums saturate, and differences stop at 0.
 pub(super) trait Units:
-    bytemuck::Pod + Default + Ord + Send + Sync + From<u8> + Into<u16> + Into<u32>
+    bytemuck::Pod
+    + Default
+    + Ord
+    + Send
+    + Sync
+    + From<u8>
+    + Into<u16>
+    + Into<u32>
+    + BitOr<Output = Self>
+    + BitAnd<Output = Self>
+    + Not<Output = Self>
 {
     /// The largest value, which stands for infinity.
     const MOST: Self;
+
+    /// A block of the largest value, one of 0, and one of the largest again.
+    const EDGE: &'static [Self; 3 * LABEL_BLOCK];
 
     /// The saturating sum.
     fn plus(self, other: Self) -> Self;
@@ -30,6 +44,16 @@ macro_rules! units {
     ($type:ty, $word:ty) => {
         impl Units for $type {
             const MOST: Self = Self::MAX;
+
+            const EDGE: &'static [Self; 3 * LABEL_BLOCK] = &{
+                let mut edge = [Self::MAX; 3 * LABEL_BLOCK];
+                let mut i = LABEL_BLOCK;
+                while i < 2 * LABEL_BLOCK {
+                    edge[i] = 0;
+                    i += 1;
+                }
+                edge
+            };
 
             #[inline(always)]
             fn plus(self, other: Self) -> Self {
@@ -162,7 +186,7 @@ pub(super) struct Truncating<'a, U> {
 impl<'a, U: Units> Truncating<'a, U> {
     #[inline(always)]
     pub(super) fn new(sums: &'a [U], least: U, cut: Truncation, out: &'a mut [U]) -> Self {
-        let (high, low) = cut.bounds(least.into());
+        let (high, low) = cut.bounds(least.into(), U::MOST.into());
         Self { sums, high: U::of(high), low: U::of(low), out }
     }
 }

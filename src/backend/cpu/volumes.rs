@@ -3,6 +3,7 @@
 use super::finest::Finest;
 use super::pages::Pages;
 use super::units::Units;
+use super::windows::Windows;
 use crate::error::Result;
 use crate::front::Prepared;
 use crate::graph::LevelGraph;
@@ -25,9 +26,11 @@ pub(super) struct Volumes<U> {
     pub(super) maps: Finest,
 }
 
-/// Volumes of one level, each \[y\]\[x\]\[slot\]\[label\] with padded labels.
+/// Volumes of one level. Cost is \[y\]\[x\]\[label\] with padded labels; the others hold the labels of the `windows` alone,
+/// within memory for all of them, which the system gives where it is used.
 pub(super) struct Level<U> {
     pub(super) graph: LevelGraph,
+    pub(super) windows: Windows,
     /// In 1/256 cost units; empty at level 0.
     pub(super) cost: Pages<u16>,
     pub(super) evidence: Pages<u8>,
@@ -54,9 +57,10 @@ impl<U: Units> Volumes<U> {
             .enumerate()
             .map(|(z, graph)| {
                 let level = &plan.levels[z];
-                let cells = level.pixels() * level.stride;
+                let cells = Windows::most_cells(level);
                 Ok(Level {
-                    cost: Pages::new(if z == 0 { 0 } else { cells })?,
+                    windows: Windows::full(level),
+                    cost: Pages::new(if z == 0 { 0 } else { level.pixels() * level.stride })?,
                     evidence: Pages::new(cells)?,
                     dependency: Pages::new(cells * graph.slots())?,
                     dependency_sent: false,
@@ -95,8 +99,9 @@ impl<U: Units> Volumes<U> {
         self.plan = plan.clone();
         (self.pair, self.label_ranges) = (pair, label_ranges);
         self.labels.fill(0);
-        for (level, graph) in self.levels.iter_mut().zip(graphs) {
-            (level.graph, level.dependency_sent, level.resolution_sent) = (graph, false, false);
+        for ((level, graph), l) in self.levels.iter_mut().zip(graphs).zip(&plan.levels) {
+            (level.graph, level.windows) = (graph, Windows::full(l));
+            (level.dependency_sent, level.resolution_sent) = (false, false);
         }
     }
 }

@@ -2,30 +2,33 @@
 
 use super::finest::Optimum;
 use super::units::{Units, argmin, smallest};
-use super::volumes::Volumes;
-use crate::plan::LevelPlan;
+use super::volumes::{Level, Volumes};
+use super::windows::Windows;
 use rayon::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
-    let (level, belief, maps) = (&v.plan.levels[0], &v.levels[0].belief, &mut v.maps);
-    let optima = maps.optima.data_mut().par_chunks_mut(level.width);
-    optima
-        .zip(belief.par_chunks_exact(level.width * level.stride))
-        .for_each(|(optima, beliefs)| optimum_row(level, beliefs, optima));
+    let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);
+    let optima = v.maps.optima.data_mut().par_chunks_mut(width);
+    optima.enumerate().for_each(|(y, optima)| optimum_row(windows, y, windows.row_of(belief, y), optima));
 }
 
 #[pulp::with_simd(optimum_row = pulp::Arch::new())]
 #[inline(always)]
 fn optimum_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,
-    level: &'a LevelPlan,
+    windows: &'a Windows,
+    y: usize,
     beliefs: &'a [U],
     optima: &'a mut [Optimum],
 ) {
-    for (optimum, belief) in optima.iter_mut().zip(beliefs.chunks_exact(level.stride)) {
-        *optimum = optimum_of(&belief[..level.labels]);
+    for (x, optimum) in optima.iter_mut().enumerate() {
+        let window = windows.of(x, y);
+        *optimum = optimum_of(&beliefs[window.at(x)..][..window.labels]);
+        optimum.label += window.first as u16;
     }
 }
+
+/// The optimum of the beliefs of one window, its label counted from the first.
 
 #[inline(always)]
 fn optimum_of<U: Units>(belief: &[U]) -> Optimum {

@@ -49,6 +49,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
             (5, messages(rows, &here.down, level + 1 < plan.levels.len())),
             (6, messages(rows, &here.up, level > 0)),
             (7, here.belief.bind(rows)),
+            (8, Binding::whole(&here.windows)),
         ]
     })?;
     r.renew(&here.belief);

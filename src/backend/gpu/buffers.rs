@@ -187,6 +187,10 @@ pub(super) struct LevelBuffers {
     pub(super) down: Rows,
     pub(super) up: Rows,
     pub(super) belief: Rows,
+    /// Label windows, first label | number of labels with padding << 16.
+    pub(super) windows: wgpu::Buffer,
+    /// Label with the smallest belief of each pixel, for the windows of the next finer level.
+    pub(super) winners: Rows,
     /// First and last label of each pixel; empty where all labels are allowed.
     pub(super) label_range: Rows,
     pub(super) members: Rows,
@@ -318,6 +322,8 @@ impl Buffers {
                 down: a.rows("messages from above", values, if z == last { &none } else { &starts })?,
                 up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
                 belief: a.rows("belief", values, &starts)?,
+                windows: a.buffer("label windows", (level.windows().0 * level.windows().1) as u64)?,
+                winners: a.rows("winners", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
                 label_range: a.rows(
                     "label ranges",
                     p.pixel_pitch,

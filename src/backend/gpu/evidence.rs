@@ -2,6 +2,7 @@
 //!
 //! Floor, a label: 3 bytes moved, 4 asked for (the costs twice, for their minimum), 25 operations for four.
 
+use super::buffers::Binding;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
@@ -31,7 +32,12 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         cap: scale.cap.into(),
     };
     r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
-        vec![(1, here.cost.bind(rows)), (2, here.evidence.bind(rows)), (3, here.belief.bind(rows))]
+        vec![
+            (1, here.cost.bind(rows)),
+            (2, here.evidence.bind(rows)),
+            (3, here.belief.bind(rows)),
+            (4, Binding::whole(&here.windows)),
+        ]
     })?;
     r.renew(&here.belief);
     Ok(())

@@ -36,7 +36,7 @@ pub use steps::{Job, MAX_LOOP_ITERATIONS};
 use steps::{Pipelines, Recorder, Step};
 use timer::{PASSES_PER_SUBMIT, Timer};
 pub use uniform::UniformLayout;
-use upload::{image_words, label_range_words, member_words, transposed};
+use upload::{image_words, label_range_words, member_words, transposed, window_words};
 
 macro_rules! declare {
     (
@@ -247,8 +247,15 @@ impl Gpu {
         ] {
             device.write(buffer, bytemuck::cast_slice(&weights.words()))?;
         }
-        for (level, ranges) in buffers.levels.iter().zip(&prepared.label_ranges) {
-            level.label_range.write(device, &label_range_words(ranges, &level.params))?;
+        for (z, (level, l)) in buffers.levels.iter().zip(&plan.levels).enumerate() {
+            let (runs, rows) = l.windows();
+            let windows = window_words(&Plane::filled(runs, rows, [0, l.stride as u16]));
+            device.write(&level.windows, bytemuck::cast_slice(&windows))?;
+            if plan.limits_labels() {
+                let all = || Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]);
+                let ranges = prepared.label_ranges.get(z).cloned().unwrap_or_else(all);
+                level.label_range.write(device, &label_range_words(&ranges, &level.params))?;
+            }
         }
         for (level, graph) in buffers.levels.iter_mut().zip(&prepared.graphs) {
             level.members.write(device, &member_words(graph, &level.params))?;

@@ -2,6 +2,7 @@
 
 use super::Gpu;
 use super::buffers::Rows;
+use super::upload::window_words;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::backend::{Backend, Map};
@@ -50,6 +51,21 @@ impl Probe for Gpu {
             }
         }
         buffer.write(&mut self.device, &words)
+    }
+
+    fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
+        let (runs, rows) = self.state().plan.levels[level].windows();
+        let buffer = self.state().buffers.levels[level].windows.clone();
+        let requested = self.request(&[(buffer, 0..4 * (runs * rows) as u64)])?;
+        let words = self.device.collect(requested)?.remove(0);
+        let windows = words.into_iter().map(|word| [word as u16, (word >> 16) as u16]).collect();
+        Ok(Plane::new(runs, rows, windows))
+    }
+
+    fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
+        self.submit()?;
+        let buffer = self.state().buffers.levels[level].windows.clone();
+        self.device.write(&buffer, bytemuck::cast_slice(&window_words(windows)))
     }
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {

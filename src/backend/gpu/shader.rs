@@ -2,7 +2,7 @@
 //! from Rust.
 
 use crate::maps::{FRACTION, flag};
-use crate::plan::VolumeWidth;
+use crate::plan::{VolumeWidth, WINDOW_RUN};
 use crate::weights::MEDIAN_WEIGHT;
 use std::fmt::Write;
 
@@ -10,12 +10,13 @@ use std::fmt::Write;
 pub(super) const WORKGROUP: u32 = 64;
 
 /// The shared parts, by their names in `#import` lines.
-const SHARED: [(&str, &str); 6] = [
+const SHARED: [(&str, &str); 7] = [
     ("band", include_str!("../../../shaders/shared/band.wgsl")),
     ("image", include_str!("../../../shaders/shared/image.wgsl")),
     ("maps", include_str!("../../../shaders/shared/maps.wgsl")),
     ("messages", include_str!("../../../shaders/shared/messages.wgsl")),
     ("volume", include_str!("../../../shaders/shared/volume.wgsl")),
+    ("windows", include_str!("../../../shaders/shared/windows.wgsl")),
     ("weighted_median", include_str!("../../../shaders/shared/weighted_median.wgsl")),
 ];
 /// The base of `messages`, by the width of messages and beliefs.
@@ -69,6 +70,7 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
             let flags = flags.map(|(name, bits)| (name, u32::from(bits).into()));
             flags.into_iter().chain([("FRACTION", FRACTION.into())]).collect()
         }
+        "windows" => vec![("WINDOW_RUN", (WINDOW_RUN as u32).into())],
         "weighted_median" => vec![("MEDIAN_WEIGHT", u32::from(MEDIAN_WEIGHT).into())],
         _ => Vec::new(),
     }

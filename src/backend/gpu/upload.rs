@@ -46,20 +46,14 @@ pub(super) struct Incoming {
 }
 
 pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> Incoming {
-    let (width, slots, pitch) = (graph.width(), graph.slots(), params.starts_pitch as usize);
+    let (width, pitch) = (graph.width(), params.starts_pitch as usize);
     let mut starts = vec![0; pitch * graph.height()];
     let mut entries = Vec::with_capacity(graph.incoming().len() + ALIGN_WORDS * graph.height());
     let mut rows = vec![0];
     for (y, starts) in starts.chunks_exact_mut(pitch).enumerate() {
         for (x, start) in starts[..width].iter_mut().enumerate() {
             *start = entries.len() as u32;
-            for &entry in graph.incoming_of(y * width + x) {
-                let (factor, slot) = (entry as usize / slots, entry as usize % slots);
-                // From the pixel to the factor: the opposite of the offset from the factor to its member.
-                let dx = (factor % width) as i32 - x as i32;
-                let dy = (factor / width) as i32 - y as i32;
-                entries.push((dx + 3) as u32 | ((dy + 3) as u32) << 3 | (slot as u32) << 6);
-            }
+            entries.extend(graph.incoming_of(y * width + x).iter().map(|entry| u32::from(entry.bits())));
         }
         starts[width] = entries.len() as u32;
         entries.resize(entries.len().next_multiple_of(ALIGN_WORDS), 0);
@@ -78,4 +72,9 @@ pub(super) fn label_range_words(label_ranges: &Plane<[u16; 2]>, params: &LevelPa
         }
     }
     words
+}
+
+/// Label windows, first label | number of labels with padding << 16.
+pub(super) fn window_words(windows: &Plane<[u16; 2]>) -> Vec<u32> {
+    windows.data().iter().map(|&[first, count]| u32::from(first) | u32::from(count) << 16).collect()
 }

@@ -1,6 +1,7 @@
 use super::{members, most};
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
+use std::ops::Range;
 
 /// The largest belief: one message below the largest value.
 pub fn belief_most(plan: &Plan) -> u32 {
@@ -12,26 +13,29 @@ pub fn belief(
     plan: &Plan,
     level: usize,
     graph: &LevelGraph,
+    has: &[Range<usize>],
     evidence: &[u32],
     dependency: &[u32],
     down: &[u32],
     up: &[u32],
 ) -> Vec<u32> {
     let labels = plan.levels[level].labels;
+    let is_label = |i: usize| has[i / labels].contains(&(i % labels));
     let mut out = evidence.to_vec();
     for messages in [down, up] {
-        for (b, m) in out.iter_mut().zip(messages) {
-            *b += m;
+        for (i, m) in messages.iter().enumerate().filter(|(i, _)| is_label(*i)) {
+            out[i] += m;
         }
     }
     for factor in 0..graph.width() * graph.height() {
         for (slot, member) in members(graph, factor).into_iter().enumerate() {
             if let Some(pixel) = member {
-                for d in 0..labels {
+                for d in has[pixel].clone() {
                     out[pixel * labels + d] += dependency[(factor * graph.slots() + slot) * labels + d];
                 }
             }
         }
     }
-    out.into_iter().map(|sum| sum.min(belief_most(plan))).collect()
+    let value = |(i, sum): (usize, u32)| if is_label(i) { sum.min(belief_most(plan)) } else { most(plan) };
+    out.into_iter().enumerate().map(value).collect()
 }

@@ -1,24 +1,40 @@
-use super::{cut, members, most, variable_message};
+use super::{UNDEFINED, cut, members, most, variable_message};
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
+use std::ops::Range;
 
-/// New messages of the dependency factors of `level`.
-pub fn dependency(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[u32], old: &[u32]) -> Vec<u32> {
+/// New messages of the dependency factors of `level`, between pixels that have the labels `has`.
+pub fn dependency(
+    plan: &Plan,
+    level: usize,
+    graph: &LevelGraph,
+    has: &[Range<usize>],
+    belief: &[u32],
+    old: &[u32],
+) -> Vec<u32> {
     let (labels, slots) = (plan.levels[level].labels, graph.slots());
-    let mut out = vec![0; old.len()];
+    let mut out = old.to_vec();
     for factor in 0..graph.width() * graph.height() {
         let range = |slot: usize| (factor * slots + slot) * labels..(factor * slots + slot + 1) * labels;
-        // (slot, q) of each member.
+        let own = |d: usize| has[factor].contains(&d);
+        // (slot, pixel, q) of each member.
         let mut present = Vec::new();
         for (slot, member) in members(graph, factor).into_iter().enumerate() {
             if let Some(pixel) = member {
                 let b = &belief[pixel * labels..(pixel + 1) * labels];
-                present.push((slot, variable_message(b, &old[range(slot)], plan.dependency)));
+                present.push((
+                    slot,
+                    pixel,
+                    variable_message(plan, b, &old[range(slot)], own, plan.dependency),
+                ));
             }
         }
-        for (to, _) in &present {
+        if present.len() < 2 {
+            continue;
+        }
+        for (to, pixel, _) in &present {
             let mut s = vec![0; labels];
-            for (from, q) in &present {
+            for (from, _, q) in &present {
                 if from != to {
                     for d in 0..labels {
                         s[d] += q[d];
@@ -26,8 +42,27 @@ pub fn dependency(plan: &Plan, level: usize, graph: &LevelGraph, belief: &[u32],
                 }
             }
             let s: Vec<i64> = s.into_iter().map(|s: i64| s.min(most(plan).into())).collect();
-            out[range(*to)].copy_from_slice(&cut(&s, plan.dependency));
+            let both = |d: usize| own(d) && has[*pixel].contains(&d);
+            let mut message = cut(plan, &s, both, plan.dependency);
+            for d in has[*pixel].clone().filter(|&d| !own(d)) {
+                message[d] = plan.dependency.tau.into();
+            }
+            out[range(*to)].copy_from_slice(&message);
         }
     }
+    undefine(plan, level, graph, has, &mut out);
     out
+}
+
+/// Marks what is not defined in dependency messages: labels that a member does not have, and in slots that no messages
+/// come from, those that the factor's own pixel does not have.
+pub fn undefine(plan: &Plan, level: usize, graph: &LevelGraph, has: &[Range<usize>], messages: &mut [u32]) {
+    let labels = plan.levels[level].labels;
+    for (i, row) in messages.chunks_mut(labels).enumerate() {
+        let (factor, slot) = (i / graph.slots(), i % graph.slots());
+        let to = members(graph, factor)[slot].unwrap_or(factor);
+        for d in (0..labels).filter(|d| !has[to].contains(d)) {
+            row[d] = UNDEFINED;
+        }
+    }
 }

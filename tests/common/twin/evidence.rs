@@ -1,14 +1,20 @@
+use super::{UNDEFINED, most};
 use mrfgs::low_level::plan::Plan;
+use std::ops::Range;
 
-/// Evidence of `level` from its cost.
-pub fn evidence(plan: &Plan, level: usize, cost: &[u32]) -> Vec<u32> {
+/// Evidence of `level` from its cost, for pixels that have the labels `has`.
+pub fn evidence(plan: &Plan, level: usize, has: &[Range<usize>], cost: &[u32]) -> Vec<u32> {
     let l = &plan.levels[level];
     let unit = if level == 0 { 256 } else { 1 };
     let scale = l.evidence;
     let mut out = Vec::new();
-    for pixel in cost.chunks(l.labels) {
-        let smallest = pixel.iter().map(|&c| i64::from(c) * unit).min().unwrap();
-        for &c in pixel {
+    for (pixel, has) in cost.chunks(l.labels).zip(has) {
+        let smallest = pixel[has.clone()].iter().map(|&c| i64::from(c) * unit).min().unwrap();
+        for (d, &c) in pixel.iter().enumerate() {
+            if !has.contains(&d) {
+                out.push(UNDEFINED);
+                continue;
+            }
             let difference = (i64::from(c) * unit - smallest).min(i64::from(scale.limit));
             let product = ((difference << scale.up) * i64::from(scale.multiplier)) >> 16;
             let e = (product + ((1 << scale.down) >> 1)) >> scale.down;
@@ -16,4 +22,9 @@ pub fn evidence(plan: &Plan, level: usize, cost: &[u32]) -> Vec<u32> {
         }
     }
     out
+}
+
+/// The beliefs of `level` that equal this evidence.
+pub fn beliefs(plan: &Plan, evidence: &[u32]) -> Vec<u32> {
+    evidence.iter().map(|&e| if e == UNDEFINED { most(plan) } else { e }).collect()
 }

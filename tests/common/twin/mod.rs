@@ -97,29 +97,44 @@ pub fn most(plan: &Plan) -> u32 {
     }
 }
 
-/// Truncates the sums `s` to a message.
-pub fn cut(s: &[i64], cut: Truncation) -> Vec<u32> {
-    let tau = i64::from(cut.tau);
-    let smallest = *s.iter().min().unwrap();
-    s.iter()
-        .map(|&s| match cut.rule {
-            TruncationRule::Relative => s.min(smallest + tau) - smallest,
-            TruncationRule::Absolute => s.min(tau) - smallest.min(tau),
-        })
-        .map(|m| u32::try_from(m).unwrap())
-        .collect()
+/// Stands for a value that is not defined: that of a label which a pixel does not have.
+pub const UNDEFINED: u32 = u32::MAX;
+
+/// Truncates the sums `s` to a message; `counts` says which labels count for the smallest.
+pub fn cut(plan: &Plan, s: &[i64], counts: impl Fn(usize) -> bool, cut: Truncation) -> Vec<u32> {
+    let (tau, infinite) = (i64::from(cut.tau), i64::from(most(plan)));
+    let smallest = (0..s.len()).filter(|&d| counts(d)).map(|d| s[d]).min().unwrap_or(infinite);
+    let low = smallest.min(infinite - tau);
+    let message = |d: usize| match cut.rule {
+        _ if !counts(d) => UNDEFINED,
+        TruncationRule::Relative => u32::try_from(s[d].min(low + tau) - low).unwrap(),
+        TruncationRule::Absolute => u32::try_from(s[d].min(tau)).unwrap(),
+    };
+    (0..s.len()).map(message).collect()
 }
 
-/// The message of a variable to a factor: its belief minus the factor's old message and, where truncation is
-/// absolute, minus the minimum of that.
-pub fn variable_message(belief: &[u32], old: &[u32], cut: Truncation) -> Vec<i64> {
-    let q: Vec<i64> = belief.iter().zip(old).map(|(&b, &m)| i64::from(b) - i64::from(m)).collect();
+/// The message of a variable to a factor: its belief minus the factor's old message, infinite where the belief is and,
+/// where truncation is absolute, minus its minimum over the labels that `count`.
+pub fn variable_message(
+    plan: &Plan,
+    belief: &[u32],
+    old: &[u32],
+    counts: impl Fn(usize) -> bool,
+    cut: Truncation,
+) -> Vec<i64> {
+    let infinite = i64::from(most(plan));
+    let finite = |d: usize| belief[d] != most(plan);
+    let q: Vec<i64> = (0..belief.len())
+        .map(|d| if finite(d) { i64::from(belief[d]) - i64::from(old[d]) } else { infinite })
+        .collect();
     assert!(q.iter().all(|&q| q >= 0), "a belief below a message that is part of it");
     match cut.rule {
         TruncationRule::Relative => q,
         TruncationRule::Absolute => {
-            let smallest = *q.iter().min().unwrap();
-            q.iter().map(|q| q - smallest).collect()
+            let counted = (0..q.len()).filter(|&d| counts(d) && finite(d)).map(|d| q[d]);
+            let smallest = counted.min().unwrap_or(infinite);
+            let less = |d: usize| if finite(d) { (q[d] - smallest).max(0) } else { infinite };
+            (0..q.len()).map(less).collect()
         }
     }
 }

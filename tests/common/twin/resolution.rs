@@ -1,11 +1,13 @@
 use super::{cut, most, variable_message};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Agreement;
+use std::ops::Range;
 
 /// New messages (down, up) of the resolution factors between `level` and the next finer one.
 pub fn resolution(
     plan: &Plan,
     level: usize,
+    [fine_has, coarse_has]: [&[Range<usize>]; 2],
     fine_belief: &[u32],
     coarse_belief: &[u32],
     old_down: &[u32],
@@ -21,16 +23,14 @@ pub fn resolution(
         }
     };
     let smallest = |values: &mut dyn Iterator<Item = i64>| values.min().unwrap_or(infinite);
-    let message = |s: Vec<i64>| {
-        if s.iter().all(|&s| s == infinite) { vec![0; s.len()] } else { cut(&s, plan.resolution) }
-    };
+    let message = |s: Vec<i64>, has: &Range<usize>| cut(plan, &s, |d| has.contains(&d), plan.resolution);
+    let from = |belief: &[u32], old: &[u32]| variable_message(plan, belief, old, |_| true, plan.resolution);
     let (mut down, mut up) = (old_down.to_vec(), old_up.to_vec());
     for y in 0..c.height {
         for x in 0..c.width {
             let at = (y * c.width + x) * c.labels;
             let parent = at..at + c.labels;
-            let q =
-                variable_message(&coarse_belief[parent.clone()], &old_up[parent.clone()], plan.resolution);
+            let q = from(&coarse_belief[parent.clone()], &old_up[parent.clone()]);
             let mut children = Vec::new();
             for (fx, fy) in [(2 * x, 2 * y), (2 * x + 1, 2 * y), (2 * x, 2 * y + 1), (2 * x + 1, 2 * y + 1)] {
                 if fx < f.width && fy < f.height {
@@ -41,14 +41,13 @@ pub fn resolution(
             // U of each child.
             let mut u = Vec::new();
             for child in &children {
-                let q =
-                    variable_message(&fine_belief[child.clone()], &old_down[child.clone()], plan.resolution);
+                let q = from(&fine_belief[child.clone()], &old_down[child.clone()]);
                 let best = |z| smallest(&mut (0..f.labels).filter(|&d| agree(d, z)).map(|d| q[d]));
                 u.push((0..c.labels).map(best).collect::<Vec<i64>>());
             }
             let to_parent =
                 (0..c.labels).map(|z| u.iter().map(|u| u[z]).sum::<i64>().min(infinite)).collect();
-            up[parent].copy_from_slice(&message(to_parent));
+            up[parent].copy_from_slice(&message(to_parent, &coarse_has[y * c.width + x]));
             for (i, child) in children.iter().enumerate() {
                 let others =
                     |z: usize| u.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, u)| u[z]).sum::<i64>();
@@ -56,7 +55,7 @@ pub fn resolution(
                 let to_child = (0..f.labels)
                     .map(|d| smallest(&mut (0..c.labels).filter(|&z| agree(d, z)).map(|z| t[z])))
                     .collect();
-                down[child.clone()].copy_from_slice(&message(to_child));
+                down[child.clone()].copy_from_slice(&message(to_child, &fine_has[child.start / f.labels]));
             }
         }
     }

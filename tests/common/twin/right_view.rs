@@ -1,4 +1,4 @@
-use super::Finest;
+use super::{Finest, most};
 use mrfgs::image::Plane;
 use mrfgs::low_level::backend::NO_LABEL;
 use mrfgs::low_level::plan::Plan;
@@ -14,7 +14,7 @@ pub fn right_view(plan: &Plan, belief: &[u32], maps: &mut Finest) {
             let left = x as i64 + i64::from(level.min) + d;
             if left >= plan.core.start as i64 && left < plan.core.end as i64 {
                 let b = at(left as usize, y, d);
-                if smallest.is_none_or(|(_, least)| b < least) {
+                if b < most(plan) && smallest.is_none_or(|(_, least)| b < least) {
                     smallest = Some((d as i32, b));
                 }
             }

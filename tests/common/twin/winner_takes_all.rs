@@ -1,5 +1,5 @@
-use super::Finest;
 use super::change::labels;
+use super::{Finest, most};
 use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 
@@ -11,6 +11,7 @@ pub fn winner_takes_all(plan: &Plan, belief: &[u32], maps: &mut Finest) {
     let smallest_of = |x: usize, y: usize, wanted: &dyn Fn(i64) -> bool| {
         let row = &belief[(y * width + x) * level.labels..];
         let values = (0..count).filter(|&d| wanted(d - optima[y * width + x])).map(|d| row[d as usize]);
+        let values = values.filter(|&b| b < most(plan));
         values.min().map_or(65_535, |v| v as i32)
     };
     maps.label = Plane::from_fn(width, height, |x, y| optima[y * width + x] as i32);

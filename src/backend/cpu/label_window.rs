@@ -1,0 +1,85 @@
+//! Label windows: see [`crate::backend::Stage::LabelWindow`].
+
+use super::units::{Units, argmin};
+use super::volumes::Volumes;
+use super::windows::Windows;
+use crate::image::Plane;
+use crate::plan::{LABEL_BLOCK, LevelPlan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_STEP};
+use rayon::prelude::*;
+
+pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let l = &v.plan.levels[level];
+    v.levels[level].windows = if v.plan.windows_follow_winners(level) {
+        let winners = winners(v, level + 1);
+        let offset = v.plan.label_offset(level + 1);
+        Windows::new(l, &around(l, &winners, offset))
+    } else if let Some(ranges) = v.label_ranges.get(level) {
+        Windows::new(l, &within(l, ranges))
+    } else {
+        Windows::full(l)
+    };
+}
+
+/// The label with the smallest belief of each pixel of `level`.
+fn winners<U: Units>(v: &Volumes<U>, level: usize) -> Plane<u16> {
+    let (l, here) = (&v.plan.levels[level], &v.levels[level]);
+    let mut winners = Plane::filled(l.width, l.height, 0);
+    winners.data_mut().par_chunks_mut(l.width).enumerate().for_each(|(y, row)| {
+        let belief = here.windows.row_of(&here.belief, y);
+        for (x, winner) in row.iter_mut().enumerate() {
+            let window = here.windows.of(x, y);
+            *winner = (window.first + argmin(&belief[window.at(x)..][..window.labels]).0) as u16;
+        }
+    });
+    winners
+}
+
+/// The windows around `winners` of the next coarser level; winner z means label 2 z + `offset`.
+fn around(level: &LevelPlan, winners: &Plane<u16>, offset: i32) -> Plane<[u16; 2]> {
+    let (width, height) = winners.size();
+    let (runs, rows) = level.windows();
+    let mut windows = Plane::filled(runs, rows, [0; 2]);
+    windows.data_mut().par_chunks_mut(runs).enumerate().for_each_init(
+        // Smallest and largest winner of each column, over all rows that are near.
+        || vec![(0, 0); width],
+        |columns, (y, windows)| {
+            columns.fill((u16::MAX, 0));
+            for y in y.saturating_sub(WINDOW_REACH)..(y + WINDOW_REACH + 1).min(height) {
+                for ((least, most), &winner) in columns.iter_mut().zip(winners.row(y)) {
+                    (*least, *most) = ((*least).min(winner), (*most).max(winner));
+                }
+            }
+            for (run, window) in windows.iter_mut().enumerate() {
+                let x = run * WINDOW_RUN / 2;
+                let near = x.saturating_sub(WINDOW_REACH)..(x + WINDOW_RUN / 2 + WINDOW_REACH).min(width);
+                let least = columns[near.clone()].iter().map(|c| c.0).min().unwrap_or(0);
+                let most = columns[near].iter().map(|c| c.1).max().unwrap_or(0);
+                let label = |winner: u16| 2 * i32::from(winner) + offset;
+                *window = holding(level, label(least) - WINDOW_MARGIN, label(most) + WINDOW_MARGIN);
+            }
+        },
+    );
+    windows
+}
+
+/// The windows that hold the label ranges of their pixels.
+fn within(level: &LevelPlan, ranges: &Plane<[u16; 2]>) -> Plane<[u16; 2]> {
+    let (runs, rows) = level.windows();
+    Plane::from_fn(runs, rows, |run, row| {
+        let rows = 2 * row..(2 * row + 2).min(level.height);
+        let columns = run * WINDOW_RUN..((run + 1) * WINDOW_RUN).min(level.width);
+        let pixels = || rows.clone().flat_map(|y| &ranges.row(y)[columns.clone()]);
+        let least = pixels().map(|range| range[0]).min().unwrap_or(0);
+        let most = pixels().map(|range| range[1]).max().unwrap_or(0);
+        holding(level, least.into(), most.into())
+    })
+}
+
+/// First label and number of cells of the window that holds the labels from `least` to `most`.
+fn holding(level: &LevelPlan, least: i32, most: i32) -> [u16; 2] {
+    let last = level.labels as i32 - 1;
+    let (least, most) = (least.clamp(0, last) as usize, most.clamp(0, last) as usize);
+    let first = least / WINDOW_STEP * WINDOW_STEP;
+    let stride = (most + 1 - first).next_multiple_of(LABEL_BLOCK);
+    [first.min(level.stride - stride) as u16, stride as u16]
+}

@@ -1,0 +1,71 @@
+//! Label windows: see [`Stage::LabelWindow`](crate::backend::Stage::LabelWindow).
+//!
+//! Windows that hold all labels are written with the pair.
+
+use super::buffers::{Binding, HALO, with_halo};
+use super::shader::Kernel;
+use super::steps::{Job, Recorder};
+use super::uniform::uniform;
+use crate::error::Result;
+use crate::plan::{LABEL_BLOCK, Plan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_STEP};
+
+const SHADER: &str = include_str!("../../../shaders/label_window.wgsl");
+
+uniform! { runs: u32, labels: u32, stride: u32, label_offset: i32 }
+
+pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
+    let kernel = |entry, reach: u32| {
+        Kernel::new("label_window", entry, SHADER)
+            .of_width(plan.volume_width)
+            .with("WINDOW_RUN", WINDOW_RUN as u32)
+            .with("WINDOW_STEP", WINDOW_STEP as u32)
+            .with("LABEL_BLOCK", LABEL_BLOCK as u32)
+            .with("MARGIN", WINDOW_MARGIN)
+            .with("REACH", reach)
+    };
+    if plan.windows_follow_winners(level) {
+        let quads = plan.levels[level + 1].quads();
+        let pixels = (2 * WINDOW_REACH + 1) * (2 * WINDOW_REACH + WINDOW_RUN / 2 + 1);
+        let reach = WINDOW_REACH as u32;
+        vec![
+            Job::new::<Uniform>(kernel("winners", reach), quads),
+            Job::new::<Uniform>(kernel("around", reach), pixels),
+        ]
+    } else if plan.limits_labels() {
+        vec![Job::new::<Uniform>(kernel("within", HALO), 2 * (WINDOW_RUN + 1))]
+    } else {
+        Vec::new()
+    }
+}
+
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (level, here) = (r.level, r.here());
+    let l = &r.plan.levels[level];
+    let runs = l.windows().0 as u32;
+    let own = |label_offset| Uniform { runs, labels: l.labels as u32, stride: l.stride as u32, label_offset };
+    let windows = Binding::whole(&here.windows);
+    match &jobs(r.plan, level)[..] {
+        [winners, around] => {
+            let own = own(r.plan.label_offset(level + 1));
+            r.level += 1;
+            let (coarse, c) = (r.here(), r.params());
+            r.rows(winners, &own, c.width, |rows| {
+                vec![(1, coarse.belief.bind(rows)), (2, coarse.winners.bind(rows))]
+            })?;
+            r.renew(&coarse.winners);
+            r.rows(around, &own, runs, |rows| {
+                let near = with_halo(rows, WINDOW_REACH as u32, c.height);
+                vec![(3, coarse.winners.bind(&near)), (5, windows.clone())]
+            })?;
+            r.level -= 1;
+        }
+        [within] => {
+            let height = r.params().height;
+            r.rows(within, &own(0), runs, |rows| {
+                vec![(4, here.label_range.bind(&with_halo(rows, HALO, height))), (5, windows.clone())]
+            })?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
