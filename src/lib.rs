@@ -71,6 +71,8 @@
 //! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
 //! maps bit for bit, whatever the number of threads.
 
+#![forbid(unsafe_code)]
+
 mod backend;
 pub mod colour;
 pub mod depth;

@@ -4,6 +4,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
+#[path = "../shaders/variants.rs"]
+mod variants;
+
 use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::backend::gpu::{Job, MAX_LOOP_ITERATIONS, UniformLayout, jobs};
 use mrfgs::low_level::plan::Plan;
@@ -11,39 +14,10 @@ use mrfgs::options::{DisparityRange, Method};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use std::collections::HashSet;
+use std::sync::LazyLock;
 
-/// Methods that together use every constant of the shaders.
-fn methods() -> Vec<Method> {
-    let paper = Method::preset("paper").unwrap();
-    let mut all = vec![Method::default(), paper];
-    for (key, value) in [
-        ("potential", "exact"),
-        ("potential", "hard"),
-        ("agreement", "strict"),
-        ("pyramid", "low-pass"),
-        ("percentile", "100"),
-        ("percentile", "0"),
-        ("percentile", "84"),
-    ] {
-        let mut method = Method::default();
-        method.set(key, value).unwrap();
-        all.push(method);
-    }
-    all
-}
-
-fn plans() -> Vec<Plan> {
-    let range = DisparityRange::new(-20, 43).unwrap();
-    methods().iter().map(|m| Plan::new(101, 67, range, m).unwrap()).collect()
-}
-
-/// Every job of the plans, each kernel once.
-fn all_jobs() -> Vec<Job> {
-    let mut seen = HashSet::new();
-    let plans = plans();
-    let jobs = plans.iter().flat_map(|plan| Stage::all(plan).into_iter().flat_map(|stage| jobs(stage, plan)));
-    jobs.filter(|job| seen.insert(job.kernel.clone())).collect()
-}
+static PLANS: LazyLock<Vec<Plan>> = LazyLock::new(variants::plans);
+static JOBS: LazyLock<Vec<Job>> = LazyLock::new(|| variants::jobs(&PLANS));
 
 fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
     let module = naga::front::wgsl::parse_str(source).map_err(|e| e.emit_to_string(source))?;
@@ -55,10 +29,9 @@ fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
 
 /// Runs `check` on every kernel, and reports all failures at once.
 fn for_every_kernel(check: impl Fn(&Job, &Module, &ModuleInfo) -> Result<(), String>) {
-    let jobs = all_jobs();
-    let entries: HashSet<_> = jobs.iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
-    assert!(entries.len() > 20 && jobs.len() > entries.len(), "only {} kernels", jobs.len());
-    let failures: Vec<String> = jobs
+    let entries: HashSet<_> = JOBS.iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
+    assert!(entries.len() > 20 && JOBS.len() > entries.len(), "only {} kernels", JOBS.len());
+    let failures: Vec<String> = JOBS
         .iter()
         .filter_map(|job| {
             let result =
@@ -70,7 +43,7 @@ fn for_every_kernel(check: impl Fn(&Job, &Module, &ModuleInfo) -> Result<(), Str
         failures.is_empty(),
         "{} of {} kernels fail:\n{}",
         failures.len(),
-        jobs.len(),
+        JOBS.len(),
         failures.join("\n")
     );
 }
@@ -81,10 +54,10 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
         .unwrap()
         .filter_map(|e| e.unwrap().path().file_name()?.to_str()?.strip_suffix(".wgsl").map(str::to_owned))
         .collect();
-    let kernels: HashSet<String> = all_jobs().iter().map(|job| job.kernel.stage().to_owned()).collect();
+    let kernels: HashSet<String> = JOBS.iter().map(|job| job.kernel.stage().to_owned()).collect();
     assert_eq!(files, kernels);
     let stages: HashSet<&str> =
-        plans().iter().flat_map(Stage::all).map(Stage::name).filter(|name| *name != "flood").collect();
+        PLANS.iter().flat_map(Stage::all).map(Stage::name).filter(|name| *name != "flood").collect();
     assert_eq!(kernels, stages.into_iter().map(str::to_owned).collect(), "the sweep alone has no shader");
 }
 
@@ -92,7 +65,7 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
 #[test]
 fn every_entry_point_is_a_kernel() {
     let used: HashSet<(&str, &str)> =
-        all_jobs().iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
+        JOBS.iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
     for_every_kernel(|job, module, _| {
         let unused = module.entry_points.iter().find(|e| !used.contains(&(job.kernel.stage(), &e.name)));
         unused.map_or(Ok(()), |e| Err(format!("nothing runs `{}`", e.name)))
@@ -106,7 +79,7 @@ fn every_shader_validates_and_no_capability_is_asked() {
 
 #[test]
 fn validation_can_fail() {
-    let source = jobs(Stage::Belief(0), &plans()[0])[0].kernel.source();
+    let source = jobs(Stage::Belief(0), &PLANS[0])[0].kernel.source();
     assert!(validated(&source).is_ok());
     assert!(validated(&source.replace("pack_narrow(values)", "values")).is_err());
     // 64-bit integers are a capability that was not requested.
@@ -149,7 +122,7 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
 /// Control: a moved field is detected.
 #[test]
 fn a_uniform_of_another_layout_is_noticed() {
-    let job = &jobs(Stage::Evidence(0), &plans()[0])[0];
+    let job = &jobs(Stage::Evidence(0), &PLANS[0])[0];
     let source = job.kernel.source();
     let fields = |source: &str| layout_of(&validated(source).unwrap().0, "Params").unwrap().0;
     let expected = |fields: &[(String, usize)]| {
@@ -199,8 +172,8 @@ fn loops_stay_below_what_drivers_run() {
         let jobs = Stage::all(plan).into_iter().flat_map(|stage| jobs(stage, plan));
         jobs.map(|job| job.loops).max().unwrap()
     };
-    for plan in plans() {
-        assert!(count(&plan) <= MAX_LOOP_ITERATIONS, "{} iterations", count(&plan));
+    for plan in PLANS.iter() {
+        assert!(count(plan) <= MAX_LOOP_ITERATIONS, "{} iterations", count(plan));
     }
     // Control: too many iterations are detected.
     let mut method = Method::default();

@@ -1,6 +1,8 @@
 //! The command line of mrfgs. Files import from the layers below them alone: text and console, then arguments, outputs, pairs
 //! of images, the running of a match, and on top the commands.
 
+#![forbid(unsafe_code)]
+
 mod args;
 mod commands;
 mod console;

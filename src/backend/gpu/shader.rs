@@ -116,6 +116,12 @@ impl Kernel {
         self.entry
     }
 
+    /// The constants that specialise it.
+    #[must_use]
+    pub fn constants(&self) -> &[(&'static str, Constant)] {
+        &self.constants
+    }
+
     /// The source of the shader: constants, then the imported parts, then its own file.
     #[must_use]
     pub fn source(&self) -> String {

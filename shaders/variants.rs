@@ -1,0 +1,53 @@
+//! Every variant of every shader, found by trying the options: for the tests of the shaders, and for what `scripts/isa` and
+//! `scripts/check-wgsl` run.
+
+use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::backend::gpu;
+use mrfgs::low_level::plan::Plan;
+use mrfgs::options::{DisparityRange, GROUPS, Key, Method, PRESETS, Takes};
+use std::collections::HashSet;
+
+/// Values of an option: all of them, or of numbers the ends, and of real ones some between.
+fn values(key: &Key) -> Vec<String> {
+    match key.takes {
+        Takes::Switch => vec!["false".into(), "true".into()],
+        Takes::Words(words) => words.iter().map(|word| word.word.into()).collect(),
+        Takes::Whole { low, high, .. } => vec![low.to_string(), high.to_string()],
+        Takes::Real { low, high } => {
+            (0..=4).map(|i| (low + f64::from(i) * (high - low) / 4.0).to_string()).collect()
+        }
+    }
+}
+
+/// A plan for every preset, the default first, and for every change of one or two options of it. The constants of a kernel
+/// follow from few options each, so that these need all variants.
+pub(crate) fn plans() -> Vec<Plan> {
+    let keys = GROUPS.iter().flat_map(|group| group.keys);
+    let changes: Vec<(String, String)> =
+        keys.flat_map(|key| values(key).into_iter().map(|value| (key.name(), value))).collect();
+    let range = DisparityRange::new(-20, 43).expect("a range");
+    let mut plans = Vec::new();
+    for (name, _) in PRESETS {
+        let preset = Method::preset(name).expect("a preset");
+        let mut add =
+            |method: &Method| plans.push(Plan::new(101, 67, range, method).expect("a valid method"));
+        add(&preset);
+        for (i, (key, value)) in changes.iter().enumerate() {
+            for (other, other_value) in &changes[i..] {
+                let mut method = preset.clone();
+                // Not every two values go together.
+                if method.set_all([(&**key, &**value), (&**other, &**other_value)]).is_ok() {
+                    add(&method);
+                }
+            }
+        }
+    }
+    plans
+}
+
+/// Every job of `plans`, each kernel once.
+pub(crate) fn jobs(plans: &[Plan]) -> Vec<gpu::Job> {
+    let mut seen = HashSet::new();
+    let jobs = plans.iter().flat_map(|plan| Stage::all(plan).into_iter().flat_map(|s| gpu::jobs(s, plan)));
+    jobs.filter(|job| seen.insert(job.kernel.clone())).collect()
+}
