@@ -111,14 +111,14 @@ fn checksum(map: &Plane<i32>) -> u64 {
 #[test]
 fn the_presets_of_the_paper_are_pinned() {
     let pins = [
-        ("paper", "slanted", 0xc8bc_3852_7afc_433d),
-        ("paper", "thin", 0x30ed_819c_c081_294f),
-        ("paper", "wall", 0x8318_d2d5_b61d_03f7),
-        ("paper", "repetitive", 0xcec4_6478_3679_3441),
+        ("paper", "slanted", 0xb8c3_44eb_108e_a005),
+        ("paper", "thin", 0xe754_6744_374c_452d),
+        ("paper", "wall", 0x51ea_9763_840b_f5cd),
+        ("paper", "repetitive", 0xede6_8a6d_460d_24cd),
         ("paper", "exposure", 0x6714_41c9_89fb_b59d),
-        ("paper", "mixed", 0xb3ea_1289_89c0_832d),
-        ("fgs", "slanted", 0x1abb_4cb2_39c2_b460),
-        ("fgs", "mixed", 0xca22_d880_685c_137d),
+        ("paper", "mixed", 0x7df3_5eaa_cdce_2f5d),
+        ("fgs", "slanted", 0x475f_b1f1_afb4_9402),
+        ("fgs", "mixed", 0x02fe_8b50_2570_aa99),
     ];
     let found = pins.map(|(preset, scene, _)| {
         let method = Method::preset(preset).unwrap();

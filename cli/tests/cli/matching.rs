@@ -253,7 +253,7 @@ fn inspect_shows_every_step() {
         }
         assert_eq!(steps.join("zones.png").exists(), preset == "paper");
         let changes = fs::read_to_string(steps.join("change-per-iteration.csv")).unwrap();
-        assert!(changes.lines().count() > 5 && changes.starts_with("iteration,rms_change_px"), "{changes}");
+        assert!(changes.lines().count() > 3 && changes.starts_with("iteration,rms_change_px"), "{changes}");
         assert!(listing(folder.path()).keys().all(|p| !p.to_str().unwrap().contains(".mrfgs-")));
         fs::remove_dir_all(steps).unwrap();
     }
