@@ -309,8 +309,7 @@ impl State {
             &self.has[z],
             &self.evidence[z],
             &self.dependency[z],
-            &self.down[z],
-            &self.up[z],
+            [&self.down[z], &self.up[z]],
         );
     }
 }

@@ -1,10 +1,11 @@
 //! Beliefs: see [`crate::backend::Stage::Belief`].
 
+use super::dependency::REACH;
 use super::units::{Blocks, Units, block, block_mut, each_lane, padding};
 use super::volumes::{Level, Volumes};
 use super::windows::{Seen, Window, Windows};
 use crate::graph::{Incoming, LevelGraph};
-use crate::plan::{LABEL_BLOCK, Plan};
+use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use rayon::prelude::*;
 
 /// The terms of the beliefs of a level.
@@ -70,26 +71,31 @@ pub(super) fn row<U: Units>(
 ) {
     let Summands { graph, windows, evidence, down, up, .. } = summands;
     let (width, row) = (graph.width(), windows.start(y));
-    for x in 0..width {
-        let window = windows.of(x, y);
-        let (at, stride) = (window.at(x), window.stride);
-        let cells = row + at..row + at + stride;
+    let near = windows.around(y);
+    let mut starts = windows.starts_around(y, first);
+    for start in &mut starts {
+        *start *= graph.slots();
+    }
+    for (x, &window) in windows.row(y).iter().enumerate() {
+        let own = window.cells();
+        let cells = row + own.start..row + own.end;
         let mut sum = Sum {
             summands,
             window,
-            place: (x, y),
+            x,
+            near: &near,
+            starts: &starts,
             evidence: &evidence[cells.clone()],
             down: down.get(cells.clone()),
             up: up.get(cells),
             dependency: dependency.unwrap_or_default(),
-            base: windows.start(first),
             incoming: if dependency.is_some() { graph.incoming_of(y * width + x) } else { &[] },
-            belief: &mut belief[at..][..stride],
+            belief: &mut belief[own],
         };
         if windows.are_full() {
-            sum.all(stride);
+            sum.all(window.stride());
         } else {
-            (0..stride).step_by(LABEL_BLOCK).for_each(|at| sum.block_in_window(at));
+            (0..window.stride()).step_by(LABEL_BLOCK).for_each(|at| sum.block_in_window(at));
         }
     }
 }
@@ -104,14 +110,15 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
 /// A pixel's belief, and its terms.
 struct Sum<'a, U> {
     summands: &'a Summands<'a, U>,
-    window: &'a Window,
-    place: (usize, usize),
+    window: Window,
+    x: usize,
+    /// Windows of the rows around, and where the messages of these rows start in `dependency`.
+    near: &'a [&'a [Window]; GRAPH_WINDOW],
+    starts: &'a [usize; GRAPH_WINDOW],
     evidence: &'a [u8],
     down: Option<&'a [U]>,
     up: Option<&'a [U]>,
     dependency: &'a [U],
-    /// The cell that `dependency` starts at, in a volume of one slot.
-    base: usize,
     incoming: &'a [Incoming],
     belief: &'a mut [U],
 }
@@ -119,13 +126,12 @@ struct Sum<'a, U> {
 impl<U: Units> Sum<'_, U> {
     /// The window of the factor of an entry, and where its messages to the pixel start.
     #[inline(always)]
-    fn factor(&self, entry: Incoming) -> (&Window, usize) {
-        let Summands { graph, windows, .. } = self.summands;
+    fn factor(&self, entry: Incoming) -> (Window, usize) {
         let (dx, dy, slot) = entry.parts();
-        let (x, y) = (self.place.0.wrapping_add_signed(dx), self.place.1.wrapping_add_signed(dy));
-        let window = windows.of(x, y);
-        let cells = windows.start(y) - self.base + window.at(x);
-        (window, graph.slots() * cells + slot * window.stride)
+        let row = REACH.wrapping_add_signed(dy);
+        let window = self.near[row][self.x.wrapping_add_signed(dx)];
+        let start = self.starts[row] + self.summands.graph.slots() * window.start();
+        (window, start + slot * window.stride())
     }
 
     #[inline(always)]
@@ -141,20 +147,20 @@ impl<U: Units> Sum<'_, U> {
     #[inline(always)]
     fn store<const N: usize>(&mut self, at: usize, sum: [U; N]) {
         let Summands { most, padding, .. } = self.summands;
-        let padding = block::<U, N>(padding, self.window.first + at);
+        let padding = block::<U, N>(padding, self.window.first() + at);
         *block_mut(self.belief, at) = each_lane::<U, N>(|i| sum[i].min(*most) | padding[i]);
     }
 
     /// The block of labels at `at`, from factors whose windows differ.
     #[inline(always)]
     fn block_in_window(&mut self, at: usize) {
-        let tau = self.summands.tau;
+        let Summands { windows, tau, .. } = self.summands;
         let mut sum: [U; LABEL_BLOCK] = self.own_terms(at);
         for &entry in self.incoming {
             let (window, start) = self.factor(entry);
-            let seen = Seen::new(self.dependency, start, window, self.window.first);
-            let (m, outside) = seen.block::<false>(at);
-            sum = plus(sum, &each_lane(|i| m[i] & !outside[i] | tau & outside[i]));
+            let seen = Seen::new(windows, window, self.dependency, start, self.window.first());
+            let (m, outside) = seen.block(at);
+            sum = plus(sum, &each_lane(|i| m[i] & !outside[i] | *tau & outside[i]));
         }
         self.store(at, sum);
     }

@@ -14,8 +14,9 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
             let row = windows.row_of(belief, y);
             let mut sum = 0;
             for (x, label) in labels.iter_mut().enumerate() {
-                let window = windows.of(x, y);
-                let new = (window.first + argmin(&row[window.at(x)..][..window.labels]).0) as u16;
+                let window = windows.row(y)[x];
+                let belief = &row[window.start()..][..windows.labels(window)];
+                let new = (window.first() + argmin(belief).0) as u16;
                 sum += u64::from(new.abs_diff(*label)).pow(2);
                 *label = new;
             }

@@ -100,36 +100,35 @@ fn row_in<U: Units, const FULL: bool>(
     scratch: &mut Scratch<U>,
 ) {
     let Factors { graph, windows, cut } = *factors;
-    let (width, slots) = (graph.width(), graph.slots());
-    let offsets: [(isize, isize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
+    let slots = graph.slots();
+    let near = windows.around(y);
+    let offsets: [(isize, usize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
         let (dx, dy) = offset(code as u8);
-        (dx as isize, dy as isize)
+        (dx as isize, REACH.wrapping_add_signed(dy as isize))
     });
     touch(around[2 * REACH]);
-    for x in 0..width {
-        let window = windows.of(x, y);
-        let messages = &mut messages[slots * window.at(x)..][..slots * window.stride];
-        let member = |(dx, dy): (isize, isize)| {
-            let (nx, row) = (x.wrapping_add_signed(dx), REACH.wrapping_add_signed(dy));
-            let theirs = windows.of(nx, y.wrapping_add_signed(dy));
-            Seen::new(around[row], theirs.at(nx), theirs, window.first)
+    for (x, &window) in near[REACH].iter().enumerate() {
+        let messages = &mut messages[slots * window.start()..][..slots * window.stride()];
+        let member = |(dx, row): (isize, usize)| {
+            let theirs = near[row][x.wrapping_add_signed(dx)];
+            Seen::new(windows, theirs, around[row], theirs.start(), window.first())
         };
         let place = |code: u8| offsets[usize::from(code)];
         match *graph.neighbours_of(x, y) {
             [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == TruncationRule::Relative => {
-                let members = [member((0, 0)), member(place(a)), member(place(b))];
-                Three { members, stride: window.stride }.send::<FULL>(cut, messages, &mut scratch.sums);
+                let members = [member((0, REACH)), member(place(a)), member(place(b))];
+                let factor = Three { members, stride: window.stride() };
+                factor.send::<FULL>(cut, messages, &mut scratch.sums);
             }
             ref codes => {
+                let present = (1..).zip(codes).filter(|(_, code)| **code != NO_MEMBER);
                 scratch.slots.clear();
                 scratch.slots.push(0);
-                scratch
-                    .slots
-                    .extend((1..).zip(codes).filter(|(_, code)| **code != NO_MEMBER).map(|(slot, _)| slot));
+                scratch.slots.extend(present.map(|(slot, _)| slot));
                 if scratch.slots.len() > 1 {
                     let member =
-                        |slot: usize| member(if slot == 0 { (0, 0) } else { place(codes[slot - 1]) });
-                    any::<U, FULL>(cut, window.stride, member, messages, scratch);
+                        |slot: usize| member(if slot == 0 { (0, REACH) } else { place(codes[slot - 1]) });
+                    any(cut, window.stride(), member, messages, scratch);
                 }
             }
         }
@@ -170,7 +169,8 @@ impl<U: Units> Three<'_, U> {
 
     #[inline(always)]
     fn q<const FULL: bool>(&self, messages: &[U], slot: usize, at: usize) -> (Block<U>, Block<U>) {
-        let (b, outside) = self.members[slot].block::<FULL>(at);
+        let member = &self.members[slot];
+        let (b, outside) = if FULL { member.whole_block(at) } else { member.block(at) };
         let m: &Block<U> = block(messages, slot * self.stride + at);
         (each_lane(|i| b[i].less(m[i]) | outside[i]), outside)
     }
@@ -195,8 +195,8 @@ impl<U: Units> Three<'_, U> {
                 *block_mut(scratch, slot * stride + at) = sums[slot];
             }
         }
-        for slot in 0..3 {
-            let (low, high) = bounds(least[slot], tau);
+        for (slot, least) in least.into_iter().enumerate() {
+            let (low, high) = bounds(least, tau);
             for at in (slot * stride..(slot + 1) * stride).step_by(LABEL_BLOCK) {
                 *block_mut(messages, at) = cut_block(block(scratch, at), &low, &high);
             }
@@ -241,7 +241,7 @@ fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
 }
 
 /// The messages of a factor of any number of members.
-fn any<'a, U: Units, const FULL: bool>(
+fn any<'a, U: Units>(
     cut: Truncation,
     stride: usize,
     member: impl Fn(usize) -> Seen<'a, U>,
@@ -253,7 +253,7 @@ fn any<'a, U: Units, const FULL: bool>(
         let seen = member(slot);
         let (q, outside) = (&mut q[i * stride..][..stride], &mut outside[i * stride..][..stride]);
         for at in (0..stride).step_by(LABEL_BLOCK) {
-            let (b, out) = seen.block::<FULL>(at);
+            let (b, out) = seen.block(at);
             let m: &Block<U> = block(messages, slot * stride + at);
             *block_mut(q, at) = each_lane::<U, LABEL_BLOCK>(|i| b[i].less(m[i]) | out[i]);
             *block_mut(outside, at) = out;

@@ -42,11 +42,11 @@ fn evidence_row_on<'a, S: pulp::Simd, C: StoredCost, U: Units>(
     belief: &'a mut [U],
 ) {
     for (x, cost) in cost.chunks_exact(level.stride).enumerate() {
-        let window = windows.of(x, y);
-        let (at, stride, labels) = (window.at(x), window.stride, window.labels);
-        let (evidence, belief) = (&mut evidence[at..][..stride], &mut belief[at..][..stride]);
+        let window = windows.row(y)[x];
+        let (cells, labels) = (window.cells(), windows.labels(window));
+        let (evidence, belief) = (&mut evidence[cells.clone()], &mut belief[cells]);
         // The cost of padding is the largest value.
-        let cost = &cost[window.first..][..stride];
+        let cost = &cost[window.first()..][..window.stride()];
         let min = cost.iter().copied().fold(C::MOST, C::min).fraction();
         for ((e, b), c) in evidence.iter_mut().zip(belief.iter_mut()).zip(cost) {
             *e = level.evidence.apply(c.fraction() - min);

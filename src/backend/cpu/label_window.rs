@@ -27,8 +27,9 @@ fn winners<U: Units>(v: &Volumes<U>, level: usize) -> Plane<u16> {
     winners.data_mut().par_chunks_mut(l.width).enumerate().for_each(|(y, row)| {
         let belief = here.windows.row_of(&here.belief, y);
         for (x, winner) in row.iter_mut().enumerate() {
-            let window = here.windows.of(x, y);
-            *winner = (window.first + argmin(&belief[window.at(x)..][..window.labels]).0) as u16;
+            let window = here.windows.row(y)[x];
+            let belief = &belief[window.start()..][..here.windows.labels(window)];
+            *winner = (window.first() + argmin(belief).0) as u16;
         }
     });
     winners

@@ -133,7 +133,7 @@ impl<U: Units> Volumes<U> {
         let mut rows = out.chunks_exact_mut(l.labels);
         each_row(l, windows, slots, |window, at| {
             let out = rows.next().expect("a row a slot");
-            for (out, &value) in out[window.range()].iter_mut().zip(&data[at..]) {
+            for (out, &value) in out[windows.range(window)].iter_mut().zip(&data[at..]) {
                 *out = value.into();
             }
         });
@@ -154,7 +154,7 @@ impl<U: Units> Volumes<U> {
             Volume::Cost(0) => padded().fill(&mut self.fine_cost, |v| v as u8),
             Volume::Cost(_) => padded().fill(&mut l.cost, |v| v as u16),
             Volume::Evidence(_) => {
-                scatter(plan, &l.windows, (1, u8::MAX), values, |v| v as u8, &mut l.evidence)
+                scatter(plan, &l.windows, (1, u8::MAX), values, |v| v as u8, &mut l.evidence);
             }
             Volume::Belief(_) => scatter(plan, &l.windows, (1, U::MOST), values, U::of, &mut l.belief),
             Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => {
@@ -170,11 +170,11 @@ impl<U: Units> Volumes<U> {
 }
 
 /// Calls `with` for every slot of every pixel, with the pixel's window and where the cells of the slot start.
-fn each_row(level: &LevelPlan, windows: &Windows, slots: usize, mut with: impl FnMut(&Window, usize)) {
+fn each_row(level: &LevelPlan, windows: &Windows, slots: usize, mut with: impl FnMut(Window, usize)) {
     for (x, y) in (0..level.height).flat_map(|y| (0..level.width).map(move |x| (x, y))) {
-        let window = windows.of(x, y);
-        let start = slots * (windows.start(y) + window.at(x));
-        (0..slots).for_each(|slot| with(window, start + slot * window.stride));
+        let window = windows.row(y)[x];
+        let start = slots * (windows.start(y) + window.start());
+        (0..slots).for_each(|slot| with(window, start + slot * window.stride()));
     }
 }
 
@@ -189,8 +189,8 @@ fn scatter<T: Copy>(
 ) {
     let mut rows = values.chunks_exact(level.labels);
     each_row(level, windows, slots, |window, at| {
-        let row = &rows.next().expect("a row a slot")[window.range()];
-        let (cells, after) = data[at..][..window.stride].split_at_mut(row.len());
+        let row = &rows.next().expect("a row a slot")[windows.range(window)];
+        let (cells, after) = data[at..][..window.stride()].split_at_mut(row.len());
         cells.iter_mut().zip(row).for_each(|(cell, &value)| *cell = convert(value));
         after.fill(padding);
     });

@@ -78,17 +78,17 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
             let coarse = windows.row_of(coarse_belief, y);
             let start = fine_windows.start(2 * y);
             let fine = &fine_belief[start..][..down.len()];
+            let (own, theirs) = (windows.row(y), fine_windows.row(2 * y));
             for x in 0..cl.width {
                 // All children share a window.
-                let (own, theirs) = (windows.of(x, y), fine_windows.of(2 * x, 2 * y));
+                let (own, theirs) = (own[x], &theirs[2 * x..]);
                 let children = [0, 1, 2, 3].map(|c| {
                     let (fx, fy) = (2 * x + c % 2, 2 * y + c / 2);
                     let inside = fx < fl.width && fy < fl.height;
-                    inside.then(|| fine_windows.start(fy) - start + theirs.at(fx))
+                    inside.then(|| fine_windows.start(fy) - start + theirs[c % 2].start())
                 });
-                let (at, stride) = (own.at(x), own.stride);
-                let (up, belief) = (&mut up[at..][..stride], &coarse[at..][..stride]);
-                factor(&between, [own, theirs], children, fine, belief, down, up, scratch);
+                let (up, belief) = (&mut up[own.cells()], &coarse[own.cells()]);
+                factor(&between, [own, theirs[0]], children, fine, belief, down, up, scratch);
             }
         },
     );
@@ -100,7 +100,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
 #[allow(clippy::too_many_arguments, reason = "volumes of both levels")]
 fn factor<U: Units>(
     between: &Between<U>,
-    [own, theirs]: [&Window; 2],
+    [own, theirs]: [Window; 2],
     children: [Option<usize>; 4],
     fine_belief: &[U],
     coarse_belief: &[U],
@@ -109,28 +109,28 @@ fn factor<U: Units>(
     Scratch { windows, parent, child, best, sums, fine }: &mut Scratch<U>,
 ) {
     let Between { cut, interpolating, lead, margin, .. } = *between;
-    let coarse_padding = &between.coarse_padding[own.first..][..own.stride];
-    let fine_padding = &between.fine_padding[theirs.first..][..theirs.stride];
-    let places = Some([(own.first, own.stride), (theirs.first, theirs.stride)]);
+    let coarse_padding = &between.coarse_padding[own.first()..][..own.stride()];
+    let fine_padding = &between.fine_padding[theirs.first()..][..theirs.stride()];
+    let places = Some([(own.first(), own.stride()), (theirs.first(), theirs.stride())]);
     if *windows != places {
         *windows = places;
         for infinite in child.iter_mut().chain(fine.iter_mut()) {
             infinite.fill(U::MOST);
         }
         for sums in sums.iter_mut() {
-            sums[own.stride] = U::MOST;
+            sums[own.stride()] = U::MOST;
         }
     }
     // Where the children's first label is in `fine`.
-    let first = margin + theirs.first + lead - 2 * own.first;
-    let parent = &mut parent[..own.stride];
+    let first = margin + theirs.first() + lead - 2 * own.first();
+    let parent = &mut parent[..own.stride()];
     variable_message(coarse_belief, up, parent, coarse_padding, cut);
     // Values written at one alignment and read at another go through memory, so everything is written before
     // it is read.
     for (place, child) in children.into_iter().zip(child.iter_mut()) {
         if let Some(at) = place {
-            let (belief, old) = (&fine_belief[at..][..theirs.stride], &down[at..][..theirs.stride]);
-            variable_message(belief, old, &mut child[1 + first..][..theirs.stride], fine_padding, cut);
+            let (belief, old) = (&fine_belief[at..][..theirs.stride()], &down[at..][..theirs.stride()]);
+            variable_message(belief, old, &mut child[1 + first..][..theirs.stride()], fine_padding, cut);
         }
     }
     for ((place, child), best) in children.into_iter().zip(child.iter()).zip(best.iter_mut()) {
@@ -138,13 +138,13 @@ fn factor<U: Units>(
             best.fill(U::default());
             continue;
         }
-        for z in (0..own.stride).step_by(LABEL_BLOCK) {
+        for z in (0..own.stride()).step_by(LABEL_BLOCK) {
             agreeing(block(child, margin + 2 * z), interpolating, block_mut(best, z));
         }
     }
     // Saturated sums cannot be undone by subtraction, so each sum is taken over the others.
     let mut least = [U::MOST; LABEL_BLOCK];
-    for z in (0..own.stride).step_by(LABEL_BLOCK) {
+    for z in (0..own.stride()).step_by(LABEL_BLOCK) {
         let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
         let parent = *block::<U, LABEL_BLOCK>(parent, z);
         let padding = block::<U, LABEL_BLOCK>(coarse_padding, z);
@@ -164,19 +164,19 @@ fn factor<U: Units>(
             *block_mut(sums, z) = all;
         }
     }
-    Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(own.stride);
+    Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(own.stride());
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
             // The label below the parent's first agrees with it too.
             fine[margin - 1] = if interpolating { t[0] } else { U::MOST };
-            for z in (0..own.stride).step_by(LABEL_BLOCK) {
+            for z in (0..own.stride()).step_by(LABEL_BLOCK) {
                 spread(block(t, z), interpolating, block_mut(fine, margin + 2 * z));
             }
         }
     }
-    let fine = fine.each_ref().map(|fine| &fine[first..][..theirs.stride]);
+    let fine = fine.each_ref().map(|fine| &fine[first..][..theirs.stride()]);
     let mut least = [[U::MOST; LABEL_BLOCK]; 4];
-    for d in (0..theirs.stride).step_by(LABEL_BLOCK) {
+    for d in (0..theirs.stride()).step_by(LABEL_BLOCK) {
         let padding = block::<U, LABEL_BLOCK>(fine_padding, d);
         for (least, fine) in least.iter_mut().zip(fine) {
             let sums = block::<U, LABEL_BLOCK>(fine, d);
@@ -185,7 +185,7 @@ fn factor<U: Units>(
     }
     for ((place, fine), least) in children.into_iter().zip(fine).zip(least_of(&least)) {
         let Some(at) = place else { continue };
-        Truncating::new(fine, least, cut, &mut down[at..][..theirs.stride]).all(theirs.stride);
+        Truncating::new(fine, least, cut, &mut down[at..][..theirs.stride()]).all(theirs.stride());
     }
 }
 

@@ -40,17 +40,17 @@ fn right_row_on<'a, S: pulp::Simd, U: Units>(
     let level = &plan.levels[0];
     let width = level.width;
     for x in plan.core.clone() {
-        let window = windows.of(x, y);
+        let window = windows.row(y)[x];
         // Label j of left pixel x is seen at right pixel x - min - j.
         let place = (width - 1 - x) as i64 + i64::from(level.min);
-        let labels = window.range();
+        let labels = windows.range(window);
         let first = (-place).clamp(labels.start as i64, labels.end as i64) as usize;
         let end = (width as i64 - place).clamp(first as i64, labels.end as i64) as usize;
         if first >= end {
             continue;
         }
         let seen = (place + first as i64) as usize..(place + end as i64) as usize;
-        let belief = &row[window.at(x) + first - window.first..][..end - first];
+        let belief = &row[window.start() + first - window.first()..][..end - first];
         let beliefs = belief.iter().zip(&names[first..end]);
         for (found, (&b, &label)) in found[seen].iter_mut().zip(beliefs) {
             // The smallest belief, and of those the lowest label.

@@ -6,41 +6,52 @@
 
 use super::units::{Units, each_lane};
 use crate::image::Plane;
-use crate::plan::{LABEL_BLOCK, LevelPlan, WINDOW_RUN};
+use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, LevelPlan, WINDOW_RUN};
+use std::array::from_fn;
+use std::ops::Range;
 
-/// The label window of a run of pixels.
+/// The label window of a pixel, and where its cells start in their row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Window {
-    /// First label.
-    pub(super) first: usize,
-    /// Cells of a pixel: whole blocks of labels.
-    pub(super) stride: usize,
-    /// Labels; the cells after them are padding.
-    pub(super) labels: usize,
-    /// Where the cells of the run start in their row.
-    start: usize,
+    start: u32,
+    first: u16,
+    stride: u16,
 }
 
 impl Window {
-    /// Where the cells of the pixel in column `x` start in their row.
+    /// Where the pixel's cells start in their row.
     #[inline(always)]
-    pub(super) fn at(&self, x: usize) -> usize {
-        self.start + x % WINDOW_RUN * self.stride
+    pub(super) fn start(self) -> usize {
+        self.start as usize
     }
 
-    /// The labels of the window.
-    pub(super) fn range(&self) -> std::ops::Range<usize> {
-        self.first..self.first + self.labels
+    /// First label.
+    #[inline(always)]
+    pub(super) fn first(self) -> usize {
+        self.first.into()
+    }
+
+    /// Number of cells: whole blocks of labels.
+    #[inline(always)]
+    pub(super) fn stride(self) -> usize {
+        self.stride.into()
+    }
+
+    /// The cells in their row.
+    #[inline(always)]
+    pub(super) fn cells(self) -> Range<usize> {
+        self.start()..self.start() + self.stride()
     }
 }
 
 /// The label windows of a level.
 pub(super) struct Windows {
-    /// Whether all hold all labels.
+    width: usize,
+    /// Labels of the level.
+    labels: usize,
+    /// Whether all windows hold all labels.
     full: bool,
-    /// Windows of a row of pixels.
-    runs: usize,
-    /// \[row of windows\]\[run\].
+    /// \[row of windows\]\[x\].
     all: Vec<Window>,
     /// Where each row of cells starts, and the end.
     rows: Vec<usize>,
@@ -53,30 +64,25 @@ impl Windows {
         Self::new(level, &Plane::filled(runs, rows, [0, level.stride as u16]))
     }
 
-    /// From the first label and the number of cells of each window.
+    /// From the first label and the number of cells of each run.
     pub(super) fn new(level: &LevelPlan, windows: &Plane<[u16; 2]>) -> Self {
-        let runs = level.windows().0;
-        let (mut all, mut rows) = (Vec::with_capacity(windows.data().len()), vec![0]);
+        let width = level.width;
+        let (mut all, mut rows) = (Vec::with_capacity(width * windows.height()), vec![0]);
         let mut end = 0;
-        for (i, row) in windows.data().chunks_exact(runs).enumerate() {
-            let mut start = LABEL_BLOCK;
-            for (run, &[first, stride]) in row.iter().enumerate() {
-                let (first, stride) = (usize::from(first), usize::from(stride));
-                all.push(Window { first, stride, labels: stride.min(level.labels - first), start });
-                start += stride * WINDOW_RUN.min(level.width - run * WINDOW_RUN);
+        for i in 0..windows.height() {
+            let mut start = LABEL_BLOCK as u32;
+            for x in 0..width {
+                let [first, stride] = windows[(x / WINDOW_RUN, i)];
+                all.push(Window { start, first, stride });
+                start += u32::from(stride);
             }
             for _ in 2 * i..level.height.min(2 * i + 2) {
-                end += start + LABEL_BLOCK;
+                end += start as usize + LABEL_BLOCK;
                 rows.push(end);
             }
         }
-        let full = all.iter().all(|window| window.stride == level.stride);
-        Self { full, runs, all, rows }
-    }
-
-    /// Whether every window holds all labels.
-    pub(super) fn are_full(&self) -> bool {
-        self.full
+        let full = windows.data().iter().all(|window| usize::from(window[1]) == level.stride);
+        Self { width, labels: level.labels, full, all, rows }
     }
 
     /// Largest number of cells of `level`.
@@ -84,13 +90,45 @@ impl Windows {
         level.height * (level.width * level.stride + 2 * LABEL_BLOCK)
     }
 
-    /// The window of the pixel at (x, y).
-    #[inline(always)]
-    pub(super) fn of(&self, x: usize, y: usize) -> &Window {
-        &self.all[y / 2 * self.runs + x / WINDOW_RUN]
+    /// Whether every window holds all labels.
+    pub(super) fn are_full(&self) -> bool {
+        self.full
     }
 
-    /// Where the cells of row `y` start; for `y` the height, the number of all cells.
+    /// The windows of row `y`.
+    #[inline(always)]
+    pub(super) fn row(&self, y: usize) -> &[Window] {
+        &self.all[y / 2 * self.width..][..self.width]
+    }
+
+    /// The windows of the rows around row `y` that its factors reach; those outside the image are empty.
+    pub(super) fn around(&self, y: usize) -> [&[Window]; GRAPH_WINDOW] {
+        from_fn(|k| self.row_around(y, k).map_or(&[][..], |ny| self.row(ny)))
+    }
+
+    /// Where the cells of these rows start, relative to row `first`; 0 for those above it and outside the image.
+    pub(super) fn starts_around(&self, y: usize, first: usize) -> [usize; GRAPH_WINDOW] {
+        let start = |ny: usize| self.rows[ny].saturating_sub(self.rows[first]);
+        from_fn(|k| self.row_around(y, k).map_or(0, start))
+    }
+
+    fn row_around(&self, y: usize, k: usize) -> Option<usize> {
+        (y + k).checked_sub(GRAPH_WINDOW / 2).filter(|&ny| ny < self.height())
+    }
+
+    /// Number of labels in a window; the cells after them are padding.
+    #[inline(always)]
+    pub(super) fn labels(&self, window: Window) -> usize {
+        window.stride().min(self.labels - window.first())
+    }
+
+    /// The labels of a window.
+    #[inline(always)]
+    pub(super) fn range(&self, window: Window) -> Range<usize> {
+        window.first()..window.first() + self.labels(window)
+    }
+
+    /// Where the cells of row `y` start; for the height, the number of all cells.
     #[inline(always)]
     pub(super) fn start(&self, y: usize) -> usize {
         self.rows[y]
@@ -120,42 +158,43 @@ impl Windows {
         rows
     }
 
-    /// The first label and the number of cells of each window.
+    /// The first label and the number of cells of each run.
     pub(super) fn to_plane(&self) -> Plane<[u16; 2]> {
-        let windows = self.all.iter().map(|w| [w.first as u16, w.stride as u16]).collect();
-        Plane::new(self.runs, self.all.len() / self.runs, windows)
+        let rows = self.all.len() / self.width;
+        Plane::from_fn(self.width.div_ceil(WINDOW_RUN), rows, |run, row| {
+            let window = self.all[row * self.width + run * WINDOW_RUN];
+            [window.first, window.stride]
+        })
     }
 }
 
-/// A block of labels of one pixel as seen through the window of another: which cells to load, and which of them are
-/// labels.
+/// The cells of a pixel as seen through the window of another.
+#[derive(Clone, Copy)]
 pub(super) struct Seen<'a, U> {
     cells: &'a [U],
     start: usize,
-    /// Label of the first window less that of the second.
+    /// First label of the other window less that of the pixel's own.
     shift: isize,
     stride: isize,
     labels: isize,
 }
 
 impl<'a, U: Units> Seen<'a, U> {
-    /// The cells of a pixel that start at `start` in the row `cells` and belong to `window`, for labels counted from
-    /// `first`.
+    /// The cells that start at `start` in `cells` and belong to a pixel with this `window`, of `windows`, for labels counted
+    /// from `first`.
     #[inline(always)]
-    pub(super) fn new(cells: &'a [U], start: usize, window: &Window, first: usize) -> Self {
-        let shift = first.cast_signed() - window.first.cast_signed();
-        Self { cells, start, shift, stride: window.stride.cast_signed(), labels: window.labels.cast_signed() }
+    pub(super) fn new(windows: &Windows, window: Window, cells: &'a [U], start: usize, first: usize) -> Self {
+        let (shift, stride) =
+            (first.cast_signed() - window.first().cast_signed(), window.stride().cast_signed());
+        // More than there are, where the window ends with the last label: then nothing after it is asked for.
+        let labels = windows.labels.cast_signed() - window.first().cast_signed();
+        Self { cells, start, shift, stride, labels: labels.min(stride) }
     }
 
-    /// The cells of the block of labels at `at`, and the largest value for those that are not labels of the pixel, 0 for
-    /// the others; all 0 where every window is `FULL`.
+    /// The block of labels at `at`: the cells, and the largest value for those that are not labels of the pixel, 0 for the
+    /// others.
     #[inline(always)]
-    pub(super) fn block<const FULL: bool>(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
-        if FULL {
-            // Padding is stored with the largest belief, which is above all others less a message.
-            let cells = self.cells[self.start + at..].first_chunk().expect("rows are whole blocks");
-            return (cells, [U::default(); LABEL_BLOCK]);
-        }
+    pub(super) fn block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
         let block = LABEL_BLOCK.cast_signed();
         let place = at.cast_signed() + self.shift;
         let from = self.start.wrapping_add_signed(place.clamp(-block, self.stride));
@@ -165,5 +204,13 @@ impl<'a, U: Units> Seen<'a, U> {
         let before: &[U; LABEL_BLOCK] = U::EDGE[before..].first_chunk().expect("three blocks");
         let after: &[U; LABEL_BLOCK] = U::EDGE[LABEL_BLOCK + after..].first_chunk().expect("three blocks");
         (cells, each_lane(|i| before[i] | after[i]))
+    }
+
+    /// The block of labels at `at` where all windows hold all labels. Padding is stored with the largest belief, which is
+    /// above all others less a message.
+    #[inline(always)]
+    pub(super) fn whole_block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
+        let cells = self.cells[self.start + at..].first_chunk().expect("rows are whole blocks");
+        (cells, [U::default(); LABEL_BLOCK])
     }
 }

@@ -21,15 +21,15 @@ fn optimum_row_on<'a, S: pulp::Simd, U: Units>(
     beliefs: &'a [U],
     optima: &'a mut [Optimum],
 ) {
+    let row = windows.row(y);
     for (x, optimum) in optima.iter_mut().enumerate() {
-        let window = windows.of(x, y);
-        *optimum = optimum_of(&beliefs[window.at(x)..][..window.labels]);
-        optimum.label += window.first as u16;
+        let window = row[x];
+        *optimum = optimum_of(&beliefs[window.start()..][..windows.labels(window)]);
+        optimum.label += window.first() as u16;
     }
 }
 
 /// The optimum of the beliefs of one window, its label counted from the first.
-
 #[inline(always)]
 fn optimum_of<U: Units>(belief: &[U]) -> Optimum {
     let (label, best) = argmin(belief);

@@ -16,8 +16,7 @@ pub fn belief(
     has: &[Range<usize>],
     evidence: &[u32],
     dependency: &[u32],
-    down: &[u32],
-    up: &[u32],
+    [down, up]: [&[u32]; 2],
 ) -> Vec<u32> {
     let labels = plan.levels[level].labels;
     let is_label = |i: usize| has[i / labels].contains(&(i % labels));

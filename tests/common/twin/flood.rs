@@ -15,6 +15,6 @@ pub fn flood(
     [evidence, down, up]: [&[u32]; 3],
 ) -> (Vec<u32>, Vec<u32>) {
     let messages = dependency(plan, level, graph, has, beliefs, messages);
-    let beliefs = belief(plan, level, graph, has, evidence, &messages, down, up);
+    let beliefs = belief(plan, level, graph, has, evidence, &messages, [down, up]);
     (beliefs, messages)
 }
