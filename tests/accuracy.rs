@@ -75,10 +75,7 @@ fn colour_counts_where_there_is_contrast() {
 
 #[test]
 fn real_pairs() {
-    let Ok(folder) = std::env::var("MRFGS_MIDDLEBURY") else {
-        let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
-        return;
-    };
+    let Some(folder) = folder_of_pairs() else { return };
     // Final: average error in pixels and bad2.0 in percent, at the level of the best fast matchers
     // (AD-Census, MGM, SGBM) on each pair. Raw: average error and bad2.0 of the paper's table 1.
     let floors = [
@@ -99,6 +96,33 @@ fn real_pairs() {
         let raw = report(&folder, &matched.maps.raw_map()).all;
         assert!(raw.avg.unwrap() < raw_avg && raw.bad[2] < raw_bad2, "{pair}: {raw:?}");
     }
+}
+
+/// The folder of the real pairs; without one it says so.
+fn folder_of_pairs() -> Option<String> {
+    let folder = std::env::var("MRFGS_MIDDLEBURY").ok();
+    if folder.is_none() {
+        let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
+    }
+    folder
+}
+
+/// The preset `fast` is a little worse than the default, and no more.
+#[test]
+fn fast_on_real_pairs() {
+    let Some(folder) = folder_of_pairs() else { return };
+    let pairs = ["Teddy", "Cones", "Dolls", "Rocks1", "Motorcycle"];
+    let mean_bad2 = |preset: &str| {
+        let method = Method::preset(preset).unwrap();
+        let bad2 = pairs.map(|pair| {
+            let folder = Path::new(&folder).join(pair);
+            report(&folder, &matched(&folder, &method).maps.final_map()).all.bad[2]
+        });
+        bad2.iter().sum::<f64>() / pairs.len() as f64
+    };
+    let (fast, default) = (mean_bad2("fast"), mean_bad2("default"));
+    println!("mean bad2.0: fast {fast:.2}, default {default:.2}");
+    assert!(fast < 6.4 && default < fast, "{fast}, {default}");
 }
 
 /// FNV-1a of a map's values.

@@ -62,10 +62,10 @@ fn listing() -> Result<String> {
     }
     let values =
         PRESETS.iter().map(|(name, _)| Ok(Method::preset(name)?.table())).collect::<Result<Vec<_>>>()?;
-    // One column for each preset, and a space more between them.
+    // One column for each preset.
     let mut table = Table::new(&format!("l{}l", "l".repeat(PRESETS.len())));
     let cells = |key: &str, values: Vec<String>, takes: &str| {
-        let cells = std::iter::once(key.to_owned()).chain(values).map(|cell| cell + " ");
+        let cells = std::iter::once(key.to_owned()).chain(values);
         cells.chain([format!("[{takes}]")]).collect::<Vec<_>>()
     };
     table.row(cells("key", PRESETS.iter().map(|p| p.0.to_owned()).collect(), "unit and range"));
