@@ -27,6 +27,8 @@ pub struct Solution {
     pub mosaic_times: Vec<(Stage, Duration)>,
     /// What went through the device.
     pub traffic: Traffic,
+    /// [`Backend::cells`] of each level; those of all tiles together.
+    pub cells: Vec<u64>,
 }
 
 /// Matches `pair` by `plan` on `backend`; `observer` hears of progress.
@@ -53,8 +55,8 @@ pub fn inspect(
     let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
     backend.wait()?;
     let maps = run.watch.host("download", || tickets.collect(backend))?;
-    let (traffic, host_times) = (backend.traffic(), run.watch.into_times());
-    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic })
+    let (traffic, cells, host_times) = (backend.traffic(), backend.cells(), run.watch.into_times());
+    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
 
 /// A match whose stages may still run, or whose maps are on their way.
@@ -63,6 +65,7 @@ pub struct Started {
     iterations: u32,
     host_times: Vec<(&'static str, Duration)>,
     traffic: Traffic,
+    cells: Vec<u64>,
 }
 
 /// As [`solve`], but does not wait for a device: the next match may be started on it before [`finish`] ends this one.
@@ -72,7 +75,8 @@ pub struct Started {
 pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Started> {
     let mut run = Run { watch: watch(plan, observer), inspector: None };
     let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
-    Ok(Started { tickets, iterations, host_times: run.watch.into_times(), traffic: backend.traffic() })
+    let (traffic, cells) = (backend.traffic(), backend.cells());
+    Ok(Started { tickets, iterations, host_times: run.watch.into_times(), traffic, cells })
 }
 
 /// Ends a match that was started on `backend`.
@@ -80,9 +84,9 @@ pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
 /// # Errors
 /// Whatever the backend reports.
 pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
-    let Started { tickets, iterations, host_times, traffic } = started;
+    let Started { tickets, iterations, host_times, traffic, cells } = started;
     let maps = tickets.collect(backend)?;
-    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic })
+    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
 
 /// How often a pair is matched: once more, mirrored, where that is how its right view is found.
@@ -179,6 +183,7 @@ pub fn solve_tiles(
     let mut run = Run { watch: watch.in_tiles(matchings(whole) * tiles.count()), inspector: None };
     let mut mosaic = Mosaic::new(whole, pair)?;
     let (mut iterations, mut traffic) = (0, Traffic::default());
+    let mut cells = vec![0; whole.levels.len()];
     let right_map_wanted = whole.method.refinement.right_map;
     if matchings(whole) == 2 {
         for tile in tiles.list() {
@@ -209,6 +214,7 @@ pub fn solve_tiles(
             run.watch.host("download", || mosaic.place_right(tile, &seen, backend))?;
         }
         traffic += backend.traffic();
+        cells.iter_mut().zip(backend.cells()).for_each(|(sum, of_tile)| *sum += of_tile);
     }
     run.watch.end_tiles();
     let mut mosaic_times = Vec::new();
@@ -227,5 +233,5 @@ pub fn solve_tiles(
         maps.right = Some(right_map(finish(&mut mosaic)?));
     }
     let host_times = run.watch.into_times();
-    Ok(Solution { maps, iterations, host_times, mosaic_times, traffic })
+    Ok(Solution { maps, iterations, host_times, mosaic_times, traffic, cells })
 }

@@ -85,6 +85,12 @@ impl LevelPlan {
         self.width * self.height
     }
 
+    /// Labels of all pixels, padding included.
+    #[must_use]
+    pub fn cells(&self) -> u64 {
+        (self.pixels() * self.stride) as u64
+    }
+
     /// Groups of four labels, padding included.
     #[must_use]
     pub fn quads(&self) -> usize {

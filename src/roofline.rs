@@ -6,7 +6,6 @@
 //! written once, in the stored width. Padding is included, because it goes through the same arithmetic. The
 //! graph, a few bytes per pixel, is left out. This number divided by the machine's copy rate is the shortest
 //! time that the stage can take. Where the volumes of a level fit in a cache, the stage can be faster.
-//! a cache, it can be beaten.
 
 use crate::backend::Stage;
 use crate::backend::volume::{Volume, volume_shape};
@@ -24,7 +23,8 @@ pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
 }
 
 /// Label updates of one run of `stage`: the number of dependency message values that it computes, which is
-/// pixels times labels (without padding) times members per factor. It is 0 for all other stages.
+/// pixels times labels (without padding, but with those that label windows leave out) times members per factor. It is 0 for
+/// all other stages.
 #[must_use]
 pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
     let (Stage::Dependency(z) | Stage::Flood(z)) = stage else { return 0 };
@@ -32,11 +32,12 @@ pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
     rows as u64 * labels as u64
 }
 
-/// The smallest number of bytes that one run of `stage` moves; 0 for a stage that is no message stage.
+/// The smallest number of bytes that one run of `stage` moves, where the volumes of each level hold so many `cells`
+/// ([`Backend::cells`](crate::backend::Backend::cells)); 0 for a stage that is no message stage.
 #[must_use]
-pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
+pub fn bytes(plan: &Plan, stage: Stage, cells: &[u64]) -> u64 {
     let stored = |volume: Volume| {
-        let (rows, _, stride) = volume_shape(plan, volume);
+        let rows = if matches!(volume, Volume::Dependency(_)) { plan.slots() } else { 1 };
         let width = match volume {
             Volume::Evidence(_) | Volume::Cost(0) => 1,
             Volume::Cost(_) => 2,
@@ -44,7 +45,7 @@ pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
                 plan.volume_width.bytes()
             }
         };
-        (rows * stride * width) as u64
+        cells[volume.level()] * (rows * width) as u64
     };
     match stage {
         Stage::Dependency(z) => stored(Volume::Belief(z)) + 2 * stored(Volume::Dependency(z)),
@@ -60,7 +61,8 @@ pub fn bytes(plan: &Plan, stage: Stage) -> u64 {
         }
         // The messages that are written are the same ones that are summed.
         Stage::Flood(z) => {
-            bytes(plan, Stage::Dependency(z)) + bytes(plan, Stage::Belief(z)) - stored(Volume::Dependency(z))
+            bytes(plan, Stage::Dependency(z), cells) + bytes(plan, Stage::Belief(z), cells)
+                - stored(Volume::Dependency(z))
         }
         _ => 0,
     }
@@ -94,7 +96,7 @@ mod tests {
                 (Stage::Cost, 0),
                 (Stage::Median, 0),
             ] {
-                assert_eq!(bytes(&plan, stage), expected, "{preset}, {stage:?}");
+                assert_eq!(bytes(&plan, stage, &[fine, coarse]), expected, "{preset}, {stage:?}");
             }
             assert_eq!(label_updates(&plan, Stage::Dependency(0)), 15 * 20 * 5);
             assert_eq!(label_updates(&plan, Stage::Dependency(1)), 6 * 11 * 5);

@@ -175,8 +175,8 @@ fn poisoned_buffers() {
 /// The maps that the backend holds.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
-    let (maps, traffic) = (backend.maps(requested).unwrap(), backend.traffic());
-    Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic }
+    let (maps, traffic, cells) = (backend.maps(requested).unwrap(), backend.traffic(), backend.cells());
+    Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic, cells }
 }
 
 /// The pair is uploaded once, the maps are read back once, and nothing is transferred in between.

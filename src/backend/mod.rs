@@ -104,6 +104,9 @@ pub trait Backend {
     /// a clock.
     fn times(&mut self) -> Result<Vec<(Stage, Duration)>>;
 
+    /// Cells of a volume of each level, as they are stored: the labels of all pixels, with padding.
+    fn cells(&self) -> Vec<u64>;
+
     /// What went through since [`Backend::prepare`], which is included; all 0 where there is no device.
     fn traffic(&self) -> Traffic;
 

@@ -33,6 +33,8 @@ pub struct Matched {
     pub timings: Vec<Timing>,
     /// What went through the device.
     pub traffic: Traffic,
+    /// Labels of all pixels that the volumes of each level held, with padding; those of all tiles together.
+    pub cells: Vec<u64>,
 }
 
 /// The time that a stage took, over all its runs.
@@ -58,6 +60,7 @@ impl Matched {
         Self {
             timings,
             traffic: solution.traffic,
+            cells: solution.cells,
             maps: solution.maps,
             iterations: solution.iterations,
             plan: tiles.whole().clone(),

@@ -112,6 +112,10 @@ impl Backend for Pooled {
         self.gpu().times()
     }
 
+    fn cells(&self) -> Vec<u64> {
+        self.0.as_ref().expect("there until it is dropped").cells()
+    }
+
     fn traffic(&self) -> Traffic {
         self.0.as_ref().expect("there until it is dropped").traffic()
     }

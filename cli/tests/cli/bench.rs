@@ -60,7 +60,9 @@ fn a_bench_gives_every_figure_of_both_backends() {
             let (iterations, cells) = (value("iterations"), f64::from(width * height * 32));
             let wide = if preset == "paper" { 2.0 } else { 1.0 };
             assert!(close(value("label_updates"), iterations * 5.0 * cells), "{what}, {backend}");
-            let message_values = value("message_bytes") / (iterations * cells);
+            let kept = found["labels_kept"][0].as_f64().unwrap() / 100.0;
+            assert!(kept > 0.0 && (kept <= 1.0 && preset == "paper" || close(kept, 1.0)), "{what}: {kept}");
+            let message_values = value("message_bytes") / (iterations * cells * kept);
             // Where messages and beliefs come in one sweep, the five messages are not read once more.
             let swept = if backend == "cpu" { 5.0 } else { 0.0 };
             assert!(close(message_values, (17.0 - swept) * wide + 1.0), "{message_values}");

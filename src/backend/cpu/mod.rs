@@ -161,6 +161,14 @@ impl Backend for Cpu {
         Ok(self.times.clone().unwrap_or_default())
     }
 
+    fn cells(&self) -> Vec<u64> {
+        let of = |windows: &windows::Windows| windows.cells();
+        match self.state.as_ref().expect("prepare comes before every stage") {
+            State::Narrow(v) => v.levels.iter().map(|level| of(&level.windows)).collect(),
+            State::Wide(v) => v.levels.iter().map(|level| of(&level.windows)).collect(),
+        }
+    }
+
     fn traffic(&self) -> Traffic {
         Traffic::default()
     }

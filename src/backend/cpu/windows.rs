@@ -90,6 +90,12 @@ impl Windows {
         level.height * (level.width * level.stride + 2 * LABEL_BLOCK)
     }
 
+    /// Cells of all pixels.
+    pub(super) fn cells(&self) -> u64 {
+        let unused = 2 * LABEL_BLOCK * self.height();
+        (self.rows[self.height()] - unused) as u64
+    }
+
     /// Whether every window holds all labels.
     pub(super) fn are_full(&self) -> bool {
         self.full

@@ -23,7 +23,7 @@ use crate::front::Prepared;
 use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
-use crate::plan::Plan;
+use crate::plan::{LevelPlan, Plan};
 use crate::weights::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
 use device::Device;
@@ -401,6 +401,10 @@ impl Backend for Gpu {
     fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
         self.wait()?;
         self.timer.as_mut().map_or(Ok(Vec::new()), |timer| timer.times(&mut self.device))
+    }
+
+    fn cells(&self) -> Vec<u64> {
+        self.state().plan.levels.iter().map(LevelPlan::cells).collect()
     }
 
     fn traffic(&self) -> Traffic {

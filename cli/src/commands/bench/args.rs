@@ -29,7 +29,8 @@ const METHOD: &str = "A preset, or a TOML file whose keys replace those of the p
 /// one more for the times of the stages, by the device's own clock where it has one.
 ///
 /// A label update is one value of a dependency message: per iteration pixels x labels x members of a factor, summed over
-/// the levels that take part. The message stages are dependency, resolution and belief. They move at least every volume that
+/// the levels that take part, labels that are not kept included. Labels kept is the share that volumes hold after label
+/// windows have left out the rest. The message stages are dependency, resolution and belief. They move at least every volume that
 /// they read or write once per run. The copy rate (bytes read and written, from one large buffer to another, measured
 /// after the matches) shows how fast that could be; volumes that fit into caches can be faster. Processor time is that of
 /// all threads, peak memory the most that the process held, including the buffers of a software device. What needs more
@@ -37,7 +38,7 @@ const METHOD: &str = "A preset, or a TOML file whose keys replace those of the p
 ///
 /// --json holds `version`, `threads`, `repeats`, `methods` (by name: their keys) and `pairs`, one entry for each pair and
 /// method: `name`, `method`, `width`, `height`, `labels` and `devices` (as --device names them, null without the memory:
-/// `ran_on`, `iterations`, `median_ms`, `min_ms`, `max_ms`, `runs_ms`, `processor_ms`, `stages` (ms by stage and level),
+/// `ran_on`, `iterations`, `labels_kept` (% by level), `median_ms`, `min_ms`, `max_ms`, `runs_ms`, `processor_ms`, `stages` (ms by stage and level),
 /// `message_ms`, `label_updates`, `message_gupdates_per_s`, `match_gupdates_per_s`, `message_bytes`, `message_gb_per_s`,
 /// `copy_gb_per_s`, `copy_share` (%), `plan_bytes`, `peak_bytes`, `device_bytes`).
 #[derive(clap::Args)]

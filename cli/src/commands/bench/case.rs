@@ -132,7 +132,7 @@ impl Case<'_> {
             matcher.keep_time(timings);
             matcher.run(pair, range)
         };
-        let Matched { plan, tiles, iterations, ran_on, traffic, .. } = run(false)?;
+        let Matched { plan, tiles, iterations, ran_on, traffic, cells, .. } = run(false)?;
         let (mut runs_ms, mut processor, mut timed) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..self.args.repeats {
             let (start, before) = (Instant::now(), processor_time());
@@ -153,21 +153,27 @@ impl Case<'_> {
         let stages = timed[0].iter().enumerate().map(|(i, timing)| {
             (stage_and_level(timing), median(timed.iter().map(|timings| ms(timings[i].time))))
         });
-        let counted = |of: fn(&Plan, Stage) -> u64| -> u64 {
-            // Every tile has run as often as any other.
-            let counts = messages(&plan, &timed[0]).map(|(stage, timing)| {
-                let once: u64 = tiles.list().iter().map(|tile| of(&tile.plan, stage)).sum();
-                u64::from(timing.runs) * once / tiles.count() as u64
-            });
+        // Of all tiles together; every tile has run as often as any other.
+        let counted = |of: &dyn Fn(Stage) -> u64| -> u64 {
+            let counts = messages(&plan, &timed[0])
+                .map(|(stage, timing)| u64::from(timing.runs) * of(stage) / tiles.count() as u64);
             counts.sum()
         };
-        let (label_updates, message_bytes) = (counted(roofline::label_updates), counted(roofline::bytes));
+        let of_tiles =
+            |of: &dyn Fn(&Plan) -> u64| tiles.list().iter().map(|tile| of(&tile.plan)).sum::<u64>();
+        let label_updates = counted(&|stage| of_tiles(&|plan| roofline::label_updates(plan, stage)));
+        let message_bytes = counted(&|stage| roofline::bytes(&plan, stage, &cells));
+        let kept = cells.iter().enumerate().map(|(z, &kept)| {
+            let all = of_tiles(&|plan| plan.levels[z].cells());
+            100.0 * kept as f64 / all as f64
+        });
         let median_ms = median(runs_ms.iter().copied());
         let giga_per_s = |count: u64, ms: f64| giga(1000.0 * count as f64 / ms);
         let message_gb_per_s = giga_per_s(message_bytes, message_ms);
         Ok(Figures {
             ran_on,
             iterations,
+            labels_kept: kept.collect(),
             median_ms,
             min_ms: runs_ms.iter().copied().fold(f64::INFINITY, f64::min),
             max_ms: runs_ms.iter().copied().fold(0.0, f64::max),

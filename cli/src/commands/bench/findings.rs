@@ -35,6 +35,7 @@ pub(super) struct Row {
 pub(super) struct Figures {
     pub(super) ran_on: String,
     pub(super) iterations: u32,
+    pub(super) labels_kept: Vec<f64>,
     pub(super) median_ms: f64,
     pub(super) min_ms: f64,
     pub(super) max_ms: f64,
@@ -57,13 +58,17 @@ pub(super) struct Figures {
 /// A line of the table: its name, and its cell for the figures of a device.
 type Line = (&'static str, fn(&Figures) -> String);
 
-const LINES: [Line; 16] = [
+const LINES: [Line; 17] = [
     ("match, median (ms)", |f| format!("{:.1}", f.median_ms)),
     ("  least", |f| format!("{:.1}", f.min_ms)),
     ("  most", |f| format!("{:.1}", f.max_ms)),
     ("  processor time", |f| figure(f.processor_ms, 1)),
     ("message stages (ms)", |f| format!("{:.1}", f.message_ms)),
     ("iterations", |f| f.iterations.to_string()),
+    ("labels kept, from level 0 up (%)", |f| {
+        let kept: Vec<_> = f.labels_kept.iter().map(|share| format!("{share:.0}")).collect();
+        kept.join(" ")
+    }),
     ("label updates (G)", |f| format!("{:.2}", giga(f.label_updates))),
     ("  per second of the message stages", |f| format!("{:.2}", f.message_gupdates_per_s)),
     ("  per second of the match", |f| format!("{:.2}", f.match_gupdates_per_s)),
