@@ -28,7 +28,7 @@ const FLOOR: u64 = 60;
 struct Exception {
     kernel: &'static str,
     floor: u64,
-    /// Whether its arrays may lie in memory.
+    /// Whether its arrays, and registers, may lie in memory.
     scratch: bool,
     reason: &'static str,
 }
@@ -86,7 +86,7 @@ impl Figures {
         let exception = Exception::of(name);
         let floor = exception.map_or(FLOOR, |exception| exception.floor);
         let mut faults = Vec::new();
-        if self.spills > 0 {
+        if self.spills > 0 && !exception.is_some_and(|exception| exception.scratch) {
             faults.push(format!("spills {} registers", self.spills));
         } else if self.scratch > 0 && !exception.is_some_and(|exception| exception.scratch) {
             faults.push(format!("keeps arrays in memory, {} bytes a wave", self.scratch));
@@ -165,7 +165,7 @@ fn run(names: &[String]) -> Result<(), String> {
         }
     }
     if faults.is_empty() {
-        println!("{} variants: none spills, and all reach their floors", kernels.len());
+        println!("{} variants: none spills without an exception, and all reach their floors", kernels.len());
         return Ok(());
     }
     faults.push(
