@@ -10,7 +10,7 @@ use crate::text::one_line;
 /// Names of the presets, with what each is for.
 pub const PRESETS: &[(&str, &str)] = &[
     ("default", "the best this engine does"),
-    ("fast", "two thirds of its time for a few more errors: for video and robots"),
+    ("fast", "two thirds of the default's time for a few more errors: for video and robots"),
     ("paper", "the paper's whole method, with its choices wherever it states them"),
     ("fgs", "the paper's predecessor: one resolution, and a left-right check by a second matching"),
 ];

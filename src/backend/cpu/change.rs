@@ -1,6 +1,6 @@
 //! The change of the label map: see [`crate::backend::Stage::Change`].
 
-use super::units::{Units, argmin};
+use super::units::Units;
 use super::volumes::{Level, Volumes};
 use rayon::prelude::*;
 
@@ -14,9 +14,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
             let row = windows.row_of(belief, y);
             let mut sum = 0;
             for (x, label) in labels.iter_mut().enumerate() {
-                let window = windows.row(y)[x];
-                let belief = &row[window.start()..][..windows.labels(window)];
-                let new = (window.first() + argmin(belief).0) as u16;
+                let new = windows.winner(windows.row(y)[x], row);
                 sum += u64::from(new.abs_diff(*label)).pow(2);
                 *label = new;
             }

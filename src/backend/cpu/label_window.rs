@@ -1,6 +1,6 @@
 //! Label windows: see [`crate::backend::Stage::LabelWindow`].
 
-use super::units::{Units, argmin};
+use super::units::Units;
 use super::volumes::Volumes;
 use super::windows::Windows;
 use crate::image::Plane;
@@ -27,9 +27,7 @@ fn winners<U: Units>(v: &Volumes<U>, level: usize) -> Plane<u16> {
     winners.data_mut().par_chunks_mut(l.width).enumerate().for_each(|(y, row)| {
         let belief = here.windows.row_of(&here.belief, y);
         for (x, winner) in row.iter_mut().enumerate() {
-            let window = here.windows.row(y)[x];
-            let belief = &belief[window.start()..][..here.windows.labels(window)];
-            *winner = (window.first() + argmin(belief).0) as u16;
+            *winner = here.windows.winner(here.windows.row(y)[x], belief);
         }
     });
     winners

@@ -162,10 +162,9 @@ impl Backend for Cpu {
     }
 
     fn cells(&self) -> Vec<u64> {
-        let of = |windows: &windows::Windows| windows.cells();
         match self.state.as_ref().expect("prepare comes before every stage") {
-            State::Narrow(v) => v.levels.iter().map(|level| of(&level.windows)).collect(),
-            State::Wide(v) => v.levels.iter().map(|level| of(&level.windows)).collect(),
+            State::Narrow(v) => v.levels.iter().map(|level| level.windows.cells()).collect(),
+            State::Wide(v) => v.levels.iter().map(|level| level.windows.cells()).collect(),
         }
     }
 

@@ -4,14 +4,14 @@
 //! run, so rows of a volume differ in length. A row has a block of unused cells on either side, so that a block of labels
 //! can be loaded wherever it touches a window.
 
-use super::units::{Units, each_lane};
+use super::units::{Units, argmin, each_lane};
 use crate::image::Plane;
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, LevelPlan, WINDOW_RUN};
 use std::array::from_fn;
 use std::ops::Range;
 
 /// The label window of a pixel, and where its cells start in their row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(super) struct Window {
     start: u32,
     first: u16,
@@ -134,6 +134,12 @@ impl Windows {
         window.first()..window.first() + self.labels(window)
     }
 
+    /// The label with the smallest belief of a pixel, the lowest on ties; `row` holds the beliefs of its row.
+    #[inline(always)]
+    pub(super) fn winner<U: Units>(&self, window: Window, row: &[U]) -> u16 {
+        (window.first() + argmin(&row[window.start()..][..self.labels(window)]).0) as u16
+    }
+
     /// Where the cells of row `y` start; for the height, the number of all cells.
     #[inline(always)]
     pub(super) fn start(&self, y: usize) -> usize {
@@ -192,9 +198,7 @@ impl<'a, U: Units> Seen<'a, U> {
     pub(super) fn new(windows: &Windows, window: Window, cells: &'a [U], start: usize, first: usize) -> Self {
         let (shift, stride) =
             (first.cast_signed() - window.first().cast_signed(), window.stride().cast_signed());
-        // More than there are, where the window ends with the last label: then nothing after it is asked for.
-        let labels = windows.labels.cast_signed() - window.first().cast_signed();
-        Self { cells, start, shift, stride, labels: labels.min(stride) }
+        Self { cells, start, shift, stride, labels: windows.labels(window).cast_signed() }
     }
 
     /// The block of labels at `at`: the cells, and the largest value for those that are not labels of the pixel, 0 for the

@@ -252,9 +252,9 @@ impl Gpu {
             let windows = window_words(&Plane::filled(runs, rows, [0, l.stride as u16]));
             device.write(&level.windows, bytemuck::cast_slice(&windows))?;
             if plan.limits_labels() {
-                let all = || Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]);
-                let ranges = prepared.label_ranges.get(z).cloned().unwrap_or_else(all);
-                level.label_range.write(device, &label_range_words(&ranges, &level.params))?;
+                let words = |ranges: &Plane<_>| label_range_words(ranges, &level.params);
+                let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
+                level.label_range.write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
             }
         }
         for (level, graph) in buffers.levels.iter_mut().zip(&prepared.graphs) {
