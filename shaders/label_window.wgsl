@@ -1,5 +1,5 @@
 // Label windows, first label | number of labels with padding << 16: `within` label ranges; or, from the next
-// coarser level, `winners` and then `around` them.
+// coarser level, `candidates` and then `around` them.
 
 #import band volume messages
 
@@ -16,9 +16,9 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> belief: array<Quad>;
-// Label with the smallest belief of each pixel of the coarser level.
-@group(0) @binding(2) var<storage, read_write> winners_out: array<u32>;
-@group(0) @binding(3) var<storage, read> winners_in: array<u32>;
+// Candidates of each pixel of the coarser level, lowest | highest << 16.
+@group(0) @binding(2) var<storage, read_write> candidates_out: array<u32>;
+@group(0) @binding(3) var<storage, read> candidates_in: array<u32>;
 // First and last label of each pixel, first | last << 16.
 @group(0) @binding(4) var<storage, read> label_range: array<u32>;
 @group(0) @binding(5) var<storage, read_write> windows: array<u32>;
@@ -34,18 +34,27 @@ fn holding(least: i32, most: i32) -> u32 {
 
 // One invocation per coarse pixel.
 @compute @workgroup_size(GROUP)
-fn winners(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn candidates(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
     }
     let row = id.y * params.level.pitch;
-    // Belief and label in one key; labels that the pixel does not have come last.
-    var least = vec4(0xffffffffu);
+    var least = vec4(MOST);
     for (var quad = 0u; quad < params.level.quads; quad++) {
-        least = min(least, (unpack(belief[row + place_of(quad, id.x)]) << vec4(16u)) | labels_of(quad));
+        least = min(least, unpack(belief[row + place_of(quad, id.x)]));
     }
-    winners_out[id.y * params.level.pixel_pitch + id.x] = smallest(least) & 0xffffu;
+    // Labels that the pixel does not have are infinite.
+    let end = vec4(min(smallest(least) + SLACK + 1u, MOST));
+    var lowest = vec4(0xffffu);
+    var highest = vec4(0u);
+    for (var quad = 0u; quad < params.level.quads; quad++) {
+        let near = unpack(belief[row + place_of(quad, id.x)]) < end;
+        lowest = min(lowest, select(vec4(0xffffu), labels_of(quad), near));
+        highest = max(highest, select(vec4(0u), labels_of(quad), near));
+    }
+    let last = max(max(highest.x, highest.y), max(highest.z, highest.w));
+    candidates_out[id.y * params.level.pixel_pitch + id.x] = smallest(lowest) | (last << 16u);
 }
 
 // One invocation per window; rows of windows are those of the coarser level.
@@ -64,9 +73,9 @@ fn around(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     var most = 0u;
     for (var v = start.y; v < end.y; v++) {
         for (var u = start.x; u < end.x; u++) {
-            let winner = winners_in[(v - top) * params.level.pixel_pitch + u];
-            least = min(least, winner);
-            most = max(most, winner);
+            let candidates = candidates_in[(v - top) * params.level.pixel_pitch + u];
+            least = min(least, candidates & 0xffffu);
+            most = max(most, candidates >> 16u);
         }
     }
     let ends = 2 * vec2(i32(least), i32(most)) + vec2(params.label_offset);

@@ -49,9 +49,11 @@ pub const LABEL_BLOCK: usize = 16;
 pub const WINDOW_RUN: usize = 8;
 /// The first label of a label window is a multiple of this.
 pub const WINDOW_STEP: usize = 4;
-/// How far from its own coarse pixels a label window looks for winners, in coarse pixels.
+/// How far above a pixel's smallest belief a label may be and still count as a candidate, in units: 2 nats.
+pub const WINDOW_SLACK: u16 = 8;
+/// How far from its own coarse pixels a label window looks for candidates, in coarse pixels.
 pub const WINDOW_REACH: usize = 2;
-/// Labels that a label window holds at least on either side of each winner.
+/// Labels that a label window holds at least on either side of each candidate.
 pub const WINDOW_MARGIN: i32 = 2;
 
 // The largest costs of a label match what the options state.
@@ -374,9 +376,9 @@ impl Plan {
         self.method.front.zone_sigmas > 0.0
     }
 
-    /// Whether the label windows of `level` follow the winners of the next coarser one.
+    /// Whether the label windows of `level` follow the beliefs of the next coarser one.
     #[must_use]
-    pub fn windows_follow_winners(&self, level: usize) -> bool {
+    pub fn windows_follow_beliefs(&self, level: usize) -> bool {
         self.method.schedule.order == Order::CoarseFirst && level + 1 < self.levels.len()
     }
 

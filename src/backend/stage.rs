@@ -30,10 +30,11 @@ macro_rules! for_every_stage {
                 /// what is needed, rounded up to whole blocks of [`LABEL_BLOCK`](crate::plan::LABEL_BLOCK), and `first` is reduced where
                 /// the window would end behind the level's last block.
                 ///
-                /// - Where the levels join one after the other, and this is not the coarsest: what is needed are the labels 2 w - 2 to 2 w + 2
-                ///   for the winners w (labels with the smallest belief, the lowest on ties) of all pixels of the next coarser level that
-                ///   are at most [`WINDOW_REACH`](crate::plan::WINDOW_REACH) rows and columns away from the run's: rows r - 2 to r + 2,
-                ///   columns 4 i - 2 to 4 i + 5 for run i.
+                /// - Where the levels join one after the other, and this is not the coarsest: what is needed are the labels 2 c - 2 to 2 c + 2
+                ///   for the candidates c of all pixels of the next coarser level that are at most
+                ///   [`WINDOW_REACH`](crate::plan::WINDOW_REACH) rows and columns away from the run's: rows r - 2 to r + 2, columns
+                ///   4 i - 2 to 4 i + 5 for run i. Candidates are the labels whose belief is at most
+                ///   [`WINDOW_SLACK`](crate::plan::WINDOW_SLACK) above the pixel's smallest.
                 /// - Otherwise, where zones limit the labels: the label ranges of the run's pixels.
                 /// - Otherwise all labels.
                 ///

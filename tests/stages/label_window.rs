@@ -38,12 +38,18 @@ fn label_window() {
             // A surface, with some pixels far from it; ties.
             let surface = random.within(0, labels as u32 - 1) as usize;
             let far = random.pick(&[2, 30, 1000]);
-            let belief: Vec<u32> =
-                (0..cells(&plan, z + 1))
-                    .map(|i| {
-                        if i % labels == surface && !random.one_in(far) { 1 } else { 2 + random.within(0, 3) }
-                    })
-                    .collect();
+            let belief: Vec<u32> = (0..cells(&plan, z + 1))
+                .map(|i| {
+                    if i % labels == surface && !random.one_in(far) {
+                        random.within(1, 4)
+                    } else if random.one_in(500) {
+                        // Just near enough to count, or not.
+                        random.within(9, 13)
+                    } else {
+                        random.within(16, 25)
+                    }
+                })
+                .collect();
             backend.probe().set_windows(z + 1, &full(&plan, z + 1)).unwrap();
             backend.probe().write(Volume::Belief(z + 1), &belief).unwrap();
             let expected = twin::label_window::label_window(&plan, z, Some(&belief), None);

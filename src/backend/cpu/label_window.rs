@@ -1,18 +1,20 @@
 //! Label windows: see [`crate::backend::Stage::LabelWindow`].
 
-use super::units::Units;
+use super::units::{Units, smallest};
 use super::volumes::Volumes;
 use super::windows::Windows;
 use crate::image::Plane;
-use crate::plan::{LABEL_BLOCK, LevelPlan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_STEP};
+use crate::plan::{
+    LABEL_BLOCK, LevelPlan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_SLACK, WINDOW_STEP,
+};
 use rayon::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let l = &v.plan.levels[level];
-    v.levels[level].windows = if v.plan.windows_follow_winners(level) {
-        let winners = winners(v, level + 1);
+    v.levels[level].windows = if v.plan.windows_follow_beliefs(level) {
+        let candidates = candidates(v, level + 1);
         let offset = v.plan.label_offset(level + 1);
-        Windows::new(l, &around(l, &winners, offset))
+        Windows::new(l, &around(l, &candidates, offset))
     } else if let Some(ranges) = v.label_ranges.get(level) {
         Windows::new(l, &within(l, ranges))
     } else {
@@ -20,32 +22,37 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     };
 }
 
-/// The label with the smallest belief of each pixel of `level`.
-fn winners<U: Units>(v: &Volumes<U>, level: usize) -> Plane<u16> {
+/// Lowest and highest candidate of each pixel of `level`.
+fn candidates<U: Units>(v: &Volumes<U>, level: usize) -> Plane<[u16; 2]> {
     let (l, here) = (&v.plan.levels[level], &v.levels[level]);
-    let mut winners = Plane::filled(l.width, l.height, 0);
-    winners.data_mut().par_chunks_mut(l.width).enumerate().for_each(|(y, row)| {
+    let mut candidates = Plane::filled(l.width, l.height, [0; 2]);
+    candidates.data_mut().par_chunks_mut(l.width).enumerate().for_each(|(y, row)| {
         let belief = here.windows.row_of(&here.belief, y);
-        for (x, winner) in row.iter_mut().enumerate() {
-            *winner = here.windows.winner(here.windows.row(y)[x], belief);
+        for (x, candidates) in row.iter_mut().enumerate() {
+            let window = here.windows.row(y)[x];
+            let belief = &belief[window.start()..][..here.windows.labels(window)];
+            let most = smallest(belief).plus(U::of(WINDOW_SLACK.into()));
+            let lowest = belief.iter().position(|&b| b <= most).unwrap_or(0);
+            let highest = belief.iter().rposition(|&b| b <= most).unwrap_or(0);
+            *candidates = [lowest, highest].map(|label| (window.first() + label) as u16);
         }
     });
-    winners
+    candidates
 }
 
-/// The windows around `winners` of the next coarser level; winner z means label 2 z + `offset`.
-fn around(level: &LevelPlan, winners: &Plane<u16>, offset: i32) -> Plane<[u16; 2]> {
-    let (width, height) = winners.size();
+/// The windows around `candidates` of the next coarser level; candidate z means label 2 z + `offset`.
+fn around(level: &LevelPlan, candidates: &Plane<[u16; 2]>, offset: i32) -> Plane<[u16; 2]> {
+    let (width, height) = candidates.size();
     let (runs, rows) = level.windows();
     let mut windows = Plane::filled(runs, rows, [0; 2]);
     windows.data_mut().par_chunks_mut(runs).enumerate().for_each_init(
-        // Smallest and largest winner of each column, over all rows that are near.
+        // Lowest and highest candidate of each column, over all rows that are near.
         || vec![(0, 0); width],
         |columns, (y, windows)| {
             columns.fill((u16::MAX, 0));
             for y in y.saturating_sub(WINDOW_REACH)..(y + WINDOW_REACH + 1).min(height) {
-                for ((least, most), &winner) in columns.iter_mut().zip(winners.row(y)) {
-                    (*least, *most) = ((*least).min(winner), (*most).max(winner));
+                for ((least, most), &[lowest, highest]) in columns.iter_mut().zip(candidates.row(y)) {
+                    (*least, *most) = ((*least).min(lowest), (*most).max(highest));
                 }
             }
             for (run, window) in windows.iter_mut().enumerate() {
@@ -53,7 +60,7 @@ fn around(level: &LevelPlan, winners: &Plane<u16>, offset: i32) -> Plane<[u16; 2
                 let near = x.saturating_sub(WINDOW_REACH)..(x + WINDOW_RUN / 2 + WINDOW_REACH).min(width);
                 let least = columns[near.clone()].iter().map(|c| c.0).min().unwrap_or(0);
                 let most = columns[near].iter().map(|c| c.1).max().unwrap_or(0);
-                let label = |winner: u16| 2 * i32::from(winner) + offset;
+                let label = |candidate: u16| 2 * i32::from(candidate) + offset;
                 *window = holding(level, label(least) - WINDOW_MARGIN, label(most) + WINDOW_MARGIN);
             }
         },

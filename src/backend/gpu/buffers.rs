@@ -189,8 +189,8 @@ pub(super) struct LevelBuffers {
     pub(super) belief: Rows,
     /// Label windows, first label | number of labels with padding << 16.
     pub(super) windows: wgpu::Buffer,
-    /// Label with the smallest belief of each pixel, for the windows of the next finer level.
-    pub(super) winners: Rows,
+    /// Lowest and highest candidate of each pixel, for the windows of the next finer level.
+    pub(super) candidates: Rows,
     /// First and last label of each pixel; empty where all labels are allowed.
     pub(super) label_range: Rows,
     pub(super) members: Rows,
@@ -323,7 +323,7 @@ impl Buffers {
                 up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
                 belief: a.rows("belief", values, &starts)?,
                 windows: a.buffer("label windows", (level.windows().0 * level.windows().1) as u64)?,
-                winners: a.rows("winners", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
+                candidates: a.rows("candidates", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
                 label_range: a.rows(
                     "label ranges",
                     p.pixel_pitch,

@@ -7,7 +7,7 @@ use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
 use crate::error::Result;
-use crate::plan::{LABEL_BLOCK, Plan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_STEP};
+use crate::plan::{LABEL_BLOCK, Plan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_SLACK, WINDOW_STEP};
 
 const SHADER: &str = include_str!("../../../shaders/label_window.wgsl");
 
@@ -21,14 +21,15 @@ pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
             .with("WINDOW_STEP", WINDOW_STEP as u32)
             .with("LABEL_BLOCK", LABEL_BLOCK as u32)
             .with("MARGIN", WINDOW_MARGIN)
+            .with("SLACK", u32::from(WINDOW_SLACK))
             .with("REACH", reach)
     };
-    if plan.windows_follow_winners(level) {
+    if plan.windows_follow_beliefs(level) {
         let quads = plan.levels[level + 1].quads();
         let pixels = (2 * WINDOW_REACH + 1) * (2 * WINDOW_REACH + WINDOW_RUN / 2 + 1);
         let reach = WINDOW_REACH as u32;
         vec![
-            Job::new::<Uniform>(kernel("winners", reach), quads),
+            Job::new::<Uniform>(kernel("candidates", reach), 2 * quads),
             Job::new::<Uniform>(kernel("around", reach), pixels),
         ]
     } else if plan.limits_labels() {
@@ -45,17 +46,17 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let own = |label_offset| Uniform { runs, labels: l.labels as u32, stride: l.stride as u32, label_offset };
     let windows = Binding::whole(&here.windows);
     match &jobs(r.plan, level)[..] {
-        [winners, around] => {
+        [candidates, around] => {
             let own = own(r.plan.label_offset(level + 1));
             r.level += 1;
             let (coarse, c) = (r.here(), r.params());
-            r.rows(winners, &own, c.width, |rows| {
-                vec![(1, coarse.belief.bind(rows)), (2, coarse.winners.bind(rows))]
+            r.rows(candidates, &own, c.width, |rows| {
+                vec![(1, coarse.belief.bind(rows)), (2, coarse.candidates.bind(rows))]
             })?;
-            r.renew(&coarse.winners);
+            r.renew(&coarse.candidates);
             r.rows(around, &own, runs, |rows| {
                 let near = with_halo(rows, WINDOW_REACH as u32, c.height);
-                vec![(3, coarse.winners.bind(&near)), (5, windows.clone())]
+                vec![(3, coarse.candidates.bind(&near)), (5, windows.clone())]
             })?;
             r.level -= 1;
         }

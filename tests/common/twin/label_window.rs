@@ -1,4 +1,4 @@
-use super::change::labels;
+use super::most;
 use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Order;
@@ -14,17 +14,22 @@ pub fn label_window(
 ) -> Plane<[u16; 2]> {
     let l = &plan.levels[level];
     let joins = plan.method.schedule.order == Order::CoarseFirst && level + 1 < plan.levels.len();
-    let winners = joins.then(|| labels(coarse_belief.unwrap(), plan.levels[level + 1].labels));
     Plane::from_fn(l.width.div_ceil(8), l.height.div_ceil(2), |run, row| {
         let mut needed = Vec::new();
-        if let Some(winners) = &winners {
-            let c = &plan.levels[level + 1];
+        if joins {
+            let (belief, c) = (coarse_belief.unwrap(), &plan.levels[level + 1]);
             for y in 0..c.height as i64 {
                 for x in 0..c.width as i64 {
                     let (run, row) = (run as i64, row as i64);
                     if (y - row).abs() <= 2 && x >= 4 * run - 2 && x <= 4 * run + 5 {
-                        let label = i64::from(c.min) + winners[y as usize * c.width + x as usize];
-                        needed.extend([2 * label - 2 - i64::from(l.min), 2 * label + 2 - i64::from(l.min)]);
+                        let pixel = &belief[(y as usize * c.width + x as usize) * c.labels..][..c.labels];
+                        let smallest = *pixel.iter().min().unwrap();
+                        for (z, &b) in pixel.iter().enumerate() {
+                            if b <= smallest + 8 && b < most(plan) {
+                                let label = 2 * (i64::from(c.min) + z as i64) - i64::from(l.min);
+                                needed.extend([label - 2, label + 2]);
+                            }
+                        }
                     }
                 }
             }
