@@ -51,7 +51,7 @@ pub fn inspect(
     observer: Observer,
     inspector: Option<Inspector>,
 ) -> Result<Solution> {
-    let mut run = Run { watch: watch(plan, observer), inspector };
+    let mut run = Run::new(watch(plan, observer), inspector);
     let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
     backend.wait()?;
     let maps = run.watch.host("download", || tickets.collect(backend))?;
@@ -73,7 +73,7 @@ pub struct Started {
 /// # Errors
 /// Those of [`solve`].
 pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Started> {
-    let mut run = Run { watch: watch(plan, observer), inspector: None };
+    let mut run = Run::new(watch(plan, observer), None);
     let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
     let (traffic, cells) = (backend.traffic(), backend.cells());
     Ok(Started { tickets, iterations, host_times: run.watch.into_times(), traffic, cells })
@@ -138,6 +138,7 @@ fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: Pair, run: &mut Run) ->
 
 /// All stages of a match in one piece; the number of iterations, and its maps.
 fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<(u32, Tickets)> {
+    let plan = &if run.inspector.is_some() { plan.clone() } else { solver::streamed(plan) };
     let mut right_labels = None;
     if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
@@ -180,7 +181,7 @@ pub fn solve_tiles(
     let whole = tiles.whole();
     let all: f64 = tiles.list().iter().map(|tile| solver::work(&tile.plan)).sum();
     let watch = Watch::new(observer, matchings(whole) as f64 * all);
-    let mut run = Run { watch: watch.in_tiles(matchings(whole) * tiles.count()), inspector: None };
+    let mut run = Run::new(watch.in_tiles(matchings(whole) * tiles.count()), None);
     let mut mosaic = Mosaic::new(whole, pair)?;
     let (mut iterations, mut traffic) = (0, Traffic::default());
     let mut cells = vec![0; whole.levels.len()];
@@ -191,8 +192,9 @@ pub fn solve_tiles(
             let crop = copy(&tile.plan, || pair.crop(&tile.crop.mirrored(pair.size().0)))?;
             let mirrored = copy(&tile.plan, || crop.mirrored())?;
             drop(crop);
-            let prepared = prepare(backend, &tile.plan, mirrored, &mut run)?;
-            solver::estimate(backend, &tile.plan, prepared, &mut run)?;
+            let plan = solver::streamed(&tile.plan);
+            let prepared = prepare(backend, &plan, mirrored, &mut run)?;
+            solver::estimate(backend, &plan, prepared, &mut run)?;
             backend.wait()?;
             run.watch.host("download", || mosaic.place_mirrored(tile, backend))?;
             traffic += backend.traffic();
@@ -201,14 +203,15 @@ pub fn solve_tiles(
     for tile in tiles.list() {
         run.watch.next_tile();
         let crop = copy(&tile.plan, || pair.crop(&tile.crop))?;
-        let prepared = prepare(backend, &tile.plan, crop, &mut run)?;
+        let plan = solver::streamed(&tile.plan);
+        let prepared = prepare(backend, &plan, crop, &mut run)?;
         let matched = prepared.pair.clone();
-        iterations = iterations.max(solver::estimate(backend, &tile.plan, prepared, &mut run)?);
+        iterations = iterations.max(solver::estimate(backend, &plan, prepared, &mut run)?);
         backend.wait()?;
         let seen = run.watch.host("download", || mosaic.place(tile, &matched, backend))?;
         if right_map_wanted && matchings(whole) == 1 {
             for stage in solver::right_view() {
-                run.stage(backend, &tile.plan, stage)?;
+                run.stage(backend, &plan, stage)?;
             }
             backend.wait()?;
             run.watch.host("download", || mosaic.place_right(tile, &seen, backend))?;

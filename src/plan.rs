@@ -251,6 +251,9 @@ pub struct Plan {
     /// Columns of the left view from which [`Stage::RightView`](crate::backend::Stage::RightView) is
     /// computed: all of them, or in a tile those of its core.
     pub core: Range<usize>,
+    /// Rows of level 0 that are held at the same time: all of them, or as many as the stages that go down the image
+    /// [together](crate::backend::wavefront) need.
+    pub held: usize,
 }
 
 impl Plan {
@@ -330,13 +333,14 @@ impl Plan {
             volume_width,
             phases,
             core: 0..width,
+            held: height,
             method,
         })
     }
 
     /// This plan for another image size: same range, method and number of levels.
     pub(crate) fn resized(&self, width: usize, height: usize) -> Self {
-        let mut plan = Self { core: 0..width, ..self.clone() };
+        let mut plan = Self { core: 0..width, held: height, ..self.clone() };
         let mut size = (width, height);
         for level in &mut plan.levels {
             (level.width, level.height) = size;
@@ -349,6 +353,24 @@ impl Plan {
     #[must_use]
     pub fn fits(&self, other: &Self) -> bool {
         *self == Self { core: self.core.clone(), ..other.clone() }
+    }
+
+    /// Rows of the volumes of `level` that are held at the same time.
+    #[must_use]
+    pub fn rows_held(&self, level: usize) -> usize {
+        if level == 0 { self.held } else { self.levels[level].height }
+    }
+
+    /// The same plan with all rows held.
+    #[must_use]
+    pub fn whole(&self) -> Self {
+        Self { held: self.levels[0].height, ..self.clone() }
+    }
+
+    /// Whether all rows of level 0 are held at the same time.
+    #[must_use]
+    pub fn holds_all_rows(&self) -> bool {
+        self.held == self.levels[0].height
     }
 
     /// (width, height) of the finest level.
@@ -426,19 +448,27 @@ impl Plan {
         2 * self.levels[level].min - self.levels[level - 1].min
     }
 
-    /// Bytes taken by the volumes and the graph of `level`.
+    /// Bytes taken by the volumes and the graph of `level`; where not all rows of level 0 are held, with what its costs are
+    /// computed from.
     #[must_use]
     pub fn level_bytes(&self, level: usize) -> u64 {
         let l = &self.levels[level];
-        let cells = (l.pixels() * l.stride) as u64;
-        let cost = if level == 0 { 1 } else { 2 };
+        let (all, held) = (l.height, self.rows_held(level));
+        // In a ring a pair of rows is replaced as a whole, and does not pass its end.
+        let rows = if held < all { all.min(held + 4) } else { all };
+        let cells = (rows * l.width * l.stride) as u64;
+        let (cost, features) = match level {
+            0 if held < all => (0, l.height * (2 * l.width + 2 * 12 * (l.width + 2 * l.stride))),
+            0 => (1, 0),
+            _ => (2, 0),
+        };
         let width = self.volume_width.bytes();
         let up = if level == 0 { 0 } else { width };
         let down = if level + 1 == self.levels.len() { 0 } else { width };
         let volumes = cost + 1 + width + up + down + self.slots() * width;
         // The member codes, and the transposed table with its row starts.
         let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
-        cells * volumes as u64 + graph as u64
+        cells * volumes as u64 + (features + graph) as u64
     }
 
     /// Largest number of bytes taken by the images and all maps.

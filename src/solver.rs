@@ -2,10 +2,11 @@
 //!
 //! [`estimate`] takes a prepared pair to the disparity of every pixel, [`post_processing`] says what follows.
 
+use crate::backend::wavefront::Wavefront;
 use crate::backend::{Backend, Stage};
 use crate::error::Result;
 use crate::front::Prepared;
-use crate::options::{Fill, Median, Method, Order};
+use crate::options::{Fill, MatchingCost, Median, Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::watch::Watch;
 use std::iter;
@@ -29,17 +30,39 @@ pub struct Run<'a, 'b> {
     pub watch: Watch<'a>,
     /// Looks in, if anyone.
     pub inspector: Option<Inspector<'b>>,
+    /// Stages that go down the image together, once all are known.
+    together: Option<Vec<Stage>>,
 }
 
-impl Run<'_, '_> {
+impl<'a, 'b> Run<'a, 'b> {
+    /// A match that `watch` follows, and `inspector`, if any, looks into.
+    #[must_use]
+    pub fn new(watch: Watch<'a>, inspector: Option<Inspector<'b>>) -> Self {
+        Self { watch, inspector, together: None }
+    }
+
     /// Runs `stage`, and shows it.
     ///
     /// # Errors
     /// Those of the backend and of the inspector, and [`crate::Error::Interrupted`] when the observer breaks.
     pub fn stage(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
+        if let Some(together) = &mut self.together {
+            together.push(stage);
+            return Ok(());
+        }
         self.watch.begin(stage.name(), work_of(plan, stage))?;
         backend.run(stage)?;
         self.inspect(&mut Inspection::Stage(backend, stage))
+    }
+
+    /// Runs the stages that were gathered since `together` began, if it did.
+    fn run_together(&mut self, backend: &mut dyn Backend, plan: &Plan) -> Result<()> {
+        let Some(stages) = self.together.take() else { return Ok(()) };
+        let wavefront = Wavefront::new(plan, stages).expect("stages that go row by row");
+        let watch = &mut self.watch;
+        backend.run_wavefront(&wavefront, &mut |stage, share| {
+            watch.begin(stage.name(), share * work_of(plan, stage))
+        })
     }
 
     fn inspect(&mut self, inspection: &mut Inspection) -> Result<()> {
@@ -66,6 +89,7 @@ pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run:
     for stage in read_out(plan) {
         run.stage(backend, plan, stage)?;
     }
+    run.run_together(backend, plan)?;
     Ok(iterations)
 }
 
@@ -75,6 +99,9 @@ pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run:
 /// Those of [`Run::stage`].
 pub fn join(backend: &mut dyn Backend, plan: &Plan, run: &mut Run, z: usize) -> Result<()> {
     run.stage(backend, plan, Stage::LabelWindow(z))?;
+    if z == 0 && !plan.holds_all_rows() {
+        run.together = Some(Vec::new());
+    }
     run.stage(backend, plan, Stage::Evidence(z))
 }
 
@@ -88,7 +115,6 @@ pub fn flood<'a, 'b>(
     run: &mut Run<'a, 'b>,
     join: impl Fn(&mut dyn Backend, &mut Run<'a, 'b>, usize) -> Result<()>,
 ) -> Result<u32> {
-    let coarsest = plan.levels.len() - 1;
     let tolerance = plan.method.schedule.tolerance;
     let mut iterations = 0;
     let mut joined = plan.levels.len();
@@ -97,13 +123,8 @@ pub fn flood<'a, 'b>(
             join(backend, run, z)?;
         }
         joined = phase.finest;
-        if phase.finest < coarsest && plan.phases.len() > 1 {
-            // What the coarser levels know reaches the new one before its own messages start. The coarser level's
-            // beliefs take in what came up, or the next resolution would take off a message that they do not hold.
-            let (joining, above) = (phase.finest, phase.finest + 1);
-            for stage in [Stage::Resolution(above), Stage::Belief(joining), Stage::Belief(above)] {
-                run.stage(backend, plan, stage)?;
-            }
+        for stage in joining(plan, phase) {
+            run.stage(backend, plan, stage)?;
         }
         let converges = tolerance > 0.0 && phase.finest == 0;
         if converges {
@@ -124,6 +145,37 @@ pub fn flood<'a, 'b>(
         }
     }
     Ok(iterations)
+}
+
+/// The stages by which what the coarser levels know reaches the one that joins in a phase, before its own messages start. The
+/// coarser level's beliefs take in what came up, or the next resolution would take off a message that they do not hold.
+fn joining(plan: &Plan, phase: &Phase) -> Vec<Stage> {
+    let (joining, above) = (phase.finest, phase.finest + 1);
+    if above == plan.levels.len() || plan.phases.len() == 1 {
+        return Vec::new();
+    }
+    vec![Stage::Resolution(above), Stage::Belief(joining), Stage::Belief(above)]
+}
+
+/// The same plan for a match that nobody looks into: where the schedule allows it, the stages that need level 0 go down the
+/// image together, and only the rows between them are held.
+#[must_use]
+pub fn streamed(plan: &Plan) -> Plan {
+    let method = &plan.method;
+    let last = plan.phases.last().expect("a phase");
+    // Convergence looks at the whole level, and so do zones and the sums of the matching cost that is not a census.
+    let whole = plan.phases.len() == 1
+        || method.schedule.tolerance > 0.0
+        || plan.limits_labels()
+        || method.cost.matching == MatchingCost::Sad;
+    let stages = iter::once(Stage::Evidence(0))
+        .chain(joining(plan, last))
+        .chain((0..last.iterations).flat_map(|i| iteration(plan, last, i)))
+        .chain(read_out(plan));
+    let wavefront = if whole { None } else { Wavefront::new(plan, stages.collect()) };
+    let streamed = wavefront.map(|wavefront| Plan { held: wavefront.rows(), ..plan.clone() });
+    // With few labels the costs take less than what they are computed from.
+    streamed.filter(|streamed| streamed.bytes() < plan.bytes()).unwrap_or_else(|| plan.clone())
 }
 
 /// The stages of iteration `i`, from 0 on, of a phase. Every message is from old beliefs: those between levels first, then a

@@ -8,6 +8,7 @@ pub mod gpu;
 pub mod probe;
 pub mod stage;
 pub mod volume;
+pub mod wavefront;
 
 use crate::error::Result;
 use crate::front::Prepared;
@@ -18,6 +19,7 @@ use probe::Probe;
 pub use stage::Stage;
 use std::time::Duration;
 pub use volume::{Map, NO_LABEL, Volume, volume_shape};
+use wavefront::Wavefront;
 
 /// What a match asked of a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,6 +76,22 @@ pub trait Backend {
 
     /// Runs a stage. Devices may still be at it when this returns.
     fn run(&mut self, stage: Stage) -> Result<()>;
+
+    /// Runs the stages of a wavefront, the first that follow on the windows of level 0. What they leave of level 0 beside maps
+    /// may be gone afterwards. `before` hears of each stage that is about to run, with the share of it that is.
+    ///
+    /// # Errors
+    /// Those of `before`, beside the device's.
+    fn run_wavefront(
+        &mut self,
+        wavefront: &Wavefront,
+        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Result<()> {
+        wavefront.stages().iter().try_for_each(|&stage| {
+            before(stage, 1.0)?;
+            self.run(stage)
+        })
+    }
 
     /// Runs [`Stage::Change`] and returns its sum.
     fn change(&mut self) -> Result<u64>;

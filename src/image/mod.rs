@@ -119,6 +119,14 @@ impl<T> Plane<T> {
         &mut self.data
     }
 
+    /// The values of these rows, mutable.
+    ///
+    /// # Panics
+    /// When there are not as many rows.
+    pub fn rows_mut(&mut self, rows: Range<usize>) -> &mut [T] {
+        &mut self.data[rows.start * self.width..rows.end * self.width]
+    }
+
     /// The values, row by row, moved out of the plane.
     #[must_use]
     pub fn into_data(self) -> Vec<T> {

@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     let mut go_on = |_| ControlFlow::Continue(());
     let watch = Watch::new(&mut go_on, 1.0);
-    solver::flood(backend, plan, &mut Run { watch, inspector: None }, |_, _, _| Ok(()))
+    solver::flood(backend, plan, &mut Run::new(watch, None), |_, _, _| Ok(()))
 }
 
 /// The same on the costs that `backend` holds.
@@ -28,5 +28,5 @@ pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u
     let mut go_on = |_| ControlFlow::Continue(());
     let watch = Watch::new(&mut go_on, 1.0);
     let join = |backend: &mut dyn Backend, run: &mut Run, z| solver::join(backend, plan, run, z);
-    solver::flood(backend, plan, &mut Run { watch, inspector: None }, join)
+    solver::flood(backend, plan, &mut Run::new(watch, None), join)
 }

@@ -2,11 +2,13 @@
 
 use super::dependency::REACH;
 use super::units::{Blocks, Units, block, block_mut, each_lane, padding};
-use super::volumes::{Level, Volumes};
+use super::volumes::{Level, Sent, Volumes};
 use super::windows::{Seen, Window, Windows};
+use crate::backend::Stage;
 use crate::graph::{Incoming, LevelGraph};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The terms of the beliefs of a level.
 pub(super) struct Summands<'a, U> {
@@ -24,44 +26,32 @@ pub(super) struct Summands<'a, U> {
 }
 
 impl<'a, U: Units> Summands<'a, U> {
-    /// The terms of level `z`, with its dependency messages, its beliefs, and whether its factors have sent
-    /// their messages.
+    /// The terms of level `z`, with its dependency messages and its beliefs.
     pub(super) fn of(
         plan: &Plan,
         levels: &'a mut [Level<U>],
         z: usize,
-    ) -> (Self, [&'a mut [U]; 2], &'a mut bool) {
-        let above = levels.get(z + 1).is_some_and(|above| above.resolution_sent);
+        sent: Sent,
+    ) -> (Self, [&'a mut [U]; 2]) {
         let l = &plan.levels[z];
-        let Level {
-            graph,
-            windows,
-            evidence,
-            dependency,
-            dependency_sent,
-            resolution_sent,
-            down,
-            up,
-            belief,
-            ..
-        } = &mut levels[z];
+        let Level { graph, windows, evidence, dependency, down, up, belief, .. } = &mut levels[z];
         let summands = Self {
             graph,
             windows,
             evidence,
             // A volume without messages is left out of the sum.
-            down: if above { down } else { &[] },
-            up: if *resolution_sent { up } else { &[] },
+            down: if sent.above { down } else { &[] },
+            up: if sent.below { up } else { &[] },
             most: U::of(plan.belief_most().into()),
             tau: U::of(plan.dependency.tau.into()),
             padding: padding(l.labels, l.stride),
         };
-        (summands, [dependency, belief], dependency_sent)
+        (summands, [dependency, belief])
     }
 }
 
-/// The beliefs of row `y`, from the dependency messages of the factors from row `first` on. `None` means that
-/// the factors have not sent any yet.
+/// The beliefs of row `y`, from the dependency messages of the factors, `dependency` being those from the cell `first` on.
+/// `None` means that the factors have not sent any yet.
 pub(super) fn row<U: Units>(
     summands: &Summands<U>,
     y: usize,
@@ -101,10 +91,16 @@ pub(super) fn row<U: Units>(
 }
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
-    let (summands, [dependency, belief], sent) = Summands::of(&v.plan, &mut v.levels, level);
-    let dependency = sent.then_some(&*dependency);
-    let rows = summands.windows.rows_mut(belief, 1, 1).into_par_iter().enumerate();
-    rows.for_each(|(y, belief)| row(&summands, y, 0, dependency, belief));
+    let sent = v.begin(Stage::Belief(level));
+    rows(v, level, sent, 0..v.plan.levels[level].height);
+}
+
+/// The beliefs of these rows.
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
+    let (summands, [dependency, belief]) = Summands::of(&v.plan, &mut v.levels, level, sent);
+    let dependency = sent.dependency.then_some(&*dependency);
+    let beliefs = summands.windows.rows_mut(belief, 1, 1, rows.clone()).into_par_iter();
+    beliefs.zip(rows).for_each(|(belief, y)| row(&summands, y, 0, dependency, belief));
 }
 
 /// A pixel's belief, and its terms.

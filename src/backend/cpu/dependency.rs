@@ -5,13 +5,14 @@
 //! belief is infinite, and the message is tau.
 
 use super::units::{Blocks, Least, Truncating, Units, block, block_mut, each_lane, keep_least, smallest};
-use super::volumes::{Level, Volumes};
+use super::volumes::{Level, Sent, Volumes};
 use super::windows::{Seen, Windows};
+use crate::backend::Stage;
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
 use std::array::from_fn;
-use std::mem;
+use std::ops::Range;
 
 /// Working memory of a thread.
 pub(super) struct Scratch<U> {
@@ -56,15 +57,21 @@ pub(super) struct Factors<'a> {
 }
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let sent = v.begin(Stage::Dependency(level));
+    rows(v, level, sent, 0..v.plan.levels[level].height);
+}
+
+/// The messages of the factors of these rows.
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
     let (plan, l) = (&v.plan, &v.plan.levels[level]);
-    let Level { graph, windows, belief, dependency: messages, dependency_sent, .. } = &mut v.levels[level];
-    // The first messages count as 0, whatever is stored.
-    let initial = !mem::replace(dependency_sent, true);
+    let Level { graph, windows, belief, dependency: messages, .. } = &mut v.levels[level];
     let factors = Factors { graph, windows, cut: plan.dependency };
-    windows.rows_mut(messages, graph.slots(), 1).into_par_iter().enumerate().for_each_init(
+    let messages = windows.rows_mut(messages, graph.slots(), 1, rows.clone());
+    messages.into_par_iter().zip(rows).for_each_init(
         || Scratch::new(l.stride, graph.slots()),
-        |scratch, (y, messages)| {
-            if initial {
+        |scratch, (messages, y)| {
+            // The first messages count as 0, whatever is stored.
+            if !sent.dependency {
                 messages.fill(U::default());
             }
             let around: Around<U> = from_fn(|k| {

@@ -3,31 +3,65 @@
 use super::pyramid::StoredCost;
 use super::units::Units;
 use super::volumes::Volumes;
-use super::windows::Windows;
+use super::windows::{Window, Windows};
 use crate::plan::LevelPlan;
 use rayon::prelude::*;
+use std::ops::Range;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    rows(v, level, 0..v.plan.levels[level].height);
+}
+
+/// The evidence of these rows.
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, rows: Range<usize>) {
     let (plan, l) = (&v.plan.levels[level], &mut v.levels[level]);
-    let (windows, evidence, belief) = (&l.windows, &mut l.evidence, &mut l.belief);
-    if level == 0 {
-        in_windows(plan, windows, &v.fine_cost, evidence, belief);
+    let windows = &l.windows;
+    let evidence = windows.rows_mut(&mut l.evidence, 1, 1, rows.clone()).into_par_iter();
+    let rows = evidence.zip(windows.rows_mut(&mut l.belief, 1, 1, rows.clone())).zip(rows);
+    if level > 0 {
+        let cells = plan.width * plan.stride;
+        rows.for_each(|((evidence, belief), y)| {
+            evidence_row(plan, windows, y, Costs::OfAll(&l.cost[y * cells..][..cells]), evidence, belief);
+        });
+    } else if v.plan.holds_all_rows() {
+        let cells = plan.width * plan.stride;
+        rows.for_each(|((evidence, belief), y)| {
+            evidence_row(
+                plan,
+                windows,
+                y,
+                Costs::OfAll(&v.fine_cost[y * cells..][..cells]),
+                evidence,
+                belief,
+            );
+        });
     } else {
-        in_windows(plan, windows, &l.cost, evidence, belief);
+        rows.for_each_init(Vec::new, |costs, ((evidence, belief), y)| {
+            costs.resize(windows.length(y), 0);
+            v.features.costs_in_windows(&v.plan, windows, y, costs);
+            evidence_row(plan, windows, y, Costs::OfWindows(costs), evidence, belief);
+        });
     }
 }
 
-fn in_windows<C: StoredCost, U: Units>(
-    level: &LevelPlan,
-    windows: &Windows,
-    cost: &[C],
-    evidence: &mut [u8],
-    belief: &mut [U],
-) {
-    let rows = windows.rows_mut(evidence, 1, 1).into_par_iter().zip(windows.rows_mut(belief, 1, 1));
-    rows.zip(cost.par_chunks(level.width * level.stride))
-        .enumerate()
-        .for_each(|(y, ((evidence, belief), cost))| evidence_row(level, windows, y, cost, evidence, belief));
+/// The costs of a row.
+#[derive(Clone, Copy)]
+enum Costs<'a, C> {
+    /// Of all labels.
+    OfAll(&'a [C]),
+    /// Of the labels of the windows, as a volume holds them.
+    OfWindows(&'a [C]),
+}
+
+impl<'a, C> Costs<'a, C> {
+    /// Those of the pixel at column `x`, for the labels of its window.
+    #[inline(always)]
+    fn of(&self, x: usize, window: Window, level: &LevelPlan) -> &'a [C] {
+        match self {
+            Self::OfAll(costs) => &costs[x * level.stride + window.first()..][..window.stride()],
+            Self::OfWindows(costs) => &costs[window.cells()],
+        }
+    }
 }
 
 #[pulp::with_simd(evidence_row = pulp::Arch::new())]
@@ -37,16 +71,15 @@ fn evidence_row_on<'a, S: pulp::Simd, C: StoredCost, U: Units>(
     level: &'a LevelPlan,
     windows: &'a Windows,
     y: usize,
-    cost: &'a [C],
+    costs: Costs<'a, C>,
     evidence: &'a mut [u8],
     belief: &'a mut [U],
 ) {
-    for (x, cost) in cost.chunks_exact(level.stride).enumerate() {
-        let window = windows.row(y)[x];
+    for (x, &window) in windows.row(y).iter().enumerate() {
         let (cells, labels) = (window.cells(), windows.labels(window));
         let (evidence, belief) = (&mut evidence[cells.clone()], &mut belief[cells]);
         // The cost of padding is the largest value.
-        let cost = &cost[window.first()..][..window.stride()];
+        let cost = costs.of(x, window, level);
         let min = cost.iter().copied().fold(C::MOST, C::min).fraction();
         for ((e, b), c) in evidence.iter_mut().zip(belief.iter_mut()).zip(cost) {
             *e = level.evidence.apply(c.fraction() - min);

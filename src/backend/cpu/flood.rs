@@ -9,9 +9,9 @@ use super::belief::{self, Summands};
 use super::dependency::{self, Around, Factors, REACH, Scratch};
 use super::units::Units;
 use super::volumes::Volumes;
+use crate::backend::Stage;
 use rayon::prelude::*;
 use std::array::from_fn;
-use std::mem;
 use std::ops::Range;
 
 /// Bands per thread, so that one slow thread does not delay all others.
@@ -29,17 +29,16 @@ struct Band<'a, U> {
 }
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let sent = v.begin(Stage::Flood(level));
     let plan = &v.plan;
-    let (summands, [messages, belief], sent) = Summands::of(plan, &mut v.levels, level);
+    let (summands, [messages, belief]) = Summands::of(plan, &mut v.levels, level, sent);
     let summands = &summands;
-    // The first messages count as 0, whatever is stored.
-    let initial = !mem::replace(sent, true);
     let l = &plan.levels[level];
     let (height, windows) = (l.height, summands.windows);
     let slots = summands.graph.slots();
     let count = (BANDS * rayon::current_num_threads()).min(height / LEAST_ROWS).max(1);
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
-    let cells = |rows: Range<usize>| windows.start(rows.end) - windows.start(rows.start);
+    let cells = |rows: Range<usize>| rows.map(|y| windows.length(y)).sum::<usize>();
 
     // The beliefs alternate: those of one band alone, then those around the border to the next band, and so
     // on.
@@ -70,14 +69,14 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     bands.into_par_iter().enumerate().for_each(|(i, mut band)| {
         let above = if i == 0 { &[][..] } else { shared[i - 1] };
         let below = shared.get(i).copied().unwrap_or_default();
-        band.sweep(&factors, summands, Scratch::new(l.stride, slots), [above, below], initial);
+        band.sweep(&factors, summands, Scratch::new(l.stride, slots), [above, below], !sent.dependency);
     });
 
     let messages = &*messages;
     edges.into_par_iter().zip(&starts[1..count]).for_each(|(edge, &start)| {
         for y in start - REACH..start + REACH {
             let first = windows.start(start - REACH);
-            let belief = &mut edge[windows.start(y) - first..windows.start(y + 1) - first];
+            let belief = &mut edge[windows.start(y) - first..][..windows.length(y)];
             belief::row(summands, y, 0, Some(messages), belief);
         }
     });
@@ -110,10 +109,10 @@ impl<U: Units> Band<'_, U> {
                         (edges[1], rows_own.end)
                     };
                     let start = windows.start(first);
-                    &beliefs[windows.start(ny) - start..windows.start(ny + 1) - start]
+                    &beliefs[windows.start(ny) - start..][..windows.length(ny)]
                 });
                 let here = windows.start(y) - windows.start(rows.start);
-                let length = windows.start(y + 1) - windows.start(y);
+                let length = windows.length(y);
                 let messages = &mut self.messages[slots * here..][..slots * length];
                 if initial {
                     messages.fill(U::default());
@@ -123,8 +122,8 @@ impl<U: Units> Band<'_, U> {
             // All factors of this row's pixels have sent their messages.
             if let Some(done) = y.checked_sub(REACH).filter(|done| rows_own.contains(done)) {
                 let start = windows.start(rows_own.start);
-                let belief = &mut self.own[windows.start(done) - start..windows.start(done + 1) - start];
-                belief::row(summands, done, rows.start, Some(&*self.messages), belief);
+                let belief = &mut self.own[windows.start(done) - start..][..windows.length(done)];
+                belief::row(summands, done, windows.start(rows.start), Some(&*self.messages), belief);
             }
         }
     }

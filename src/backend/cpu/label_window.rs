@@ -10,15 +10,15 @@ use crate::plan::{
 use rayon::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
-    let l = &v.plan.levels[level];
+    let (l, held) = (&v.plan.levels[level], v.plan.rows_held(level));
     v.levels[level].windows = if v.plan.windows_follow_beliefs(level) {
         let candidates = candidates(v, level + 1);
         let offset = v.plan.label_offset(level + 1);
-        Windows::new(l, &around(l, &candidates, offset))
+        Windows::new(l, held, &around(l, &candidates, offset))
     } else if let Some(ranges) = v.label_ranges.get(level) {
-        Windows::new(l, &within(l, ranges))
+        Windows::new(l, held, &within(l, ranges))
     } else {
-        Windows::full(l)
+        Windows::full(l, held)
     };
 }
 

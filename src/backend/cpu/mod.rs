@@ -1,5 +1,6 @@
 //! The CPU path: every stage, parallel over rows, with inner loops over labels.
 
+mod features;
 mod finest;
 mod pages;
 mod probe;
@@ -8,6 +9,7 @@ mod volumes;
 mod windows;
 
 use super::probe::Probe;
+use super::wavefront::Wavefront;
 use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
@@ -16,9 +18,10 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{Plan, VolumeWidth};
 pub(crate) use finest::Finest;
+use std::ops::Range;
 use std::time::{Duration, Instant};
 use units::Units;
-use volumes::Volumes;
+use volumes::{Sent, Volumes};
 
 /// The CPU path.
 #[derive(Default)]
@@ -68,6 +71,22 @@ macro_rules! declare {
 
 crate::for_every_stage!(declare);
 
+impl<U: Units> Volumes<U> {
+    /// Runs rows of a stage that goes row by row.
+    fn run_rows(&mut self, stage: Stage, sent: Sent, rows: Range<usize>) {
+        match stage {
+            Stage::Evidence(z) => evidence::rows(self, z, rows),
+            Stage::Dependency(z) => dependency::rows(self, z, sent, rows),
+            Stage::Resolution(z) => resolution::rows(self, z, sent, rows),
+            Stage::Belief(z) => belief::rows(self, z, sent, rows),
+            Stage::WinnerTakesAll => winner_takes_all::rows(self, rows),
+            Stage::RightView => right_view::rows(self, rows),
+            Stage::SubPixel => sub_pixel::rows(self, rows),
+            _ => unreachable!("{stage:?} does not go row by row"),
+        }
+    }
+}
+
 /// Runs an expression on the volumes, whatever their width.
 macro_rules! on_volumes {
     ($self:ident, $volumes:ident => $body:expr) => {
@@ -114,6 +133,27 @@ impl Backend for Cpu {
         on_volumes!(self, v => v.run(stage));
         if let Some(times) = &mut self.times {
             times.push((stage, start.elapsed()));
+        }
+        Ok(())
+    }
+
+    fn run_wavefront(
+        &mut self,
+        wavefront: &Wavefront,
+        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Result<()> {
+        let sent = on_volumes!(self, v => wavefront.stages().iter().map(|&stage| v.begin(stage)).collect::<Vec<_>>());
+        let mut times = vec![Duration::ZERO; sent.len()];
+        for (i, rows) in wavefront.parts() {
+            let stage = wavefront.stages()[i];
+            let level = on_volumes!(self, v => v.plan.levels[stage.level().unwrap_or(0)].height);
+            before(stage, rows.len() as f64 / level as f64)?;
+            let start = Instant::now();
+            on_volumes!(self, v => v.run_rows(stage, sent[i], rows));
+            times[i] += start.elapsed();
+        }
+        if let Some(all) = &mut self.times {
+            all.extend(wavefront.stages().iter().copied().zip(times));
         }
         Ok(())
     }

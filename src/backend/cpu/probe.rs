@@ -55,7 +55,10 @@ impl Probe for Cpu {
     }
 
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
-        on_volumes!(self, v => v.levels[level].windows = Windows::new(&v.plan.levels[level], windows));
+        on_volumes!(self, v => {
+            let (plan, held) = (&v.plan.levels[level], v.plan.rows_held(level));
+            v.levels[level].windows = Windows::new(plan, held, windows);
+        });
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use super::units::Units;
 use super::volumes::Volumes;
-use crate::plan::Plan;
+use crate::plan::{LevelPlan, Plan};
 use rayon::prelude::*;
 
 const WEIGHTS: [u32; 5] = [1, 4, 6, 4, 1];
@@ -81,51 +81,125 @@ impl StoredCost for u16 {
     }
 }
 
+/// Coarse rows that a thread takes at a time where the costs of the fine rows are not stored: those that two threads need are
+/// computed twice.
+const ROWS: usize = 16;
+
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let (plan, features) = (&v.plan, &v.features);
     let (finer, coarser) = v.levels.split_at_mut(level);
     let out = &mut coarser[0].cost;
-    if level == 1 {
-        reduce(&v.plan, level, &v.fine_cost, out);
+    if level > 1 {
+        reduce(plan, level, &finer[level - 1].cost, out);
+    } else if plan.holds_all_rows() {
+        reduce(plan, level, &v.fine_cost, out);
     } else {
-        reduce(&v.plan, level, &finer[level - 1].cost, out);
+        let (fine, coarse) = (&plan.levels[0], &plan.levels[1]);
+        let row_cells = coarse.width * coarse.stride;
+        out.par_chunks_mut(ROWS * row_cells).enumerate().for_each_init(
+            || (Scratch::new(fine, coarse), Held::new(fine)),
+            |(scratch, held), (i, rows)| {
+                for (y, row) in (i * ROWS..).zip(rows.chunks_exact_mut(row_cells)) {
+                    let rows = held.rows(around(y, fine), |y, costs| features.costs(plan, y, costs));
+                    reduce_row(plan, level, rows, scratch, row);
+                }
+            },
+        );
     }
 }
 
 fn reduce<C: StoredCost>(plan: &Plan, level: usize, fine: &[C], out: &mut [u16]) {
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
-    let offset = plan.label_offset(level);
-    let minimum = plan.minimum_over_d();
     let row_cells = fl.width * fl.stride;
     out.par_chunks_mut(cl.width * cl.stride).enumerate().for_each_init(
-        // The five fine rows reduced over y, then one pixel reduced over x as well, with a margin of
-        // two labels.
-        || {
-            let sums = |n| vec![C::Sum::default(); n];
-            (sums(row_cells), sums(fl.stride), vec![0u16; 2 * cl.stride + 5])
-        },
-        |(column, sums, smooth), (y, row)| {
-            let fine_row = |j: usize| {
-                let fy = (2 * y + j).saturating_sub(2).min(fl.height - 1);
-                &fine[fy * row_cells..][..row_cells]
-            };
-            let rows = [0, 1, 2, 3, 4].map(fine_row);
-            add_all(rows, |sum, weight, cost| cost.add(sum, weight), column);
-            for (x, costs) in row.chunks_exact_mut(cl.stride).enumerate() {
-                let columns = [0, 1, 2, 3, 4].map(|i: usize| {
-                    let fx = (2 * x + i).saturating_sub(2).min(fl.width - 1);
-                    &column[fx * fl.stride..][..fl.labels]
-                });
-                let (before, inside) = smooth.split_at_mut((2 - offset) as usize);
-                let (inside, after) = inside.split_at_mut(fl.labels);
-                add_all(columns, C::add_sums, &mut sums[..fl.labels]);
-                inside.iter_mut().zip(sums.iter()).for_each(|(mean, &sum)| *mean = C::mean(sum));
-                before.fill(inside[0]);
-                after.fill(inside[fl.labels - 1]);
-                reduce_labels(smooth, minimum, &mut costs[..cl.labels]);
-                costs[cl.labels..].fill(u16::MAX);
-            }
+        || Scratch::new(fl, cl),
+        |scratch, (y, row)| {
+            let rows = around(y, fl).map(|fy| &fine[fy * row_cells..][..row_cells]);
+            reduce_row(plan, level, rows, scratch, row);
         },
     );
+}
+
+/// The fine rows that a coarse row is computed from.
+fn around(y: usize, fine: &LevelPlan) -> [usize; 5] {
+    [0, 1, 2, 3, 4].map(|j: usize| (2 * y + j).saturating_sub(2).min(fine.height - 1))
+}
+
+/// The last few rows of costs that were computed.
+struct Held {
+    row_cells: usize,
+    costs: Vec<u8>,
+    rows: [Option<usize>; 5],
+}
+
+impl Held {
+    fn new(fine: &LevelPlan) -> Self {
+        let row_cells = fine.width * fine.stride;
+        Self { row_cells, costs: vec![0; 5 * row_cells], rows: [None; 5] }
+    }
+
+    /// The costs of `rows`, of which no two are more than four apart; `compute` gives those that are not held.
+    fn rows(&mut self, rows: [usize; 5], compute: impl Fn(usize, &mut [u8])) -> [&[u8]; 5] {
+        for y in rows {
+            if self.rows[y % 5] != Some(y) {
+                compute(y, &mut self.costs[y % 5 * self.row_cells..][..self.row_cells]);
+                self.rows[y % 5] = Some(y);
+            }
+        }
+        rows.map(|y| &self.costs[y % 5 * self.row_cells..][..self.row_cells])
+    }
+}
+
+/// Working memory of a thread.
+struct Scratch<S> {
+    /// The five fine rows reduced over y.
+    columns: Vec<S>,
+    /// One pixel reduced over x as well.
+    sums: Vec<S>,
+    /// Its mean, with a margin of two labels.
+    smooth: Vec<u16>,
+}
+
+impl<S: Copy + Default> Scratch<S> {
+    fn new(fine: &LevelPlan, coarse: &LevelPlan) -> Self {
+        let sums = |n| vec![S::default(); n];
+        Self {
+            columns: sums(fine.width * fine.stride),
+            sums: sums(fine.stride),
+            smooth: vec![0; 2 * coarse.stride + 5],
+        }
+    }
+}
+
+/// A row of a level, from five of the finer one.
+#[pulp::with_simd(reduce_row = pulp::Arch::new())]
+#[inline(always)]
+fn reduce_row_on<'a, D: pulp::Simd, C: StoredCost>(
+    _: D,
+    plan: &'a Plan,
+    level: usize,
+    rows: [&'a [C]; 5],
+    scratch: &'a mut Scratch<C::Sum>,
+    out: &'a mut [u16],
+) {
+    let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
+    let (offset, minimum) = (plan.label_offset(level), plan.minimum_over_d());
+    let Scratch { columns, sums, smooth } = scratch;
+    add_all(rows, |sum, weight, cost| cost.add(sum, weight), columns);
+    for (x, costs) in out.chunks_exact_mut(cl.stride).enumerate() {
+        let columns = [0, 1, 2, 3, 4].map(|i: usize| {
+            let fx = (2 * x + i).saturating_sub(2).min(fl.width - 1);
+            &columns[fx * fl.stride..][..fl.labels]
+        });
+        let (before, inside) = smooth.split_at_mut((2 - offset) as usize);
+        let (inside, after) = inside.split_at_mut(fl.labels);
+        add_all(columns, C::add_sums, &mut sums[..fl.labels]);
+        inside.iter_mut().zip(sums.iter()).for_each(|(mean, &sum)| *mean = C::mean(sum));
+        before.fill(inside[0]);
+        after.fill(inside[fl.labels - 1]);
+        reduce_labels(smooth, minimum, &mut costs[..cl.labels]);
+        costs[cl.labels..].fill(u16::MAX);
+    }
 }
 
 /// The binomial sum of five rows; `add` adds a weight times a value to a sum.

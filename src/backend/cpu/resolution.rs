@@ -5,11 +5,12 @@
 use super::units::{
     Blocks, Truncating, Units, block, block_mut, each_lane, keep_least, least_of, padding, smallest,
 };
-use super::volumes::{Level, Volumes};
+use super::volumes::{Level, Sent, Volumes};
 use super::windows::Window;
+use crate::backend::Stage;
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
-use std::mem;
+use std::ops::Range;
 
 struct Scratch<U> {
     /// First label and number of cells of the parent's window and of the children's; what lies outside them is infinite in
@@ -40,13 +41,17 @@ struct Between<U> {
 }
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
+    let sent = v.begin(Stage::Resolution(level));
+    rows(v, level, sent, 0..v.plan.levels[level].height);
+}
+
+/// The messages of the factors of these coarse rows.
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
     let plan = &v.plan;
     let (finer, coarser) = v.levels.split_at_mut(level);
     let (Level { belief: fine_belief, down, windows: fine_windows, .. }, coarse) =
         (&mut finer[level - 1], &mut coarser[0]);
-    let Level { belief: coarse_belief, up, resolution_sent, windows, .. } = coarse;
-    // The first messages count as 0, whatever is stored.
-    let initial = !mem::replace(resolution_sent, true);
+    let Level { belief: coarse_belief, up, windows, .. } = coarse;
     let (fl, cl) = (&plan.levels[level - 1], &plan.levels[level]);
     let between = Between {
         cut: plan.resolution,
@@ -56,8 +61,9 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
         fine_padding: padding(fl.labels, fl.stride),
         coarse_padding: padding(cl.labels, cl.stride),
     };
-    let rows = windows.rows_mut(up, 1, 1).into_par_iter().zip(fine_windows.rows_mut(down, 1, 2)).enumerate();
-    rows.for_each_init(
+    let fine_rows = 2 * rows.start..fl.height.min(2 * rows.end);
+    let ups = windows.rows_mut(up, 1, 1, rows.clone()).into_par_iter();
+    ups.zip(fine_windows.rows_mut(down, 1, 2, fine_rows)).zip(rows).for_each_init(
         || {
             let infinite = |n: usize| vec![U::MOST; n];
             let fine = || infinite(between.margin + 2 * cl.stride + fl.stride + 4);
@@ -70,8 +76,9 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
                 fine: [(); 4].map(|()| fine()),
             }
         },
-        |scratch, (y, (up, down))| {
-            if initial {
+        |scratch, ((up, down), y)| {
+            // The first messages count as 0, whatever is stored.
+            if !sent.below {
                 up.fill(U::default());
                 down.fill(U::default());
             }

@@ -5,18 +5,23 @@ use super::volumes::{Level, Volumes};
 use super::windows::Windows;
 use crate::plan::Plan;
 use rayon::prelude::*;
+use std::ops::Range;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
+    rows(v, 0..v.plan.levels[0].height);
+}
+
+/// These rows of the right view.
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let (plan, maps, Level { belief, windows, .. }) = (&v.plan, &mut v.maps, &v.levels[0]);
     let (width, labels) = (plan.levels[0].width, plan.levels[0].labels);
     let names: Vec<u32> = (0..labels as u32).collect();
-    let rows =
-        maps.right.data_mut().par_chunks_mut(width).zip(maps.right_best.data_mut().par_chunks_mut(width));
-    rows.enumerate().for_each_init(
+    let right = maps.right.rows_mut(rows.clone()).par_chunks_mut(width);
+    right.zip(maps.right_best.rows_mut(rows.clone()).par_chunks_mut(width)).zip(rows).for_each_init(
         // By the right pixel's place from the right, so that ascending labels are side by side: belief and label of the best
         // so far, or as much as [`crate::backend::NO_LABEL`] says in both.
         || vec![u32::MAX; width],
-        |found, (y, (right, best))| {
+        |found, ((right, best), y)| {
             found.fill(u32::MAX);
             right_row(plan, windows, y, &names, windows.row_of(belief, y), found);
             for ((right, best), &found) in right.iter_mut().zip(best).zip(found.iter().rev()) {

@@ -1,9 +1,11 @@
 //! The volumes of a match, in the width that its plan needs.
 
+use super::features::Features;
 use super::finest::Finest;
 use super::pages::Pages;
 use super::units::Units;
 use super::windows::Windows;
+use crate::backend::Stage;
 use crate::error::Result;
 use crate::front::Prepared;
 use crate::graph::LevelGraph;
@@ -14,7 +16,9 @@ use crate::plan::Plan;
 pub(super) struct Volumes<U> {
     pub(super) plan: Plan,
     pub(super) pair: Pair,
-    /// Cost of level 0; the costs of coarser levels are in `levels`.
+    /// What the matching cost compares, where level 0 is not held whole.
+    pub(super) features: Features,
+    /// Cost of level 0, where that is held whole; the costs of coarser levels are in `levels`.
     pub(super) fine_cost: Pages<u8>,
     pub(super) levels: Vec<Level<U>>,
     /// First and last label of each pixel, by level; empty where all labels are allowed.
@@ -26,8 +30,20 @@ pub(super) struct Volumes<U> {
     pub(super) maps: Finest,
 }
 
+/// Which messages there are when a stage starts. Those that have not been sent count as 0, whatever is stored.
+#[derive(Clone, Copy)]
+pub(super) struct Sent {
+    /// Those of the level's dependency factors.
+    pub(super) dependency: bool,
+    /// Those between the level and the next coarser one.
+    pub(super) above: bool,
+    /// Those between the level and the next finer one.
+    pub(super) below: bool,
+}
+
 /// Volumes of one level. Cost is \[y\]\[x\]\[label\] with padded labels; the others hold the labels of the `windows` alone,
-/// within memory for all of them, which the system gives where it is used.
+/// within memory for all of them, which the system gives where it is used. At level 0 they hold
+/// [`Plan::rows_held`] rows.
 pub(super) struct Level<U> {
     pub(super) graph: LevelGraph,
     pub(super) windows: Windows,
@@ -57,9 +73,10 @@ impl<U: Units> Volumes<U> {
             .enumerate()
             .map(|(z, graph)| {
                 let level = &plan.levels[z];
-                let cells = Windows::most_cells(level);
+                let held = plan.rows_held(z);
+                let cells = Windows::most_cells(level, held);
                 Ok(Level {
-                    windows: Windows::full(level),
+                    windows: Windows::full(level, held),
                     cost: Pages::new(if z == 0 { 0 } else { level.pixels() * level.stride })?,
                     evidence: Pages::new(cells)?,
                     dependency: Pages::new(cells * graph.slots())?,
@@ -76,7 +93,8 @@ impl<U: Units> Volumes<U> {
         Ok(Self {
             plan: plan.clone(),
             pair,
-            fine_cost: Pages::new(fine.pixels() * fine.stride)?,
+            features: Features::default(),
+            fine_cost: Pages::new(if plan.holds_all_rows() { fine.pixels() * fine.stride } else { 0 })?,
             levels,
             label_ranges,
             labels: vec![0; fine.pixels()],
@@ -93,14 +111,30 @@ impl<U: Units> Volumes<U> {
         }
     }
 
+    /// Starts a stage: which messages there are by now, and that it sends its own.
+    pub(super) fn begin(&mut self, stage: Stage) -> Sent {
+        let z = stage.level().unwrap_or(0);
+        let sent = Sent {
+            dependency: self.levels[z].dependency_sent,
+            above: self.levels.get(z + 1).is_some_and(|above| above.resolution_sent),
+            below: self.levels[z].resolution_sent,
+        };
+        match stage {
+            Stage::Dependency(_) | Stage::Flood(_) => self.levels[z].dependency_sent = true,
+            Stage::Resolution(_) => self.levels[z].resolution_sent = true,
+            _ => {}
+        }
+        sent
+    }
+
     /// Resets everything for another pair whose plan fits, to the state that [`Self::new`] gives.
     pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
         let Prepared { pair, graphs, label_ranges, .. } = prepared;
         self.plan = plan.clone();
         (self.pair, self.label_ranges) = (pair, label_ranges);
         self.labels.fill(0);
-        for ((level, graph), l) in self.levels.iter_mut().zip(graphs).zip(&plan.levels) {
-            (level.graph, level.windows) = (graph, Windows::full(l));
+        for (z, ((level, graph), l)) in self.levels.iter_mut().zip(graphs).zip(&plan.levels).enumerate() {
+            (level.graph, level.windows) = (graph, Windows::full(l, plan.rows_held(z)));
             (level.dependency_sent, level.resolution_sent) = (false, false);
         }
     }

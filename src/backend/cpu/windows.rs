@@ -3,6 +3,9 @@
 //! A volume is \[y\]\[x\]\[slot\]\[label of the pixel's window\] (slot only for dependency messages). Windows differ from run to
 //! run, so rows of a volume differ in length. A row has a block of unused cells on either side, so that a block of labels
 //! can be loaded wherever it touches a window.
+//!
+//! Where not all rows are held at the same time, a volume is a ring: a row takes the place of one that is no longer needed.
+//! The two rows that share windows stay side by side.
 
 use super::units::{Units, argmin, each_lane};
 use crate::image::Plane;
@@ -53,22 +56,23 @@ pub(super) struct Windows {
     full: bool,
     /// \[row of windows\]\[x\].
     all: Vec<Window>,
-    /// Where each row of cells starts, and the end.
+    /// Where each row of cells starts.
     rows: Vec<usize>,
+    /// Cells of a row, by row of windows.
+    lengths: Vec<usize>,
 }
 
 impl Windows {
-    /// Windows that hold all labels.
-    pub(super) fn full(level: &LevelPlan) -> Self {
+    /// Windows that hold all labels, of which `held` rows are needed at the same time.
+    pub(super) fn full(level: &LevelPlan, held: usize) -> Self {
         let (runs, rows) = level.windows();
-        Self::new(level, &Plane::filled(runs, rows, [0, level.stride as u16]))
+        Self::new(level, held, &Plane::filled(runs, rows, [0, level.stride as u16]))
     }
 
-    /// From the first label and the number of cells of each run.
-    pub(super) fn new(level: &LevelPlan, windows: &Plane<[u16; 2]>) -> Self {
-        let width = level.width;
-        let (mut all, mut rows) = (Vec::with_capacity(width * windows.height()), vec![0]);
-        let mut end = 0;
+    /// From the first label and the number of cells of each run; `held` rows are needed at the same time.
+    pub(super) fn new(level: &LevelPlan, held: usize, windows: &Plane<[u16; 2]>) -> Self {
+        let (width, height) = (level.width, level.height);
+        let (mut all, mut lengths) = (Vec::with_capacity(width * windows.height()), Vec::new());
         for i in 0..windows.height() {
             let mut start = LABEL_BLOCK as u32;
             for x in 0..width {
@@ -76,24 +80,22 @@ impl Windows {
                 all.push(Window { start, first, stride });
                 start += u32::from(stride);
             }
-            for _ in 2 * i..level.height.min(2 * i + 2) {
-                end += start as usize + LABEL_BLOCK;
-                rows.push(end);
-            }
+            lengths.push(start as usize + LABEL_BLOCK);
         }
         let full = windows.data().iter().all(|window| usize::from(window[1]) == level.stride);
-        Self { width, labels: level.labels, full, all, rows }
+        let rows = places(&lengths, held, height);
+        Self { width, labels: level.labels, full, all, rows, lengths }
     }
 
-    /// Largest number of cells of `level`.
-    pub(super) fn most_cells(level: &LevelPlan) -> usize {
-        level.height * (level.width * level.stride + 2 * LABEL_BLOCK)
+    /// Largest number of cells of a volume of `level`, of which `held` rows are needed at the same time.
+    pub(super) fn most_cells(level: &LevelPlan, held: usize) -> usize {
+        let rows = level.height.min(if held < level.height { 2 * (pairs(held) + 1) } else { held });
+        rows * (level.width * level.stride + 2 * LABEL_BLOCK)
     }
 
     /// Cells of all pixels.
     pub(super) fn cells(&self) -> u64 {
-        let unused = 2 * LABEL_BLOCK * self.height();
-        (self.rows[self.height()] - unused) as u64
+        (0..self.height()).map(|y| (self.length(y) - 2 * LABEL_BLOCK) as u64).sum()
     }
 
     /// Whether every window holds all labels.
@@ -112,10 +114,9 @@ impl Windows {
         from_fn(|k| self.row_around(y, k).map_or(&[][..], |ny| self.row(ny)))
     }
 
-    /// Where the cells of these rows start, relative to row `first`; 0 for those above it and outside the image.
+    /// Where the cells of these rows start, counted from the cell `first`; 0 for those before it and outside the image.
     pub(super) fn starts_around(&self, y: usize, first: usize) -> [usize; GRAPH_WINDOW] {
-        let start = |ny: usize| self.rows[ny].saturating_sub(self.rows[first]);
-        from_fn(|k| self.row_around(y, k).map_or(0, start))
+        from_fn(|k| self.row_around(y, k).map_or(0, |ny| self.rows[ny].saturating_sub(first)))
     }
 
     fn row_around(&self, y: usize, k: usize) -> Option<usize> {
@@ -140,34 +141,55 @@ impl Windows {
         (window.first() + argmin(&row[window.start()..][..self.labels(window)]).0) as u16
     }
 
-    /// Where the cells of row `y` start; for the height, the number of all cells.
+    /// Where the cells of row `y` start.
     #[inline(always)]
     pub(super) fn start(&self, y: usize) -> usize {
         self.rows[y]
     }
 
+    /// Number of cells of row `y`.
+    #[inline(always)]
+    pub(super) fn length(&self, y: usize) -> usize {
+        self.lengths[y / 2]
+    }
+
     /// Number of rows.
     pub(super) fn height(&self) -> usize {
-        self.rows.len() - 1
+        self.rows.len()
     }
 
     /// The cells of row `y` of a volume.
     #[inline(always)]
     pub(super) fn row_of<'a, T>(&self, volume: &'a [T], y: usize) -> &'a [T] {
-        &volume[self.rows[y]..self.rows[y + 1]]
+        &volume[self.rows[y]..][..self.lengths[y / 2]]
     }
 
-    /// The rows of a volume with `slots` times as many cells, `each` of them together.
-    pub(super) fn rows_mut<'a, T>(&self, volume: &'a mut [T], slots: usize, each: usize) -> Vec<&'a mut [T]> {
-        let mut rest = volume;
-        let mut rows = Vec::with_capacity(self.height().div_ceil(each));
-        for y in (0..self.height()).step_by(each) {
-            let end = (y + each).min(self.height());
-            let (row, after) = rest.split_at_mut((self.rows[end] - self.rows[y]) * slots);
-            rows.push(row);
-            rest = after;
-        }
-        rows
+    /// These rows of a volume with `slots` times as many cells, `each` of them together: one, or two that share windows.
+    pub(super) fn rows_mut<'a, T>(
+        &self,
+        volume: &'a mut [T],
+        slots: usize,
+        each: usize,
+        rows: Range<usize>,
+    ) -> Vec<&'a mut [T]> {
+        let Some(&first) = self.rows.get(rows.start) else { return Vec::new() };
+        // In a ring the later rows may be before the earlier ones.
+        let (before, after) = volume.split_at_mut(slots * first);
+        let mut parts = [(after, slots * first), (before, 0)].into_iter();
+        let (mut rest, mut at) = parts.next().expect("two parts");
+        rows.clone()
+            .step_by(each)
+            .map(|y| {
+                let start = slots * self.rows[y];
+                if start < at {
+                    (rest, at) = parts.next().expect("a ring is gone through once");
+                }
+                let end = start + slots * self.lengths[y / 2] * each.min(rows.end - y);
+                let (row, after) = std::mem::take(&mut rest)[start - at..].split_at_mut(end - start);
+                (rest, at) = (after, end);
+                row
+            })
+            .collect()
     }
 
     /// The first label and the number of cells of each run.
@@ -178,6 +200,32 @@ impl Windows {
             [window.first, window.stride]
         })
     }
+}
+
+/// Pairs of rows, each from an even row on, that `held` rows touch at most.
+fn pairs(held: usize) -> usize {
+    held / 2 + 1
+}
+
+/// Where each row starts in a volume of which `held` rows are needed at the same time; `lengths` of the rows, by pair.
+fn places(lengths: &[usize], held: usize, height: usize) -> Vec<usize> {
+    let doubled: Vec<usize> = lengths.iter().map(|length| 2 * length).collect();
+    let size = if held < height {
+        let most = doubled.windows(pairs(held).min(doubled.len())).map(|pairs| pairs.iter().sum()).max();
+        // What is left at the end of the ring is less than a pair.
+        most.unwrap_or(0) + doubled.iter().max().unwrap_or(&0)
+    } else {
+        usize::MAX
+    };
+    let (mut rows, mut end) = (Vec::with_capacity(height), 0);
+    for (i, &pair) in doubled.iter().enumerate() {
+        if end + pair > size {
+            end = 0;
+        }
+        rows.extend((2 * i..height.min(2 * i + 2)).map(|y| end + y % 2 * lengths[i]));
+        end += pair;
+    }
+    rows
 }
 
 /// The cells of a pixel as seen through the window of another.
@@ -222,5 +270,43 @@ impl<'a, U: Units> Seen<'a, U> {
     pub(super) fn whole_block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
         let cells = self.cells[self.start + at..].first_chunk().expect("rows are whole blocks");
         (cells, [U::default(); LABEL_BLOCK])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether any two of `held` rows in a row share cells, with the places that rows have.
+    fn collide(places: &[usize], lengths: &[usize], held: usize) -> bool {
+        let cells = |y: usize| places[y]..places[y] + lengths[y / 2];
+        (0..places.len()).any(|y| {
+            (y.saturating_sub(held - 1)..y).any(|other| {
+                let (a, b) = (cells(y), cells(other));
+                a.start < b.end && b.start < a.end
+            })
+        })
+    }
+
+    #[test]
+    fn rows_that_are_held_do_not_share_cells() {
+        let mut seed = 1u32;
+        let mut random = |most: u32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 16) % most
+        };
+        for height in [1, 2, 9, 40, 101] {
+            for held in [1, 2, 5, 16, 17, 60] {
+                let lengths: Vec<usize> =
+                    (0..usize::div_ceil(height, 2)).map(|_| 1 + random(50) as usize).collect();
+                let places = places(&lengths, held, height);
+                assert!(!collide(&places, &lengths, held), "{height} rows, {held} held");
+                if held + 10 < height {
+                    let end = (0..height).map(|y| places[y] + lengths[y / 2]).max().unwrap();
+                    assert!(end < 2 * lengths.iter().sum::<usize>(), "a ring is smaller than all rows");
+                    assert!(collide(&places, &lengths, held + 8), "more rows than are held must be noticed");
+                }
+            }
+        }
     }
 }

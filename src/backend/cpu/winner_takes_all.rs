@@ -5,11 +5,17 @@ use super::units::{Units, argmin, smallest};
 use super::volumes::{Level, Volumes};
 use super::windows::Windows;
 use rayon::prelude::*;
+use std::ops::Range;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
+    rows(v, 0..v.plan.levels[0].height);
+}
+
+/// The optima of these rows.
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);
-    let optima = v.maps.optima.data_mut().par_chunks_mut(width);
-    optima.enumerate().for_each(|(y, optima)| optimum_row(windows, y, windows.row_of(belief, y), optima));
+    let optima = v.maps.optima.rows_mut(rows.clone()).par_chunks_mut(width);
+    optima.zip(rows).for_each(|(optima, y)| optimum_row(windows, y, windows.row_of(belief, y), optima));
 }
 
 #[pulp::with_simd(optimum_row = pulp::Arch::new())]

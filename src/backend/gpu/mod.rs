@@ -317,7 +317,7 @@ impl Backend for Gpu {
                 // What the last match holds goes before the next one asks for more.
                 drop(other);
                 if self.device.software {
-                    memory::check(plan.bytes(), Purpose::Match)?;
+                    memory::check(plan.whole().bytes(), Purpose::Match)?;
                 }
                 let buffers = Buffers::new(&self.device, plan)?;
                 let mut steps = HashMap::new();
