@@ -1,6 +1,6 @@
 //! Beliefs: see [`crate::backend::Stage::Belief`].
 
-use super::dependency::REACH;
+use super::dependency::{REACH, touch};
 use super::units::{Blocks, Units, block, block_mut, each_lane, padding};
 use super::volumes::{Level, Sent, Volumes};
 use super::windows::{Seen, Window, Windows};
@@ -66,6 +66,12 @@ pub(super) fn row<U: Units>(
     for start in &mut starts {
         *start *= graph.slots();
     }
+    if let Some(dependency) = dependency {
+        // The lowest of the rows that the factors of this row's pixels are on: the others were needed before.
+        let lowest = (y + REACH).min(windows.height() - 1);
+        let start = windows.start(lowest) - first;
+        touch(&dependency[graph.slots() * start..][..graph.slots() * windows.length(lowest)]);
+    }
     for (x, &window) in windows.row(y).iter().enumerate() {
         let own = window.cells();
         let cells = row + own.start..row + own.end;
@@ -82,7 +88,7 @@ pub(super) fn row<U: Units>(
             incoming: if dependency.is_some() { graph.incoming_of(y * width + x) } else { &[] },
             belief: &mut belief[own],
         };
-        if windows.are_full() {
+        if sum.incoming.iter().all(|&entry| sum.factor(entry).0.matches(window)) {
             sum.all(window.stride());
         } else {
             (0..window.stride()).step_by(LABEL_BLOCK).for_each(|at| sum.block_in_window(at));

@@ -91,21 +91,6 @@ pub(super) fn row<U: Units>(
     messages: &mut [U],
     scratch: &mut Scratch<U>,
 ) {
-    if factors.windows.are_full() {
-        row_in::<U, true>(factors, y, around, messages, scratch);
-    } else {
-        row_in::<U, false>(factors, y, around, messages, scratch);
-    }
-}
-
-/// The same; `FULL` where every window holds all labels.
-fn row_in<U: Units, const FULL: bool>(
-    factors: &Factors,
-    y: usize,
-    around: &Around<U>,
-    messages: &mut [U],
-    scratch: &mut Scratch<U>,
-) {
     let Factors { graph, windows, cut } = *factors;
     let slots = graph.slots();
     let near = windows.around(y);
@@ -116,16 +101,21 @@ fn row_in<U: Units, const FULL: bool>(
     touch(around[2 * REACH]);
     for (x, &window) in near[REACH].iter().enumerate() {
         let messages = &mut messages[slots * window.start()..][..slots * window.stride()];
-        let member = |(dx, row): (isize, usize)| {
-            let theirs = near[row][x.wrapping_add_signed(dx)];
-            Seen::new(windows, theirs, around[row], theirs.start(), window.first())
+        let window_at = |(dx, row): (isize, usize)| near[row][x.wrapping_add_signed(dx)];
+        let member = |place: (isize, usize)| {
+            let (theirs, cells) = (window_at(place), around[place.1]);
+            Seen::new(windows, theirs, cells, theirs.start(), window.first())
         };
         let place = |code: u8| offsets[usize::from(code)];
         match *graph.neighbours_of(x, y) {
             [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == TruncationRule::Relative => {
-                let members = [member((0, REACH)), member(place(a)), member(place(b))];
-                let factor = Three { members, stride: window.stride() };
-                factor.send::<FULL>(cut, messages, &mut scratch.sums);
+                let (a, b) = (place(a), place(b));
+                let factor = Three { members: [(0, REACH), a, b].map(member), stride: window.stride() };
+                if [a, b].into_iter().all(|place| window_at(place).matches(window)) {
+                    factor.send::<true>(cut, messages, &mut scratch.sums);
+                } else {
+                    factor.send::<false>(cut, messages, &mut scratch.sums);
+                }
             }
             ref codes => {
                 let present = (1..).zip(codes).filter(|(_, code)| **code != NO_MEMBER);
@@ -144,7 +134,7 @@ fn row_in<U: Units, const FULL: bool>(
 
 /// Brings a row into the cache in sequential order, which the prefetcher predicts. It cannot predict the
 /// order in which factors access the row.
-fn touch<U: Units>(row: &[U]) {
+pub(super) fn touch<U: Units>(row: &[U]) {
     const CACHE_LINE: usize = 64;
     let step = CACHE_LINE / size_of::<U>();
     std::hint::black_box(row.iter().step_by(step).fold(U::default(), |most, &v| most.max(v)));
@@ -161,13 +151,13 @@ struct Three<'a, U> {
 
 impl<U: Units> Three<'_, U> {
     /// The sums for each member at the block of labels at `at`, and again with infinite ones where the member does not
-    /// have the label.
+    /// have the label. `SAME` where all members have the same labels.
     #[inline(always)]
-    fn sums<const FULL: bool>(&self, messages: &[U], at: usize) -> ([Block<U>; 3], [Block<U>; 3]) {
+    fn sums<const SAME: bool>(&self, messages: &[U], at: usize) -> ([Block<U>; 3], [Block<U>; 3]) {
         let [(q0, out0), (q1, out1), (q2, out2)] = [
-            self.q::<FULL>(messages, 0, at),
-            self.q::<FULL>(messages, 1, at),
-            self.q::<FULL>(messages, 2, at),
+            self.q::<SAME>(messages, 0, at),
+            self.q::<SAME>(messages, 1, at),
+            self.q::<SAME>(messages, 2, at),
         ];
         let sums = [plus(&q1, &q2), plus(&q0, &q2), plus(&q0, &q1)];
         let own = [or(&sums[0], &out0), or(&sums[1], &out1), or(&sums[2], &out2)];
@@ -175,19 +165,19 @@ impl<U: Units> Three<'_, U> {
     }
 
     #[inline(always)]
-    fn q<const FULL: bool>(&self, messages: &[U], slot: usize, at: usize) -> (Block<U>, Block<U>) {
+    fn q<const SAME: bool>(&self, messages: &[U], slot: usize, at: usize) -> (Block<U>, Block<U>) {
         let member = &self.members[slot];
-        let (b, outside) = if FULL { member.whole_block(at) } else { member.block(at) };
+        let (b, outside) = if SAME { member.same_block(at) } else { member.block(at) };
         let m: &Block<U> = block(messages, slot * self.stride + at);
         (each_lane(|i| b[i].less(m[i]) | outside[i]), outside)
     }
 
     /// Writes the messages of the factor.
     #[inline(always)]
-    fn send<const FULL: bool>(&self, cut: Truncation, messages: &mut [U], scratch: &mut [U]) {
+    fn send<const SAME: bool>(&self, cut: Truncation, messages: &mut [U], scratch: &mut [U]) {
         let (stride, tau) = (self.stride, U::of(cut.tau.into()));
         if stride == LABEL_BLOCK {
-            let (sums, own) = self.sums::<FULL>(messages, 0);
+            let (sums, own) = self.sums::<SAME>(messages, 0);
             for slot in 0..3 {
                 let (low, high) = bounds(own[slot], tau);
                 *block_mut(messages, slot * stride) = cut_block(&sums[slot], &low, &high);
@@ -196,7 +186,7 @@ impl<U: Units> Three<'_, U> {
         }
         let mut least = [[U::MOST; LABEL_BLOCK]; 3];
         for at in (0..stride).step_by(LABEL_BLOCK) {
-            let (sums, own) = self.sums::<FULL>(messages, at);
+            let (sums, own) = self.sums::<SAME>(messages, at);
             for slot in 0..3 {
                 keep_least(&mut least[slot], &own[slot]);
                 *block_mut(scratch, slot * stride + at) = sums[slot];

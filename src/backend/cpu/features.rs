@@ -54,8 +54,9 @@ impl Features {
 #[pulp::with_simd(cost_row = pulp::Arch::new())]
 #[inline(always)]
 fn cost_row_on<'a, S: pulp::Simd>(_: S, plan: &'a Plan, features: &'a RowFeatures, out: &'a mut [u8]) {
+    let row = RowCosts { plan, features };
     for (x, costs) in out.chunks_exact_mut(plan.levels[0].stride).enumerate() {
-        features.costs_of(plan, x, 0, costs);
+        row.costs_of(x, 0, costs);
     }
 }
 
@@ -68,8 +69,9 @@ fn window_row_on<'a, S: pulp::Simd>(
     windows: &'a [Window],
     out: &'a mut [u8],
 ) {
+    let row = RowCosts { plan, features };
     for (x, window) in windows.iter().enumerate() {
-        features.costs_of(plan, x, window.first(), &mut out[window.cells()]);
+        row.costs_of(x, window.first(), &mut out[window.cells()]);
     }
 }
 
@@ -82,26 +84,85 @@ fn near_row_on<'a, S: pulp::Simd>(
     optima: &'a [Optimum],
     out: &'a mut [[u8; NEAR]],
 ) {
+    let row = RowCosts { plan, features };
     let last = plan.levels[0].stride - LABEL_BLOCK;
     for (x, (optimum, out)) in optima.iter().zip(out).enumerate() {
         let label = usize::from(optimum.label);
         let from = label.saturating_sub(2).min(last);
         let mut costs = [0; 2 + LABEL_BLOCK + NEAR];
-        features.costs_of(plan, x, from, &mut costs[2..2 + LABEL_BLOCK]);
+        row.costs_of(x, from, &mut costs[2..2 + LABEL_BLOCK]);
         // A pixel of the right view may have no label.
         *out = *block(&costs, (label - from).min(LABEL_BLOCK));
     }
 }
 
-/// The costs of a left pixel against every pixel of the right row.
+/// The costs of a row.
+struct RowCosts<'a> {
+    plan: &'a Plan,
+    features: &'a RowFeatures,
+}
+
+impl RowCosts<'_> {
+    /// The costs of the pixel at column `x` at the labels from `from` on; those behind the last label are the largest value.
+    #[inline(always)]
+    fn costs_of(&self, x: usize, from: usize, costs: &mut [u8]) {
+        let (level, outside) = (&self.plan.levels[0], self.plan.outside_cost);
+        let RowFeatures { left, right, weights, any_masked } = self.features;
+        let (width, margin, pitch) = (level.width, left.margin, left.pitch);
+        let labels = level.labels.saturating_sub(from).min(costs.len());
+        // The right pixel of label index j is at `place` + j from the right.
+        let place = (width - 1 - x) as i64 + i64::from(level.min);
+        // Labels whose pixel is inside the right image.
+        let first = (-place).max(0);
+        let end = (width as i64 - place).min(level.labels as i64);
+        // From the pixel on, and from that of the first label on.
+        let here = &left.values[margin + x..];
+        if here[Row::MASKED * pitch] != 0 || first >= end {
+            costs[..labels].fill(outside);
+            costs[labels..].fill(u8::MAX);
+            return;
+        }
+        let place = (margin as i64 + place) as usize + from;
+        let count = costs.len();
+        let there = &right.values[place..];
+        PixelCosts { here, there, pitch, weight: weights[x], costs: &mut *costs }.all(count);
+        let among = |label: i64| (label - from as i64).clamp(0, labels as i64) as usize;
+        let (first, end) = (among(first), among(end));
+        if *any_masked {
+            let masked = &there[Row::MASKED * pitch + first..];
+            for (cost, &masked) in costs[first..end].iter_mut().zip(masked) {
+                *cost = if masked == 0 { *cost } else { outside };
+            }
+        }
+        // Most pixels need none of these, and an empty fill takes its time too.
+        if first > 0 {
+            costs[..first].fill(outside);
+        }
+        if end < count {
+            costs[end..labels].fill(outside);
+            costs[labels..].fill(u8::MAX);
+        }
+    }
+}
+
+/// The costs of a left pixel against pixels of the right row.
 struct PixelCosts<'a> {
-    left: &'a Row,
-    right: &'a Row,
-    /// Position of the pixel in its row, and of the pixel of the first label in the other row.
-    at: usize,
-    place: usize,
+    /// The values of the pixel, `pitch` apart.
+    here: &'a [u8],
+    /// From those of the first label's pixel on.
+    there: &'a [u8],
+    pitch: usize,
     weight: u16,
     costs: &'a mut [u8],
+}
+
+impl PixelCosts<'_> {
+    /// The values of both pixels in a plane, for the labels from `label` on.
+    #[inline(always)]
+    fn both<const N: usize>(&self, plane: usize, label: usize) -> (u8, &[u8; N]) {
+        let plane = plane * self.pitch;
+        (self.here[plane], block(self.there, plane + label))
+    }
 }
 
 impl Blocks for PixelCosts<'_> {
@@ -109,17 +170,17 @@ impl Blocks for PixelCosts<'_> {
     fn block<const N: usize>(&mut self, label: usize) {
         let mut bits = [0u8; N];
         for plane in Row::CENSUS {
-            let here = self.left.plane(plane)[self.at];
-            let there = block::<u8, N>(self.right.plane(plane), self.place + label);
+            let (here, there) = self.both::<N>(plane, label);
             bits = each_lane(|i| bits[i] + (here ^ there[i]).count_ones() as u8);
         }
         let mut costs: [u8; N] = each_lane(|i| CENSUS_BIT_COST as u8 * bits[i].min(CENSUS_BITS as u8));
         if self.weight > 0 {
             let mut apart = [0u8; N];
             for plane in Row::CHANNELS {
-                let here = self.left.plane(plane)[self.at];
-                let there = block::<u8, N>(self.right.plane(plane), self.place + label);
-                apart = each_lane(|i| apart[i].saturating_add(here.abs_diff(there[i])));
+                let (here, there) = self.both::<N>(plane, label);
+                // Not abs_diff: compilers widen that to 32 bits.
+                let difference = |a: u8, b: u8| a.saturating_sub(b) | b.saturating_sub(a);
+                apart = each_lane(|i| apart[i].saturating_add(difference(here, there[i])));
             }
             let weighted: [u16; N] = each_lane(|i| self.weight * u16::from(apart[i].min(COLOUR_MOST as u8)));
             costs =
@@ -223,50 +284,12 @@ impl RowFeatures {
         fill_row(&mut self.left, views.pair.left(), left, y);
         fill_row(&mut self.right, views.pair.right(), right, y);
         colour_weights(views.plan, left, y, sums, &mut self.weights);
-        self.any_masked = self.right.plane(Row::MASKED).iter().any(|&masked| masked != 0);
+        self.any_masked = self.right.pixels_mut(Row::MASKED).iter().any(|&masked| masked != 0);
     }
 
     /// The costs of the row, \[x\]\[label\], with padding.
     pub(super) fn costs(&self, plan: &Plan, out: &mut [u8]) {
         cost_row(plan, self, out);
-    }
-
-    /// The costs of the pixel at column `x` at the labels from `from` on; those behind the last label are the largest value.
-    #[inline(always)]
-    fn costs_of(&self, plan: &Plan, x: usize, from: usize, costs: &mut [u8]) {
-        let (level, outside) = (&plan.levels[0], plan.outside_cost);
-        let Self { left, right, weights, any_masked } = self;
-        let (width, margin) = (level.width, left.margin);
-        let labels = level.labels.saturating_sub(from).min(costs.len());
-        // The right pixel of label index j is at `place` + j from the right.
-        let place = (width - 1 - x) as i64 + i64::from(level.min);
-        // Labels whose pixel is inside the right image.
-        let first = (-place).max(0);
-        let end = (width as i64 - place).min(level.labels as i64);
-        if left.plane(Row::MASKED)[margin + x] != 0 || first >= end {
-            costs[..labels].fill(outside);
-            costs[labels..].fill(u8::MAX);
-            return;
-        }
-        let place = (margin as i64 + place) as usize + from;
-        let count = costs.len();
-        PixelCosts { left, right, at: margin + x, place, weight: weights[x], costs }.all(count);
-        let among = |label: i64| (label - from as i64).clamp(0, labels as i64) as usize;
-        let (first, end) = (among(first), among(end));
-        if *any_masked {
-            let masked = &right.plane(Row::MASKED)[place + first..];
-            for (cost, &masked) in costs[first..end].iter_mut().zip(masked) {
-                *cost = if masked == 0 { *cost } else { outside };
-            }
-        }
-        // Most pixels need none of these, and an empty fill takes its time too.
-        if first > 0 {
-            costs[..first].fill(outside);
-        }
-        if end < count {
-            costs[end..labels].fill(outside);
-            costs[labels..].fill(u8::MAX);
-        }
     }
 }
 
@@ -283,15 +306,11 @@ impl Row {
     const CENSUS: Range<usize> = 0..8;
     const CHANNELS: Range<usize> = 8..11;
     const MASKED: usize = 11;
+    const PLANES: usize = 12;
 
     fn new(width: usize, margin: usize) -> Self {
         let pitch = width + 2 * margin;
-        Self { margin, pitch, values: vec![0; (Self::MASKED + 1) * pitch] }
-    }
-
-    #[inline(always)]
-    fn plane(&self, plane: usize) -> &[u8] {
-        &self.values[plane * self.pitch..][..self.pitch]
+        Self { margin, pitch, values: vec![0; Self::PLANES * pitch] }
     }
 
     /// The pixels of a plane.

@@ -40,6 +40,12 @@ impl Window {
         self.stride.into()
     }
 
+    /// Whether both hold the same labels.
+    #[inline(always)]
+    pub(super) fn matches(self, other: Self) -> bool {
+        (self.first, self.stride) == (other.first, other.stride)
+    }
+
     /// The cells in their row.
     #[inline(always)]
     pub(super) fn cells(self) -> Range<usize> {
@@ -52,8 +58,6 @@ pub(super) struct Windows {
     width: usize,
     /// Labels of the level.
     labels: usize,
-    /// Whether all windows hold all labels.
-    full: bool,
     /// \[row of windows\]\[x\].
     all: Vec<Window>,
     /// Where each row of cells starts.
@@ -82,9 +86,8 @@ impl Windows {
             }
             lengths.push(start as usize + LABEL_BLOCK);
         }
-        let full = windows.data().iter().all(|window| usize::from(window[1]) == level.stride);
         let rows = places(&lengths, held, height);
-        Self { width, labels: level.labels, full, all, rows, lengths }
+        Self { width, labels: level.labels, all, rows, lengths }
     }
 
     /// Largest number of cells of a volume of `level`, of which `held` rows are needed at the same time.
@@ -96,11 +99,6 @@ impl Windows {
     /// Cells of all pixels.
     pub(super) fn cells(&self) -> u64 {
         (0..self.height()).map(|y| (self.length(y) - 2 * LABEL_BLOCK) as u64).sum()
-    }
-
-    /// Whether every window holds all labels.
-    pub(super) fn are_full(&self) -> bool {
-        self.full
     }
 
     /// The windows of row `y`.
@@ -264,10 +262,10 @@ impl<'a, U: Units> Seen<'a, U> {
         (cells, each_lane(|i| before[i] | after[i]))
     }
 
-    /// The block of labels at `at` where all windows hold all labels. Padding is stored with the largest belief, which is
+    /// The block of labels at `at` where both windows hold the same labels. Padding is stored with the largest belief, which is
     /// above all others less a message.
     #[inline(always)]
-    pub(super) fn whole_block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
+    pub(super) fn same_block(&self, at: usize) -> (&'a [U; LABEL_BLOCK], [U; LABEL_BLOCK]) {
         let cells = self.cells[self.start + at..].first_chunk().expect("rows are whole blocks");
         (cells, [U::default(); LABEL_BLOCK])
     }
