@@ -1,4 +1,8 @@
 //! The weighted median of the disparities: see [`crate::backend::Stage::Median`].
+//!
+//! Neighbouring pixels of a row are the lanes of vectors: what a place of the window holds for all of them is adjacent, and no sum
+//! crosses lanes. Each lane bisects an interval of its own, from the smallest to the largest value in its window that has
+//! weight. Every step sums the weights of the values below the middle. This needs no sort.
 
 use super::finest::Finest;
 use super::units::{block, each_lane};
@@ -8,7 +12,6 @@ use crate::options::Median;
 use crate::plan::Plan;
 use crate::weights::{MEDIAN_WEIGHT, MedianWeights};
 use rayon::prelude::*;
-use std::array::from_fn;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
     let touched = |f: u8| match plan.method.refinement.median {
@@ -19,76 +22,57 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
     smooth(&MedianWeights::of(&plan.method), touched, guide, maps);
 }
 
-/// Applies the median to every pixel whose flags are `touched`.
+/// Applies the median to every pixel whose flags are `touched`. Such a pixel has a disparity.
 pub(super) fn smooth(
     weights: &MedianWeights,
     touched: impl Fn(u8) -> bool + Sync,
     guide: &Image,
     maps: &mut Finest,
 ) {
-    // Rows of the window are vectors of one of two lengths.
-    match 2 * weights.radius() + 1 {
-        ..=16 => smooth_by::<16>(weights, touched, guide, maps),
-        _ => smooth_by::<32>(weights, touched, guide, maps),
-    }
-}
-
-/// As [`smooth`], with `LANES` lanes for each row of a window, padded where the row is shorter.
-fn smooth_by<const LANES: usize>(
-    weights: &MedianWeights,
-    touched: impl Fn(u8) -> bool + Sync,
-    guide: &Image,
-    maps: &mut Finest,
-) {
     let Finest { disparity, validity: flags, .. } = maps;
-    let (width, height) = disparity.size();
-    let (radius, step) = (weights.radius(), 1 << weights.step_bits());
-    let seen = Seen::new(weights, LANES, guide, disparity, flags);
+    let width = disparity.width();
+    let seen = Seen::new(weights, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
-    disparity.for_each_init(Window::<LANES>::new, |window, (y, row)| {
-        // The rows of the window, without those that it skips.
-        let (apart, reach) = (step << weights.row_bits(), radius >> weights.row_bits());
-        let first = y - reach.min(y / apart) * apart;
-        let rows = (first..(y + reach * apart + 1).min(height)).step_by(apart);
-        window.open(rows.map(|ny| (ny * seen.pitch, weights.space_row(ny.abs_diff(y) / step))));
-        median_row(window, &seen, weights.doublings(), &|x| touched(flags[(x, y)]), y, row);
+    disparity.for_each_init(Window::default, |window, (y, row)| {
+        window.open(weights, &seen, y);
+        window.touched.clear();
+        window.touched.extend(flags.row(y).iter().map(|&f| touched(f)));
+        window.touched.resize(width + LANES, false);
+        median_row(window, &seen, row);
     });
 }
 
-/// The medians of the touched pixels of row `y`.
+/// The medians of the touched pixels of the row that `window` is open at.
 #[pulp::with_simd(median_row = pulp::Arch::new())]
 #[inline(always)]
-fn median_row_on<'a, S: pulp::Simd, const LANES: usize>(
-    _: S,
-    window: &'a mut Window<LANES>,
-    seen: &'a Seen,
-    doublings: u32,
-    touched: &'a dyn Fn(usize) -> bool,
-    y: usize,
-    row: &'a mut [i32],
-) {
-    let mut places = [0; GROUP];
-    let mut all = (0..row.len()).filter(|&x| touched(x));
-    loop {
-        let mut count = 0;
-        for (place, x) in places.iter_mut().zip(&mut all) {
-            *place = x;
-            count += 1;
+fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen, row: &'a mut [i32]) {
+    let mut x = 0;
+    while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched) {
+        x += skipped;
+        let touched: [bool; LANES] = *block(&window.touched, x);
+        let medians = window.medians(seen, x, &touched);
+        for ((out, median), _) in row[x..].iter_mut().zip(medians).zip(touched).filter(|each| each.1) {
+            *out = median;
         }
-        if count == 0 {
-            return;
-        }
-        window.medians(doublings, seen, &places[..count], y, row);
+        x += LANES;
     }
 }
 
-/// The input of the windows: rows in which the columns of one window are adjacent, with unknown pixels beyond
-/// both borders.
+/// Number of pixels whose windows are weighed together, in vectors of bytes.
+const LANES: usize = 32;
+/// Number of pixels whose medians are found together, in vectors of 16 bits.
+const HALF: usize = LANES / 2;
+/// Number of places whose weights are summed before they join the others.
+const GROUP: usize = 4;
+/// Sums of this many weights fit in 16 bits.
+const PART: usize = 512;
+
+/// The input of the windows, with unknown pixels beyond the ends of the rows.
 struct Seen {
-    radius: usize,
+    /// Number of unknown pixels before each row.
+    margin: usize,
     pitch: usize,
-    /// Start of the window of each column's pixel, within a row.
-    columns: Vec<usize>,
+    height: usize,
     guides: [Vec<u8>; 3],
     /// The largest value where there is a disparity, else 0.
     known: Vec<u8>,
@@ -96,209 +80,223 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(
-        weights: &MedianWeights,
-        lanes: usize,
-        guide: &Image,
-        disparity: &Plane<i32>,
-        flags: &Plane<u8>,
-    ) -> Self {
+    fn new(weights: &MedianWeights, guide: &Image, disparity: &Plane<i32>, flags: &Plane<u8>) -> Self {
         let (width, height) = disparity.size();
-        let (radius, step) = (weights.radius(), 1 << weights.step_bits());
-        let mut columns = vec![0; width];
-        let mut start = 0;
-        for phase in 0..step.min(width) {
-            for (place, x) in (phase..width).step_by(step).enumerate() {
-                columns[x] = start + place;
-            }
-            start += (width - phase).div_ceil(step) + 2 * radius;
-        }
-        let pitch = start + lanes;
-        let mut seen = Self {
-            radius,
-            pitch,
-            columns,
-            guides: [(); 3].map(|()| vec![0; pitch * height]),
-            known: vec![0; pitch * height],
-            values: vec![0; pitch * height],
-        };
-        let [r, g, b] = &mut seen.guides;
+        let margin = weights.radius() << weights.step_bits();
+        let pitch = width + 2 * margin + LANES;
+        let bytes = || vec![0; pitch * height];
+        let [mut r, mut g, mut b, mut known] = [bytes(), bytes(), bytes(), bytes()];
+        let mut values = vec![0; pitch * height];
         let guides = r.par_chunks_mut(pitch).zip(g.par_chunks_mut(pitch)).zip(b.par_chunks_mut(pitch));
-        let rows = guides.zip(seen.known.par_chunks_mut(pitch)).zip(seen.values.par_chunks_mut(pitch));
+        let rows = guides.zip(known.par_chunks_mut(pitch)).zip(values.par_chunks_mut(pitch));
         rows.enumerate().for_each(|(y, ((((r, g), b), known), values))| {
-            for (x, &column) in seen.columns.iter().enumerate() {
-                let at = column + radius;
-                let scaled = guide.pixels[(x, y)].map(|v| ((u32::from(v) * weights.scale()) >> 16) as u8);
-                (r[at], g[at], b[at]) = (scaled[0], scaled[1], scaled[2]);
-                known[at] = if has_disparity(flags[(x, y)]) { u8::MAX } else { 0 };
-                values[at] = disparity[(x, y)];
-            }
+            let inside = margin..margin + width;
+            let bytes = [r, g, b, known].map(|row| &mut row[inside.clone()]);
+            seen_row(weights.scale(), guide.pixels.row(y), flags.row(y), bytes);
+            values[inside].copy_from_slice(disparity.row(y));
         });
-        seen
+        Self { margin, pitch, height, guides: [r, g, b], known, values }
     }
 }
 
-/// Most medians are this close to the value that they replace, in 1/256 px.
-const NEAR: i32 = 64;
-/// The values of a window are clamped to this distance from a guess.
-const FAR: i32 = i16::MAX as i32;
-
-/// Number of pixels whose medians are found side by side: each step of one search waits for the step before.
-const GROUP: usize = 4;
-/// Number of samples of a window that are summed side by side; a remainder would be summed one by one.
-const SIDE: usize = 32;
-/// Sums of this many weights fit in 16 bits.
-const PART: usize = 512;
-
-/// The windows of a group of pixels of one row.
-struct Window<const LANES: usize> {
-    /// Start of each row in the input.
-    rows: Vec<usize>,
-    /// The weight that distance subtracts.
-    space: Vec<[u8; LANES]>,
-    contents: [Contents<LANES>; GROUP],
-}
-
-/// Values and weights of a window, row by row, in whole blocks of [`SIDE`]. A pixel without disparity has
-/// weight 0.
-#[derive(Clone, Default)]
-struct Contents<const LANES: usize> {
-    column: usize,
-    /// Where the search for the median starts.
-    guess: i32,
-    /// Relative to the guess.
-    values: Vec<[i16; LANES]>,
-    weights: Vec<[u16; LANES]>,
-    total: u32,
-    /// The ends of the interval that contains the median, relative to the guess.
-    low: i32,
-    high: i32,
-}
-
-impl<const LANES: usize> Window<LANES> {
-    fn new() -> Self {
-        Self { rows: Vec::new(), space: Vec::new(), contents: from_fn(|_| Contents::default()) }
+/// The guides of a row, and where it is known.
+#[pulp::with_simd(seen_row = pulp::Arch::new())]
+#[inline(always)]
+fn seen_row_on<'a, S: pulp::Simd>(
+    _: S,
+    scale: u32,
+    pixels: &'a [[u16; 4]],
+    flags: &'a [u8],
+    out: [&'a mut [u8]; 4],
+) {
+    let [r, g, b, known] = out;
+    for ((((pixel, r), g), b), (&flags, known)) in
+        pixels.iter().zip(r).zip(g).zip(b).zip(flags.iter().zip(known))
+    {
+        let [red, green, blue, _] = pixel.map(|channel| ((u32::from(channel) * scale) >> 16) as u8);
+        (*r, *g, *b) = (red, green, blue);
+        *known = if has_disparity(flags) { u8::MAX } else { 0 };
     }
+}
 
-    /// Sets the rows: the start of each in the input, and the weight that distance subtracts in it.
-    fn open<'a>(&mut self, rows: impl Iterator<Item = (usize, &'a [u8])>) {
-        self.rows.clear();
-        self.space.clear();
-        for (start, space) in rows {
-            self.rows.push(start);
-            self.space.push(from_fn(|i| space.get(i).copied().unwrap_or(u8::MAX)));
+/// The windows of [`LANES`] adjacent pixels.
+#[derive(Default)]
+struct Window {
+    /// Where the row of the centres starts in the input.
+    centre: usize,
+    /// By place: where it lies in the input for the pixel in column 0, and the weight of what has the colour of the centre there.
+    offsets: Vec<(usize, u8)>,
+    doublings: u32,
+    /// Whether each pixel of the row takes its median.
+    touched: Vec<bool>,
+    /// The first `count` places have weight.
+    weighed: Vec<Weighed>,
+    places: Vec<Place>,
+    count: usize,
+}
+
+/// Where a place of the first lane's window lies in the input, and the weights of all lanes: 0 without disparity.
+#[derive(Clone, Copy, Default)]
+struct Weighed {
+    at: usize,
+    weights: [u8; LANES],
+}
+
+/// What a place of the window holds, for all lanes.
+#[repr(align(64))]
+#[derive(Clone, Copy, Default)]
+struct Place {
+    /// Relative to a guess of each lane.
+    values: [i16; LANES],
+    /// 0 without disparity.
+    weights: [u16; LANES],
+}
+
+/// What is known of the medians before the search, for all lanes.
+struct Bounds {
+    /// The smallest and the largest of the guess and the values that have weight.
+    low: [i16; LANES],
+    high: [i16; LANES],
+    /// The weight that the values up to the median have at least: half of all, rounded up. It fits in 16 bits, since windows have at most
+    /// 31 x 31 places.
+    need: [u16; LANES],
+}
+
+impl Window {
+    /// Moves to row `y`, whose windows leave out what is above and below the image.
+    fn open(&mut self, weights: &MedianWeights, seen: &Seen, y: usize) {
+        let step = 1 << weights.step_bits();
+        // The rows of the window, without those that it skips.
+        let (apart, reach) = (step << weights.row_bits(), weights.radius() >> weights.row_bits());
+        let first = y - reach.min(y / apart) * apart;
+        self.offsets.clear();
+        for ny in (first..(y + reach * apart + 1).min(seen.height)).step_by(apart) {
+            for (column, &taken) in weights.space_row(ny.abs_diff(y) / step).iter().enumerate() {
+                self.offsets.push((ny * seen.pitch + column * step, MEDIAN_WEIGHT.saturating_sub(taken)));
+            }
         }
-        let whole = self.rows.len().next_multiple_of(SIDE / LANES);
-        for Contents { values, weights, .. } in &mut self.contents {
-            values.resize(whole, [0; LANES]);
-            weights.clear();
-            weights.resize(whole, [0; LANES]);
-        }
+        (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings());
+        self.weighed.resize(self.offsets.len(), Weighed::default());
+        self.places.resize(self.offsets.len().next_multiple_of(GROUP), Place::default());
     }
 
-    /// Replaces the pixels `places` of row `y` by the weighted medians of their windows. Each search starts
-    /// near the value that it replaces.
+    /// The medians of the pixels from column `x` on, as far as they are `touched`.
     #[inline(always)]
-    fn medians(&mut self, doublings: u32, seen: &Seen, places: &[usize], y: usize, row: &mut [i32]) {
-        let Self { rows, space, contents } = self;
-        let contents = &mut contents[..places.len()];
-        for (window, &x) in contents.iter_mut().zip(places) {
-            (window.column, window.guess) = (seen.columns[x], row[x]);
-            window.weigh(doublings, seen, rows, space, y);
-            window.open(seen, rows);
-        }
-        while contents.iter().any(Contents::is_open) {
-            for window in contents.iter_mut().filter(|window| window.is_open()) {
-                window.cut();
-                if !window.is_open() && window.low.abs() == FAR {
-                    // The median is out of reach of this guess.
-                    window.guess += window.low;
-                    window.open(seen, rows);
+    fn medians(&mut self, seen: &Seen, x: usize, touched: &[bool; LANES]) -> [i32; LANES] {
+        let mut medians: [i32; LANES] = *block(&seen.values, self.centre + x);
+        self.weigh(seen, x, touched);
+        loop {
+            let bounds = self.load(seen, &medians);
+            let mut far = false;
+            for first in [0, HALF] {
+                let found = self.search(&bounds, first, block(touched, first));
+                for ((median, found), touched) in
+                    medians[first..].iter_mut().zip(found).zip(&touched[first..])
+                {
+                    *median += i32::from(found);
+                    far |= *touched && (found == i16::MIN || found == i16::MAX);
                 }
             }
+            // A median out of the reach of its guess is searched for again, from there.
+            if !far {
+                return medians;
+            }
         }
-        for (window, &x) in contents.iter().zip(places) {
-            row[x] = window.guess + window.low;
+    }
+
+    /// Finds the places that have weight for any of the pixels `touched`.
+    #[inline(always)]
+    fn weigh(&mut self, seen: &Seen, x: usize, touched: &[bool; LANES]) {
+        let cells = seen.known.len();
+        let known = &seen.known[..cells];
+        let [red, green, blue] = seen.guides.each_ref().map(|guide| &guide[..cells]);
+        let centres: [[u8; LANES]; 3] = [red, green, blue].map(|guide| *block(guide, self.centre + x));
+        let doublings = self.doublings;
+        // The value that takes all of the weight once it is doubled.
+        let most = (MEDIAN_WEIGHT + 1) >> doublings;
+        let touched: [u8; LANES] = each_lane(|i| u8::from(touched[i]).wrapping_neg());
+        let mut count = 0;
+        for &(offset, near) in &self.offsets {
+            let at = offset + x;
+            let r = apart(block(red, at), &centres[0]);
+            let g = apart(block(green, at), &centres[1]);
+            let b = apart(block(blue, at), &centres[2]);
+            let apart: [u8; LANES] = each_lane(|i| r[i].saturating_add(g[i]).saturating_add(b[i]));
+            let colour: [u8; LANES] = each_lane(|i| apart[i].min(most) << doublings);
+            let known: &[u8; LANES] = block(known, at);
+            let weights: [u8; LANES] = each_lane(|i| near.saturating_sub(colour[i]) & known[i] & touched[i]);
+            self.weighed[count] = Weighed { at, weights };
+            count += usize::from(weights != [0; LANES]);
         }
+        self.count = count;
+    }
+
+    /// Loads the values of all places that have weight, relative to the guesses.
+    #[inline(always)]
+    fn load(&mut self, seen: &Seen, guess: &[i32; LANES]) -> Bounds {
+        let (mut low, mut high) = ([0i16; LANES], [0i16; LANES]);
+        let mut total = [0u32; LANES];
+        let weighed = &self.weighed[..self.count];
+        for (places, weighed) in self.places.chunks_mut(PART).zip(weighed.chunks(PART)) {
+            let mut part = [0u16; LANES];
+            for (place, Weighed { at, weights }) in places.iter_mut().zip(weighed) {
+                let weights: [u16; LANES] = each_lane(|i| weights[i].into());
+                let values: &[i32; LANES] = block(&seen.values, *at);
+                let values: [i16; LANES] =
+                    each_lane(|i| (values[i] - guess[i]).clamp(i16::MIN.into(), i16::MAX.into()) as i16);
+                let weighted: [i16; LANES] = each_lane(|i| values[i] & mask(weights[i] > 0) as i16);
+                low = each_lane(|i| low[i].min(weighted[i]));
+                high = each_lane(|i| high[i].max(weighted[i]));
+                part = each_lane(|i| part[i] + weights[i]);
+                *place = Place { values, weights };
+            }
+            total = each_lane(|i| total[i] + u32::from(part[i]));
+        }
+        // Groups are whole.
+        let whole = self.count.next_multiple_of(GROUP);
+        self.places[self.count..whole].fill(Place::default());
+        Bounds { low, high, need: each_lane(|i| total[i].div_ceil(2) as u16) }
+    }
+
+    /// The medians of half of the lanes, from lane `first` on: the largest values below which there is less weight than needed.
+    #[inline(always)]
+    fn search(&self, bounds: &Bounds, first: usize, touched: &[bool; HALF]) -> [i16; HALF] {
+        let [low, high]: [&[i16; HALF]; 2] = [block(&bounds.low, first), block(&bounds.high, first)];
+        let need: &[u16; HALF] = block(&bounds.need, first);
+        let spans: [u16; HALF] = each_lane(|i| if touched[i] { high[i].abs_diff(low[i]) } else { 0 });
+        let mut found = *low;
+        let mut steps = u16::BITS - spans.iter().fold(0, |all, span| all | span).leading_zeros();
+        while steps > 0 {
+            steps -= 1;
+            // A step may take all 16 bits; its halves leave room for the sign.
+            let [less, more] = [(1u16 << steps) / 2, (1u16 << steps).div_ceil(2)].map(|part| part as i16);
+            let end: [i16; HALF] = each_lane(|i| found[i].saturating_add(less).saturating_add(more));
+            let mut below = [0u16; HALF];
+            for places in self.places[..self.count.next_multiple_of(GROUP)].as_chunks::<GROUP>().0 {
+                let mut part = [0u16; HALF];
+                for place in places {
+                    let values: &[i16; HALF] = block(&place.values, first);
+                    let weights: &[u16; HALF] = block(&place.weights, first);
+                    part = each_lane(|i| part[i] + (mask(values[i] < end[i]) & weights[i]));
+                }
+                below = each_lane(|i| below[i].saturating_add(part[i]));
+            }
+            found = each_lane(|i| if below[i] < need[i] { end[i] } else { found[i] });
+        }
+        found
     }
 }
 
-impl<const LANES: usize> Contents<LANES> {
-    #[inline(always)]
-    fn weigh(&mut self, doublings: u32, seen: &Seen, rows: &[usize], space: &[[u8; LANES]], y: usize) {
-        let centre = y * seen.pitch + self.column + seen.radius;
-        let centres = seen.guides.each_ref().map(|guide| guide[centre]);
-        // The value that takes all of the weight once it is doubled.
-        let most = (MEDIAN_WEIGHT + 1) >> doublings;
-        for ((weights, space), &row) in self.weights.iter_mut().zip(space).zip(rows) {
-            let at = row + self.column;
-            let mut apart = [0u8; LANES];
-            for (guide, centre) in seen.guides.iter().zip(centres) {
-                let guide: &[u8; LANES] = block(guide, at);
-                let above: [u8; LANES] = each_lane(|i| guide[i].saturating_sub(centre));
-                let below: [u8; LANES] = each_lane(|i| centre.saturating_sub(guide[i]));
-                apart = each_lane(|i| apart[i].saturating_add(above[i] | below[i]));
-            }
-            let known: &[u8; LANES] = block(&seen.known, at);
-            let mut colour: [u8; LANES] = each_lane(|i| apart[i].min(most));
-            for _ in 0..doublings {
-                colour = each_lane(|i| colour[i].wrapping_add(colour[i]));
-            }
-            let left: [u8; LANES] = each_lane(|i| MEDIAN_WEIGHT.saturating_sub(colour[i]));
-            let left: [u8; LANES] = each_lane(|i| left[i].saturating_sub(space[i]) & known[i]);
-            *weights = each_lane(|i| left[i].into());
-        }
-    }
+/// Absolute differences.
+#[inline(always)]
+fn apart(guides: &[u8; LANES], centres: &[u8; LANES]) -> [u8; LANES] {
+    let above: [u8; LANES] = each_lane(|i| guides[i].saturating_sub(centres[i]));
+    let below: [u8; LANES] = each_lane(|i| centres[i].saturating_sub(guides[i]));
+    each_lane(|i| above[i] | below[i])
+}
 
-    /// Loads the values around the guess, and finds out which of three intervals contains the median.
-    #[inline(always)]
-    fn open(&mut self, seen: &Seen, rows: &[usize]) {
-        for (values, &row) in self.values.iter_mut().zip(rows) {
-            let seen: &[i32; LANES] = block(&seen.values, row + self.column);
-            *values = each_lane(|i| (seen[i] - self.guess).clamp(-FAR, FAR) as i16);
-        }
-        let [below_near, below_far, total] = self.below([-NEAR, NEAR, FAR]);
-        self.total = total;
-        [self.low, self.high] = if 2 * below_near >= total {
-            [-FAR, -NEAR]
-        } else if 2 * below_far >= total {
-            [1 - NEAR, NEAR]
-        } else {
-            [NEAR + 1, FAR]
-        };
-    }
-
-    /// Whether the median is not found yet.
-    #[inline(always)]
-    fn is_open(&self) -> bool {
-        self.low < self.high
-    }
-
-    /// Divides the interval into four and keeps the one with the median. This needs no sort.
-    #[inline(always)]
-    fn cut(&mut self) {
-        let share = (self.high - self.low + 4) / 4;
-        let ends = [1, 2, 3].map(|k| self.low + k * share - 1);
-        let short = self.below(ends).iter().filter(|&&below| 2 * below < self.total).count();
-        self.low += short as i32 * share;
-        self.high = self.high.min(self.low + share - 1);
-    }
-
-    /// The weight of all values up to each of three ends.
-    #[inline(always)]
-    fn below(&self, ends: [i32; 3]) -> [u32; 3] {
-        let [a, b, c] = ends.map(|end| end.min(FAR) as i16);
-        let mut sums = [0; 3];
-        let parts = self.values.as_flattened().chunks(PART).zip(self.weights.as_flattened().chunks(PART));
-        for (values, weights) in parts {
-            let mut part = [0u16; 3];
-            for (&v, &w) in values.iter().zip(weights) {
-                part[0] = part[0].wrapping_add(if v <= a { w } else { 0 });
-                part[1] = part[1].wrapping_add(if v <= b { w } else { 0 });
-                part[2] = part[2].wrapping_add(if v <= c { w } else { 0 });
-            }
-            sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += u32::from(part));
-        }
-        sums
-    }
+/// All bits of `yes`.
+#[inline(always)]
+fn mask(yes: bool) -> u16 {
+    u16::from(yes).wrapping_neg()
 }
