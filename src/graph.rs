@@ -45,6 +45,12 @@ impl Incoming {
         Self(((dx + RADIUS) | (dy + RADIUS) << 3 | (slot as i32) << 6) as u16)
     }
 
+    /// The same factor's `slot`, where this is slot 0.
+    #[inline(always)]
+    fn in_slot(self, slot: u16) -> Self {
+        Self(self.0 | slot << 6)
+    }
+
     /// (dx, dy, slot) of [`Self::new`].
     #[must_use]
     #[inline(always)]
@@ -87,39 +93,31 @@ impl LevelGraph {
     /// neighbours`.
     #[must_use]
     pub fn new(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
-        let pixels = width * height;
         assert_eq!(
             codes.len(),
-            pixels * neighbours,
+            width * height * neighbours,
             "{neighbours} codes for each of {width} x {height} pixels"
         );
+        let offsets: Vec<(i32, i32)> = offsets().collect();
+        for (slot, &code) in codes.iter().enumerate().filter(|slot| *slot.1 != NO_MEMBER) {
+            let factor = slot / neighbours;
+            let (x, y) = (factor % width, factor / width);
+            let inside = offsets.get(usize::from(code)).is_some_and(|&(dx, dy)| {
+                x.wrapping_add_signed(dx as isize) < width && y.wrapping_add_signed(dy as isize) < height
+            });
+            assert!(inside, "factor ({x}, {y}): member code {code} leads out of the image");
+        }
+        Self::of_valid(width, height, neighbours, codes)
+    }
+
+    /// As [`Self::new`], without a check of the codes.
+    fn of_valid(width: usize, height: usize, neighbours: usize, codes: Vec<u8>) -> Self {
         let step = |(dx, dy): (i32, i32)| dy as isize * width as isize + dx as isize;
         let steps = offsets().map(step).collect();
         let mut graph =
             Self { width, height, neighbours, codes, steps, starts: Vec::new(), incoming: Vec::new() };
-        graph.check();
         (graph.starts, graph.incoming) = graph.transposed();
         graph
-    }
-
-    /// Panics when a code points outside the image.
-    fn check(&self) {
-        if self.neighbours == 0 {
-            return;
-        }
-        let offsets: Vec<(i32, i32)> = offsets().collect();
-        let rows = self.codes.par_chunks_exact(self.width * self.neighbours);
-        rows.enumerate().for_each(|(y, row)| {
-            for (x, codes) in row.chunks_exact(self.neighbours).enumerate() {
-                for &code in codes.iter().filter(|&&code| code != NO_MEMBER) {
-                    let inside = offsets.get(usize::from(code)).is_some_and(|&(dx, dy)| {
-                        x.wrapping_add_signed(dx as isize) < self.width
-                            && y.wrapping_add_signed(dy as isize) < self.height
-                    });
-                    assert!(inside, "factor ({x}, {y}): member code {code} leads out of the image");
-                }
-            }
-        });
     }
 
     /// The transposed table: where the entries of each pixel start ([`Self::starts`]), and the entries
@@ -156,17 +154,26 @@ impl LevelGraph {
     /// Calls `with` for every slot that holds one of `pixels`, with the index of the pixel among them.
     #[inline(always)]
     fn each_member(&self, pixels: &Range<usize>, mut with: impl FnMut(usize, Incoming)) {
+        // By code: from a factor to its member, and the entry of slot 0. An empty slot leads to no pixel.
+        let mut steps = [isize::MIN / 2; 1 << u8::BITS];
+        let mut entries = [Incoming::default(); 1 << u8::BITS];
+        for ((step, entry), (&to, (dx, dy))) in
+            steps.iter_mut().zip(&mut entries).zip(self.steps.iter().zip(offsets()))
+        {
+            (*step, *entry) = (to, Incoming::new(-dx, -dy, 0));
+        }
         let reach = RADIUS as usize * self.width;
         let factors = pixels.start.saturating_sub(reach)..(pixels.end + reach).min(self.width * self.height);
         for factor in factors {
-            if pixels.contains(&factor) {
-                with(factor - pixels.start, Incoming::new(0, 0, 0));
+            let own = factor.wrapping_sub(pixels.start);
+            if own < pixels.len() {
+                with(own, Incoming::new(0, 0, 0));
             }
             let codes = &self.codes[factor * self.neighbours..][..self.neighbours];
             for (slot, &code) in (1..).zip(codes) {
-                if let Some(pixel) = self.pixel(factor, code).filter(|pixel| pixels.contains(pixel)) {
-                    let (dx, dy) = offset(code);
-                    with(pixel - pixels.start, Incoming::new(-dx, -dy, slot));
+                let member = own.wrapping_add_signed(steps[usize::from(code)]);
+                if member < pixels.len() {
+                    with(member, entries[usize::from(code)].in_slot(slot));
                 }
             }
         }
@@ -261,6 +268,14 @@ fn spatial_weight(sigma_space: f64, sigma_range: f64) -> u32 {
 const RANK_BITS: u32 = 6;
 /// The key of a pixel that cannot be a neighbour; all other keys are smaller.
 const NO_KEY: i32 = i32::MAX;
+/// Number of pixels of a row whose neighbours are chosen together.
+const LANES: usize = 32;
+/// Number of pixels around one that may be its neighbours.
+const AROUND: usize = GRAPH_WINDOW * GRAPH_WINDOW - 1;
+
+/// The keys of all that may be neighbours of [`LANES`] adjacent pixels, in whole lines of a cache.
+#[repr(align(64))]
+struct Keys([[i32; LANES]; AROUND]);
 
 fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let (width, height) = image.pixels.size();
@@ -268,103 +283,202 @@ fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
     let mut window: Vec<(i32, i32)> = offsets().filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
     let guide = Guide {
+        network: Network::new(neighbours),
         window,
         weight,
-        channels: [0, 1, 2].map(|c| {
-            let channel = image.pixels.data().par_iter().map(|pixel| pixel[c]);
-            Plane::new(width, height, channel.collect())
-        }),
-        masked: {
-            let keys = image.masked.data().par_iter().map(|&masked| if masked { NO_KEY } else { 0 });
-            Plane::new(width, height, keys.collect())
-        },
+        channels: [0, 1, 2].map(|c| padded(&image.pixels, 0, |pixel| pixel[c])),
+        masked: padded(&image.masked, NO_KEY, |&masked| if masked { NO_KEY } else { 0 }),
     };
     let mut codes = vec![NO_MEMBER; width * height * neighbours];
     if neighbours > 0 {
         codes.par_chunks_mut(width * neighbours).enumerate().for_each_init(
-            || (vec![0; width], vec![0; width * neighbours]),
-            |(keys, chosen), (y, row)| {
-                chosen.fill(NO_KEY);
-                choose_row(&guide, y, keys, chosen);
-                for (x, out) in row.chunks_exact_mut(neighbours).enumerate() {
-                    let found = chosen[x..].iter().step_by(width).filter(|&&key| key != NO_KEY);
-                    if !image.masked[(x, y)] {
-                        for (out, &key) in out.iter_mut().zip(found) {
-                            let (dx, dy) = guide.window[(key & ((1 << RANK_BITS) - 1)) as usize];
-                            *out = code(dx, dy);
-                        }
-                    }
+            || Keys([[0; LANES]; AROUND]),
+            |keys, (y, row)| {
+                choose_row(&guide, y, keys, row);
+                for (codes, _) in
+                    row.chunks_exact_mut(neighbours).zip(image.masked.row(y)).filter(|own| *own.1)
+                {
+                    codes.fill(NO_MEMBER);
                 }
             },
         );
     }
-    LevelGraph::new(width, height, neighbours, codes)
+    LevelGraph::of_valid(width, height, neighbours, codes)
 }
 
-/// The data that neighbours are chosen by, as planes per channel, so that a whole row is processed with
-/// vectors.
+/// A plane of `convert`ed values with `beyond` at both ends of its rows: [`RADIUS`] times at the start, and as often and [`LANES`]
+/// times at the end.
+fn padded<T: Sync, U: Copy + Send + Sync>(
+    plane: &Plane<T>,
+    beyond: U,
+    convert: impl Fn(&T) -> U + Sync,
+) -> Plane<U> {
+    let (width, height) = plane.size();
+    let margin = RADIUS as usize;
+    let pitch = width + 2 * margin + LANES;
+    let mut data = vec![beyond; pitch * height];
+    data.par_chunks_mut(pitch).enumerate().for_each(|(y, row)| {
+        for (out, value) in row[margin..].iter_mut().zip(plane.row(y)) {
+            *out = convert(value);
+        }
+    });
+    Plane::new(pitch, height, data)
+}
+
+/// The data that neighbours are chosen by, as planes per channel, so that many pixels are processed with vectors.
 struct Guide {
+    network: Network,
     /// The offsets of the window, nearest first.
     window: Vec<(i32, i32)>,
     /// Weight of a squared pixel of distance.
     weight: u32,
     channels: [Plane<u16>; 3],
-    /// [`NO_KEY`] where masked, else 0.
+    /// [`NO_KEY`] where masked or outside, else 0.
     masked: Plane<i32>,
 }
 
-/// Offers every offset of the window to the pixels of row `y`; the smallest keys stay in `chosen`, by slot.
+/// What it takes to find the smallest of [`AROUND`] keys, in order: half as many comparisons as one insertion after the other. Both
+/// halves are searched in the same way, and what they found is merged by Batcher's odd-even merge. Only comparisons that matter for the
+/// smallest are left.
+struct Network {
+    /// Places to compare and exchange so that the first holds the smaller key, one pair after the other.
+    pairs: Vec<(u8, u8)>,
+    /// Where the smallest keys are then, in order.
+    smallest: Vec<u8>,
+}
+
+impl Network {
+    /// For the `count` smallest keys.
+    fn new(count: usize) -> Self {
+        let mut all = Vec::new();
+        let places: Vec<u8> = (0..AROUND as u8).collect();
+        let smallest = Self::select(&places, count, &mut all);
+        let mut matter = [false; AROUND];
+        smallest.iter().for_each(|&place| matter[usize::from(place)] = true);
+        let mut pairs: Vec<(u8, u8)> = Vec::new();
+        for &(a, b) in all.iter().rev() {
+            if matter[usize::from(a)] || matter[usize::from(b)] {
+                (matter[usize::from(a)], matter[usize::from(b)]) = (true, true);
+                pairs.push((a, b));
+            }
+        }
+        pairs.reverse();
+        Self { pairs, smallest }
+    }
+
+    /// The places of the `count` smallest keys in `places`, once the comparisons that join `pairs` are made.
+    fn select(places: &[u8], count: usize, pairs: &mut Vec<(u8, u8)>) -> Vec<u8> {
+        if places.len() == 1 {
+            return places[..count.min(1)].to_vec();
+        }
+        let (first, second) = places.split_at(places.len().next_power_of_two() / 2);
+        let sorted = [first, second].map(|half| Self::select(half, count, pairs));
+        let mut merged = Self::merge(&sorted[0], &sorted[1], pairs);
+        merged.truncate(count);
+        merged
+    }
+
+    /// Merges sorted places.
+    fn merge(a: &[u8], b: &[u8], pairs: &mut Vec<(u8, u8)>) -> Vec<u8> {
+        if a.is_empty() || b.is_empty() {
+            return [a, b].concat();
+        }
+        if let (&[a], &[b]) = (a, b) {
+            pairs.push((a, b));
+            return vec![a, b];
+        }
+        let every_second =
+            |first: usize| [a, b].map(|side| side.iter().skip(first).step_by(2).copied().collect::<Vec<_>>());
+        let [even, odd] = [0, 1].map(|first| {
+            let [a, b] = every_second(first);
+            Self::merge(&a, &b, pairs)
+        });
+        let mut merged = vec![even[0]];
+        for i in 0..odd.len().max(even.len() - 1) {
+            let next = [odd.get(i).copied(), even.get(i + 1).copied()];
+            if let [Some(a), Some(b)] = next {
+                pairs.push((a, b));
+            }
+            merged.extend(next.into_iter().flatten());
+        }
+        merged
+    }
+}
+
+/// The neighbours of all pixels of row `y`.
 #[pulp::with_simd(choose_row = pulp::Arch::new())]
 #[inline(always)]
-fn choose_row_on<'a, S: pulp::Simd>(
-    _: S,
-    guide: &'a Guide,
-    y: usize,
-    keys: &'a mut [i32],
-    chosen: &'a mut [i32],
-) {
-    let Guide { window, weight, channels, masked } = guide;
-    let (width, height) = masked.size();
-    let centre = channels.each_ref().map(|channel| channel.row(y));
-    for (rank, &(dx, dy)) in window.iter().enumerate() {
-        let ny = y as i32 + dy;
-        let (first, end) = ((-dx).max(0) as usize, width as i32 - dx.max(0));
-        if ny < 0 || ny >= height as i32 || first as i32 >= end {
-            continue;
+fn choose_row_on<'a, S: pulp::Simd>(_: S, guide: &'a Guide, y: usize, keys: &'a mut Keys, row: &'a mut [u8]) {
+    let Guide { network, window, .. } = guide;
+    let neighbours = network.smallest.len();
+    // By rank.
+    let mut codes = [NO_MEMBER; 1 << RANK_BITS];
+    for (code_of, &(dx, dy)) in codes.iter_mut().zip(window) {
+        *code_of = code(dx, dy);
+    }
+    for (tile, row) in row.chunks_mut(LANES * neighbours).enumerate() {
+        offer(guide, tile * LANES, y, keys);
+        let keys = &mut keys.0;
+        for &(a, b) in &network.pairs {
+            let (a, b) = (usize::from(a), usize::from(b));
+            let (first, second) = (keys[a], keys[b]);
+            keys[a] = each_lane(|i| first[i].min(second[i]));
+            keys[b] = each_lane(|i| first[i].max(second[i]));
         }
-        let (seen, to) = (first..end as usize, (first as i32 + dx) as usize);
-        let there = to..to + seen.len();
+        for (slot, &place) in network.smallest.iter().enumerate() {
+            for (out, key) in row[slot..].iter_mut().step_by(neighbours).zip(&keys[usize::from(place)]) {
+                *out = codes[*key as usize % codes.len()];
+            }
+        }
+    }
+}
+
+/// The keys of all that may be neighbours of the pixels of row `y` from column `x` on: the distance, and the rank.
+#[inline(always)]
+fn offer(guide: &Guide, x: usize, y: usize, keys: &mut Keys) {
+    let Guide { window, weight, channels, masked, .. } = guide;
+    let centre = x + RADIUS as usize;
+    let [r, g, b] = channels.each_ref().map(|channel| -> &[u16; LANES] { lanes(channel.row(y), centre) });
+    for ((rank, &(dx, dy)), keys) in window.iter().enumerate().zip(&mut keys.0) {
+        let Some(ny) = y.checked_add_signed(dy as isize).filter(|&ny| ny < masked.height()) else {
+            *keys = [NO_KEY; LANES];
+            continue;
+        };
+        let at = centre.wrapping_add_signed(dx as isize);
         let distance = weight * (dx * dx + dy * dy) as u32;
         let base = (distance << RANK_BITS | rank as u32) as i32;
-        let keys = &mut keys[seen.clone()];
-        let here = centre.map(|channel| &channel[seen.clone()]);
-        let others = channels.each_ref().map(|channel| &channel.row(ny as usize)[there.clone()]);
-        offer(base, here, others, &masked.row(ny as usize)[there], keys);
-        for chosen in chosen.chunks_exact_mut(width) {
-            keep_smaller(&mut chosen[seen.clone()], keys);
-        }
+        let [red, green, blue] = channels;
+        let [r, g, b] = [
+            squared(r, lanes(red.row(ny), at)),
+            squared(g, lanes(green.row(ny), at)),
+            squared(b, lanes(blue.row(ny), at)),
+        ];
+        let masked = lanes(masked.row(ny), at);
+        *keys = each_lane(|i| (base + ((r[i] + g[i] + b[i]) << RANK_BITS)) | masked[i]);
     }
 }
 
-/// The keys of one neighbour for all pixels of a row: `base` plus the squared colour difference.
+/// Squared differences, in quarters of an 8-bit level.
 #[inline(always)]
-fn offer(base: i32, here: [&[u16]; 3], others: [&[u16]; 3], masked: &[i32], keys: &mut [i32]) {
-    let (here, others) = (here.map(|c| &c[..keys.len()]), others.map(|c| &c[..keys.len()]));
-    for ((i, key), &masked) in keys.iter_mut().enumerate().zip(masked) {
-        let squared = |c: usize| {
-            let difference = i32::from((here[c][i].abs_diff(others[c][i]) >> 6) as i16);
-            difference * difference
-        };
-        *key = (base + ((squared(0) + squared(1) + squared(2)) << RANK_BITS)) | masked;
-    }
+fn squared(here: &[u16; LANES], there: &[u16; LANES]) -> [i32; LANES] {
+    let apart: [i16; LANES] = each_lane(|i| (here[i].abs_diff(there[i]) >> 6) as i16);
+    each_lane(|i| i32::from(apart[i]) * i32::from(apart[i]))
 }
 
-/// Keeps the smaller of each pair in `chosen` and the larger in `keys`.
+/// [`LANES`] values of a padded row.
 #[inline(always)]
-fn keep_smaller(chosen: &mut [i32], keys: &mut [i32]) {
-    for (chosen, key) in chosen.iter_mut().zip(keys) {
-        (*chosen, *key) = ((*chosen).min(*key), (*chosen).max(*key));
+fn lanes<T>(row: &[T], at: usize) -> &[T; LANES] {
+    row[at..].first_chunk().expect("rows are padded")
+}
+
+/// The values of `lane` at 0 .. `LANES`, always inlined.
+#[inline(always)]
+fn each_lane<T: Copy + Default>(mut lane: impl FnMut(usize) -> T) -> [T; LANES] {
+    let mut lanes = [T::default(); LANES];
+    for (i, out) in lanes.iter_mut().enumerate() {
+        *out = lane(i);
     }
+    lanes
 }
 
 /// The next coarser image: a 5 x 5 binomial low-pass over the unmasked pixels, taken at every second pixel. A
