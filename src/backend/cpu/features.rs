@@ -14,9 +14,6 @@ use std::ops::Range;
 const CENSUS_X: usize = CENSUS_RADIUS_X as usize;
 const CENSUS_Y: isize = CENSUS_RADIUS_Y as isize;
 
-/// Costs of a pixel that [`Features::costs_near`] gives, from two below its label on.
-pub(super) const NEAR: usize = 5;
-
 /// What the costs of all rows are computed from, where they are not stored themselves.
 #[derive(Default)]
 pub(super) struct Features {
@@ -45,8 +42,8 @@ impl Features {
         window_row(plan, &self.rows[y], windows.row(y), out);
     }
 
-    /// Those from two labels below the labels of `optima` to two above, of which those in the range count.
-    pub(super) fn costs_near(&self, plan: &Plan, y: usize, optima: &[Optimum], out: &mut [[u8; NEAR]]) {
+    /// Those around the labels of `optima`, a byte each from two labels below on. Those outside the range are undefined.
+    pub(super) fn costs_near(&self, plan: &Plan, y: usize, optima: &[Optimum], out: &mut [u64]) {
         near_row(plan, &self.rows[y], optima, out);
     }
 }
@@ -82,17 +79,17 @@ fn near_row_on<'a, S: pulp::Simd>(
     plan: &'a Plan,
     features: &'a RowFeatures,
     optima: &'a [Optimum],
-    out: &'a mut [[u8; NEAR]],
+    out: &'a mut [u64],
 ) {
     let row = RowCosts { plan, features };
     let last = plan.levels[0].stride - LABEL_BLOCK;
     for (x, (optimum, out)) in optima.iter().zip(out).enumerate() {
         let label = usize::from(optimum.label);
         let from = label.saturating_sub(2).min(last);
-        let mut costs = [0; 2 + LABEL_BLOCK + NEAR];
+        let mut costs = [0; 2 + LABEL_BLOCK + size_of::<u64>()];
         row.costs_of(x, from, &mut costs[2..2 + LABEL_BLOCK]);
         // A pixel of the right view may have no label.
-        *out = *block(&costs, (label - from).min(LABEL_BLOCK));
+        *out = u64::from_le_bytes(*block(&costs, (label - from).min(LABEL_BLOCK)));
     }
 }
 
