@@ -354,7 +354,9 @@ impl Network {
         let places: Vec<u8> = (0..AROUND as u8).collect();
         let smallest = Self::select(&places, count, &mut all);
         let mut matter = [false; AROUND];
-        smallest.iter().for_each(|&place| matter[usize::from(place)] = true);
+        for &place in &smallest {
+            matter[usize::from(place)] = true;
+        }
         let mut pairs: Vec<(u8, u8)> = Vec::new();
         for &(a, b) in all.iter().rev() {
             if matter[usize::from(a)] || matter[usize::from(b)] {
