@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::solver;
 use mrfgs::low_level::tiles::Tiles;
 use mrfgs::options::Order;
 
@@ -46,6 +47,8 @@ fn memory(tiles: &Tiles, plan: &Plan) -> Table {
         table.row(["whole image", "", "", &bytes(tiles.bytes() - plan.bytes())]);
     }
     table.row(["all", "", "", &bytes(tiles.bytes())]);
+    let cpu = solver::streamed(plan).bytes() + (tiles.bytes() - plan.bytes());
+    table.row(["on the CPU", "", "", &format!("{} at most", bytes(cpu))]);
     table
 }
 
