@@ -229,7 +229,7 @@ fn cells(plan: &Plan, level: usize) -> f64 {
 fn work_of(plan: &Plan, stage: Stage) -> f64 {
     match stage {
         Stage::Cost => cells(plan, 0),
-        Stage::Pyramid(z) | Stage::Flood(z) => cells(plan, z),
+        Stage::Pyramid(z) | Stage::Flood(z) | Stage::Dependency(z) => cells(plan, z),
         _ => 0.0,
     }
 }
