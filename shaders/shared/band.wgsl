@@ -18,8 +18,6 @@ struct Level {
     member_pitch: u32,
     // Elements in a row of a map with one element per pixel.
     pixel_pitch: u32,
-    // Words in a row of the starts of the transposed table.
-    starts_pitch: u32,
 }
 
 // The stage works on rows first_row .. first_row + rows of the level.

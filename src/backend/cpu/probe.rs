@@ -8,6 +8,7 @@ use crate::backend::Map;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::error::Result;
+use crate::graph::LevelGraph;
 use crate::image::Plane;
 use crate::plan::LevelPlan;
 use rayon::prelude::*;
@@ -56,6 +57,19 @@ impl Probe for Cpu {
 
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
         on_volumes!(self, v => v.levels[level].windows = Windows::new(&v.plan.levels[level], windows));
+        Ok(())
+    }
+
+    fn change(&mut self) -> Result<u64> {
+        Ok(on_volumes!(self, v => v.change.unwrap_or(0)))
+    }
+
+    fn graph(&mut self, level: usize) -> Result<LevelGraph> {
+        Ok(on_volumes!(self, v => v.levels[level].graph.clone()))
+    }
+
+    fn set_graph(&mut self, level: usize, graph: &LevelGraph) -> Result<()> {
+        on_volumes!(self, v => v.levels[level].graph = graph.clone());
         Ok(())
     }
 
@@ -109,7 +123,7 @@ impl<U: Units> Volumes<U> {
             Volume::Cost(_) => gather(&l.cost, labels, stride),
             Volume::Evidence(_) => self.gather_windows(z, &l.evidence, 1, u8::MAX.into()),
             Volume::Dependency(_) if l.dependency_sent => {
-                self.gather_windows(z, &l.dependency, l.graph.slots(), dependency)
+                self.gather_windows(z, &l.dependency, self.plan.slots(), dependency)
             }
             Volume::Down(_) if self.levels[z + 1].resolution_sent => {
                 self.gather_windows(z, &l.down, 1, resolution)
@@ -159,7 +173,7 @@ impl<U: Units> Volumes<U> {
             Volume::Belief(_) => scatter(plan, &l.windows, (1, U::MOST), values, U::of, &mut l.belief),
             Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => {
                 let (slots, messages) = match volume {
-                    Volume::Dependency(_) => (l.graph.slots(), &mut l.dependency),
+                    Volume::Dependency(_) => (self.plan.slots(), &mut l.dependency),
                     Volume::Down(_) => (1, &mut l.down),
                     _ => (1, &mut l.up),
                 };

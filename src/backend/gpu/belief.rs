@@ -1,6 +1,6 @@
 //! Beliefs: see [`Stage::Belief`](crate::backend::Stage::Belief).
 //!
-//! Floor, a label: 6 bytes moved and asked for, 20 operations for four; beside that the table of the graph.
+//! Floor, a label: 6 bytes moved and asked for, 20 operations for four; beside that the graph: 8 bytes a pixel, and 4 a member.
 
 use super::buffers::{Binding, HALO, Rows, with_halo};
 use super::shader::Kernel;
@@ -21,14 +21,15 @@ pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
         .of_width(plan.volume_width)
         .with("HAS_DOWN", level + 1 < plan.levels.len())
         .with("HAS_UP", level > 0)
+        .with("SLOTS", plan.slots() as u32)
+        .with("WINDOW", GRAPH_WINDOW as u32)
         .with("RADIUS", HALO)
         .with("QUADS", QUADS);
     // A pixel is a member of at most the factors of its window.
-    let quads = QUADS as usize;
-    vec![Job::new::<Uniform>(kernel, 2 * quads + GRAPH_WINDOW * GRAPH_WINDOW * (quads + 1))]
+    let (quads, words) = (QUADS as usize, plan.neighbours.div_ceil(4));
+    vec![Job::new::<Uniform>(kernel, 2 * quads + GRAPH_WINDOW * GRAPH_WINDOW * (1 + words + quads))]
 }
 
-/// The graph of the pair decides where rows of the transposed table begin, so each pair has its own steps.
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (plan, level, here, l) = (r.plan, r.level, r.here(), r.params());
     let own = Uniform { most: plan.belief_most().into() };
@@ -44,8 +45,8 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         vec![
             (1, here.evidence.bind(rows)),
             (2, here.dependency.bind(&with_halo(rows, HALO, l.height))),
-            (3, here.starts.bind(rows)),
-            (4, here.incoming(rows)),
+            (3, here.members.bind(&with_halo(rows, HALO, l.height))),
+            (4, here.incoming.bind(rows)),
             (5, messages(rows, &here.down, level + 1 < plan.levels.len())),
             (6, messages(rows, &here.up, level > 0)),
             (7, here.belief.bind(rows)),

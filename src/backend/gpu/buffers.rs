@@ -4,19 +4,23 @@
 //! halo: a few rows of its neighbours, so that a stage that reads around a pixel finds everything in one
 //! part. A stage that writes a volume with a halo ends with copies that update those rows.
 
+use super::change::Convergence;
 use super::device::Device;
 use super::uniform::{ALIGN_WORDS, LevelParams};
-use super::upload::Incoming;
+use super::upload::window_words;
 use crate::error::{MemoryError, Result};
+use crate::image::Plane;
 use crate::plan::{GRAPH_WINDOW, Plan};
+use crate::weights::MedianWeights;
 use std::num::NonZero;
 use std::ops::Range;
 
 /// Halo of a part, in rows on either side: as far as any stage reads around a pixel in a volume.
 pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
 
-/// Weights of a quarter of the median's largest window, its axes included.
-const MEDIAN_WORDS: u64 = 16 * 16;
+/// What stages and copies do with buffers.
+const USAGE: wgpu::BufferUsages =
+    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);
 
 /// `rows` with up to `halo` rows above and below.
 pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32> {
@@ -161,6 +165,13 @@ pub(super) struct Buffers {
     pub(super) squares: Rows,
     /// Sums of the squared changes of each row, lower and upper half.
     pub(super) change_sums: wgpu::Buffer,
+    /// Whether the label map has settled.
+    pub(super) convergence: wgpu::Buffer,
+    /// Workgroups of the dispatches that end when it has: as they are now, and from the start.
+    pub(super) groups: wgpu::Buffer,
+    pub(super) all_groups: wgpu::Buffer,
+    /// Number of these dispatches.
+    pub(super) endings: u32,
     pub(super) optima: Rows,
     pub(super) right_labels: Rows,
     pub(super) raw: Rows,
@@ -175,7 +186,8 @@ pub(super) struct Buffers {
     /// Whether each row holds a valid pixel, and the row that it takes its values from.
     pub(super) filled_rows: wgpu::Buffer,
     pub(super) source_rows: wgpu::Buffer,
-    all: Vec<wgpu::Buffer>,
+    written: Vec<wgpu::Buffer>,
+    constant: Vec<wgpu::Buffer>,
 }
 
 /// Volumes of one level.
@@ -189,37 +201,20 @@ pub(super) struct LevelBuffers {
     pub(super) belief: Rows,
     /// Label windows, first label | number of labels with padding << 16.
     pub(super) windows: wgpu::Buffer,
+    /// Those that hold all labels.
+    pub(super) full_windows: wgpu::Buffer,
     /// Lowest and highest candidate of each pixel, for the windows of the next finer level.
     pub(super) candidates: Rows,
     /// First and last label of each pixel; empty where all labels are allowed.
     pub(super) label_range: Rows,
+    /// What members are chosen by; empty at level 0, whose guide is the left image.
+    pub(super) guide: Rows,
     pub(super) members: Rows,
-    pub(super) starts: Rows,
-    /// Entries of the transposed table, for the rows that each part holds.
-    incoming: Vec<(wgpu::Buffer, Range<u32>)>,
-    /// First word of each row in the transposed table, and the end.
-    incoming_rows: Vec<u32>,
+    /// Which factors hold each pixel.
+    pub(super) incoming: Rows,
 }
 
 impl LevelBuffers {
-    /// Entries of the transposed table for `rows`.
-    pub(super) fn incoming(&self, rows: &Range<u32>) -> Binding {
-        let part = self.incoming.iter().find(|(_, own)| own.start <= rows.start && rows.end <= own.end);
-        let (buffer, own) = part.expect("bands stay within parts");
-        let first = self.incoming_rows[own.start as usize];
-        let at = |row: u32| 4 * u64::from(self.incoming_rows[row as usize] - first);
-        Binding { buffer: buffer.clone(), bytes: at(rows.start)..at(rows.end) }
-    }
-
-    pub(super) fn write_incoming(&mut self, device: &mut Device, incoming: Incoming) -> Result<()> {
-        for (buffer, own) in &self.incoming {
-            let words = incoming.rows[own.start as usize] as usize..incoming.rows[own.end as usize] as usize;
-            device.write(buffer, bytemuck::cast_slice(&incoming.entries[words]))?;
-        }
-        self.incoming_rows = incoming.rows;
-        self.starts.write(device, &incoming.starts)
-    }
-
     /// The message volumes, which start at 0.
     pub(super) fn messages(&self) -> [&Rows; 3] {
         [&self.dependency, &self.down, &self.up]
@@ -228,12 +223,28 @@ impl LevelBuffers {
 
 /// Allocates buffers, and keeps track of them.
 struct Allocator<'a> {
-    device: &'a Device,
-    all: Vec<wgpu::Buffer>,
+    device: &'a mut Device,
+    written: Vec<wgpu::Buffer>,
+    constant: Vec<wgpu::Buffer>,
 }
 
 impl Allocator<'_> {
+    /// A buffer that matches write.
     fn buffer(&mut self, label: &str, words: u64) -> Result<wgpu::Buffer> {
+        let buffer = self.allocate(label, words, USAGE)?;
+        self.written.push(buffer.clone());
+        Ok(buffer)
+    }
+
+    /// A buffer that keeps these words from match to match.
+    fn constant(&mut self, label: &str, words: &[u32]) -> Result<wgpu::Buffer> {
+        let buffer = self.allocate(label, words.len() as u64, USAGE)?;
+        self.device.write(&buffer, bytemuck::cast_slice(words))?;
+        self.constant.push(buffer.clone());
+        Ok(buffer)
+    }
+
+    fn allocate(&self, label: &str, words: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         let size = (4 * words).max(4 * ALIGN_WORDS as u64);
         let (name, largest) = (&self.device.name, self.device.max_buffer);
         if size > largest {
@@ -243,11 +254,10 @@ impl Allocator<'_> {
         let buffer = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            usage,
             mapped_at_creation: false,
         });
         self.device.check()?;
-        self.all.push(buffer.clone());
         Ok(buffer)
     }
 
@@ -292,29 +302,24 @@ impl Buffers {
     ///
     /// # Errors
     /// [`Error::Memory`] when it does not fit, [`Error::Device`] when the device fails.
-    pub(super) fn new(device: &Device, plan: &Plan) -> Result<Self> {
+    pub(super) fn new(device: &mut Device, plan: &Plan) -> Result<Self> {
         if let Some(available) = device.memory.filter(|&m| m < plan.bytes()) {
             let (name, needed) = (device.name.clone(), plan.bytes());
             return Err(MemoryError::Device { name, needed, available }.into());
         }
-        let mut allocator = Allocator { device, all: Vec::new() };
+        let mut allocator = Allocator { device, written: Vec::new(), constant: Vec::new() };
         let a = &mut allocator;
         let last = plan.levels.len() - 1;
         let mut levels = Vec::new();
         for (z, level) in plan.levels.iter().enumerate() {
             let p = LevelParams::new(plan, level);
-            let starts = part_starts(device, plan, &p)?;
+            let starts = part_starts(a.device, plan, &p)?;
             // A volume that a level does not have still needs a binding in the shaders.
-            let none = [0, 0];
+            let (none, whole) = ([0, 0], [0, p.height]);
             let bytes = plan.volume_width.bytes() as u32;
             let values = bytes * p.pitch;
-            let incoming = starts.windows(2).map(|own| {
-                // The factors that contain a pixel are at most three rows away; rows are aligned.
-                let rows = with_halo(&(own[0]..own[1]), HALO, p.height).len() * p.width as usize;
-                let words = rows * plan.slots() + ALIGN_WORDS * (own[1] - own[0]) as usize;
-                Ok((a.buffer("transposed table", words as u64)?, own[0]..own[1]))
-            });
-            let incoming = incoming.collect::<Result<_>>()?;
+            let (runs, rows) = level.windows();
+            let windows = window_words(&Plane::filled(runs, rows, [0, level.stride as u16]));
             levels.push(LevelBuffers {
                 cost: a.rows("cost", if z == 0 { p.pitch } else { 2 * p.pitch }, &starts)?,
                 evidence: a.rows("evidence", p.pitch, &starts)?,
@@ -322,7 +327,8 @@ impl Buffers {
                 down: a.rows("messages from above", values, if z == last { &none } else { &starts })?,
                 up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
                 belief: a.rows("belief", values, &starts)?,
-                windows: a.buffer("label windows", (level.windows().0 * level.windows().1) as u64)?,
+                windows: a.buffer("label windows", windows.len() as u64)?,
+                full_windows: a.constant("full label windows", &windows)?,
                 candidates: a.rows("candidates", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
                 label_range: a.rows(
                     "label ranges",
@@ -330,9 +336,8 @@ impl Buffers {
                     if plan.limits_labels() { &starts } else { &none },
                 )?,
                 members: a.rows("members", p.member_pitch, &starts)?,
-                starts: a.rows("starts", p.starts_pitch, &starts)?,
-                incoming,
-                incoming_rows: Vec::new(),
+                incoming: a.rows("transposed table", 2 * p.pixel_pitch, &starts)?,
+                guide: a.rows("guide", 4 * p.pixel_pitch, if z == 0 { &none } else { &whole })?,
                 params: p,
             });
         }
@@ -349,9 +354,14 @@ impl Buffers {
         let (speckle_parents, speckle_sizes) = (map("speckle parents", 1)?, map("speckle sizes", 1)?);
         let rows = u64::from(fine.height);
         Ok(Self {
-            median_weights: a.buffer("median weights", MEDIAN_WORDS)?,
-            stretched_weights: a.buffer("stretched weights", MEDIAN_WORDS)?,
+            median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
+            stretched_weights: a
+                .constant("stretched weights", &MedianWeights::stretched(&plan.method).words())?,
             change_sums: a.buffer("change", 2 * rows)?,
+            convergence: a.buffer("convergence", size_of::<Convergence>() as u64 / 4)?,
+            groups: a.buffer("groups", 0)?,
+            all_groups: a.constant("groups", &[])?,
+            endings: 0,
             filled_rows: a.buffer("filled rows", rows)?,
             source_rows: a.buffer("source rows", rows)?,
             levels,
@@ -370,12 +380,31 @@ impl Buffers {
             spare_flags,
             speckle_parents,
             speckle_sizes,
-            all: allocator.all,
+            written: allocator.written,
+            constant: allocator.constant,
         })
     }
 
-    /// All buffers.
-    pub(super) fn all(&self) -> &[wgpu::Buffer] {
-        &self.all
+    /// Makes room for the workgroups of the dispatches that end when the map has settled.
+    pub(super) fn end_when_settled(&mut self, device: &mut Device, groups: &[[u32; 3]]) -> Result<()> {
+        let usage = wgpu::BufferUsages::INDIRECT | USAGE;
+        let words = groups.as_flattened();
+        let mut allocator = Allocator { device, written: Vec::new(), constant: Vec::new() };
+        self.all_groups = allocator.constant("groups", words)?;
+        self.groups = allocator.allocate("groups", words.len() as u64, usage)?;
+        self.written.push(self.groups.clone());
+        self.constant.append(&mut allocator.constant);
+        self.endings = groups.len() as u32;
+        Ok(())
+    }
+
+    /// The buffers that matches write.
+    pub(super) fn written(&self) -> &[wgpu::Buffer] {
+        &self.written
+    }
+
+    /// Bytes of all buffers.
+    pub(super) fn bytes(&self) -> u64 {
+        self.written.iter().chain(&self.constant).map(wgpu::Buffer::size).sum()
     }
 }

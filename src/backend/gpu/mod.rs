@@ -4,8 +4,9 @@
 //! other, packed four 8-bit or two 16-bit values a word; labels are padded to blocks of 16. Rows start at multiples of 256
 //! bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a shader see at once, a stage
 //! runs band by band, each band bound with the rows above and below that it reads; where it exceeds the largest buffer, it is
-//! several (`buffers`). The pair and its graph go up once, the maps come down once, and in between nothing leaves the device
-//! but the sum of [`Stage::Change`].
+//! several (`buffers`). The pair goes up once, the maps come down once, and in between nothing leaves the device.
+//! Where message passing stops by itself, [`Stage::Change`] decides that there: from then on, it makes the dispatches of the
+//! messages empty.
 
 mod buffers;
 mod device;
@@ -24,19 +25,20 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
-use crate::weights::MedianWeights;
 use buffers::{Buffers, LevelBuffers, Rows};
+use change::Convergence;
 use device::Device;
 pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
 pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use steps::{Groups, Pipelines, Recorder, Step};
 pub use steps::{Job, MAX_LOOP_ITERATIONS};
-use steps::{Pipelines, Recorder, Step};
 use timer::{PASSES_PER_SUBMIT, Timer};
 pub use uniform::UniformLayout;
-use upload::{image_words, label_range_words, member_words, transposed, window_words};
+use upload::{image_words, label_range_words, narrow_words};
 
 macro_rules! declare {
     (
@@ -74,6 +76,12 @@ crate::for_every_stage!(declare);
 /// long jobs, and for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 30;
 
+/// What a match by `plan` may run, beside the [`jobs`] of its stages.
+#[must_use]
+pub fn other_jobs(plan: &Plan) -> Vec<Job> {
+    upload::jobs(plan)
+}
+
 /// The GPU path on one device.
 pub struct Gpu {
     device: Device,
@@ -91,6 +99,10 @@ struct State {
     plan: Plan,
     buffers: Buffers,
     steps: HashMap<Stage, Arc<[Step]>>,
+    /// Those of [`upload`].
+    upload: Arc<[Step]>,
+    /// Words of an image on their way up.
+    words: Vec<u32>,
 }
 
 impl Gpu {
@@ -122,10 +134,39 @@ impl Gpu {
 
     /// The steps of `stage` for `plan` on these buffers.
     fn steps(&mut self, stage: Stage, plan: &Plan, buffers: &Buffers) -> Result<Arc<[Step]>> {
-        let level = stage.level().unwrap_or(0);
+        self.recorded(stage.level().unwrap_or(0), plan, buffers, None, |recorder| record(recorder, stage))
+    }
+
+    /// The steps of all stages.
+    fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<HashMap<Stage, Arc<[Step]>>> {
+        let mut steps = HashMap::new();
+        let mut endings = Vec::new();
+        for stage in Stage::all(plan).into_iter().filter(|stage| *stage != Stage::Change) {
+            let is_message = matches!(stage, Stage::Dependency(_) | Stage::Resolution(_) | Stage::Belief(_));
+            let endings = (is_message && plan.settled_change().is_some()).then_some(&mut endings);
+            let level = stage.level().unwrap_or(0);
+            let recorded =
+                self.recorded(level, plan, buffers, endings, |recorder| record(recorder, stage))?;
+            steps.insert(stage, recorded);
+        }
+        // This stage makes the dispatches of messages empty: it comes when these are known.
+        buffers.end_when_settled(&mut self.device, &endings)?;
+        steps.insert(Stage::Change, self.steps(Stage::Change, plan, buffers)?);
+        Ok(steps)
+    }
+
+    /// The steps that `record` records at `level`.
+    fn recorded<'a>(
+        &'a mut self,
+        level: usize,
+        plan: &'a Plan,
+        buffers: &'a Buffers,
+        endings: Option<&'a mut Vec<[u32; 3]>>,
+        record: impl FnOnce(&mut Recorder<'a>) -> Result<()>,
+    ) -> Result<Arc<[Step]>> {
         let Self { device, pipelines, .. } = self;
-        let mut recorder = Recorder { device, pipelines, plan, buffers, level, steps: Vec::new() };
-        record(&mut recorder, stage)?;
+        let mut recorder = Recorder { device, pipelines, plan, buffers, level, endings, steps: Vec::new() };
+        record(&mut recorder)?;
         Ok(recorder.steps.into())
     }
 
@@ -151,6 +192,7 @@ impl Gpu {
                     let mut timer = self.timer.take();
                     let writes = timer.as_mut().and_then(Timer::pass);
                     let mut work = self.work;
+                    let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
                     {
                         let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
                             label: None,
@@ -160,7 +202,13 @@ impl Gpu {
                         while let Some(Step::Dispatch(dispatch)) = rest.get(recorded) {
                             pass.set_pipeline(&dispatch.pipeline);
                             pass.set_bind_group(0, &dispatch.bind_group, &[]);
-                            pass.dispatch_workgroups(dispatch.groups.0, dispatch.groups.1, 1);
+                            match &dispatch.groups {
+                                Groups::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
+                                Groups::UntilSettled(at) => {
+                                    let groups = groups.as_ref().expect("a stage has a state to run on");
+                                    pass.dispatch_workgroups_indirect(groups, 12 * *at as u64);
+                                }
+                            }
                             work += dispatch.work;
                             recorded += 1;
                             if work >= WORK_PER_SUBMIT {
@@ -194,7 +242,7 @@ impl Gpu {
     }
 
     /// Asks for each range of bytes, after everything recorded so far.
-    fn request(&mut self, ranges: &[(wgpu::Buffer, std::ops::Range<u64>)]) -> Result<device::Requested> {
+    fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;
@@ -221,7 +269,8 @@ impl Gpu {
     /// The words of all rows that were asked for.
     fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
         let mut words = self.device.collect(rows.parts)?.into_iter();
-        Ok(rows.counts.into_iter().map(|n| words.by_ref().take(n).collect::<Vec<_>>().concat()).collect())
+        let joined = |n| words.by_ref().take(n).reduce(|all, part| [all, part].concat()).unwrap_or_default();
+        Ok(rows.counts.into_iter().map(joined).collect())
     }
 
     /// The words of all rows.
@@ -234,43 +283,60 @@ impl Gpu {
         self.state.as_ref().expect("prepare comes before every stage")
     }
 
-    /// Puts the pair, its graphs and its label ranges into the buffers, and messages at their start.
+    /// Puts the pair and its label ranges into the buffers, and messages at their start.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
-        let State { plan, buffers, steps } = state;
+        let State { plan, buffers, words, upload, .. } = state;
         let device = &mut self.device;
-        let pitch = buffers.levels[0].params.pixel_pitch;
-        buffers.left.write(device, &image_words(prepared.pair.left(), pitch))?;
-        buffers.right.write(device, &image_words(prepared.pair.right(), pitch))?;
-        for (weights, buffer) in [
-            (MedianWeights::of(&plan.method), &buffers.median_weights),
-            (MedianWeights::stretched(&plan.method), &buffers.stretched_weights),
-        ] {
-            device.write(buffer, bytemuck::cast_slice(&weights.words()))?;
+        let (pair, pitch) = (&prepared.pair, buffers.levels[0].params.pixel_pitch);
+        let mut narrow = true;
+        for (image, spare) in [(pair.left(), &buffers.spare_disparity), (pair.right(), &buffers.spare_flags)]
+        {
+            narrow = narrow && narrow_words(image, pitch, words);
+            if narrow {
+                spare.write(device, words)?;
+            }
+        }
+        if !narrow {
+            buffers.left.write(device, &image_words(pair.left(), pitch))?;
+            buffers.right.write(device, &image_words(pair.right(), pitch))?;
         }
         for (z, (level, l)) in buffers.levels.iter().zip(&plan.levels).enumerate() {
-            let (runs, rows) = l.windows();
-            let windows = window_words(&Plane::filled(runs, rows, [0, l.stride as u16]));
-            device.write(&level.windows, bytemuck::cast_slice(&windows))?;
             if plan.limits_labels() {
                 let words = |ranges: &Plane<_>| label_range_words(ranges, &level.params);
                 let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
                 level.label_range.write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
             }
         }
-        for (level, graph) in buffers.levels.iter_mut().zip(&prepared.graphs) {
-            level.members.write(device, &member_words(graph, &level.params))?;
-            level.write_incoming(device, transposed(graph, &level.params))?;
-        }
-        for z in 0..plan.levels.len() {
-            // The transposed table of this pair has rows of its own.
-            steps.insert(Stage::Belief(z), self.steps(Stage::Belief(z), plan, buffers)?);
-        }
         let zeroed = buffers.levels.iter().flat_map(LevelBuffers::messages).chain([&buffers.labels]);
         let encoder = self.encoder()?;
         for buffer in zeroed.flat_map(Rows::buffers) {
             encoder.clear_buffer(buffer, 0, None);
         }
+        for level in &buffers.levels {
+            let size = level.full_windows.size();
+            encoder.copy_buffer_to_buffer(&level.full_windows, 0, &level.windows, 0, size);
+        }
+        encoder.clear_buffer(&buffers.convergence, 0, None);
+        let size = buffers.all_groups.size();
+        encoder.copy_buffer_to_buffer(&buffers.all_groups, 0, &buffers.groups, 0, size);
+        if narrow {
+            // No run of a stage.
+            let timer = self.timer.take();
+            self.record(upload)?;
+            self.timer = timer;
+        }
         self.device.check()
+    }
+
+    fn convergence_at(&self) -> (wgpu::Buffer, Range<u64>) {
+        (self.state().buffers.convergence.clone(), 0..size_of::<Convergence>() as u64)
+    }
+
+    /// What [`Stage::Change`] has found so far.
+    fn convergence(&mut self) -> Result<Convergence> {
+        let at = self.convergence_at();
+        let requested = self.request(&[at])?;
+        Ok(Convergence::of(&self.device.collect(requested)?[0]))
     }
 
     /// Width, height, and elements in a row of maps.
@@ -286,9 +352,23 @@ struct RequestedRows {
     parts: device::Requested,
 }
 
+/// A plane of what `value` makes of the words of a map, which has so many (columns, rows, words a row).
+fn plane<T>(
+    words: &[u32],
+    (width, height, pitch): (usize, usize, usize),
+    value: impl Fn(u32) -> T,
+) -> Plane<T> {
+    let mut values = Vec::with_capacity(width * height);
+    for row in words.chunks_exact(pitch) {
+        values.extend(row[..width].iter().map(|&word| value(word)));
+    }
+    Plane::new(width, height, values)
+}
+
 /// Maps on their way from the device.
 struct RequestedMaps {
-    rows: RequestedRows,
+    /// Disparity, raw disparity, flags; and where message passing may stop by itself, its [`Convergence`].
+    parts: device::Requested,
     shape: (usize, usize, usize),
 }
 
@@ -319,17 +399,15 @@ impl Backend for Gpu {
                 if self.device.software {
                     memory::check(plan.bytes(), Purpose::Match)?;
                 }
-                let buffers = Buffers::new(&self.device, plan)?;
-                let mut steps = HashMap::new();
-                // Beliefs wait for the graph.
-                for stage in Stage::all(plan).into_iter().filter(|stage| !matches!(stage, Stage::Belief(_))) {
-                    steps.insert(stage, self.steps(stage, plan, &buffers)?);
-                }
-                State { plan: plan.clone(), buffers, steps }
+                let mut buffers = Buffers::new(&mut self.device, plan)?;
+                let steps = self.all_steps(plan, &mut buffers)?;
+                let upload = self.recorded(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
+                let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
+                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
             }
         };
         self.load(&mut state, &prepared)?;
-        self.device.traffic.bytes_held = state.buffers.all().iter().map(wgpu::Buffer::size).sum();
+        self.device.traffic.bytes_held = state.buffers.bytes();
         self.state = Some(state);
         Ok(())
     }
@@ -354,13 +432,15 @@ impl Backend for Gpu {
         Ok(())
     }
 
-    fn change(&mut self) -> Result<u64> {
-        self.run(Stage::Change)?;
-        let sums = self.state().buffers.change_sums.clone();
-        let rows = self.state().plan.levels[0].height;
-        let requested = self.request(&[(sums, 0..8 * rows as u64)])?;
-        let words = self.device.collect(requested)?;
-        Ok(words[0].chunks_exact(2).map(|half| u64::from(half[1]) << 32 | u64::from(half[0])).sum())
+    fn settled(&mut self, wait: bool) -> Result<bool> {
+        Ok(wait && self.convergence()?.settled())
+    }
+
+    fn idle_iterations(&mut self) -> Result<u32> {
+        if self.state().plan.settled_change().is_none() {
+            return Ok(0);
+        }
+        Ok(self.convergence()?.idle())
     }
 
     fn wait(&mut self) -> Result<()> {
@@ -372,25 +452,28 @@ impl Backend for Gpu {
         self.map_values(map)
     }
 
-    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()> {
-        self.write_map(Map::RightLabel, labels)
-    }
-
     fn request_maps(&mut self) -> Result<Ticket> {
         let b = &self.state().buffers;
         let (disparity, raw, flags) = (b.disparity.clone(), b.raw.clone(), b.flags.clone());
-        let rows = self.request_rows(&[&disparity, &raw, &flags])?;
+        let mut parts: Vec<_> = [disparity, raw, flags].iter().flat_map(Rows::own).collect();
+        parts.extend(self.state().plan.settled_change().map(|_| self.convergence_at()));
+        let parts = self.request(&parts)?;
         let shape = self.map_shape();
-        Ok(self.requests.add(RequestedMaps { rows, shape }))
+        Ok(self.requests.add(RequestedMaps { parts, shape }))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<Maps> {
-        let RequestedMaps { rows, shape: (width, height, pitch) } = self.requests.take(&ticket);
-        let words = self.collect_rows(rows)?;
-        let plane = |i: usize| Plane::from_fn(width, height, |x, y| words[i][y * pitch + x].cast_signed());
-        let byte =
-            |bit: u32| Plane::from_fn(width, height, |x, y| (words[2][y * pitch + x] >> bit & 0xff) as u8);
-        Ok(Maps { disparity: plane(0), raw: plane(1), confidence: byte(8), validity: byte(0), right: None })
+    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
+        let RequestedMaps { parts, shape } = self.requests.take(&ticket);
+        let words = self.device.collect(parts)?;
+        let idle = words.get(3).map_or(0, |words| Convergence::of(words).idle());
+        let maps = Maps {
+            disparity: plane(&words[0], shape, u32::cast_signed),
+            raw: plane(&words[1], shape, u32::cast_signed),
+            confidence: plane(&words[2], shape, |word| (word >> 8) as u8),
+            validity: plane(&words[2], shape, |word| word as u8),
+            right: None,
+        };
+        Ok((maps, idle))
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

@@ -11,7 +11,7 @@ use crate::plan::Plan;
 
 const SHADER: &str = include_str!("../../../shaders/pyramid.wgsl");
 
-uniform! { fine: LevelParams, padding: [u32; 2], label_offset: i32 }
+uniform! { fine: LevelParams, padding: [u32; 3], label_offset: i32 }
 
 pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
     let kernel = Kernel::new("pyramid", "main", SHADER)

@@ -11,7 +11,7 @@ use crate::plan::{Plan, TruncationRule};
 
 const SHADER: &str = include_str!("../../../shaders/resolution.wgsl");
 
-uniform! { fine: LevelParams, padding: [u32; 2], label_offset: i32, tau: u32 }
+uniform! { fine: LevelParams, padding: [u32; 3], label_offset: i32, tau: u32 }
 
 pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
     let (coarse, fine) = (plan.levels[level].stride, plan.levels[level - 1].stride);

@@ -21,9 +21,17 @@ pub(super) enum Step {
 pub(super) struct Dispatch {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bind_group: wgpu::BindGroup,
-    pub(super) groups: (u32, u32),
+    pub(super) groups: Groups,
     /// Largest total number of loop iterations of all invocations.
     pub(super) work: u64,
+}
+
+/// Workgroups of a dispatch.
+pub(super) enum Groups {
+    /// So many in x and y.
+    Fixed(u32, u32),
+    /// As many as stand at this place of [`Buffers::groups`]: none, once the label map has settled.
+    UntilSettled(usize),
 }
 
 /// Compiled kernels.
@@ -58,6 +66,8 @@ pub(super) struct Recorder<'a> {
     pub(super) plan: &'a Plan,
     pub(super) buffers: &'a Buffers,
     pub(super) level: usize,
+    /// Where the workgroups of dispatches go that end when the label map has settled.
+    pub(super) endings: Option<&'a mut Vec<[u32; 3]>>,
     pub(super) steps: Vec<Step>,
 }
 
@@ -201,10 +211,18 @@ impl<'a> Recorder<'a> {
             entries: &entries,
         });
         self.device.write(&uniform, &bytes)?;
+        let height = total.div_ceil(u64::from(grid)) as u32;
+        let groups = match &mut self.endings {
+            None => Groups::Fixed(grid, height),
+            Some(endings) => {
+                endings.push([grid, height, 1]);
+                Groups::UntilSettled(endings.len() - 1)
+            }
+        };
         self.steps.push(Step::Dispatch(Dispatch {
             pipeline,
             bind_group,
-            groups: (grid, total.div_ceil(u64::from(grid)) as u32),
+            groups,
             work: job.loops.max(1) as u64 * u64::from(size.0) * u64::from(size.1),
         }));
         Ok(())

@@ -57,10 +57,9 @@ pub(super) struct LevelParams {
     pub(super) dependency_pitch: u32,
     pub(super) member_pitch: u32,
     pub(super) pixel_pitch: u32,
-    pub(super) starts_pitch: u32,
 }
 
-layout!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch, pixel_pitch, starts_pitch);
+layout!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch, pixel_pitch);
 
 impl LevelParams {
     /// Parameters of `level`.
@@ -78,7 +77,6 @@ impl LevelParams {
             dependency_pitch: pitch(level.width * plan.slots() * quads),
             member_pitch: pitch(level.width * plan.neighbours.div_ceil(4)),
             pixel_pitch: pitch(level.width),
-            starts_pitch: pitch(level.width + 1),
         }
     }
 }
@@ -100,7 +98,7 @@ layout!(Band: first_row, rows, row_groups, grid);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Header {
     pub(super) level: LevelParams,
-    pub(super) padding: [u32; 2],
+    pub(super) padding: [u32; 3],
     pub(super) band: Band,
 }
 
