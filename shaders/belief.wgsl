@@ -1,15 +1,17 @@
 // Beliefs: evidence plus all messages. One invocation per pixel and block of 16 labels.
 
-#import band volume windows messages
+#import band volume windows messages sections
 
 struct Params {
     level: Level,
     @align(16) band: Band,
     // Largest belief; larger sums saturate at it.
     most: u32,
+    // Whether there are messages from above and from below.
+    has_down: u32,
+    has_up: u32,
 }
 
-@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> evidence: array<u32>;
 @group(0) @binding(2) var<storage, read> dependency: array<Quad>;
 // Codes of the neighbours, four per word.
@@ -27,6 +29,7 @@ const MEMBER_WORDS: u32 = (SLOTS + 2u) / 4u;
 
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    enter(group);
     let id = place(group, lane);
     let quads = params.level.quads;
     let blocks = quads / QUADS;
@@ -37,15 +40,15 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if block >= blocks || id.y >= params.band.rows {
         return;
     }
-    let row = id.y * params.level.pitch;
+    let row = params.band.volume_at + id.y * params.level.pitch;
     var sums: array<vec4<u32>, QUADS>;
     for (var i = 0u; i < QUADS; i++) {
         let at = row + place_of(first + i, x);
         sums[i] = unpack_narrow(evidence[at]);
-        if HAS_DOWN {
+        if params.has_down == 1u {
             sums[i] += unpack(down[at]);
         }
-        if HAS_UP {
+        if params.has_up == 1u {
             sums[i] += unpack(up[at]);
         }
     }
@@ -53,7 +56,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let top = halo_start(RADIUS);
     var factors = vec2(1u << CENTRE, 0u);
     if SLOTS > 1u {
-        factors = incoming[id.y * params.level.pixel_pitch + x];
+        factors = incoming[params.level.incoming_at + id.y * params.level.pixel_pitch + x];
     }
     while (factors.x | factors.y) != 0u {
         let is_low = factors.x != 0u;
@@ -64,12 +67,14 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         // Seen from the factor, the pixel is at the opposite place. Where no slot says so, it is the factor's own.
         let opposite = vec4(2u * CENTRE - code);
         var slots = vec4<u32>();
+        let words = params.level.members_at + fy * params.level.member_pitch + fx * MEMBER_WORDS;
         for (var word = 0u; word < MEMBER_WORDS; word++) {
-            let codes = unpack_narrow(members[fy * params.level.member_pitch + fx * MEMBER_WORDS + word]);
+            let codes = unpack_narrow(members[words + word]);
             slots += select(vec4<u32>(), vec4(4u * word) + vec4(1u, 2u, 3u, 4u), codes == opposite);
         }
         let slot = slots.x + slots.y + slots.z + slots.w;
-        let message = fy * params.level.dependency_pitch + place_of(slot * quads + first, fx);
+        let message = params.band.dependency_at + fy * params.level.dependency_pitch
+            + place_of(slot * quads + first, fx);
         for (var i = 0u; i < QUADS; i++) {
             sums[i] += unpack(dependency[message + i * width]);
         }

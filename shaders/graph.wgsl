@@ -1,7 +1,7 @@
 // The graph of a level: `downsample` the guide of the next finer level, `choose` the members of every factor, and
 // `transpose` the table of the members. One invocation per pixel.
 
-#import band volume image
+#import band volume image sections
 
 struct Params {
     level: Level,
@@ -10,10 +10,12 @@ struct Params {
     ranked: array<vec4<u32>, PLACES / 16u>,
     @align(16) fine: Level,
     // Weight of a squared pixel of distance.
-    @align(16) weight: u32,
+    weight: u32,
+    // Where the guide of the level begins in what is bound, and that of the next finer one.
+    guide_at: u32,
+    fine_at: u32,
 }
 
-@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> guide: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read_write> coarse_guide: array<vec4<u32>>;
 // Codes of the neighbours, four per word.
@@ -28,6 +30,7 @@ const MEMBER_WORDS: u32 = (NEIGHBOURS + 3u) / 4u;
 // The binomial mean over the unmasked pixels around twice (x, y).
 @compute @workgroup_size(GROUP)
 fn downsample(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    enter(group);
     let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
@@ -41,7 +44,7 @@ fn downsample(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     for (var j = -2; j <= 2; j++) {
         let row = u32(clamp(at.y + j, 0, size.y - 1) - top) * params.fine.pixel_pitch;
         for (var i = -2; i <= 2; i++) {
-            let pixel = guide[row + u32(clamp(at.x + i, 0, size.x - 1))];
+            let pixel = guide[params.fine_at + row + u32(clamp(at.x + i, 0, size.x - 1))];
             if pixel.z == 0u {
                 // 1, 4, 6, 4, 1 in both directions.
                 let w = ((6u >> u32(abs(i))) + u32(i == 1 || i == -1))
@@ -64,6 +67,7 @@ fn downsample(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
 // Keeps the neighbours with the smallest keys, distance << RANK_BITS | rank, in their order.
 @compute @workgroup_size(GROUP)
 fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    enter(group);
     let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
@@ -72,8 +76,8 @@ fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let here = vec2(id.x, params.band.first_row + id.y);
     let top = halo_start(RADIUS);
     let pitch = params.level.pixel_pitch;
-    let centre = guide[(here.y - top) * pitch + id.x];
-    let out = id.y * params.level.member_pitch + id.x * MEMBER_WORDS;
+    let centre = guide[params.guide_at + (here.y - top) * pitch + id.x];
+    let out = params.level.members_at + id.y * params.level.member_pitch + id.x * MEMBER_WORDS;
     // The keys of each pass are above those of the last one.
     var last = -1;
     for (var first = 0u; first < NEIGHBOURS; first += CHOSEN) {
@@ -87,7 +91,7 @@ fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
             // Beyond the upper and the left border, this wraps to large numbers.
             let there = here + steps - vec2(RADIUS);
             if all(there < size) {
-                let pixel = guide[(there.y - top) * pitch + there.x];
+                let pixel = guide[params.guide_at + (there.y - top) * pitch + there.x];
                 if (pixel.z | centre.z) == 0u {
                     let away = vec2<i32>(steps) - vec2(i32(RADIUS));
                     let a = channels(centre);
@@ -132,6 +136,7 @@ fn code_of(rank: u32) -> u32 {
 // Asks all factors of the window whether they hold the pixel.
 @compute @workgroup_size(GROUP)
 fn transpose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    enter(group);
     let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
@@ -146,13 +151,14 @@ fn transpose(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             // Seen from there, the pixel is at the opposite place. Every factor holds its own pixel.
             let opposite = PLACES - code;
             var holds = code == opposite;
+            let words = params.level.members_at + (there.y - top) * params.level.member_pitch + there.x * MEMBER_WORDS;
             for (var word = 0u; word < MEMBER_WORDS; word++) {
-                let codes = members_in[(there.y - top) * params.level.member_pitch + there.x * MEMBER_WORDS + word];
+                let codes = members_in[words + word];
                 holds = holds || any(unpack_narrow(codes) == vec4(opposite));
             }
             let bit = u32(holds) << (code % 32u);
             factors |= select(vec2(0u, bit), vec2(bit, 0u), code < 32u);
         }
     }
-    incoming[id.y * params.level.pixel_pitch + id.x] = factors;
+    incoming[params.level.incoming_at + id.y * params.level.pixel_pitch + id.x] = factors;
 }

@@ -76,7 +76,7 @@ pub trait Backend {
     fn run(&mut self, stage: Stage) -> Result<()>;
 
     /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
-    /// to `wait`; once the map has settled it does nothing for the messages of the iterations that follow.
+    /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.
     fn settled(&mut self, wait: bool) -> Result<bool>;
 
     /// How many iterations found the map settled already.

@@ -3,6 +3,8 @@
 //! A volume larger than the device's largest buffer is split into parts of whole rows. Each part also holds a
 //! halo: a few rows of its neighbours, so that a stage that reads around a pixel finds everything in one
 //! part. A stage that writes a volume with a halo ends with copies that update those rows.
+//!
+//! Where they fit, levels share buffers, so that one dispatch can go over several of them.
 
 use super::change::Convergence;
 use super::device::Device;
@@ -10,8 +12,9 @@ use super::uniform::{ALIGN_WORDS, LevelParams};
 use super::upload::window_words;
 use crate::error::{MemoryError, Result};
 use crate::image::Plane;
-use crate::plan::{GRAPH_WINDOW, Plan};
+use crate::plan::{GRAPH_WINDOW, LevelPlan, Plan};
 use crate::weights::MedianWeights;
+use std::array;
 use std::num::NonZero;
 use std::ops::Range;
 
@@ -41,6 +44,15 @@ struct Part {
     own: Range<u32>,
     /// The rows that it holds, halo included.
     held: Range<u32>,
+    /// Where they begin in the buffer, in bytes.
+    offset: u64,
+}
+
+impl Part {
+    /// Where `row` begins in the buffer.
+    fn at(&self, row: u32, row_bytes: u64) -> u64 {
+        self.offset + u64::from(row - self.held.start) * row_bytes
+    }
 }
 
 /// A range of a buffer to bind, at a byte offset that is a multiple of 256.
@@ -85,7 +97,7 @@ impl Rows {
         let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;
         let part = self.parts.iter().find(|p| within(&p.own)).or(self.parts.iter().find(|p| within(&p.held)));
         let part = part.expect("bands stay within parts, and halos within what parts hold");
-        let at = |row: u32| u64::from(row - part.held.start) * self.row_bytes;
+        let at = |row: u32| part.at(row, self.row_bytes);
         Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
     }
 
@@ -96,7 +108,7 @@ impl Rows {
             for (j, from) in self.parts.iter().enumerate() {
                 let rows = to.held.start.max(from.own.start)..to.held.end.min(from.own.end);
                 if i != j && !rows.is_empty() {
-                    let at = |part: &Part| u64::from(rows.start - part.held.start) * self.row_bytes;
+                    let at = |part: &Part| part.at(rows.start, self.row_bytes);
                     copies.push(Copy {
                         from: (from.buffer.clone(), at(from)),
                         to: (to.buffer.clone(), at(to)),
@@ -113,8 +125,8 @@ impl Rows {
         let pairs = self.parts.iter().zip(&to.parts);
         pairs
             .map(|(from, to)| Copy {
-                from: (from.buffer.clone(), 0),
-                to: (to.buffer.clone(), 0),
+                from: (from.buffer.clone(), from.offset),
+                to: (to.buffer.clone(), to.offset),
                 bytes: from.held.len() as u64 * self.row_bytes,
             })
             .collect()
@@ -131,11 +143,19 @@ impl Rows {
 
     /// Each part's buffer, and the byte range of its own rows in it.
     pub(super) fn own(&self) -> Vec<(wgpu::Buffer, Range<u64>)> {
-        let own = self.parts.iter().map(|p| {
-            let at = |row: u32| u64::from(row - p.held.start) * self.row_bytes;
-            (p.buffer.clone(), at(p.own.start)..at(p.own.end))
-        });
-        own.collect()
+        let at = |p: &Part, row: u32| p.at(row, self.row_bytes);
+        self.parts.iter().map(|p| (p.buffer.clone(), at(p, p.own.start)..at(p, p.own.end))).collect()
+    }
+
+    /// Each part's buffer, and the byte range of all its rows in it.
+    pub(super) fn held(&self) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
+        let at = |p: &Part, row: u32| p.at(row, self.row_bytes);
+        self.parts.iter().map(move |p| (&p.buffer, at(p, p.held.start)..at(p, p.held.end)))
+    }
+
+    /// Where the first row begins in its buffer, in elements of so many bytes.
+    fn start(&self, bytes: u64) -> u32 {
+        (self.parts[0].offset / bytes) as u32
     }
 
     /// Writes the words of all rows.
@@ -143,14 +163,50 @@ impl Rows {
         let per_row = self.row_bytes as usize / 4;
         for part in &self.parts {
             let held = part.held.start as usize * per_row..part.held.end as usize * per_row;
-            device.write(&part.buffer, bytemuck::cast_slice(&words[held]))?;
+            device.write_at(&part.buffer, part.offset, bytemuck::cast_slice(&words[held]))?;
         }
         Ok(())
     }
 }
 
+/// One buffer for several levels, coarsest first.
+struct Pool {
+    buffer: wgpu::Buffer,
+    /// Words that are taken.
+    taken: u64,
+}
+
+impl Pool {
+    /// The next `height` rows of `words` words each.
+    fn rows(&mut self, words: u32, height: u32) -> Rows {
+        let (all, offset) = (0..height, 4 * self.taken);
+        self.taken += u64::from(words) * u64::from(height);
+        let part = Part { buffer: self.buffer.clone(), own: all.clone(), held: all, offset };
+        Rows { parts: vec![part], row_bytes: 4 * u64::from(words) }
+    }
+}
+
+/// The buffers that the coarser levels share.
+pub(super) struct Shared {
+    /// The finest of these levels.
+    pub(super) finest: usize,
+    pub(super) evidence: wgpu::Buffer,
+    pub(super) dependency: wgpu::Buffer,
+    pub(super) down: wgpu::Buffer,
+    pub(super) up: wgpu::Buffer,
+    pub(super) belief: wgpu::Buffer,
+    pub(super) windows: wgpu::Buffer,
+    pub(super) guide: wgpu::Buffer,
+    pub(super) members: wgpu::Buffer,
+    pub(super) incoming: wgpu::Buffer,
+}
+
 /// All buffers of a match on a device.
 pub(super) struct Buffers {
+    /// `None` where not even the coarsest level fits.
+    pub(super) shared: Option<Shared>,
+    /// A guide on its way to its level.
+    pub(super) next_guide: wgpu::Buffer,
     pub(super) levels: Vec<LevelBuffers>,
     pub(super) left: Rows,
     pub(super) right: Rows,
@@ -200,14 +256,14 @@ pub(super) struct LevelBuffers {
     pub(super) up: Rows,
     pub(super) belief: Rows,
     /// Label windows, first label | number of labels with padding << 16.
-    pub(super) windows: wgpu::Buffer,
+    pub(super) windows: Rows,
     /// Those that hold all labels.
     pub(super) full_windows: wgpu::Buffer,
     /// Lowest and highest candidate of each pixel, for the windows of the next finer level.
     pub(super) candidates: Rows,
     /// First and last label of each pixel; empty where all labels are allowed.
     pub(super) label_range: Rows,
-    /// What members are chosen by; empty at level 0, whose guide is the left image.
+    /// What members are chosen by; at level 0 the left image.
     pub(super) guide: Rows,
     pub(super) members: Rows,
     /// Which factors hold each pixel.
@@ -215,6 +271,24 @@ pub(super) struct LevelBuffers {
 }
 
 impl LevelBuffers {
+    /// The parameters of the level where what it [shares](Shared) is bound, and where its volumes and its dependency messages begin there,
+    /// in quads.
+    pub(super) fn shared_params(&self, plan: &Plan) -> (LevelParams, (u32, u32)) {
+        let quad = 4 * plan.volume_width.bytes() as u64;
+        let params = LevelParams {
+            members_at: self.members.start(4),
+            incoming_at: self.incoming.start(8),
+            windows_at: self.windows.start(4),
+            ..self.params
+        };
+        (params, (self.belief.start(quad), self.dependency.start(quad)))
+    }
+
+    /// Where its guide begins in what it shares, in pixels.
+    pub(super) fn guide_at(&self) -> u32 {
+        self.guide.start(16)
+    }
+
     /// The message volumes, which start at 0.
     pub(super) fn messages(&self) -> [&Rows; 3] {
         [&self.dependency, &self.down, &self.up]
@@ -268,10 +342,66 @@ impl Allocator<'_> {
             let own = ends[0]..ends[1];
             let held = with_halo(&own, HALO, height);
             let buffer = self.buffer(label, u64::from(words) * held.len() as u64)?;
-            Ok(Part { buffer, own, held })
+            Ok(Part { buffer, own, held, offset: 0 })
         });
         Ok(Rows { parts: parts.collect::<Result<_>>()?, row_bytes: 4 * u64::from(words) })
     }
+}
+
+/// What levels share, by name and place.
+const SHARED: [&str; 9] = [
+    "evidence",
+    "dependency messages",
+    "messages from above",
+    "messages from below",
+    "belief",
+    "label windows",
+    "guide",
+    "members",
+    "transposed table",
+];
+const EVIDENCE: usize = 0;
+const DEPENDENCY: usize = 1;
+const DOWN: usize = 2;
+const UP: usize = 3;
+const BELIEF: usize = 4;
+const WINDOWS: usize = 5;
+const GUIDE: usize = 6;
+const MEMBERS: usize = 7;
+const INCOMING: usize = 8;
+
+/// The sizes of what a level may share.
+struct Words {
+    /// Words in a row.
+    in_row: [u32; SHARED.len()],
+    rows: [u32; SHARED.len()],
+}
+
+impl Words {
+    fn of(plan: &Plan, z: usize) -> Self {
+        let p = LevelParams::new(plan, &plan.levels[z]);
+        let bytes = plan.volume_width.bytes() as u32;
+        let values = bytes * p.pitch;
+        let windows = full_windows(&plan.levels[z]).len() as u32;
+        let mut rows = [p.height; SHARED.len()];
+        rows[WINDOWS] = 1;
+        let dependency = bytes * p.dependency_pitch;
+        let (guide, incoming) = (4 * p.pixel_pitch, 2 * p.pixel_pitch);
+        let in_row = [p.pitch, dependency, values, values, values, windows, guide, p.member_pitch, incoming];
+        Self { in_row, rows }
+    }
+
+    fn all(&self, kind: usize) -> u64 {
+        u64::from(self.in_row[kind]) * u64::from(self.rows[kind])
+    }
+}
+
+/// Label windows that hold all labels, in as many words as can be bound.
+fn full_windows(level: &LevelPlan) -> Vec<u32> {
+    let (runs, rows) = level.windows();
+    let mut words = window_words(&Plane::filled(runs, rows, [0, level.stride as u16]));
+    words.resize(words.len().next_multiple_of(ALIGN_WORDS), 0);
+    words
 }
 
 /// First rows of the parts of a level, and its height. They are even, so that the two rows of a coarser pixel
@@ -310,41 +440,49 @@ impl Buffers {
         let mut allocator = Allocator { device, written: Vec::new(), constant: Vec::new() };
         let a = &mut allocator;
         let last = plan.levels.len() - 1;
+        let (finest, mut shared) = Self::shared(a, plan)?;
+        let none = [0, 0];
         let mut levels = Vec::new();
-        for (z, level) in plan.levels.iter().enumerate() {
+        for (z, level) in plan.levels.iter().enumerate().rev() {
             let p = LevelParams::new(plan, level);
             let starts = part_starts(a.device, plan, &p)?;
-            // A volume that a level does not have still needs a binding in the shaders.
-            let (none, whole) = ([0, 0], [0, p.height]);
-            let bytes = plan.volume_width.bytes() as u32;
-            let values = bytes * p.pitch;
-            let (runs, rows) = level.windows();
-            let windows = window_words(&Plane::filled(runs, rows, [0, level.stride as u16]));
+            let words = Words::of(plan, z);
+            let windows = full_windows(level);
+            let mut rows = |kind: usize, starts: &[u32]| match &mut shared {
+                Some(pools) if z >= finest => Ok(pools[kind].rows(words.in_row[kind], words.rows[kind])),
+                _ => a.rows(SHARED[kind], words.in_row[kind], starts),
+            };
+            let whole = [0, p.height];
+            let up = if z == 0 { None } else { Some(rows(UP, &starts)?) };
             levels.push(LevelBuffers {
-                cost: a.rows("cost", if z == 0 { p.pitch } else { 2 * p.pitch }, &starts)?,
-                evidence: a.rows("evidence", p.pitch, &starts)?,
-                dependency: a.rows("dependency messages", bytes * p.dependency_pitch, &starts)?,
-                down: a.rows("messages from above", values, if z == last { &none } else { &starts })?,
-                up: a.rows("messages from below", values, if z == 0 { &none } else { &starts })?,
-                belief: a.rows("belief", values, &starts)?,
-                windows: a.buffer("label windows", windows.len() as u64)?,
+                evidence: rows(EVIDENCE, &starts)?,
+                dependency: rows(DEPENDENCY, &starts)?,
+                down: rows(DOWN, if z == last { &none } else { &starts })?,
+                belief: rows(BELIEF, &starts)?,
+                windows: rows(WINDOWS, &[0, 1])?,
+                guide: rows(GUIDE, &whole)?,
+                members: rows(MEMBERS, &starts)?,
+                incoming: rows(INCOMING, &starts)?,
+                // What a level does not have still needs a binding in the shaders.
+                up: up.map_or_else(|| a.rows(SHARED[UP], words.in_row[UP], &none), Ok)?,
                 full_windows: a.constant("full label windows", &windows)?,
+                cost: a.rows("cost", if z == 0 { p.pitch } else { 2 * p.pitch }, &starts)?,
                 candidates: a.rows("candidates", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
                 label_range: a.rows(
                     "label ranges",
                     p.pixel_pitch,
                     if plan.limits_labels() { &starts } else { &none },
                 )?,
-                members: a.rows("members", p.member_pitch, &starts)?,
-                incoming: a.rows("transposed table", 2 * p.pixel_pitch, &starts)?,
-                guide: a.rows("guide", 4 * p.pixel_pitch, if z == 0 { &none } else { &whole })?,
                 params: p,
             });
         }
+        levels.reverse();
         let fine = levels[0].params;
         let whole = [0, fine.height];
+        let next_guide = levels.get(1).map_or(0, |l| 4 * u64::from(l.params.pixel_pitch * l.params.height));
+        let next_guide = a.buffer("next guide", next_guide)?;
         let mut map = |label: &str, words: u32| a.rows(label, words * fine.pixel_pitch, &whole);
-        let (left, right) = (map("left image", 4)?, map("right image", 4)?);
+        let (left, right) = (levels[0].guide.clone(), map("right image", 4)?);
         let census = [map("left census", 2)?, map("right census", 2)?];
         let contrast = map("contrast", 1)?;
         let (labels, squares) = (map("labels", 1)?, map("squares", 1)?);
@@ -364,6 +502,12 @@ impl Buffers {
             endings: 0,
             filled_rows: a.buffer("filled rows", rows)?,
             source_rows: a.buffer("source rows", rows)?,
+            shared: shared.map(|pools| {
+                let [evidence, dependency, down, up, belief, windows, guide, members, incoming] =
+                    pools.map(|pool| pool.buffer);
+                Shared { finest, evidence, dependency, down, up, belief, windows, guide, members, incoming }
+            }),
+            next_guide,
             levels,
             left,
             right,
@@ -383,6 +527,38 @@ impl Buffers {
             written: allocator.written,
             constant: allocator.constant,
         })
+    }
+
+    /// The finest level that shares buffers, and these: as many levels as fit in what a shader may see at once.
+    fn shared(a: &mut Allocator, plan: &Plan) -> Result<(usize, Option<[Pool; SHARED.len()]>)> {
+        let most = a.device.max_binding.min(a.device.max_buffer) / 4;
+        let mut sizes = [0; SHARED.len()];
+        let mut finest = plan.levels.len();
+        while finest > 0 {
+            let words = Words::of(plan, finest - 1);
+            let more: [u64; SHARED.len()] = array::from_fn(|kind| sizes[kind] + words.all(kind));
+            if more.iter().any(|&words| words > most) {
+                break;
+            }
+            (sizes, finest) = (more, finest - 1);
+        }
+        if finest == plan.levels.len() {
+            return Ok((finest, None));
+        }
+        if finest == 0 {
+            // Level 0 has no messages from below.
+            sizes[UP] -= Words::of(plan, 0).all(UP);
+        }
+        let mut pools = Vec::new();
+        for (label, words) in SHARED.iter().zip(sizes) {
+            pools.push(Pool { buffer: a.buffer(label, words)?, taken: 0 });
+        }
+        Ok((finest, pools.try_into().ok()))
+    }
+
+    /// A guide of these parameters on its way to its level.
+    pub(super) fn next_guide(&self, params: &LevelParams) -> Rows {
+        Pool { buffer: self.next_guide.clone(), taken: 0 }.rows(4 * params.pixel_pitch, params.height)
     }
 
     /// Makes room for the workgroups of the dispatches that end when the map has settled.

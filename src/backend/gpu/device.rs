@@ -192,6 +192,10 @@ pub struct FaultInjection {
 /// software driver shares a processor with everything else that runs there.
 const PATIENCE: Duration = Duration::from_secs(60);
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
+/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop long jobs,
+/// and on a processor for a bar that moves.
+const WORK_PER_SUBMIT: u64 = 1 << 32;
+const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
 /// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late.
 const SUBMISSIONS: usize = 4;
 
@@ -209,6 +213,8 @@ pub(super) struct Device {
     pub(super) memory: Option<u64>,
     /// Nanoseconds per tick of its timestamps, where it has them.
     pub(super) tick: Option<f64>,
+    /// Loop iterations that are submitted at once, about.
+    pub(super) work_per_submit: u64,
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<wgpu::SubmissionIndex>,
@@ -282,6 +288,7 @@ impl Device {
             max_groups: limits.max_compute_workgroups_per_dimension,
             memory: faults.memory,
             tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
+            work_per_submit: if software { SOFTWARE_WORK_PER_SUBMIT } else { WORK_PER_SUBMIT },
             patience: faults.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
             lost_after: faults.lost_after,
             under_way: VecDeque::new(),
@@ -316,7 +323,11 @@ impl Device {
     }
 
     pub(super) fn write(&mut self, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
-        self.queue()?.write_buffer(buffer, 0, bytes);
+        self.write_at(buffer, 0, bytes)
+    }
+
+    pub(super) fn write_at(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) -> Result<()> {
+        self.queue()?.write_buffer(buffer, offset, bytes);
         self.traffic.bytes_up += bytes.len() as u64;
         Ok(())
     }

@@ -25,12 +25,13 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
-use buffers::{Buffers, LevelBuffers, Rows};
+use buffers::{Buffers, LevelBuffers, Rows, Shared};
 use change::Convergence;
 use device::Device;
 pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
 pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
+use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -72,10 +73,6 @@ macro_rules! declare {
 
 crate::for_every_stage!(declare);
 
-/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop
-/// long jobs, and for a bar that moves.
-const WORK_PER_SUBMIT: u64 = 1 << 30;
-
 /// What a match by `plan` may run, beside the [`jobs`] of its stages.
 #[must_use]
 pub fn other_jobs(plan: &Plan) -> Vec<Job> {
@@ -90,8 +87,47 @@ pub struct Gpu {
     passes: usize,
     work: u64,
     timer: Option<Timer>,
+    /// The same stage at one level after the other, which can run together.
+    waiting: Vec<Stage>,
     state: Option<State>,
     requests: Requests<RequestedMaps>,
+}
+
+/// Steps by what they are for.
+type Steps<K> = HashMap<K, Arc<[Step]>>;
+
+/// Records a stage at several levels at once.
+type RecordLevels = fn(&mut Recorder, &Shared, Range<usize>) -> Result<()>;
+
+/// How `stage` goes over levels at once, where it can.
+fn record_levels(stage: Stage) -> Option<RecordLevels> {
+    match stage {
+        Stage::Graph(_) => Some(graph::record_levels),
+        Stage::Dependency(_) => Some(dependency::record_levels),
+        Stage::Resolution(_) => Some(resolution::record_levels),
+        Stage::Belief(_) => Some(belief::record_levels),
+        _ => None,
+    }
+}
+
+/// Whether all that `stage` reads and writes is shared.
+fn can_share(stage: Stage, shared: &Shared) -> bool {
+    match stage {
+        Stage::Resolution(z) => z > shared.finest,
+        stage => stage.level().is_some_and(|z| z >= shared.finest),
+    }
+}
+
+/// The same stage at the next coarser level, where the two can run together.
+fn next_level(stage: Stage) -> Option<Stage> {
+    match stage {
+        Stage::Graph(z) => Some(Stage::Graph(z + 1)),
+        Stage::Dependency(z) => Some(Stage::Dependency(z + 1)),
+        Stage::Resolution(z) => Some(Stage::Resolution(z + 1)),
+        Stage::Belief(z) => Some(Stage::Belief(z + 1)),
+        Stage::Flood(z) => Some(Stage::Flood(z + 1)),
+        _ => None,
+    }
 }
 
 /// Everything that belongs to one plan.
@@ -99,10 +135,19 @@ struct State {
     plan: Plan,
     buffers: Buffers,
     steps: HashMap<Stage, Arc<[Step]>>,
+    /// The steps of a stage at this level and the next ones, so many together.
+    together: HashMap<(Stage, usize), Arc<[Step]>>,
     /// Those of [`upload`].
     upload: Arc<[Step]>,
     /// Words of an image on their way up.
     words: Vec<u32>,
+}
+
+impl State {
+    /// Whether `stage` may wait for others that run together with it.
+    fn may_wait(&self, stage: Stage) -> bool {
+        next_level(stage).is_some() && self.buffers.shared.as_ref().is_some_and(|s| can_share(stage, s))
+    }
 }
 
 impl Gpu {
@@ -127,6 +172,7 @@ impl Gpu {
             passes: 0,
             work: 0,
             timer: None,
+            waiting: Vec::new(),
             state: None,
             requests: Requests::default(),
         })
@@ -137,22 +183,35 @@ impl Gpu {
         self.recorded(stage.level().unwrap_or(0), plan, buffers, None, |recorder| record(recorder, stage))
     }
 
-    /// The steps of all stages.
-    fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<HashMap<Stage, Arc<[Step]>>> {
-        let mut steps = HashMap::new();
+    /// The steps of all stages, and those of levels together.
+    fn all_steps(
+        &mut self,
+        plan: &Plan,
+        buffers: &mut Buffers,
+    ) -> Result<(Steps<Stage>, Steps<(Stage, usize)>)> {
+        let (mut steps, mut together) = (HashMap::new(), HashMap::new());
         let mut endings = Vec::new();
         for stage in Stage::all(plan).into_iter().filter(|stage| *stage != Stage::Change) {
             let is_message = matches!(stage, Stage::Dependency(_) | Stage::Resolution(_) | Stage::Belief(_));
-            let endings = (is_message && plan.settled_change().is_some()).then_some(&mut endings);
+            let ends = is_message && plan.settled_change().is_some();
+            let ending = ends.then_some(&mut endings);
             let level = stage.level().unwrap_or(0);
-            let recorded =
-                self.recorded(level, plan, buffers, endings, |recorder| record(recorder, stage))?;
+            let recorded = self.recorded(level, plan, buffers, ending, |recorder| record(recorder, stage))?;
             steps.insert(stage, recorded);
+            let Some(shared) = &buffers.shared else { continue };
+            for end in level + 2..=plan.levels.len() {
+                let Some(record) = record_levels(stage).filter(|_| can_share(stage, shared)) else { break };
+                let ending = ends.then_some(&mut endings);
+                let recorded = self.recorded(level, plan, buffers, ending, |recorder| {
+                    record(recorder, shared, level..end)
+                })?;
+                together.insert((stage, end - level), recorded);
+            }
         }
         // This stage makes the dispatches of messages empty: it comes when these are known.
         buffers.end_when_settled(&mut self.device, &endings)?;
         steps.insert(Stage::Change, self.steps(Stage::Change, plan, buffers)?);
-        Ok(steps)
+        Ok((steps, together))
     }
 
     /// The steps that `record` records at `level`.
@@ -191,7 +250,7 @@ impl Gpu {
                 Step::Dispatch(_) => {
                     let mut timer = self.timer.take();
                     let writes = timer.as_mut().and_then(Timer::pass);
-                    let mut work = self.work;
+                    let (mut work, most) = (self.work, self.device.work_per_submit);
                     let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
                     {
                         let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
@@ -211,7 +270,7 @@ impl Gpu {
                             }
                             work += dispatch.work;
                             recorded += 1;
-                            if work >= WORK_PER_SUBMIT {
+                            if work >= most {
                                 break;
                             }
                         }
@@ -223,14 +282,44 @@ impl Gpu {
                 }
             }
             rest = &rest[recorded..];
-            if self.passes >= PASSES_PER_SUBMIT || self.work >= WORK_PER_SUBMIT {
-                self.submit()?;
+            let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
+            if timed || self.work >= self.device.work_per_submit {
+                self.submit_recorded()?;
             }
         }
         Ok(())
     }
 
+    /// Records the stages that wait.
+    fn gather(&mut self) -> Result<()> {
+        let waiting = mem::take(&mut self.waiting);
+        let Some(&first) = waiting.first() else { return Ok(()) };
+        let parts = if matches!(first, Stage::Flood(_)) { 0..2 } else { 0..1 };
+        for part in parts {
+            let stages = waiting.iter().map(|&stage| match stage {
+                Stage::Flood(z) => flood::parts(z)[part],
+                stage => stage,
+            });
+            let stages: Vec<Stage> = stages.collect();
+            let state = self.state();
+            let steps = match state.together.get(&(stages[0], stages.len())) {
+                Some(steps) => vec![Arc::clone(steps)],
+                None => stages.iter().map(|stage| Arc::clone(&state.steps[stage])).collect(),
+            };
+            for steps in steps {
+                self.record(&steps)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Submits everything.
     fn submit(&mut self) -> Result<()> {
+        self.gather()?;
+        self.submit_recorded()
+    }
+
+    fn submit_recorded(&mut self) -> Result<()> {
         (self.passes, self.work) = (0, 0);
         if let Some(mut encoder) = self.encoder.take() {
             if let Some(timer) = &mut self.timer {
@@ -243,6 +332,7 @@ impl Gpu {
 
     /// Asks for each range of bytes, after everything recorded so far.
     fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
+        self.gather()?;
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;
@@ -309,12 +399,14 @@ impl Gpu {
         }
         let zeroed = buffers.levels.iter().flat_map(LevelBuffers::messages).chain([&buffers.labels]);
         let encoder = self.encoder()?;
-        for buffer in zeroed.flat_map(Rows::buffers) {
-            encoder.clear_buffer(buffer, 0, None);
+        for (buffer, place) in zeroed.flat_map(Rows::held) {
+            encoder.clear_buffer(buffer, place.start, Some(place.end - place.start));
         }
         for level in &buffers.levels {
-            let size = level.full_windows.size();
-            encoder.copy_buffer_to_buffer(&level.full_windows, 0, &level.windows, 0, size);
+            for (windows, place) in level.windows.held() {
+                let size = place.end - place.start;
+                encoder.copy_buffer_to_buffer(&level.full_windows, 0, windows, place.start, size);
+            }
         }
         encoder.clear_buffer(&buffers.convergence, 0, None);
         let size = buffers.all_groups.size();
@@ -382,7 +474,12 @@ impl Backend for Gpu {
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
+        if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
+            // The maps stay, as all that was asked for leaves them.
+            self.submit()?;
+        }
         (self.encoder, self.passes, self.work) = (None, 0, 0);
+        self.waiting.clear();
         self.device.traffic = Traffic::default();
         let mut state = match self.state.take() {
             Some(mut state) if plan.fits(&state.plan) => {
@@ -400,10 +497,10 @@ impl Backend for Gpu {
                     memory::check(plan.bytes(), Purpose::Match)?;
                 }
                 let mut buffers = Buffers::new(&mut self.device, plan)?;
-                let steps = self.all_steps(plan, &mut buffers)?;
+                let (steps, together) = self.all_steps(plan, &mut buffers)?;
                 let upload = self.recorded(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
                 let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
-                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
+                State { plan: plan.clone(), buffers, steps, together, upload, words: vec![0; words] }
             }
         };
         self.load(&mut state, &prepared)?;
@@ -413,6 +510,17 @@ impl Backend for Gpu {
     }
 
     fn run(&mut self, stage: Stage) -> Result<()> {
+        if self.timer.is_none() && self.state().may_wait(stage) {
+            for _ in 0..if matches!(stage, Stage::Flood(_)) { 2 } else { 1 } {
+                self.device.count_stage();
+            }
+            if self.waiting.last().is_some_and(|&last| next_level(last) != Some(stage)) {
+                self.gather()?;
+            }
+            self.waiting.push(stage);
+            return self.device.check();
+        }
+        self.gather()?;
         if let Stage::Flood(z) = stage {
             return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
         }
@@ -433,7 +541,8 @@ impl Backend for Gpu {
     }
 
     fn settled(&mut self, wait: bool) -> Result<bool> {
-        Ok(wait && self.convergence()?.settled())
+        // Where times are kept, idle iterations are not to be among them.
+        Ok((wait || self.timer.is_some()) && self.convergence()?.settled())
     }
 
     fn idle_iterations(&mut self) -> Result<u32> {

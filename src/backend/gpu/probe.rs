@@ -57,17 +57,18 @@ impl Probe for Gpu {
 
     fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
         let (runs, rows) = self.state().plan.levels[level].windows();
-        let buffer = self.state().buffers.levels[level].windows.clone();
-        let requested = self.request(&[(buffer, 0..4 * (runs * rows) as u64)])?;
-        let words = self.device.collect(requested)?.remove(0);
-        let windows = words.into_iter().map(|word| [word as u16, (word >> 16) as u16]).collect();
+        let windows = self.state().buffers.levels[level].windows.clone();
+        let words = self.rows(&[&windows])?.remove(0);
+        let windows = words[..runs * rows].iter().map(|&word| [word as u16, (word >> 16) as u16]).collect();
         Ok(Plane::new(runs, rows, windows))
     }
 
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
         self.submit()?;
-        let buffer = self.state().buffers.levels[level].windows.clone();
-        self.device.write(&buffer, bytemuck::cast_slice(&window_words(windows)))
+        let [(buffer, place)] = &self.state().buffers.levels[level].windows.own()[..] else {
+            unreachable!("one row is in one part")
+        };
+        self.device.write_at(buffer, place.start, bytemuck::cast_slice(&window_words(windows)))
     }
 
     fn change(&mut self) -> Result<u64> {
