@@ -371,7 +371,10 @@ impl Device {
     }
 
     /// Requests buffers, as they are after everything submitted so far.
-    pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Requested {
+    pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Result<Requested> {
+        // A device that is lost says so here, and not that the buffers are wrong.
+        self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
+        self.check()?;
         let (sender, mapped) = mpsc::channel();
         for buffer in &buffers {
             self.traffic.bytes_down += buffer.size();
@@ -381,28 +384,34 @@ impl Device {
                 let _ = sender.send(result);
             });
         }
-        Requested { buffers, mapped, submitted: self.submitted }
+        Ok(Requested { buffers, mapped, submitted: self.submitted })
     }
 
     /// The words of each requested buffer; later submissions may still be in flight.
     pub(super) fn collect(&mut self, requested: Requested) -> Result<Vec<Vec<u32>>> {
+        self.read(requested, |all| all.iter().map(|words| words.to_vec()).collect())
+    }
+
+    /// What `read` makes of the words of all requested buffers.
+    pub(super) fn read<T>(&mut self, requested: Requested, read: impl FnOnce(&[&[u32]]) -> T) -> Result<T> {
         while self.submitted - (self.under_way.len() as u64) < requested.submitted {
             self.wait_for_one()?;
         }
         self.check()?;
         // Buffers whose submission finished long ago are mapped by any poll.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
-        let mut all = Vec::new();
         for _ in &requested.buffers {
             let mapped = requested.mapped.try_recv().map_err(|e| failed(&self.name, &e))?;
             mapped.map_err(|e| failed(&self.name, &e))?;
         }
+        let mut views = Vec::new();
         for buffer in &requested.buffers {
-            let view = buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?;
-            all.push(bytemuck::pod_collect_to_vec(&view));
+            views.push(buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?);
         }
+        let words: Vec<&[u32]> = views.iter().map(|view| bytemuck::cast_slice(view)).collect();
+        let read = read(&words);
         self.check()?;
-        Ok(all)
+        Ok(read)
     }
 
     fn hung(&self) -> Error {

@@ -346,7 +346,7 @@ impl Gpu {
             staged.push(staging);
         }
         self.submit()?;
-        Ok(self.device.request(staged))
+        self.device.request(staged)
     }
 
     /// Asks for the words of all rows.
@@ -573,16 +573,16 @@ impl Backend for Gpu {
 
     fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
         let RequestedMaps { parts, shape } = self.requests.take(&ticket);
-        let words = self.device.collect(parts)?;
-        let idle = words.get(3).map_or(0, |words| Convergence::of(words).idle());
-        let maps = Maps {
-            disparity: plane(&words[0], shape, u32::cast_signed),
-            raw: plane(&words[1], shape, u32::cast_signed),
-            confidence: plane(&words[2], shape, |word| (word >> 8) as u8),
-            validity: plane(&words[2], shape, |word| word as u8),
-            right: None,
-        };
-        Ok((maps, idle))
+        self.device.read(parts, |words| {
+            let maps = Maps {
+                disparity: plane(words[0], shape, u32::cast_signed),
+                raw: plane(words[1], shape, u32::cast_signed),
+                confidence: plane(words[2], shape, |word| (word >> 8) as u8),
+                validity: plane(words[2], shape, |word| word as u8),
+                right: None,
+            };
+            (maps, words.get(3).map_or(0, |words| Convergence::of(words).idle()))
+        })
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

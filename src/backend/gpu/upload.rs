@@ -28,14 +28,16 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     })
 }
 
-/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`. Returns whether that says all: whether they
-/// are in whole 8-bit levels, and grey follows from colour.
+/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`, as long as that says all: as long as they are
+/// in whole 8-bit levels, and grey follows from colour. Returns whether it does.
 pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool {
-    let rows = words.chunks_exact_mut(pitch as usize).enumerate();
-    rows.fold(true, |all, (y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row) && all)
+    let mut rows = words.chunks_exact_mut(pitch as usize).enumerate();
+    rows.all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
 }
 
-fn narrow_row(pixels: &[Pixel], masked: &[bool], words: &mut [u32]) -> bool {
+#[pulp::with_simd(narrow_row = pulp::Arch::new())]
+#[inline(always)]
+fn narrow_row_on<S: pulp::Simd>(_: S, pixels: &[Pixel], masked: &[bool], words: &mut [u32]) -> bool {
     let mut missed = 0;
     for ((word, pixel), &masked) in words.iter_mut().zip(pixels).zip(masked) {
         let [r, g, b, grey] = pixel.map(u32::from);
