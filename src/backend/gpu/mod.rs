@@ -93,8 +93,8 @@ pub struct Gpu {
     requests: Requests<RequestedMaps>,
 }
 
-/// Steps by what they are for.
-type Steps<K> = HashMap<K, Arc<[Step]>>;
+/// The steps of a stage at its level and the next ones, so many together.
+type Steps = HashMap<(Stage, usize), Arc<[Step]>>;
 
 /// Records a stage at several levels at once.
 type RecordLevels = fn(&mut Recorder, &Shared, Range<usize>) -> Result<()>;
@@ -134,9 +134,7 @@ fn next_level(stage: Stage) -> Option<Stage> {
 struct State {
     plan: Plan,
     buffers: Buffers,
-    steps: HashMap<Stage, Arc<[Step]>>,
-    /// The steps of a stage at this level and the next ones, so many together.
-    together: HashMap<(Stage, usize), Arc<[Step]>>,
+    steps: Steps,
     /// Those of [`upload`].
     upload: Arc<[Step]>,
     /// Words of an image on their way up.
@@ -183,13 +181,9 @@ impl Gpu {
         self.recorded(stage.level().unwrap_or(0), plan, buffers, None, |recorder| record(recorder, stage))
     }
 
-    /// The steps of all stages, and those of levels together.
-    fn all_steps(
-        &mut self,
-        plan: &Plan,
-        buffers: &mut Buffers,
-    ) -> Result<(Steps<Stage>, Steps<(Stage, usize)>)> {
-        let (mut steps, mut together) = (HashMap::new(), HashMap::new());
+    /// The steps of all stages, at single levels and where these share buffers at several together.
+    fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Steps> {
+        let mut steps = HashMap::new();
         let mut endings = Vec::new();
         for stage in Stage::all(plan).into_iter().filter(|stage| *stage != Stage::Change) {
             let is_message = matches!(stage, Stage::Dependency(_) | Stage::Resolution(_) | Stage::Belief(_));
@@ -197,7 +191,7 @@ impl Gpu {
             let ending = ends.then_some(&mut endings);
             let level = stage.level().unwrap_or(0);
             let recorded = self.recorded(level, plan, buffers, ending, |recorder| record(recorder, stage))?;
-            steps.insert(stage, recorded);
+            steps.insert((stage, 1), recorded);
             let Some(shared) = &buffers.shared else { continue };
             for end in level + 2..=plan.levels.len() {
                 let Some(record) = record_levels(stage).filter(|_| can_share(stage, shared)) else { break };
@@ -205,13 +199,13 @@ impl Gpu {
                 let recorded = self.recorded(level, plan, buffers, ending, |recorder| {
                     record(recorder, shared, level..end)
                 })?;
-                together.insert((stage, end - level), recorded);
+                steps.insert((stage, end - level), recorded);
             }
         }
         // This stage makes the dispatches of messages empty: it comes when these are known.
         buffers.end_when_settled(&mut self.device, &endings)?;
-        steps.insert(Stage::Change, self.steps(Stage::Change, plan, buffers)?);
-        Ok((steps, together))
+        steps.insert((Stage::Change, 1), self.steps(Stage::Change, plan, buffers)?);
+        Ok(steps)
     }
 
     /// The steps that `record` records at `level`.
@@ -302,9 +296,9 @@ impl Gpu {
             });
             let stages: Vec<Stage> = stages.collect();
             let state = self.state();
-            let steps = match state.together.get(&(stages[0], stages.len())) {
+            let steps = match state.steps.get(&(stages[0], stages.len())) {
                 Some(steps) => vec![Arc::clone(steps)],
-                None => stages.iter().map(|stage| Arc::clone(&state.steps[stage])).collect(),
+                None => stages.iter().map(|stage| Arc::clone(&state.steps[&(*stage, 1)])).collect(),
             };
             for steps in steps {
                 self.record(&steps)?;
@@ -486,7 +480,7 @@ impl Backend for Gpu {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
                     let steps = self.steps(Stage::RightView, plan, &state.buffers)?;
-                    state.steps.insert(Stage::RightView, steps);
+                    state.steps.insert((Stage::RightView, 1), steps);
                 }
                 state
             }
@@ -497,10 +491,10 @@ impl Backend for Gpu {
                     memory::check(plan.bytes(), Purpose::Match)?;
                 }
                 let mut buffers = Buffers::new(&mut self.device, plan)?;
-                let (steps, together) = self.all_steps(plan, &mut buffers)?;
+                let steps = self.all_steps(plan, &mut buffers)?;
                 let upload = self.recorded(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
                 let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
-                State { plan: plan.clone(), buffers, steps, together, upload, words: vec![0; words] }
+                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
             }
         };
         self.load(&mut state, &prepared)?;
@@ -525,7 +519,7 @@ impl Backend for Gpu {
             return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
         }
         self.device.count_stage();
-        let steps = Arc::clone(&self.state().steps[&stage]);
+        let steps = Arc::clone(&self.state().steps[&(stage, 1)]);
         let Some(timer) = &mut self.timer else { return self.record(&steps) };
         timer.begin(stage);
         if timer.has_clock() {

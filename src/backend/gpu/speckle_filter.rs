@@ -50,7 +50,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let halo = r.plan.method.refinement.speckle_size;
     let size = r.plan.method.refinement.speckle_size;
     let (blocks, most_columns) = joined(l.width);
-    let base = Uniform { halo, size, blocks, ..Uniform::default() };
+    let base = Uniform { halo, blocks, size, ..Uniform::default() };
     let (parents, sizes) = (&b.speckle_parents, &b.speckle_sizes);
     // What is found in a band goes to the first rows of the scratch maps.
     let found = |what: &Rows, seen: &Range<u32>| what.bind(&(0..seen.end - seen.start));
