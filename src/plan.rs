@@ -444,8 +444,8 @@ impl Plan {
         let up = if level == 0 { 0 } else { width };
         let down = if level + 1 == self.levels.len() { 0 } else { width };
         let volumes = cost + 1 + width + up + down + self.slots() * width;
-        // The member codes, and the transposed table with its row starts. What members are chosen by takes less than what is left
-        // of this on a device, and of the maps on the CPU path.
+        // The member codes, and the transposed table with its row starts. A device needs less for these; what members are chosen by
+        // takes the rest there, and on the CPU path what its maps leave.
         let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
         cells * volumes as u64 + graph as u64
     }
