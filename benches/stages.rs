@@ -11,8 +11,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::Gpu;
 use mrfgs::low_level::backend::{Backend, Stage};
+use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::{engine, graph};
 use mrfgs::options::Method;
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -30,6 +30,7 @@ fn cases() -> Vec<(Synthetic, &'static [&'static str])> {
 fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
     let pyramid = (1..plan.levels.len()).map(Stage::Pyramid).collect();
     vec![
+        ("graph", (0..plan.levels.len()).map(Stage::Graph).collect()),
         ("cost", vec![Stage::Cost]),
         ("pyramid", pyramid),
         ("evidence", vec![Stage::Evidence(0)]),
@@ -73,9 +74,6 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                     engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match")
                 });
             });
-            if name == "cpu" {
-                group.bench_function("graph", |b| b.iter(|| graph::build(pair.left(), &plan)));
-            }
             group.finish();
         }
     }

@@ -1,10 +1,26 @@
-// The label map of level 0 and its change: `labels`, then `sums`.
+// The label map of level 0 and its change: `labels`, then `sums`, then `settle`.
 
 #import band volume messages
 
 struct Params {
     level: Level,
     @align(16) band: Band,
+    // The largest sum at which the map has settled, lower and upper half, and whether that matters.
+    most_low: u32,
+    most_high: u32,
+    may_settle: u32,
+    // Dispatches that end when it has.
+    endings: u32,
+}
+
+struct Convergence {
+    // Sum of the last time, lower and upper half.
+    sum: vec2<u32>,
+    // How often the map was looked at.
+    runs: u32,
+    settled: u32,
+    // How often it had settled before.
+    idle: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -14,6 +30,9 @@ struct Params {
 @group(0) @binding(3) var<storage, read_write> squares: array<u32>;
 // Lower and upper half.
 @group(0) @binding(4) var<storage, read_write> row_sums: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read_write> convergence: Convergence;
+// Workgroups of the dispatches, in x, y and z.
+@group(0) @binding(6) var<storage, read_write> groups: array<u32>;
 
 // The label map, and each pixel's squared difference from the previous one. One invocation per pixel.
 @compute @workgroup_size(GROUP)
@@ -48,4 +67,31 @@ fn sums(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         sum = vec2(low, sum.y + u32(low < sum.x));
     }
     row_sums[params.band.first_row + id.x] = sum;
+}
+
+// Sums all rows, and ends message passing once the sum is small. One invocation.
+@compute @workgroup_size(GROUP)
+fn settle(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let id = place(group, lane);
+    if id.x > 0u || id.y > 0u {
+        return;
+    }
+    if convergence.settled != 0u {
+        convergence.idle += 1u;
+        return;
+    }
+    var sum = vec2<u32>();
+    for (var y = 0u; y < params.level.height; y++) {
+        let low = sum.x + row_sums[y].x;
+        sum = vec2(low, sum.y + row_sums[y].y + u32(low < sum.x));
+    }
+    let is_small = sum.y < params.most_high || (sum.y == params.most_high && sum.x <= params.most_low);
+    if params.may_settle == 1u && convergence.runs > 0u && is_small {
+        convergence.settled = 1u;
+        for (var i = 0u; i < params.endings; i++) {
+            groups[3u * i] = 0u;
+        }
+    }
+    convergence.sum = sum;
+    convergence.runs += 1u;
 }

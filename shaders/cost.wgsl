@@ -1,4 +1,4 @@
-// Matching cost of level 0: `sad`, or `census` of both images and `contrast` of the left one, then `ad_census`.
+// Matching cost of level 0: `sad`, or `census` and then `ad_census`.
 
 #import band volume image
 
@@ -20,10 +20,9 @@ struct Params {
 @group(0) @binding(5) var<storage, read> right_census: array<vec2<u32>>;
 // Weight of colour at each pixel.
 @group(0) @binding(6) var<storage, read> weight: array<u32>;
-// Either image, its census, and the weight of colour from its contrast.
-@group(0) @binding(7) var<storage, read> image: array<vec4<u32>>;
-@group(0) @binding(8) var<storage, read_write> image_census: array<vec2<u32>>;
-@group(0) @binding(9) var<storage, read_write> image_weight: array<u32>;
+@group(0) @binding(7) var<storage, read_write> left_census_out: array<vec2<u32>>;
+@group(0) @binding(8) var<storage, read_write> right_census_out: array<vec2<u32>>;
+@group(0) @binding(9) var<storage, read_write> weight_out: array<u32>;
 
 // Matching cost of level 0 by the mean colour difference over a window. One invocation per RUN pixels of a
 // row and quad of labels: it computes each column of the window once for all of them.
@@ -91,8 +90,14 @@ fn sad(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index)
     }
 }
 
-// Census of every pixel of one image: a bit for each other pixel of a 9 x 7 window in raster order, set where
-// its grey is below the centre's. One invocation per pixel.
+// The bits of a census with one more.
+fn with_bit(bits: vec2<u32>, bit: bool) -> vec2<u32> {
+    return vec2((bits.x << 1u) | u32(bit), (bits.y << 1u) | (bits.x >> 31u));
+}
+
+// Census of every pixel of both images: a bit for each other pixel of a 9 x 7 window in raster order, set where
+// its grey is below the centre's. And the weight of colour at the pixels of the left image, from the variance of
+// grey in that window. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -104,42 +109,24 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let y = i32(params.band.first_row + id.y);
     let top = halo_start(u32(CENSUS_RADIUS_Y));
     let pitch = params.level.pixel_pitch;
-    let centre = image[(u32(y) - top) * pitch + id.x].y >> 16u;
-    var bits = vec2<u32>();
-    for (var dy = -CENSUS_RADIUS_Y; dy <= CENSUS_RADIUS_Y; dy++) {
-        let row = (u32(clamp(y + dy, 0, i32(params.level.height) - 1)) - top) * pitch;
-        for (var dx = -CENSUS_RADIUS_X; dx <= CENSUS_RADIUS_X; dx++) {
-            if dx != 0 || dy != 0 {
-                let pixel = image[row + u32(clamp(x + dx, 0, i32(width) - 1))];
-                let below = (pixel.y >> 16u) < centre && pixel.z == 0u;
-                bits = vec2((bits.x << 1u) | u32(below), (bits.y << 1u) | (bits.x >> 31u));
-            }
-        }
-    }
-    image_census[id.y * pitch + id.x] = bits;
-}
-
-// Weight of colour at every pixel of the left image, from the variance of grey in the window of the census.
-// One invocation per pixel.
-@compute @workgroup_size(GROUP)
-fn contrast(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let id = place(group, lane);
-    let width = params.level.width;
-    if id.x >= width || id.y >= params.band.rows {
-        return;
-    }
-    let x = i32(id.x);
-    let y = i32(params.band.first_row + id.y);
-    let top = halo_start(u32(CENSUS_RADIUS_Y));
-    let pitch = params.level.pixel_pitch;
-    let centre = image[(u32(y) - top) * pitch + id.x].y >> 24u;
+    let centre = (u32(y) - top) * pitch + id.x;
+    let left_grey = left[centre].y >> 16u;
+    let right_grey = right[centre].y >> 16u;
+    var left_bits = vec2<u32>();
+    var right_bits = vec2<u32>();
     var sum = 0u;
     var squares = 0u;
     for (var dy = -CENSUS_RADIUS_Y; dy <= CENSUS_RADIUS_Y; dy++) {
         let row = (u32(clamp(y + dy, 0, i32(params.level.height) - 1)) - top) * pitch;
         for (var dx = -CENSUS_RADIUS_X; dx <= CENSUS_RADIUS_X; dx++) {
-            let pixel = image[row + u32(clamp(x + dx, 0, i32(width) - 1))];
-            let grey = select(centre, pixel.y >> 24u, pixel.z == 0u);
+            let at = row + u32(clamp(x + dx, 0, i32(width) - 1));
+            let l = left[at];
+            let r = right[at];
+            if dx != 0 || dy != 0 {
+                left_bits = with_bit(left_bits, (l.y >> 16u) < left_grey && l.z == 0u);
+                right_bits = with_bit(right_bits, (r.y >> 16u) < right_grey && r.z == 0u);
+            }
+            let grey = select(left_grey >> 8u, l.y >> 24u, l.z == 0u);
             sum += grey;
             squares += grey * grey;
         }
@@ -149,7 +136,10 @@ fn contrast(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
     if most > 0u {
         w = w * min(CENSUS_PLACES * squares - sum * sum, most) / most;
     }
-    image_weight[id.y * pitch + id.x] = w;
+    let out = id.y * pitch + id.x;
+    left_census_out[out] = left_bits;
+    right_census_out[out] = right_bits;
+    weight_out[out] = w;
 }
 
 // Matching cost of level 0 by census and colour difference. One invocation per pixel and quad of labels.

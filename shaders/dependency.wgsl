@@ -1,7 +1,7 @@
 // Messages of the dependency factors. One invocation per factor. A factor reads old beliefs and its own old
 // messages and writes only its own messages, so flooding in place is exact.
 
-#import band volume messages
+#import band volume messages sections
 
 struct Params {
     level: Level,
@@ -10,7 +10,6 @@ struct Params {
     tau: u32,
 }
 
-@group(0) @binding(0) var<uniform> params: Params;
 // Codes of the neighbours, four per word.
 @group(0) @binding(1) var<storage, read> members: array<u32>;
 @group(0) @binding(2) var<storage, read> belief: array<Quad>;
@@ -31,6 +30,7 @@ fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
 
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    enter(group);
     let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
@@ -40,18 +40,19 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let top = halo_start(RADIUS);
     let width = params.level.width;
     // First quad of the factor's messages, and of each member's belief.
-    let own = id.y * params.level.dependency_pitch + id.x;
+    let own = params.band.dependency_at + id.y * params.level.dependency_pitch + id.x;
     var bases: array<u32, SLOTS>;
-    bases[0] = (y - top) * params.level.pitch + id.x;
+    let beliefs = params.band.volume_at;
+    bases[0] = beliefs + (y - top) * params.level.pitch + id.x;
     var present = 1u;
-    let codes = id.y * params.level.member_pitch + id.x * ((SLOTS + 2u) / 4u);
+    let codes = params.level.members_at + id.y * params.level.member_pitch + id.x * ((SLOTS + 2u) / 4u);
     for (var slot = 1u; slot < SLOTS; slot++) {
         let code = (members[codes + (slot - 1u) / 4u] >> (8u * ((slot - 1u) % 4u))) & 0xffu;
         bases[slot] = ABSENT;
         if code != NO_MEMBER {
             let px = id.x + code % WINDOW - RADIUS;
             let py = y + code / WINDOW - RADIUS;
-            bases[slot] = (py - top) * params.level.pitch + px;
+            bases[slot] = beliefs + (py - top) * params.level.pitch + px;
             present += 1u;
         }
     }

@@ -8,7 +8,7 @@ struct Params {
     @align(16) band: Band,
     @align(16) fine: Level,
     // Twice the smallest label of the level minus the finer level's smallest label: 0 or -1.
-    @align(16) label_offset: i32,
+    label_offset: i32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

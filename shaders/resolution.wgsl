@@ -2,19 +2,20 @@
 // invocation per coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster
 // order. Where no label agrees, sums are infinite: the largest value, at which they saturate.
 
-#import band volume messages
+#import band volume messages sections
 
 struct Params {
     level: Level,
     @align(16) band: Band,
     @align(16) fine: Level,
     // Twice the smallest label of the level minus the finer level's smallest label: 0 or -1.
-    @align(16) label_offset: i32,
+    label_offset: i32,
     // Cost of disagreement.
     tau: u32,
+    // Where the volumes of the finer level begin in what is bound, in quads.
+    fine_at: u32,
 }
 
-@group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> fine_belief: array<u32>;
 @group(0) @binding(2) var<storage, read> coarse_belief: array<u32>;
 @group(0) @binding(3) var<storage, read_write> down: array<u32>;
@@ -128,6 +129,7 @@ fn emit_down(index: i32, sums: vec4<u32>, least: vec4<u32>) {
 
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    enter(group);
     let id = place(group, lane);
     if id.x >= params.level.width || id.y >= params.band.rows {
         return;
@@ -141,8 +143,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     exists = vec4(true, right, below, right && below);
     let rows = vec4(y) + select(vec4<u32>(), vec4(0u, 0u, 1u, 1u), exists);
     let columns = vec4(x) + select(vec4<u32>(), vec4(0u, 1u, 0u, 1u), exists);
-    children_at = QUAD_WORDS * (rows * fine.pitch + columns);
-    parent_at = QUAD_WORDS * (id.y * params.level.pitch + id.x);
+    children_at = QUAD_WORDS * (params.fine_at + rows * fine.pitch + columns);
+    parent_at = QUAD_WORDS * (params.band.volume_at + id.y * params.level.pitch + id.x);
     child_floor = vec4<u32>();
     parent_floor = 0u;
     let labels = params.level.labels;

@@ -3,8 +3,8 @@
 // Regions are found by union-find (after Playne and Hawick 2018). Every pixel of a region points at a smaller
 // position in it, down to the root, which points at itself. First the segments of each row get their runs.
 // Then the segments of a row are joined, and then ever larger blocks of rows. Between these steps all
-// pointers are flattened, so that they point at their roots directly. One step joins two blocks along one
-// border, so a chain never gets longer than that border has pixels on its two sides. This bounds the loops.
+// pointers are flattened, so that they point at their roots directly. One step joins a few blocks along their
+// borders, so a chain never gets longer than these have pixels on both sides. This bounds the loops.
 //
 // Positions count from the first row that the stage sees: the band, and around it as many rows as the height
 // at which a region is certainly large enough.
@@ -16,9 +16,10 @@ struct Params {
     @align(16) band: Band,
     // Rows around the band that the stage sees.
     halo: u32,
-    // Rows of the blocks that are joined, or 0 to join the segments of each row; and the columns to join them
-    // in.
+    // Rows of the blocks that are joined, or 0 to join the segments of each row; how many of them become one; and
+    // the columns to join them in.
     span: u32,
+    blocks: u32,
     first_column: u32,
     columns: u32,
     // Regions of fewer pixels are small.
@@ -94,7 +95,9 @@ fn join(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let id = place(group, lane);
     let across = params.span == 0u;
     let x = select(params.first_column + id.x, SEGMENT * (id.x + 1u), across);
-    let y = select(params.span * (2u * id.y + 1u), id.y, across);
+    // One border less than there are blocks.
+    let block = id.y / (params.blocks - 1u) * params.blocks + id.y % (params.blocks - 1u) + 1u;
+    let y = select(params.span * block, id.y, across);
     if x >= params.level.width || y >= params.band.rows || (!across && id.x >= params.columns) {
         return;
     }

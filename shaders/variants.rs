@@ -48,6 +48,9 @@ pub(crate) fn plans() -> Vec<Plan> {
 /// Every job of `plans`, each kernel once.
 pub(crate) fn jobs(plans: &[Plan]) -> Vec<gpu::Job> {
     let mut seen = HashSet::new();
-    let jobs = plans.iter().flat_map(|plan| Stage::all(plan).into_iter().flat_map(|s| gpu::jobs(s, plan)));
+    let jobs = plans.iter().flat_map(|plan| {
+        let of_stages = Stage::all(plan).into_iter().flat_map(|stage| gpu::jobs(stage, plan));
+        of_stages.chain(gpu::other_jobs(plan))
+    });
     jobs.filter(|job| seen.insert(job.kernel.clone())).collect()
 }

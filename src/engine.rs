@@ -1,6 +1,6 @@
 //! A pair through a backend: in one piece, or tile by tile.
 
-use crate::backend::{Backend, Map, Stage, Ticket, Traffic};
+use crate::backend::{Backend, Stage, Ticket, Traffic};
 use crate::error::{Error, Purpose, Result};
 use crate::front::{self, Prepared};
 use crate::image::Pair;
@@ -54,7 +54,8 @@ pub fn inspect(
     let mut run = Run::new(watch(plan, observer), inspector);
     let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
     backend.wait()?;
-    let maps = run.watch.host("download", || tickets.collect(backend))?;
+    let (maps, idle) = run.watch.host("download", || tickets.collect(backend))?;
+    let iterations = iterations - idle;
     let (traffic, cells, host_times) = (backend.traffic(), backend.cells(), run.watch.into_times());
     Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
@@ -85,7 +86,8 @@ pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
 /// Whatever the backend reports.
 pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
     let Started { tickets, iterations, host_times, traffic, cells } = started;
-    let maps = tickets.collect(backend)?;
+    let (maps, idle) = tickets.collect(backend)?;
+    let iterations = iterations - idle;
     Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
 
@@ -106,12 +108,13 @@ struct Tickets {
 }
 
 impl Tickets {
-    fn collect(self, backend: &mut dyn Backend) -> Result<Maps> {
-        let mut maps = backend.maps(self.left)?;
+    /// The maps, and how many iterations were idle.
+    fn collect(self, backend: &mut dyn Backend) -> Result<(Maps, u32)> {
+        let (mut maps, idle) = backend.maps(self.left)?;
         if let Some(right) = self.right {
-            maps.right = Some(right_map(backend.maps(right)?));
+            maps.right = Some(right_map(backend.maps(right)?.0));
         }
-        Ok(maps)
+        Ok((maps, idle))
     }
 }
 
@@ -139,21 +142,17 @@ fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: Pair, run: &mut Run) ->
 /// All stages of a match in one piece; the number of iterations, and its maps.
 fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<(u32, Tickets)> {
     let plan = &if run.inspector.is_some() { plan.clone() } else { solver::streamed(plan) };
-    let mut right_labels = None;
     if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = run.inspector.take();
         let mirrored = copy(plan, || pair.mirrored())?;
         let mirrored = prepare(backend, plan, mirrored, run)?;
         solver::estimate(backend, plan, mirrored, run)?;
+        run.stage(backend, plan, Stage::MirrorLabels)?;
         run.inspector = inspector;
-        right_labels = Some(backend.map(Map::Label)?.mirrored());
     }
     let prepared = prepare(backend, plan, pair.clone(), run)?;
     let iterations = solver::estimate(backend, plan, prepared, run)?;
-    if let Some(labels) = right_labels {
-        backend.set_right_labels(&labels)?;
-    }
     for stage in solver::post_processing(&plan.method) {
         run.stage(backend, plan, stage)?;
     }
@@ -206,7 +205,8 @@ pub fn solve_tiles(
         let plan = solver::streamed(&tile.plan);
         let prepared = prepare(backend, &plan, crop, &mut run)?;
         let matched = prepared.pair.clone();
-        iterations = iterations.max(solver::estimate(backend, &plan, prepared, &mut run)?);
+        let all = solver::estimate(backend, &plan, prepared, &mut run)?;
+        iterations = iterations.max(all - backend.idle_iterations()?);
         backend.wait()?;
         let seen = run.watch.host("download", || mosaic.place(tile, &matched, backend))?;
         if right_map_wanted && matchings(whole) == 1 {

@@ -8,9 +8,9 @@
 //! open).
 
 use crate::image::{Image, Plane};
+use crate::options::Method;
 use crate::plan::{GRAPH_WINDOW, Plan};
 use rayon::prelude::*;
-use std::iter;
 use std::ops::Range;
 
 /// The code of a slot that holds no pixel, because the neighbour is outside the image, masked, or missing.
@@ -58,12 +58,6 @@ impl Incoming {
         let (bits, radius) = (isize::from(self.0.cast_signed()), RADIUS as isize);
         ((bits & 7) - radius, (bits >> 3 & 7) - radius, (bits >> 6).cast_unsigned())
     }
-
-    /// dx + 3 | (dy + 3) << 3 | slot << 6.
-    #[must_use]
-    pub fn bits(self) -> u16 {
-        self.0
-    }
 }
 
 /// (dx, dy) of the member with this `code`: its position in the window, in raster order.
@@ -86,7 +80,7 @@ pub fn code(dx: i32, dy: i32) -> u8 {
 
 impl LevelGraph {
     /// Builds a graph from the codes of each factor's neighbours: `neighbours` per pixel, pixels in raster
-    /// order. Slot 0 of every factor is its own pixel and has no code.
+    /// order. Slot 0 of every factor is its own pixel and has no code. No factor has a neighbour twice.
     ///
     /// # Panics
     /// When a code points outside the image or the window, or the number of codes is not `width * height *
@@ -120,8 +114,7 @@ impl LevelGraph {
         graph
     }
 
-    /// The transposed table: where the entries of each pixel start ([`Self::starts`]), and the entries
-    /// ([`Self::incoming`]).
+    /// The transposed table: where the entries of each pixel start, with one more than there are pixels, and the entries.
     fn transposed(&self) -> (Vec<u32>, Vec<Incoming>) {
         let (pixels, band) = (self.width * self.height, BAND * self.width);
         let of_band = |i: usize| i * band..((i + 1) * band).min(pixels);
@@ -225,19 +218,7 @@ impl LevelGraph {
         &self.codes
     }
 
-    /// Where each pixel's entries start in [`Self::incoming`]; one entry more than there are pixels.
-    #[must_use]
-    pub fn starts(&self) -> &[u32] {
-        &self.starts
-    }
-
-    /// The transposed table: for each pixel the slots that hold it, factors in raster order.
-    #[must_use]
-    pub fn incoming(&self) -> &[Incoming] {
-        &self.incoming
-    }
-
-    /// The slots that hold `pixel`.
+    /// The slots that hold `pixel`, factors in raster order.
     #[must_use]
     #[inline]
     pub fn incoming_of(&self, pixel: usize) -> &[Incoming] {
@@ -245,29 +226,13 @@ impl LevelGraph {
     }
 }
 
-/// The graphs of all levels of `plan`, built from the reference image.
-#[must_use]
-pub fn build(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
-    let weight = spatial_weight(plan.method.graph.sigma_space, plan.method.graph.sigma_range);
-    let mut coarser: Vec<Image> = Vec::new();
-    for _ in 1..plan.levels.len() {
-        coarser.push(downsample(coarser.last().unwrap_or(image)));
-    }
-    let levels: Vec<&Image> = iter::once(image).chain(&coarser).collect();
-    levels.into_par_iter().map(|level| level_graph(level, plan.neighbours, weight)).collect()
-}
-
 /// Weight of a squared pixel of distance relative to a squared quarter level of colour difference.
-fn spatial_weight(sigma_space: f64, sigma_range: f64) -> u32 {
+pub(crate) fn spatial_weight(method: &Method) -> u32 {
     // Intensities 0 ..= 1 are 0 ..= 1020 quarters of an 8-bit level.
-    let ratio = sigma_range * 1020.0 / sigma_space;
+    let ratio = method.graph.sigma_range * 1020.0 / method.graph.sigma_space;
     (ratio * ratio + 0.5).floor().min(f64::from(1u32 << 20)) as u32
 }
 
-/// Bits of a key that hold the neighbour's rank; the other bits hold its distance, below 2^25.
-const RANK_BITS: u32 = 6;
-/// The key of a pixel that cannot be a neighbour; all other keys are smaller.
-const NO_KEY: i32 = i32::MAX;
 /// Number of pixels of a row whose neighbours are chosen together.
 const LANES: usize = 32;
 /// Number of pixels around one that may be its neighbours.
@@ -277,15 +242,27 @@ const AROUND: usize = GRAPH_WINDOW * GRAPH_WINDOW - 1;
 #[repr(align(64))]
 struct Keys([[i32; LANES]; AROUND]);
 
-fn level_graph(image: &Image, neighbours: usize, weight: u32) -> LevelGraph {
-    let (width, height) = image.pixels.size();
-    // By distance, then in raster order: this rank breaks ties.
+/// The offsets of the window without the centre's, by distance and then in raster order: this rank breaks ties.
+pub(crate) fn by_distance() -> Vec<(i32, i32)> {
     let mut window: Vec<(i32, i32)> = offsets().filter(|&o| o != (0, 0)).collect();
     window.sort_by_key(|&(dx, dy)| dx * dx + dy * dy);
+    window
+}
+
+/// Bits of a key that hold the neighbour's rank; the other bits hold its distance, below 2^25.
+pub(crate) const RANK_BITS: u32 = 6;
+/// The key of a pixel that cannot be a neighbour; all other keys are smaller.
+pub(crate) const NO_KEY: i32 = i32::MAX;
+
+/// The graph of the level whose guide is `image`.
+#[must_use]
+pub fn of_level(image: &Image, plan: &Plan) -> LevelGraph {
+    let (width, height) = image.pixels.size();
+    let neighbours = plan.neighbours;
     let guide = Guide {
         network: Network::new(neighbours),
-        window,
-        weight,
+        window: by_distance(),
+        weight: spatial_weight(&plan.method),
         channels: [0, 1, 2].map(|c| padded(&image.pixels, 0, |pixel| pixel[c])),
         masked: padded(&image.masked, NO_KEY, |&masked| if masked { NO_KEY } else { 0 }),
     };

@@ -114,7 +114,7 @@ pub mod low_level {
         backend;
         /// A pair through a backend, in one piece or tile by tile.
         engine;
-        /// What a match needs of a pair: illumination, graphs, texture zones, sparse matches, label ranges.
+        /// What a match needs of a pair: illumination, texture zones, sparse matches, label ranges.
         front;
         /// The members of the dependency factors.
         graph;

@@ -398,6 +398,14 @@ impl Plan {
         self.method.front.zone_sigmas > 0.0
     }
 
+    /// The largest sum of squared changes, over all pixels of the finest level, at which its map has settled; `None` where message
+    /// passing goes on anyway.
+    #[must_use]
+    pub fn settled_change(&self) -> Option<u64> {
+        let tolerance = self.method.schedule.tolerance;
+        (tolerance > 0.0).then(|| (tolerance * tolerance * self.levels[0].pixels() as f64).floor() as u64)
+    }
+
     /// Whether the label windows of `level` follow the beliefs of the next coarser one.
     #[must_use]
     pub fn windows_follow_beliefs(&self, level: usize) -> bool {
@@ -466,7 +474,8 @@ impl Plan {
         let up = if level == 0 { 0 } else { width };
         let down = if level + 1 == self.levels.len() { 0 } else { width };
         let volumes = cost + 1 + width + up + down + self.slots() * width;
-        // The member codes, and the transposed table with its row starts.
+        // The member codes, and the transposed table with its row starts. A device needs less for these; what members are chosen by
+        // takes the rest there, and on the CPU path what its maps leave.
         let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
         cells * volumes as u64 + (features + graph) as u64
     }
@@ -479,17 +488,14 @@ impl Plan {
         (100 + right) * self.levels[0].pixels() as u64
     }
 
-    /// Largest number of bytes that the host takes besides the pair before it hands the graphs to a backend. Per
-    /// pixel: 17 to build the graphs (14 of guides, 3 of coarser images), besides the graphs themselves; 66 to
-    /// correct the illumination (48 for one view, 18 for the corrected pair); and 200 to find texture zones
+    /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
+    /// correct the illumination (48 for one view, 18 for the corrected pair), and 200 to find texture zones
     /// (spectrum and responses).
     #[must_use]
     pub fn front_bytes(&self) -> u64 {
-        let graphs =
-            self.levels.iter().map(|l| l.pixels() * (self.neighbours + 2 * self.slots() + 4)).sum::<usize>();
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
         let zones = if self.limits_labels() { 200 } else { 0 };
-        (17 + corrected + zones) * self.levels[0].pixels() as u64 + graphs as u64
+        (corrected + zones) * self.levels[0].pixels() as u64
     }
 
     /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks.

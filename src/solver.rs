@@ -71,13 +71,16 @@ impl<'a, 'b> Run<'a, 'b> {
 }
 
 /// From a prepared pair to the disparity of every pixel of the left view, and where the method asks for it of the right one;
-/// returns the number of iterations.
+/// returns the number of iterations, [`Backend::idle_iterations`] included.
 ///
 /// # Errors
 /// Those of [`Run::stage`].
 pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run: &mut Run) -> Result<u32> {
     run.inspect(&mut Inspection::Prepared(&prepared))?;
     run.watch.host("upload", || backend.prepare(plan, prepared))?;
+    for z in 0..plan.levels.len() {
+        run.stage(backend, plan, Stage::Graph(z))?;
+    }
     let costs = (0..plan.levels.len()).flat_map(|z| {
         let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
         iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
@@ -105,7 +108,8 @@ pub fn join(backend: &mut dyn Backend, plan: &Plan, run: &mut Run, z: usize) -> 
     run.stage(backend, plan, Stage::Evidence(z))
 }
 
-/// Runs the flooding of `plan`; `join` is called for each level that joins, coarsest first. Returns the number of iterations.
+/// Runs the flooding of `plan`; `join` is called for each level that joins, coarsest first. Returns the number of iterations,
+/// [`Backend::idle_iterations`] included.
 ///
 /// # Errors
 /// Those of [`estimate`] and of `join`.
@@ -115,7 +119,6 @@ pub fn flood<'a, 'b>(
     run: &mut Run<'a, 'b>,
     join: impl Fn(&mut dyn Backend, &mut Run<'a, 'b>, usize) -> Result<()>,
 ) -> Result<u32> {
-    let tolerance = plan.method.schedule.tolerance;
     let mut iterations = 0;
     let mut joined = plan.levels.len();
     for phase in &plan.phases {
@@ -126,9 +129,9 @@ pub fn flood<'a, 'b>(
         for stage in joining(plan, phase) {
             run.stage(backend, plan, stage)?;
         }
-        let converges = tolerance > 0.0 && phase.finest == 0;
-        if converges {
-            backend.change()?;
+        let may_settle = plan.settled_change().is_some() && phase.finest == 0;
+        if may_settle {
+            run.stage(backend, plan, Stage::Change)?;
         }
         for i in 0..phase.iterations {
             iterations += 1;
@@ -136,9 +139,10 @@ pub fn flood<'a, 'b>(
                 run.stage(backend, plan, stage)?;
             }
             run.inspect(&mut Inspection::Iteration(backend, iterations))?;
-            if converges {
-                let (sum, pixels) = (backend.change()? as f64, plan.levels[0].pixels() as f64);
-                if sum <= tolerance * tolerance * pixels {
+            if may_settle {
+                run.stage(backend, plan, Stage::Change)?;
+                // Who looks in sees no idle iterations, at the price of time.
+                if backend.settled(run.inspector.is_some())? {
                     break;
                 }
             }

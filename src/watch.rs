@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// Progress of a match.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// The stage about to run, or a step of the host between stages: "graph", "upload" and so on.
+    /// The stage about to run, or a step of the host between stages: "zones", "upload" and so on.
     pub stage: &'static str,
     /// Fraction of the work that is done, 0 to 1.
     pub done: f64,

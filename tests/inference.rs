@@ -11,7 +11,6 @@ use common::random::{self, Random, State};
 use common::twin;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::low_level::backend::{Backend, Volume};
-use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{HARD_CAP, Plan};
 use mrfgs::options::{Agreement, Method, Order, Potential};
@@ -146,7 +145,7 @@ impl Model {
 
     fn backend_with(&self, backend: &mut dyn Backend, evidence: &[Vec<u32>]) {
         let (width, height) = self.plan.size();
-        backend.prepare(&self.plan, Prepared::new(&blank(width, height), self.graphs.clone())).unwrap();
+        common::prepare(backend, &self.plan, &blank(width, height), &self.graphs);
         State::fresh(&self.plan, evidence.to_vec()).write(backend);
     }
 

@@ -15,7 +15,6 @@ use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::{Backend, Map, NO_LABEL, Stage};
 use mrfgs::low_level::engine::{self, Solution};
 use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::tiles::Tiles;
 use mrfgs::maps::{Maps, RightMap, flag};
@@ -264,12 +263,16 @@ fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
 
 /// Runs all stages up to [`Stage::SubPixel`]; returns the number of iterations.
 fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
-    backend.prepare(plan, Prepared::new(pair, graph::build(pair.left(), plan))).unwrap();
+    backend.prepare(plan, Prepared::new(pair)).unwrap();
     backend.run(Stage::Cost).unwrap();
-    for z in 1..plan.levels.len() {
-        backend.run(Stage::Pyramid(z)).unwrap();
+    for z in 0..plan.levels.len() {
+        backend.run(Stage::Graph(z)).unwrap();
+        if z > 0 {
+            backend.run(Stage::Pyramid(z)).unwrap();
+        }
     }
-    let iterations = common::flood_on_costs(backend, plan).unwrap();
+    let all = common::flood_on_costs(backend, plan).unwrap();
+    let iterations = all - backend.idle_iterations().unwrap();
     for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
         backend.run(stage).unwrap();
     }
@@ -503,7 +506,7 @@ fn no_label_agrees_with_none() {
     let mut maps = Finest::zero((5, 1));
     maps.right_label = Plane::filled(5, 1, NO_LABEL.into());
     for (name, mut backend) in backends() {
-        backend.prepare(&plan, Prepared::new(&pair, graph::build(pair.left(), &plan))).unwrap();
+        backend.prepare(&plan, Prepared::new(&pair)).unwrap();
         maps.write(backend.as_mut());
         backend.run(Stage::LeftRightCheck).unwrap();
         let validity = backend.map(Map::Validity).unwrap();

@@ -14,7 +14,6 @@ use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::engine::{Solution, solve};
 use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
 use std::io::Write;
@@ -175,7 +174,7 @@ fn poisoned_buffers() {
 /// The maps that the backend holds.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
-    let (maps, traffic, cells) = (backend.maps(requested).unwrap(), backend.traffic(), backend.cells());
+    let (maps, traffic, cells) = (backend.maps(requested).unwrap().0, backend.traffic(), backend.cells());
     Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic, cells }
 }
 
@@ -189,12 +188,13 @@ fn nothing_leaves_the_device_in_between() {
     let traffic = gpu.traffic();
     // Disparity, raw disparity and flags of 240 x 180 pixels, rows of 256.
     assert_eq!(traffic.bytes_down, 3 * 4 * 256 * 180, "{traffic:?}");
-    // With a tolerance, the sums of every row are read back in each iteration too.
+    // With a tolerance, a few words say when it was reached.
     let mut tolerant = method.clone();
-    tolerant.schedule.tolerance = 1e-6;
+    (tolerant.schedule.tolerance, tolerant.schedule.final_iterations) = (0.5, 20);
     let iterations = matched(&mut gpu, &pair, range, &tolerant).iterations;
-    let sums = gpu.traffic().bytes_down - traffic.bytes_down;
-    assert!(sums >= 8 * 180 && sums <= u64::from(iterations + 1) * 8 * 180, "{sums}");
+    assert!(gpu.traffic().bytes_down - traffic.bytes_down < 64);
+    assert_eq!(iterations, matched(&mut Cpu::default(), &pair, range, &tolerant).iterations);
+    assert!(iterations < 3 * 5 + 20, "{iterations}");
     // A second pair of the same plan takes the same dispatches, and no new parameters.
     matched(&mut gpu, &pair, range, &method);
     matched(&mut gpu, &pair, range, &method);
@@ -284,10 +284,9 @@ fn volumes_of_a_real_pair() {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
     let mut cpu = Cpu::default();
-    let graphs = graph::build(pair.left(), &plan);
     let backends: [&mut dyn Backend; 2] = [&mut cpu, &mut gpu];
     let costs = backends.map(|backend| {
-        backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
+        backend.prepare(&plan, Prepared::new(&pair)).unwrap();
         backend.run(Stage::Cost).unwrap();
         backend.probe().read(Volume::Cost(0)).unwrap()
     });

@@ -4,7 +4,7 @@
 
 // The label window of the pixel at (x, y): first label | number of labels with padding << 16.
 fn window_of(x: u32, y: u32) -> u32 {
-    return windows[y / 2u * ((params.level.width + WINDOW_RUN - 1u) / WINDOW_RUN) + x / WINDOW_RUN];
+    return windows[params.level.windows_at + y / 2u * ((params.level.width + WINDOW_RUN - 1u) / WINDOW_RUN) + x / WINDOW_RUN];
 }
 
 // Which entries of a quad are labels in this window.

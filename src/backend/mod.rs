@@ -68,7 +68,7 @@ pub trait Backend {
 
     /// Takes what a match by `plan` needs, gives every pixel all labels, and sets all messages, and the map that [`Stage::Change`] compares with, to 0. All
     /// that the stages need is allocated here, from the plan alone; a second pair whose plan [fits](Plan::fits) goes into the same
-    /// buffers.
+    /// buffers, and maps stay.
     ///
     /// # Errors
     /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
@@ -87,14 +87,18 @@ pub trait Backend {
         wavefront: &Wavefront,
         before: &mut dyn FnMut(Stage, f64) -> Result<()>,
     ) -> Result<()> {
-        wavefront.stages().iter().try_for_each(|&stage| {
+        wavefront.schedule().iter().try_for_each(|&stage| {
             before(stage, 1.0)?;
             self.run(stage)
         })
     }
 
-    /// Runs [`Stage::Change`] and returns its sum.
-    fn change(&mut self) -> Result<u64>;
+    /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
+    /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.
+    fn settled(&mut self, wait: bool) -> Result<bool>;
+
+    /// How many iterations found the map settled already.
+    fn idle_iterations(&mut self) -> Result<u32>;
 
     /// Waits until every stage has run.
     fn wait(&mut self) -> Result<()>;
@@ -102,18 +106,15 @@ pub trait Backend {
     /// The values of `map`, as they are once all stages before have run.
     fn map(&mut self, map: Map) -> Result<Plane<i32>>;
 
-    /// Replaces [`Map::RightLabel`], for [`Stage::LeftRightCheck`]: where another match has found it.
-    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()>;
-
     /// Asks for the maps as they are once all stages before have run. The next pair may be prepared before they arrive.
     fn request_maps(&mut self) -> Result<Ticket>;
 
-    /// The maps that this backend was asked for, once they have arrived. What was asked for earlier and never collected is
-    /// dropped.
+    /// The maps that this backend was asked for, once they have arrived, and [`Self::idle_iterations`] as it was then. What was
+    /// asked for earlier and never collected is dropped.
     ///
     /// # Panics
     /// When the ticket is of another backend.
-    fn maps(&mut self, ticket: Ticket) -> Result<Maps>;
+    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)>;
 
     /// Starts to take the time of every stage, or stops.
     fn keep_time(&mut self, on: bool) -> Result<()>;

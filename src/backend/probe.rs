@@ -2,6 +2,7 @@
 
 use super::volume::{Map, Volume};
 use crate::error::Result;
+use crate::graph::LevelGraph;
 use crate::image::Plane;
 
 /// A look into a backend between two stages, at the price of time. The methods fail with [`crate::Error::Device`] when the
@@ -22,9 +23,18 @@ pub trait Probe {
     /// Replaces the label windows of `level`; what its volumes hold is lost.
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()>;
 
+    /// The sum of the last [`Stage::Change`](super::Stage::Change).
+    fn change(&mut self) -> Result<u64>;
+
+    /// The graph of `level`.
+    fn graph(&mut self, level: usize) -> Result<LevelGraph>;
+
+    /// Replaces the graph of `level`.
+    fn set_graph(&mut self, level: usize, graph: &LevelGraph) -> Result<()>;
+
     /// Replaces the values of `map`.
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()>;
 
-    /// Overwrites every buffer with `byte`. A later match of the same plan shows it wherever it reads what it did not write.
+    /// Overwrites everything that a match writes with `byte`. A later match of the same plan shows it wherever it reads what it did not write.
     fn poison(&mut self, byte: u8) -> Result<()>;
 }

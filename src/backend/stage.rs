@@ -13,6 +13,9 @@ macro_rules! for_every_stage {
     ($then:ident) => {
         $then! {
             levels {
+                /// The members of the dependency factors of a level, chosen as [`crate::graph`] says from the level's guide. The guide
+                /// of level 0 is the left image, that of a coarser level [`crate::graph::downsample`] of the next finer one.
+                Graph graph;
                 /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
                 /// 256 times).
                 ///
@@ -88,7 +91,8 @@ macro_rules! for_every_stage {
                 ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
                 Cost cost;
                 /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
-                /// time (of label indices; from 0 the first time), which [`Backend::change`](super::Backend::change) returns.
+                /// time (of label indices; from 0 the first time). But for the first time, the map has settled where the sum is at
+                /// most [`Plan::settled_change`](crate::plan::Plan::settled_change).
                 Change change;
                 /// [`Map::Label`](super::Map::Label), [`Map::Best`](super::Map::Best) and [`Map::RunnerUp`](super::Map::RunnerUp) of level 0, among the labels
                 /// that the pixel has.
@@ -112,6 +116,10 @@ macro_rules! for_every_stage {
                 /// [`Map::RunnerUp`](super::Map::RunnerUp) becomes the new best, since no runner-up of the right view is known.
                 /// [`Stage::Cost`], [`Stage::SubPixel`] and the stages of maps then work on the right view.
                 SwapViews swap_views;
+                /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest) become
+                /// [`Map::Label`](super::Map::Label) and [`Map::Best`](super::Map::Best), with x counted from the other side: what the match
+                /// of the mirrored pair has found. They stay when that of the pair itself is prepared.
+                MirrorLabels mirror_labels;
             }
             maps {
                 /// [`Map::Validity`](super::Map::Validity): [`flag::MASKED`] alone on pixels masked in the left image, [`flag::OUTSIDE`] on others

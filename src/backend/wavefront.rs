@@ -15,6 +15,7 @@ pub const BAND: usize = 16;
 /// Stages that go down an image together.
 #[derive(Clone, Debug)]
 pub struct Wavefront {
+    schedule: Vec<Stage>,
     stages: Vec<Stage>,
     /// Rows of level 0 that each stage is behind the first one.
     lags: Vec<usize>,
@@ -35,7 +36,8 @@ impl Wavefront {
 
     /// The same with stages this many rows nearer than they may be.
     fn with_slack(plan: &Plan, stages: Vec<Stage>, nearer: usize) -> Option<Self> {
-        let stages: Vec<Stage> = stages.into_iter().flat_map(parts).collect();
+        let schedule = stages;
+        let stages: Vec<Stage> = schedule.iter().copied().flat_map(parts).collect();
         let level = |stage: &Stage| stage.level().unwrap_or(0);
         // Whole pixels of the coarsest level make whole rows of all.
         let step = 1 << stages.iter().map(level).max().unwrap_or(0);
@@ -53,7 +55,7 @@ impl Wavefront {
         }
         let heights = plan.levels.iter().map(|level| level.height).collect();
         let above = reaches.last().copied().unwrap_or(0);
-        Some(Self { stages, lags, heights, band: BAND.next_multiple_of(step), above })
+        Some(Self { schedule, stages, lags, heights, band: BAND.next_multiple_of(step), above })
     }
 
     /// Rows of level 0 that are needed at the same time, at most.
@@ -62,7 +64,13 @@ impl Wavefront {
         (self.band + self.lags.last().unwrap_or(&0) + self.above).min(self.heights[0])
     }
 
-    /// The stages.
+    /// The stages as they were scheduled.
+    #[must_use]
+    pub fn schedule(&self) -> &[Stage] {
+        &self.schedule
+    }
+
+    /// The stages that go row by row: those that were scheduled, or what they stand for.
     #[must_use]
     pub fn stages(&self) -> &[Stage] {
         &self.stages

@@ -8,7 +8,6 @@ pub mod matches;
 pub mod zones;
 
 use crate::error::{Error, Purpose, Result};
-use crate::graph::{self, LevelGraph};
 use crate::image::{Pair, Plane};
 use crate::memory;
 use crate::options::Illumination;
@@ -23,8 +22,6 @@ use zones::Zones;
 pub struct Prepared {
     /// The pair to match, its illumination corrected where the method asks for it.
     pub pair: Pair,
-    /// The graph of every level.
-    pub graphs: Vec<LevelGraph>,
     /// First and last label index of each pixel, by level; empty where every label is allowed.
     pub label_ranges: Vec<Plane<[u16; 2]>>,
     /// The source of the label ranges: texture zones and sparse matches.
@@ -32,10 +29,10 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// A pair that needs only its graphs.
+    /// A pair that is matched as it is, with all labels.
     #[must_use]
-    pub fn new(pair: &Pair, graphs: Vec<LevelGraph>) -> Self {
-        Self { pair: pair.clone(), graphs, label_ranges: Vec::new(), zones: None }
+    pub fn new(pair: &Pair) -> Self {
+        Self { pair: pair.clone(), label_ranges: Vec::new(), zones: None }
     }
 
     /// The same pair with these label ranges.
@@ -64,8 +61,7 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
             watch.host("illumination", both)?
         }
     };
-    let graphs = watch.host("graph", || Ok(graph::build(pair.left(), plan)))?;
-    let mut prepared = Prepared::new(&pair, graphs);
+    let mut prepared = Prepared::new(&pair);
     if plan.limits_labels() {
         let options = zones::Options { zones: method.front.zones as usize, ..zones::Options::default() };
         let zones = watch.host("zones", || Ok(zones::segment(pair.left(), &options)))?;

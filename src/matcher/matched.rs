@@ -40,7 +40,7 @@ pub struct Matched {
 /// The time that a stage took, over all its runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// The stage, or what the host does around the stages: "illumination", "graph", "upload", "zones" and the like.
+    /// The stage, or what the host does around the stages: "illumination", "upload", "zones" and the like.
     pub stage: &'static str,
     /// Its level, where it has one.
     pub level: Option<usize>,

@@ -80,8 +80,12 @@ impl Backend for Pooled {
         self.gpu().run(stage)
     }
 
-    fn change(&mut self) -> Result<u64> {
-        self.gpu().change()
+    fn settled(&mut self, wait: bool) -> Result<bool> {
+        self.gpu().settled(wait)
+    }
+
+    fn idle_iterations(&mut self) -> Result<u32> {
+        self.gpu().idle_iterations()
     }
 
     fn wait(&mut self) -> Result<()> {
@@ -92,15 +96,11 @@ impl Backend for Pooled {
         self.gpu().map(map)
     }
 
-    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()> {
-        self.gpu().set_right_labels(labels)
-    }
-
     fn request_maps(&mut self) -> Result<Ticket> {
         self.gpu().request_maps()
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<Maps> {
+    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
         self.gpu().maps(ticket)
     }
 

@@ -10,11 +10,33 @@ pub mod devices;
 pub mod random;
 pub mod twin;
 
+use mrfgs::image::{Image, Pair};
 use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::front::Prepared;
+use mrfgs::low_level::graph::{self, LevelGraph};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::solver::{self, Run};
 use mrfgs::low_level::watch::Watch;
 use std::ops::ControlFlow;
+
+/// The graphs of all levels of `plan`, chosen by `image`.
+pub fn graphs(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
+    let mut guide = image.clone();
+    let mut graphs = vec![graph::of_level(&guide, plan)];
+    for _ in 1..plan.levels.len() {
+        guide = graph::downsample(&guide);
+        graphs.push(graph::of_level(&guide, plan));
+    }
+    graphs
+}
+
+/// Prepares `backend` for a match of `pair` by `plan`, on `graphs`.
+pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[LevelGraph]) {
+    backend.prepare(plan, Prepared::new(pair)).unwrap();
+    for (z, graph) in graphs.iter().enumerate() {
+        backend.probe().set_graph(z, graph).unwrap();
+    }
+}
 
 /// Runs the message passing of `plan` on the evidence that `backend` holds; returns the number of iterations.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {

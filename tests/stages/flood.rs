@@ -2,11 +2,10 @@
 
 use crate::common::random::{self, Random};
 use crate::common::twin;
+use crate::common::{graphs, prepare};
 use crate::{on_all, same};
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
-use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph;
 use mrfgs::options::Method;
 
 #[test]
@@ -35,13 +34,13 @@ fn a_sweep_in_bands_is_a_sweep() {
         // The rows do not divide evenly into bands.
         let plan = random::plan((9, 133), -2, 21, &Method::preset(preset).unwrap());
         let pair = random::pair(&mut random, 9, 133);
-        let graphs = graph::build(pair.left(), &plan);
+        let graphs = graphs(pair.left(), &plan);
         let state = random::state(&mut random, &plan, &graphs, true);
         let run = |threads: usize, stages: &[Stage]| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let mut cpu = Cpu::default();
-                cpu.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
+                prepare(&mut cpu, &plan, &pair, &graphs);
                 state.write(&mut cpu);
                 for &stage in stages {
                     cpu.run(stage).unwrap();

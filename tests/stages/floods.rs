@@ -8,7 +8,7 @@ use crate::{MINIMA, on_all, resolve, same, twin_start};
 use mrfgs::image::Pair;
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph::{self, LevelGraph};
+use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{Agreement, MatchingCost, Method, Order, PRESETS, Potential};
 use std::collections::HashSet;
@@ -146,20 +146,29 @@ fn twin_read_out(plan: &Plan, cost: &[u32], belief: &[u32], maps: &mut twin::Fin
 
 /// From the pair to the estimate, on every backend and on the twins; returns the number of iterations.
 pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
-    let graphs = graph::build(pair.left(), plan);
+    let codes = twin::graph::graphs(pair.left(), plan);
+    let graphs: Vec<LevelGraph> = codes
+        .into_iter()
+        .zip(&plan.levels)
+        .map(|(codes, l)| LevelGraph::new(l.width, l.height, plan.neighbours, codes))
+        .collect();
     let (costs, mut state) = twin_start(plan, pair);
     let iterations = twin_flood(plan, &graphs, &mut state, Some(&costs));
     let mut maps = twin::Finest::zero(plan.size());
     twin_read_out(plan, &costs[0], &state.belief[0], &mut maps);
     for (name, mut backend) in backends() {
         let backend = backend.as_mut();
-        backend.prepare(plan, Prepared::new(pair, graphs.clone())).unwrap();
+        backend.prepare(plan, Prepared::new(pair)).unwrap();
         backend.run(Stage::Cost).unwrap();
-        for z in 1..plan.levels.len() {
-            backend.run(Stage::Pyramid(z)).unwrap();
+        for z in 0..plan.levels.len() {
+            backend.run(Stage::Graph(z)).unwrap();
+            if z > 0 {
+                backend.run(Stage::Pyramid(z)).unwrap();
+            }
         }
         let check = |backend: &mut dyn Backend| -> Result<(), String> {
-            let actual = crate::common::flood_on_costs(backend, plan).unwrap();
+            let all = crate::common::flood_on_costs(backend, plan).unwrap();
+            let actual = all - backend.idle_iterations().unwrap();
             if actual != iterations {
                 return Err(format!("{actual} iterations but the twin did {iterations}"));
             }

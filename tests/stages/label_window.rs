@@ -28,7 +28,7 @@ fn label_window() {
         method.schedule.order = Order::CoarseFirst;
         let (width, height) = case.plan.size();
         let plan = Plan::new(width, height, case.plan.range, &method).unwrap();
-        backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
+        backend.prepare(&plan, Prepared::new(&case.pair)).unwrap();
         let last = plan.levels.len() - 1;
         if found(backend, &plan, last) != twin::label_window::label_window(&plan, last, None, None) {
             return Err("windows of the coarsest level".into());
@@ -90,7 +90,7 @@ fn windows_within_label_ranges() {
                 })
             })
             .collect();
-        let prepared = Prepared::new(&case.pair, case.graphs.clone()).within(ranges.clone());
+        let prepared = Prepared::new(&case.pair).within(ranges.clone());
         backend.prepare(&plan, prepared).unwrap();
         for (z, ranges) in ranges.iter().enumerate() {
             let expected = twin::label_window::label_window(&plan, z, None, Some(ranges));

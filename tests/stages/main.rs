@@ -24,14 +24,13 @@ macro_rules! declare {
 
 mrfgs::for_every_stage!(declare);
 
-use common::compare::{compare, compare_maps};
+use common::compare::compare;
 use common::devices::backends;
 use common::random::{self, Random, State};
 use common::twin;
 use mrfgs::image::{Pair, Plane};
 use mrfgs::low_level::backend::{Backend, Volume};
-use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph::{self, LevelGraph};
+use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{COST_MAX, Plan};
 use std::collections::HashSet;
 use std::ops::Range;
@@ -99,7 +98,7 @@ fn cases() -> Vec<Case> {
             assert_eq!(plan.neighbours, neighbours);
             let pair = random::pair(&mut random, size.0, size.1);
             let graphs = if random.one_in(2) {
-                graph::build(pair.left(), &plan)
+                common::graphs(pair.left(), &plan)
             } else {
                 random::graphs(&mut random, &plan)
             };
@@ -117,7 +116,7 @@ fn on_all(check: impl Fn(&Case, &mut dyn Backend, &mut Random) -> Result<(), Str
     for case in cases() {
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
-            backend.prepare(&case.plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
+            common::prepare(backend, &case.plan, &case.pair, &case.graphs);
             for (z, windows) in case.windows.iter().enumerate() {
                 backend.probe().set_windows(z, windows).unwrap();
             }
@@ -171,45 +170,6 @@ fn the_cases_cover_what_they_should() {
         seen(&|p| (1..p.levels.len()).map(|z| p.label_offset(z)).min().unwrap_or(1).to_string()).len(),
         3
     );
-}
-
-#[test]
-fn graph() {
-    for case in cases() {
-        let built = graph::build(case.pair.left(), &case.plan);
-        let expected = twin::graph::graphs(case.pair.left(), &case.plan);
-        for (z, (graph, codes)) in built.iter().zip(expected).enumerate() {
-            assert!(graph.codes() == codes, "level {z} of {}", case.name);
-        }
-        for graph in case.graphs.iter().chain(&built) {
-            let mut incoming = vec![Vec::new(); graph.width() * graph.height()];
-            for factor in 0..incoming.len() {
-                for (slot, member) in twin::members(graph, factor).into_iter().enumerate() {
-                    assert_eq!(graph.member(factor, slot), member);
-                    if let Some(pixel) = member {
-                        incoming[pixel].push((factor, slot));
-                    }
-                }
-            }
-            for (pixel, slots) in incoming.iter().enumerate() {
-                let found = graph.incoming_of(pixel).iter().map(|entry| {
-                    let (dx, dy, slot) = entry.parts();
-                    (pixel.wrapping_add_signed(dy * graph.width() as isize + dx), slot)
-                });
-                assert_eq!(found.collect::<Vec<_>>(), *slots, "pixel {pixel} of {}", case.name);
-            }
-        }
-    }
-}
-
-#[test]
-fn downsample() {
-    for case in cases() {
-        let (actual, expected) =
-            (graph::downsample(case.pair.left()), twin::graph::downsample(case.pair.left()));
-        compare_maps("pixels", &actual.pixels, &expected.pixels).unwrap();
-        compare_maps("mask", &actual.masked, &expected.masked).unwrap();
-    }
 }
 
 /// The twins' costs of all levels, and their state before any level has joined.

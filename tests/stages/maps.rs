@@ -7,7 +7,6 @@ use super::common::twin::{self, Finest};
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{Median, Method};
@@ -48,7 +47,7 @@ pub(crate) fn on_maps(
             twin(&plan, &pair, &mut expected);
             for (name, backend) in &mut backends {
                 let backend = backend.as_mut();
-                backend.prepare(&plan, Prepared::new(&pair, graph::build(pair.left(), &plan))).unwrap();
+                backend.prepare(&plan, Prepared::new(&pair)).unwrap();
                 maps.write(backend);
                 backend.run(stage).unwrap();
                 if let Err(e) = compare_finest(backend, &expected) {
@@ -74,7 +73,7 @@ fn nothing_valid() {
             let mut expected = maps.clone();
             expected.confidence = Plane::filled(size.0, size.1, 0);
             for (name, mut backend) in backends() {
-                backend.prepare(&plan, Prepared::new(&pair, graph::build(pair.left(), &plan))).unwrap();
+                backend.prepare(&plan, Prepared::new(&pair)).unwrap();
                 maps.write(backend.as_mut());
                 for stage in
                     [Stage::SpeckleFilter, Stage::Fill, Stage::FillMedian, Stage::Median, Stage::Confidence]
@@ -140,7 +139,7 @@ fn control_changes_are_found() {
     for (name, mut backend) in backends() {
         for (stage, bare, twin, change) in changes {
             let input = if *bare { &unflagged } else { &maps };
-            backend.prepare(&plan, Prepared::new(&pair, graph::build(pair.left(), &plan))).unwrap();
+            backend.prepare(&plan, Prepared::new(&pair)).unwrap();
             input.write(backend.as_mut());
             backend.run(*stage).unwrap();
             let mut other = plan.clone();

@@ -29,7 +29,7 @@ fn right_view() {
             // Then a tile with its own core, in the same buffers.
             let start = random.within(0, width as u32 - 1) as usize;
             plan.core = start..random.within(start as u32 + 1, width as u32) as usize;
-            backend.prepare(&plan, Prepared::new(&case.pair, case.graphs.clone())).unwrap();
+            backend.prepare(&plan, Prepared::new(&case.pair)).unwrap();
             backend.probe().set_windows(0, &case.windows[0]).unwrap();
         }
         Ok(())

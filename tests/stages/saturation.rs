@@ -1,13 +1,13 @@
 //! Saturating sums, in 8 and in 16 bits.
 
 use crate::common::devices::backends;
+use crate::common::prepare;
 use crate::common::random::{self, Random, State};
 use crate::common::twin;
 use crate::common::twin::belief::belief_most;
 use crate::floods::twin_flood;
 use crate::{NEIGHBOURS, cells, resolve, same};
 use mrfgs::low_level::backend::{Backend, Stage, Volume, volume_shape};
-use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::{self, LevelGraph};
 use mrfgs::low_level::plan::{LevelPlan, Plan, Truncation, TruncationRule, VolumeWidth};
 use mrfgs::options::{Agreement, Method};
@@ -51,7 +51,7 @@ fn flood_of_the_sure(plan: &Plan) -> u32 {
     let start = state.clone();
     twin_flood(plan, &graphs, &mut state, None);
     for (name, mut backend) in backends() {
-        backend.prepare(plan, Prepared::new(&pair, graphs.clone())).unwrap();
+        prepare(backend.as_mut(), plan, &pair, &graphs);
         start.write(backend.as_mut());
         crate::common::flood(backend.as_mut(), plan).unwrap();
         for (volume, expected) in state.volumes() {
@@ -131,7 +131,7 @@ fn control_saturated_sums_say_nothing() {
             };
             for (name, mut backend) in backends() {
                 let backend = backend.as_mut();
-                backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
+                prepare(backend, &plan, &pair, &graphs);
                 for z in 0..2 {
                     let belief = better(&plan, Volume::Belief(z), belief_most(&plan));
                     backend.probe().write(Volume::Belief(z), &belief).unwrap();
@@ -185,7 +185,7 @@ fn control_padding_stays_behind_beliefs_that_saturate() {
         let silent = vec![0; cells(&plan, 0) * plan.slots()];
         for (name, mut backend) in backends() {
             let backend = backend.as_mut();
-            backend.prepare(&plan, Prepared::new(&pair, graphs.clone())).unwrap();
+            prepare(backend, &plan, &pair, &graphs);
             backend.probe().write(Volume::Evidence(0), &flat(0)).unwrap();
             backend.probe().write(Volume::Belief(0), &flat(0)).unwrap();
             for _ in 0..2 {

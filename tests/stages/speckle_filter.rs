@@ -8,7 +8,6 @@ use crate::maps::{on_maps, small_plan};
 use mrfgs::image::Plane;
 use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::front::Prepared;
-use mrfgs::low_level::graph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Method;
@@ -61,7 +60,7 @@ fn regions_that_wind() {
             let mut expected = maps.clone();
             twin::speckle_filter::speckle_filter(&plan, &mut expected);
             for (name, mut backend) in backends() {
-                backend.prepare(&plan, Prepared::new(&pair, graph::build(pair.left(), &plan))).unwrap();
+                backend.prepare(&plan, Prepared::new(&pair)).unwrap();
                 maps.write(backend.as_mut());
                 backend.run(Stage::SpeckleFilter).unwrap();
                 if let Err(e) = compare_finest(backend.as_mut(), &expected) {

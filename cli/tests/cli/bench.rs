@@ -78,11 +78,13 @@ fn a_bench_gives_every_figure_of_both_backends() {
             let stages = found["stages"].as_object().unwrap();
             assert!(stages.values().all(|ms| ms.as_f64().is_some_and(|ms| ms >= 0.0)), "{stages:?}");
             let messages = if backend == "cpu" { "flood, level 0" } else { "dependency, level 0" };
-            for stage in ["graph", "cost", messages, "median"] {
+            for stage in ["graph, level 0", "cost", messages, "median"] {
                 assert!(stages.contains_key(stage), "no {stage} in {stages:?}");
             }
             assert_eq!(stages.contains_key("zones"), preset == "paper");
-            assert_eq!(found["device_bytes"].is_null(), backend == "cpu");
+            for key in ["device_bytes", "dispatches", "submissions", "bytes_up", "bytes_down"] {
+                assert_eq!(found[key].is_null(), backend == "cpu", "{key}");
+            }
             if backend == "gpu" {
                 assert!(value("device_bytes") >= value("plan_bytes") / 2.0, "{what}");
             }

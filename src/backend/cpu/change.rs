@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let (width, Level { belief, windows, .. }) = (v.plan.levels[0].width, &v.levels[0]);
-    v.change = v
+    let sum = v
         .labels
         .par_chunks_mut(width)
         .enumerate()
@@ -21,4 +21,6 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
             sum
         })
         .sum();
+    v.settled = v.change.is_some() && v.plan.settled_change().is_some_and(|most| sum <= most);
+    v.change = Some(sum);
 }

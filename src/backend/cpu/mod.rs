@@ -158,9 +158,12 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn change(&mut self) -> Result<u64> {
-        self.run(Stage::Change)?;
-        Ok(on_volumes!(self, v => v.change))
+    fn settled(&mut self, _: bool) -> Result<bool> {
+        Ok(on_volumes!(self, v => v.settled))
+    }
+
+    fn idle_iterations(&mut self) -> Result<u32> {
+        Ok(0)
     }
 
     fn wait(&mut self) -> Result<()> {
@@ -169,11 +172,6 @@ impl Backend for Cpu {
 
     fn map(&mut self, map: Map) -> Result<Plane<i32>> {
         Ok(on_volumes!(self, v => v.maps.read(map)))
-    }
-
-    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()> {
-        on_volumes!(self, v => v.maps.write(Map::RightLabel, labels));
-        Ok(())
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
@@ -188,8 +186,8 @@ impl Backend for Cpu {
         Ok(self.requests.add(maps))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<Maps> {
-        Ok(self.requests.take(&ticket))
+    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
+        Ok((self.requests.take(&ticket), 0))
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

@@ -8,6 +8,7 @@ use crate::backend::Map;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::error::Result;
+use crate::graph::LevelGraph;
 use crate::image::Plane;
 use crate::plan::LevelPlan;
 use rayon::prelude::*;
@@ -62,6 +63,19 @@ impl Probe for Cpu {
         Ok(())
     }
 
+    fn change(&mut self) -> Result<u64> {
+        Ok(on_volumes!(self, v => v.change.unwrap_or(0)))
+    }
+
+    fn graph(&mut self, level: usize) -> Result<LevelGraph> {
+        Ok(on_volumes!(self, v => v.levels[level].graph.clone()))
+    }
+
+    fn set_graph(&mut self, level: usize, graph: &LevelGraph) -> Result<()> {
+        on_volumes!(self, v => v.levels[level].graph = graph.clone());
+        Ok(())
+    }
+
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
         on_volumes!(self, v => v.maps.write(map, values));
         Ok(())
@@ -112,7 +126,7 @@ impl<U: Units> Volumes<U> {
             Volume::Cost(_) => gather(&l.cost, labels, stride),
             Volume::Evidence(_) => self.gather_windows(z, &l.evidence, 1, u8::MAX.into()),
             Volume::Dependency(_) if l.dependency_sent => {
-                self.gather_windows(z, &l.dependency, l.graph.slots(), dependency)
+                self.gather_windows(z, &l.dependency, self.plan.slots(), dependency)
             }
             Volume::Down(_) if self.levels[z + 1].resolution_sent => {
                 self.gather_windows(z, &l.down, 1, resolution)
@@ -162,7 +176,7 @@ impl<U: Units> Volumes<U> {
             Volume::Belief(_) => scatter(plan, &l.windows, (1, U::MOST), values, U::of, &mut l.belief),
             Volume::Dependency(_) | Volume::Down(_) | Volume::Up(_) => {
                 let (slots, messages) = match volume {
-                    Volume::Dependency(_) => (l.graph.slots(), &mut l.dependency),
+                    Volume::Dependency(_) => (self.plan.slots(), &mut l.dependency),
                     Volume::Down(_) => (1, &mut l.down),
                     _ => (1, &mut l.up),
                 };

@@ -9,7 +9,7 @@ use crate::backend::Stage;
 use crate::error::Result;
 use crate::front::Prepared;
 use crate::graph::LevelGraph;
-use crate::image::{Pair, Plane};
+use crate::image::{Image, Pair, Plane};
 use crate::plan::Plan;
 
 /// All volumes of a match.
@@ -23,10 +23,11 @@ pub(super) struct Volumes<U> {
     pub(super) levels: Vec<Level<U>>,
     /// First and last label of each pixel, by level; empty where all labels are allowed.
     pub(super) label_ranges: Vec<Plane<[u16; 2]>>,
-    /// Label map of the last [`Stage::Change`](crate::backend::Stage::Change), and the sum of squared
-    /// changes.
+    /// Label map of the last [`Stage::Change`](crate::backend::Stage::Change), the sum of squared
+    /// changes, and whether the map has settled.
     pub(super) labels: Vec<u16>,
-    pub(super) change: u64,
+    pub(super) change: Option<u64>,
+    pub(super) settled: bool,
     pub(super) maps: Finest,
 }
 
@@ -46,6 +47,8 @@ pub(super) struct Sent {
 /// [`Plan::rows_held`] rows.
 pub(super) struct Level<U> {
     pub(super) graph: LevelGraph,
+    /// What the graph was chosen by; `None` at level 0, whose guide is the left image.
+    pub(super) guide: Option<Image>,
     pub(super) windows: Windows,
     /// In 1/256 cost units; empty at level 0.
     pub(super) cost: Pages<u16>,
@@ -66,26 +69,27 @@ pub(super) struct Level<U> {
 
 impl<U: Units> Volumes<U> {
     pub(super) fn new(plan: &Plan, prepared: Prepared) -> Result<Self> {
-        let Prepared { pair, graphs, label_ranges, .. } = prepared;
+        let Prepared { pair, label_ranges, .. } = prepared;
         let last = plan.levels.len() - 1;
-        let levels = graphs
-            .into_iter()
+        let levels = plan
+            .levels
+            .iter()
             .enumerate()
-            .map(|(z, graph)| {
-                let level = &plan.levels[z];
+            .map(|(z, level)| {
                 let held = plan.rows_held(z);
                 let cells = Windows::most_cells(level, held);
                 Ok(Level {
                     windows: Windows::full(level, held),
                     cost: Pages::new(if z == 0 { 0 } else { level.pixels() * level.stride })?,
                     evidence: Pages::new(cells)?,
-                    dependency: Pages::new(cells * graph.slots())?,
+                    dependency: Pages::new(cells * plan.slots())?,
                     dependency_sent: false,
                     resolution_sent: false,
                     down: Pages::new(if z == last { 0 } else { cells })?,
                     up: Pages::new(if z == 0 { 0 } else { cells })?,
                     belief: Pages::new(cells)?,
-                    graph,
+                    graph: LevelGraph::default(),
+                    guide: None,
                 })
             })
             .collect::<Result<_>>()?;
@@ -98,16 +102,17 @@ impl<U: Units> Volumes<U> {
             levels,
             label_ranges,
             labels: vec![0; fine.pixels()],
-            change: 0,
+            change: None,
+            settled: false,
             maps: Finest::new(plan.size()),
         })
     }
 
-    /// Frees the graphs and the label ranges.
+    /// Frees the graphs with their guides, and the label ranges.
     pub(super) fn release(&mut self) {
         self.label_ranges = Vec::new();
         for level in &mut self.levels {
-            level.graph = LevelGraph::default();
+            (level.graph, level.guide) = (LevelGraph::default(), None);
         }
     }
 
@@ -129,12 +134,14 @@ impl<U: Units> Volumes<U> {
 
     /// Resets everything for another pair whose plan fits, to the state that [`Self::new`] gives.
     pub(super) fn reset(&mut self, plan: &Plan, prepared: Prepared) {
-        let Prepared { pair, graphs, label_ranges, .. } = prepared;
+        let Prepared { pair, label_ranges, .. } = prepared;
         self.plan = plan.clone();
         (self.pair, self.label_ranges) = (pair, label_ranges);
         self.labels.fill(0);
-        for (z, ((level, graph), l)) in self.levels.iter_mut().zip(graphs).zip(&plan.levels).enumerate() {
-            (level.graph, level.windows) = (graph, Windows::full(l, plan.rows_held(z)));
+        (self.change, self.settled) = (None, false);
+        for (z, (level, l)) in self.levels.iter_mut().zip(&plan.levels).enumerate() {
+            (level.graph, level.guide) = (LevelGraph::default(), None);
+            level.windows = Windows::full(l, plan.rows_held(z));
             (level.dependency_sent, level.resolution_sent) = (false, false);
         }
     }

@@ -1,25 +1,74 @@
-//! How much the label map changed: see [`Stage::Change`](crate::backend::Stage::Change).
+//! How much the label map changed, and whether it has settled: see [`Stage::Change`](crate::backend::Stage::Change).
 
 use super::buffers::Binding;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
+use super::uniform::uniform;
 use crate::error::Result;
 use crate::plan::Plan;
+use bytemuck::{Pod, Zeroable};
 
 const SHADER: &str = include_str!("../../../shaders/change.wgsl");
 
-/// `labels` and `sums`.
+uniform! { most_low: u32, most_high: u32, may_settle: u32, endings: u32 }
+
+/// What the stage has found so far, as the shader keeps it.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct Convergence {
+    sum: [u32; 2],
+    runs: u32,
+    settled: u32,
+    idle: u32,
+}
+
+impl Convergence {
+    /// What these words say.
+    pub(super) fn of(words: &[u32]) -> Self {
+        *bytemuck::from_bytes(&bytemuck::cast_slice(words)[..size_of::<Self>()])
+    }
+
+    /// The last sum of squared changes.
+    pub(super) fn sum(self) -> u64 {
+        u64::from(self.sum[1]) << 32 | u64::from(self.sum[0])
+    }
+
+    pub(super) fn settled(self) -> bool {
+        self.settled != 0
+    }
+
+    /// How often the map had settled before.
+    pub(super) fn idle(self) -> u32 {
+        self.idle
+    }
+}
+
+/// `labels`, `sums` and `settle`.
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
     let level = &plan.levels[0];
-    let kernel = |entry| Kernel::new("change", entry, SHADER).of_width(plan.volume_width);
-    vec![Job::new::<()>(kernel("labels"), level.quads()), Job::new::<()>(kernel("sums"), level.width)]
+    let job = |entry, loops| {
+        let kernel = Kernel::new("change", entry, SHADER).of_width(plan.volume_width);
+        Job::new::<Uniform>(kernel, loops)
+    };
+    // The messages of a level take few dispatches, also together with those of others.
+    let endings = 64 * plan.levels.len();
+    vec![job("labels", level.quads()), job("sums", level.width), job("settle", level.height + endings)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, here, l) = (r.buffers, r.here(), r.params());
-    let [labels, sums] = &jobs(r.plan, 0)[..] else { unreachable!("two kernels") };
-    r.rows(labels, &(), l.width, |rows| {
+    let [labels, sums, settle] = &jobs(r.plan, 0)[..] else { unreachable!("three kernels") };
+    let most = r.plan.settled_change();
+    let own = Uniform {
+        most_low: most.unwrap_or(0) as u32,
+        most_high: (most.unwrap_or(0) >> 32) as u32,
+        may_settle: most.is_some().into(),
+        endings: b.endings,
+    };
+    r.rows(labels, &own, l.width, |rows| {
         vec![(1, here.belief.bind(rows)), (2, b.labels.bind(rows)), (3, b.squares.bind(rows))]
     })?;
-    r.one_a_row(sums, &(), |rows| vec![(3, b.squares.bind(rows)), (4, Binding::whole(&b.change_sums))])
+    r.one_a_row(sums, &own, |rows| vec![(3, b.squares.bind(rows)), (4, Binding::whole(&b.change_sums))])?;
+    let bindings = [&b.change_sums, &b.convergence, &b.groups].map(Binding::whole);
+    r.dispatch(settle, &own, 0..l.height, (1, 1), &[4, 5, 6].into_iter().zip(bindings).collect::<Vec<_>>())
 }

@@ -1,7 +1,7 @@
 //! Matching cost: see [`Stage::Cost`](crate::backend::Stage::Cost).
 //!
-//! Floor: `census` moves 24 bytes a pixel, `contrast` 20, at 1,000 operations each, and asks for 400, the 63 places of the
-//! window; `ad_census` moves 1 byte a label at 100 operations for four, and asks for 32, the right row once a label.
+//! Floor: `census` moves 52 bytes a pixel at 2,500 operations, and asks for 2,000, the 63 places of the window in both images;
+//! `ad_census` moves 1 byte a label at 100 operations for four, and asks for 32, the right row once a label.
 
 use super::buffers::with_halo;
 use super::shader::Kernel;
@@ -20,7 +20,7 @@ const SAD_RUN: u32 = 8;
 
 uniform! { outside_cost: u32, colour_weight: u32, colour_variance: u32, sad_radius: i32 }
 
-/// `sad`; or `census`, `contrast` and `ad_census`.
+/// `sad`; or `census` and `ad_census`.
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
     let job = |entry: &'static str, loops| {
         let kernel = Kernel::new("cost", entry, SHADER)
@@ -39,7 +39,7 @@ pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
         return vec![job("sad", (window + run - 1) * (1 + 5 * window + run) + run * 5)];
     }
     let window = (2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2);
-    vec![job("census", window), job("contrast", window), job("ad_census", 4)]
+    vec![job("census", window), job("ad_census", 4)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
@@ -52,15 +52,16 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     };
     let cost = &r.here().cost;
     match &jobs(plan, 0)[..] {
-        [census, contrast, ad_census] => {
-            let around = |rows: &_| with_halo(rows, CENSUS_RADIUS_Y, l.height);
-            for (image, bits) in [&b.left, &b.right].into_iter().zip(&b.census) {
-                r.rows(census, &own, l.width, |rows| {
-                    vec![(7, image.bind(&around(rows))), (8, bits.bind(rows))]
-                })?;
-            }
-            r.rows(contrast, &own, l.width, |rows| {
-                vec![(7, b.left.bind(&around(rows))), (9, b.contrast.bind(rows))]
+        [census, ad_census] => {
+            r.rows(census, &own, l.width, |rows| {
+                let seen = with_halo(rows, CENSUS_RADIUS_Y, l.height);
+                vec![
+                    (1, b.left.bind(&seen)),
+                    (2, b.right.bind(&seen)),
+                    (7, b.census[0].bind(rows)),
+                    (8, b.census[1].bind(rows)),
+                    (9, b.contrast.bind(rows)),
+                ]
             })?;
             r.rows(ad_census, &own, l.width * l.quads, |rows| {
                 vec![

@@ -3,21 +3,23 @@
 //! Floor, a label and three members: 7 bytes moved, 15 asked for (the beliefs of three members, all of it again after the
 //! minimum), 50 operations for four labels.
 
-use super::buffers::{HALO, with_halo};
+use super::buffers::{HALO, Shared, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
 use crate::error::Result;
 use crate::graph::NO_MEMBER;
 use crate::plan::{GRAPH_WINDOW, Plan, TruncationRule};
+use std::ops::Range;
 
 const SHADER: &str = include_str!("../../../shaders/dependency.wgsl");
 
 uniform! { tau: u32 }
 
-pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
+pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
     let absolute = plan.dependency.rule == TruncationRule::Absolute;
-    let (quads, slots) = (plan.levels[level].quads(), plan.slots());
+    // The finest level has the most labels.
+    let (quads, slots) = (plan.levels[0].quads(), plan.slots());
     let kernel = Kernel::new("dependency", "main", SHADER)
         .of_width(plan.volume_width)
         .with("SLOTS", slots as u32)
@@ -26,7 +28,8 @@ pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
         .with("WINDOW", GRAPH_WINDOW as u32)
         .with("RADIUS", HALO);
     let floors = if absolute { slots * (quads + 1) } else { 0 };
-    vec![Job::new::<Uniform>(kernel, floors + 3 * slots + 2 * quads * (2 * slots + 1))]
+    let loops = floors + 3 * slots + 2 * quads * (2 * slots + 1);
+    vec![Job::new::<Uniform>(kernel, loops).over_levels(plan)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
@@ -38,4 +41,12 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     })?;
     r.renew(&here.dependency);
     Ok(())
+}
+
+/// The same for all of `levels` at once.
+pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
+    let (plan, buffers) = (r.plan, r.buffers);
+    let own = |z: usize| (Uniform { tau: plan.dependency.tau.into() }, buffers.levels[z].params.width);
+    let bound = [(1, &shared.members), (2, &shared.belief), (3, &shared.dependency)];
+    r.levels(&jobs(plan, 0)[0], levels, own, &bound)
 }

@@ -192,6 +192,10 @@ pub struct FaultInjection {
 /// software driver shares a processor with everything else that runs there.
 const PATIENCE: Duration = Duration::from_secs(60);
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
+/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop long jobs,
+/// and on a processor for a bar that moves.
+const WORK_PER_SUBMIT: u64 = 1 << 32;
+const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
 /// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late.
 const SUBMISSIONS: usize = 4;
 
@@ -209,6 +213,8 @@ pub(super) struct Device {
     pub(super) memory: Option<u64>,
     /// Nanoseconds per tick of its timestamps, where it has them.
     pub(super) tick: Option<f64>,
+    /// Loop iterations that are submitted at once, about.
+    pub(super) work_per_submit: u64,
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<wgpu::SubmissionIndex>,
@@ -282,6 +288,7 @@ impl Device {
             max_groups: limits.max_compute_workgroups_per_dimension,
             memory: faults.memory,
             tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
+            work_per_submit: if software { SOFTWARE_WORK_PER_SUBMIT } else { WORK_PER_SUBMIT },
             patience: faults.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
             lost_after: faults.lost_after,
             under_way: VecDeque::new(),
@@ -316,7 +323,11 @@ impl Device {
     }
 
     pub(super) fn write(&mut self, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
-        self.queue()?.write_buffer(buffer, 0, bytes);
+        self.write_at(buffer, 0, bytes)
+    }
+
+    pub(super) fn write_at(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) -> Result<()> {
+        self.queue()?.write_buffer(buffer, offset, bytes);
         self.traffic.bytes_up += bytes.len() as u64;
         Ok(())
     }
@@ -360,7 +371,10 @@ impl Device {
     }
 
     /// Requests buffers, as they are after everything submitted so far.
-    pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Requested {
+    pub(super) fn request(&mut self, buffers: Vec<wgpu::Buffer>) -> Result<Requested> {
+        // A device that is lost says so here, and not that the buffers are wrong.
+        self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
+        self.check()?;
         let (sender, mapped) = mpsc::channel();
         for buffer in &buffers {
             self.traffic.bytes_down += buffer.size();
@@ -370,28 +384,38 @@ impl Device {
                 let _ = sender.send(result);
             });
         }
-        Requested { buffers, mapped, submitted: self.submitted }
+        Ok(Requested { buffers, mapped, submitted: self.submitted })
     }
 
     /// The words of each requested buffer; later submissions may still be in flight.
     pub(super) fn collect(&mut self, requested: Requested) -> Result<Vec<Vec<u32>>> {
+        self.read(requested, |all| all.iter().map(|words| words.to_vec()).collect())
+    }
+
+    /// What `read` makes of the words of all requested buffers.
+    pub(super) fn read<T>(&mut self, requested: Requested, read: impl FnOnce(&[&[u32]]) -> T) -> Result<T> {
         while self.submitted - (self.under_way.len() as u64) < requested.submitted {
             self.wait_for_one()?;
         }
         self.check()?;
         // Buffers whose submission finished long ago are mapped by any poll.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
-        let mut all = Vec::new();
         for _ in &requested.buffers {
             let mapped = requested.mapped.try_recv().map_err(|e| failed(&self.name, &e))?;
             mapped.map_err(|e| failed(&self.name, &e))?;
         }
+        let mut views = Vec::new();
         for buffer in &requested.buffers {
-            let view = buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?;
-            all.push(bytemuck::pod_collect_to_vec(&view));
+            views.push(buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?);
         }
+        let words = views.iter().map(|view| {
+            // No bytes need not be aligned.
+            if view.is_empty() { &[][..] } else { bytemuck::cast_slice(view) }
+        });
+        let words: Vec<&[u32]> = words.collect();
+        let read = read(&words);
         self.check()?;
-        Ok(all)
+        Ok(read)
     }
 
     fn hung(&self) -> Error {

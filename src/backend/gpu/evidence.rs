@@ -2,7 +2,6 @@
 //!
 //! Floor, a label: 3 bytes moved, 4 asked for (the costs twice, for their minimum), 25 operations for four.
 
-use super::buffers::Binding;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
@@ -36,7 +35,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
             (1, here.cost.bind(rows)),
             (2, here.evidence.bind(rows)),
             (3, here.belief.bind(rows)),
-            (4, Binding::whole(&here.windows)),
+            (4, here.windows.bind(&(0..1))),
         ]
     })?;
     r.renew(&here.belief);

@@ -1,8 +1,8 @@
 //! Label windows: see [`Stage::LabelWindow`](crate::backend::Stage::LabelWindow).
 //!
-//! Windows that hold all labels are written with the pair.
+//! Windows that hold all labels are there from the start.
 
-use super::buffers::{Binding, HALO, with_halo};
+use super::buffers::{HALO, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
@@ -44,7 +44,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let l = &r.plan.levels[level];
     let runs = l.windows().0 as u32;
     let own = |label_offset| Uniform { runs, labels: l.labels as u32, stride: l.stride as u32, label_offset };
-    let windows = Binding::whole(&here.windows);
+    let windows = here.windows.bind(&(0..1));
     match &jobs(r.plan, level)[..] {
         [candidates, around] => {
             let own = own(r.plan.label_offset(level + 1));

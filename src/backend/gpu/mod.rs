@@ -4,8 +4,9 @@
 //! other, packed four 8-bit or two 16-bit values a word; labels are padded to blocks of 16. Rows start at multiples of 256
 //! bytes, so that any rows of a volume can be bound: where a volume exceeds what a device lets a shader see at once, a stage
 //! runs band by band, each band bound with the rows above and below that it reads; where it exceeds the largest buffer, it is
-//! several (`buffers`). The pair and its graph go up once, the maps come down once, and in between nothing leaves the device
-//! but the sum of [`Stage::Change`].
+//! several (`buffers`). The pair goes up once, the maps come down once, and in between nothing leaves the device.
+//! Where message passing stops by itself, [`Stage::Change`] decides that there: from then on, it makes the dispatches of the
+//! messages empty.
 
 mod buffers;
 mod device;
@@ -24,19 +25,21 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
-use crate::weights::MedianWeights;
-use buffers::{Buffers, LevelBuffers, Rows};
+use buffers::{Buffers, LevelBuffers, Rows, Shared};
+use change::Convergence;
 use device::Device;
 pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
 pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
+use std::mem;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use steps::{Groups, Pipelines, Recorder, Step};
 pub use steps::{Job, MAX_LOOP_ITERATIONS};
-use steps::{Pipelines, Recorder, Step};
 use timer::{PASSES_PER_SUBMIT, Timer};
 pub use uniform::UniformLayout;
-use upload::{image_words, label_range_words, member_words, transposed, window_words};
+use upload::{image_words, label_range_words, narrow_words};
 
 macro_rules! declare {
     (
@@ -70,9 +73,11 @@ macro_rules! declare {
 
 crate::for_every_stage!(declare);
 
-/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop
-/// long jobs, and for a bar that moves.
-const WORK_PER_SUBMIT: u64 = 1 << 30;
+/// What a match by `plan` may run, beside the [`jobs`] of its stages.
+#[must_use]
+pub fn other_jobs(plan: &Plan) -> Vec<Job> {
+    upload::jobs(plan)
+}
 
 /// The GPU path on one device.
 pub struct Gpu {
@@ -82,15 +87,65 @@ pub struct Gpu {
     passes: usize,
     work: u64,
     timer: Option<Timer>,
+    /// The same stage at one level after the other, which can run together.
+    waiting: Vec<Stage>,
     state: Option<State>,
     requests: Requests<RequestedMaps>,
+}
+
+/// The steps of a stage at its level and the next ones, so many together.
+type Steps = HashMap<(Stage, usize), Arc<[Step]>>;
+
+/// Records a stage at several levels at once.
+type RecordLevels = fn(&mut Recorder, &Shared, Range<usize>) -> Result<()>;
+
+/// How `stage` goes over levels at once, where it can.
+fn record_levels(stage: Stage) -> Option<RecordLevels> {
+    match stage {
+        Stage::Graph(_) => Some(graph::record_levels),
+        Stage::Dependency(_) => Some(dependency::record_levels),
+        Stage::Resolution(_) => Some(resolution::record_levels),
+        Stage::Belief(_) => Some(belief::record_levels),
+        _ => None,
+    }
+}
+
+/// Whether all that `stage` reads and writes is shared.
+fn can_share(stage: Stage, shared: &Shared) -> bool {
+    match stage {
+        Stage::Resolution(z) => z > shared.finest,
+        stage => stage.level().is_some_and(|z| z >= shared.finest),
+    }
+}
+
+/// The same stage at the next coarser level, where the two can run together.
+fn next_level(stage: Stage) -> Option<Stage> {
+    match stage {
+        Stage::Graph(z) => Some(Stage::Graph(z + 1)),
+        Stage::Dependency(z) => Some(Stage::Dependency(z + 1)),
+        Stage::Resolution(z) => Some(Stage::Resolution(z + 1)),
+        Stage::Belief(z) => Some(Stage::Belief(z + 1)),
+        Stage::Flood(z) => Some(Stage::Flood(z + 1)),
+        _ => None,
+    }
 }
 
 /// Everything that belongs to one plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
-    steps: HashMap<Stage, Arc<[Step]>>,
+    steps: Steps,
+    /// Those of [`upload`].
+    upload: Arc<[Step]>,
+    /// Words of an image on their way up.
+    words: Vec<u32>,
+}
+
+impl State {
+    /// Whether `stage` may wait for others that run together with it.
+    fn may_wait(&self, stage: Stage) -> bool {
+        next_level(stage).is_some() && self.buffers.shared.as_ref().is_some_and(|s| can_share(stage, s))
+    }
 }
 
 impl Gpu {
@@ -115,6 +170,7 @@ impl Gpu {
             passes: 0,
             work: 0,
             timer: None,
+            waiting: Vec::new(),
             state: None,
             requests: Requests::default(),
         })
@@ -122,10 +178,48 @@ impl Gpu {
 
     /// The steps of `stage` for `plan` on these buffers.
     fn steps(&mut self, stage: Stage, plan: &Plan, buffers: &Buffers) -> Result<Arc<[Step]>> {
-        let level = stage.level().unwrap_or(0);
+        self.recorded(stage.level().unwrap_or(0), plan, buffers, None, |recorder| record(recorder, stage))
+    }
+
+    /// The steps of all stages, at single levels and where these share buffers at several together.
+    fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Steps> {
+        let mut steps = HashMap::new();
+        let mut endings = Vec::new();
+        for stage in Stage::all(plan).into_iter().filter(|stage| *stage != Stage::Change) {
+            let is_message = matches!(stage, Stage::Dependency(_) | Stage::Resolution(_) | Stage::Belief(_));
+            let ends = is_message && plan.settled_change().is_some();
+            let ending = ends.then_some(&mut endings);
+            let level = stage.level().unwrap_or(0);
+            let recorded = self.recorded(level, plan, buffers, ending, |recorder| record(recorder, stage))?;
+            steps.insert((stage, 1), recorded);
+            let Some(shared) = &buffers.shared else { continue };
+            for end in level + 2..=plan.levels.len() {
+                let Some(record) = record_levels(stage).filter(|_| can_share(stage, shared)) else { break };
+                let ending = ends.then_some(&mut endings);
+                let recorded = self.recorded(level, plan, buffers, ending, |recorder| {
+                    record(recorder, shared, level..end)
+                })?;
+                steps.insert((stage, end - level), recorded);
+            }
+        }
+        // This stage makes the dispatches of messages empty: it comes when these are known.
+        buffers.end_when_settled(&mut self.device, &endings)?;
+        steps.insert((Stage::Change, 1), self.steps(Stage::Change, plan, buffers)?);
+        Ok(steps)
+    }
+
+    /// The steps that `record` records at `level`.
+    fn recorded<'a>(
+        &'a mut self,
+        level: usize,
+        plan: &'a Plan,
+        buffers: &'a Buffers,
+        endings: Option<&'a mut Vec<[u32; 3]>>,
+        record: impl FnOnce(&mut Recorder<'a>) -> Result<()>,
+    ) -> Result<Arc<[Step]>> {
         let Self { device, pipelines, .. } = self;
-        let mut recorder = Recorder { device, pipelines, plan, buffers, level, steps: Vec::new() };
-        record(&mut recorder, stage)?;
+        let mut recorder = Recorder { device, pipelines, plan, buffers, level, endings, steps: Vec::new() };
+        record(&mut recorder)?;
         Ok(recorder.steps.into())
     }
 
@@ -150,7 +244,8 @@ impl Gpu {
                 Step::Dispatch(_) => {
                     let mut timer = self.timer.take();
                     let writes = timer.as_mut().and_then(Timer::pass);
-                    let mut work = self.work;
+                    let (mut work, most) = (self.work, self.device.work_per_submit);
+                    let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
                     {
                         let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
                             label: None,
@@ -160,10 +255,16 @@ impl Gpu {
                         while let Some(Step::Dispatch(dispatch)) = rest.get(recorded) {
                             pass.set_pipeline(&dispatch.pipeline);
                             pass.set_bind_group(0, &dispatch.bind_group, &[]);
-                            pass.dispatch_workgroups(dispatch.groups.0, dispatch.groups.1, 1);
+                            match &dispatch.groups {
+                                Groups::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
+                                Groups::UntilSettled(at) => {
+                                    let groups = groups.as_ref().expect("a stage has a state to run on");
+                                    pass.dispatch_workgroups_indirect(groups, 12 * *at as u64);
+                                }
+                            }
                             work += dispatch.work;
                             recorded += 1;
-                            if work >= WORK_PER_SUBMIT {
+                            if work >= most {
                                 break;
                             }
                         }
@@ -175,14 +276,44 @@ impl Gpu {
                 }
             }
             rest = &rest[recorded..];
-            if self.passes >= PASSES_PER_SUBMIT || self.work >= WORK_PER_SUBMIT {
-                self.submit()?;
+            let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
+            if timed || self.work >= self.device.work_per_submit {
+                self.submit_recorded()?;
             }
         }
         Ok(())
     }
 
+    /// Records the stages that wait.
+    fn gather(&mut self) -> Result<()> {
+        let waiting = mem::take(&mut self.waiting);
+        let Some(&first) = waiting.first() else { return Ok(()) };
+        let parts = if matches!(first, Stage::Flood(_)) { 0..2 } else { 0..1 };
+        for part in parts {
+            let stages = waiting.iter().map(|&stage| match stage {
+                Stage::Flood(z) => flood::parts(z)[part],
+                stage => stage,
+            });
+            let stages: Vec<Stage> = stages.collect();
+            let state = self.state();
+            let steps = match state.steps.get(&(stages[0], stages.len())) {
+                Some(steps) => vec![Arc::clone(steps)],
+                None => stages.iter().map(|stage| Arc::clone(&state.steps[&(*stage, 1)])).collect(),
+            };
+            for steps in steps {
+                self.record(&steps)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Submits everything.
     fn submit(&mut self) -> Result<()> {
+        self.gather()?;
+        self.submit_recorded()
+    }
+
+    fn submit_recorded(&mut self) -> Result<()> {
         (self.passes, self.work) = (0, 0);
         if let Some(mut encoder) = self.encoder.take() {
             if let Some(timer) = &mut self.timer {
@@ -194,7 +325,8 @@ impl Gpu {
     }
 
     /// Asks for each range of bytes, after everything recorded so far.
-    fn request(&mut self, ranges: &[(wgpu::Buffer, std::ops::Range<u64>)]) -> Result<device::Requested> {
+    fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
+        self.gather()?;
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;
@@ -208,7 +340,7 @@ impl Gpu {
             staged.push(staging);
         }
         self.submit()?;
-        Ok(self.device.request(staged))
+        self.device.request(staged)
     }
 
     /// Asks for the words of all rows.
@@ -221,7 +353,8 @@ impl Gpu {
     /// The words of all rows that were asked for.
     fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
         let mut words = self.device.collect(rows.parts)?.into_iter();
-        Ok(rows.counts.into_iter().map(|n| words.by_ref().take(n).collect::<Vec<_>>().concat()).collect())
+        let joined = |n| words.by_ref().take(n).reduce(|all, part| [all, part].concat()).unwrap_or_default();
+        Ok(rows.counts.into_iter().map(joined).collect())
     }
 
     /// The words of all rows.
@@ -234,43 +367,62 @@ impl Gpu {
         self.state.as_ref().expect("prepare comes before every stage")
     }
 
-    /// Puts the pair, its graphs and its label ranges into the buffers, and messages at their start.
+    /// Puts the pair and its label ranges into the buffers, and messages at their start.
     fn load(&mut self, state: &mut State, prepared: &Prepared) -> Result<()> {
-        let State { plan, buffers, steps } = state;
+        let State { plan, buffers, words, upload, .. } = state;
         let device = &mut self.device;
-        let pitch = buffers.levels[0].params.pixel_pitch;
-        buffers.left.write(device, &image_words(prepared.pair.left(), pitch))?;
-        buffers.right.write(device, &image_words(prepared.pair.right(), pitch))?;
-        for (weights, buffer) in [
-            (MedianWeights::of(&plan.method), &buffers.median_weights),
-            (MedianWeights::stretched(&plan.method), &buffers.stretched_weights),
-        ] {
-            device.write(buffer, bytemuck::cast_slice(&weights.words()))?;
+        let (pair, pitch) = (&prepared.pair, buffers.levels[0].params.pixel_pitch);
+        let mut narrow = true;
+        for (image, spare) in [(pair.left(), &buffers.spare_disparity), (pair.right(), &buffers.spare_flags)]
+        {
+            narrow = narrow && narrow_words(image, pitch, words);
+            if narrow {
+                spare.write(device, words)?;
+            }
+        }
+        if !narrow {
+            buffers.left.write(device, &image_words(pair.left(), pitch))?;
+            buffers.right.write(device, &image_words(pair.right(), pitch))?;
         }
         for (z, (level, l)) in buffers.levels.iter().zip(&plan.levels).enumerate() {
-            let (runs, rows) = l.windows();
-            let windows = window_words(&Plane::filled(runs, rows, [0, l.stride as u16]));
-            device.write(&level.windows, bytemuck::cast_slice(&windows))?;
             if plan.limits_labels() {
                 let words = |ranges: &Plane<_>| label_range_words(ranges, &level.params);
                 let all = || words(&Plane::filled(l.width, l.height, [0, l.labels as u16 - 1]));
                 level.label_range.write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
             }
         }
-        for (level, graph) in buffers.levels.iter_mut().zip(&prepared.graphs) {
-            level.members.write(device, &member_words(graph, &level.params))?;
-            level.write_incoming(device, transposed(graph, &level.params))?;
-        }
-        for z in 0..plan.levels.len() {
-            // The transposed table of this pair has rows of its own.
-            steps.insert(Stage::Belief(z), self.steps(Stage::Belief(z), plan, buffers)?);
-        }
         let zeroed = buffers.levels.iter().flat_map(LevelBuffers::messages).chain([&buffers.labels]);
         let encoder = self.encoder()?;
-        for buffer in zeroed.flat_map(Rows::buffers) {
-            encoder.clear_buffer(buffer, 0, None);
+        for (buffer, place) in zeroed.flat_map(Rows::held) {
+            encoder.clear_buffer(buffer, place.start, Some(place.end - place.start));
+        }
+        for level in &buffers.levels {
+            for (windows, place) in level.windows.held() {
+                let size = place.end - place.start;
+                encoder.copy_buffer_to_buffer(&level.full_windows, 0, windows, place.start, size);
+            }
+        }
+        encoder.clear_buffer(&buffers.convergence, 0, None);
+        let size = buffers.all_groups.size();
+        encoder.copy_buffer_to_buffer(&buffers.all_groups, 0, &buffers.groups, 0, size);
+        if narrow {
+            // No run of a stage.
+            let timer = self.timer.take();
+            self.record(upload)?;
+            self.timer = timer;
         }
         self.device.check()
+    }
+
+    fn convergence_at(&self) -> (wgpu::Buffer, Range<u64>) {
+        (self.state().buffers.convergence.clone(), 0..size_of::<Convergence>() as u64)
+    }
+
+    /// What [`Stage::Change`] has found so far.
+    fn convergence(&mut self) -> Result<Convergence> {
+        let at = self.convergence_at();
+        let requested = self.request(&[at])?;
+        Ok(Convergence::of(&self.device.collect(requested)?[0]))
     }
 
     /// Width, height, and elements in a row of maps.
@@ -286,9 +438,23 @@ struct RequestedRows {
     parts: device::Requested,
 }
 
+/// A plane of what `value` makes of the words of a map, which has so many (columns, rows, words a row).
+fn plane<T>(
+    words: &[u32],
+    (width, height, pitch): (usize, usize, usize),
+    value: impl Fn(u32) -> T,
+) -> Plane<T> {
+    let mut values = Vec::with_capacity(width * height);
+    for row in words.chunks_exact(pitch) {
+        values.extend(row[..width].iter().map(|&word| value(word)));
+    }
+    Plane::new(width, height, values)
+}
+
 /// Maps on their way from the device.
 struct RequestedMaps {
-    rows: RequestedRows,
+    /// Disparity, raw disparity, flags; and where message passing may stop by itself, its [`Convergence`].
+    parts: device::Requested,
     shape: (usize, usize, usize),
 }
 
@@ -302,14 +468,19 @@ impl Backend for Gpu {
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
+        if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
+            // The maps stay, as all that was asked for leaves them.
+            self.submit()?;
+        }
         (self.encoder, self.passes, self.work) = (None, 0, 0);
+        self.waiting.clear();
         self.device.traffic = Traffic::default();
         let mut state = match self.state.take() {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
                     let steps = self.steps(Stage::RightView, plan, &state.buffers)?;
-                    state.steps.insert(Stage::RightView, steps);
+                    state.steps.insert((Stage::RightView, 1), steps);
                 }
                 state
             }
@@ -319,27 +490,36 @@ impl Backend for Gpu {
                 if self.device.software {
                     memory::check(plan.whole().bytes(), Purpose::Match)?;
                 }
-                let buffers = Buffers::new(&self.device, plan)?;
-                let mut steps = HashMap::new();
-                // Beliefs wait for the graph.
-                for stage in Stage::all(plan).into_iter().filter(|stage| !matches!(stage, Stage::Belief(_))) {
-                    steps.insert(stage, self.steps(stage, plan, &buffers)?);
-                }
-                State { plan: plan.clone(), buffers, steps }
+                let mut buffers = Buffers::new(&mut self.device, plan)?;
+                let steps = self.all_steps(plan, &mut buffers)?;
+                let upload = self.recorded(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
+                let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
+                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
             }
         };
         self.load(&mut state, &prepared)?;
-        self.device.traffic.bytes_held = state.buffers.all().iter().map(wgpu::Buffer::size).sum();
+        self.device.traffic.bytes_held = state.buffers.bytes();
         self.state = Some(state);
         Ok(())
     }
 
     fn run(&mut self, stage: Stage) -> Result<()> {
+        if self.timer.is_none() && self.state().may_wait(stage) {
+            for _ in 0..if matches!(stage, Stage::Flood(_)) { 2 } else { 1 } {
+                self.device.count_stage();
+            }
+            if self.waiting.last().is_some_and(|&last| next_level(last) != Some(stage)) {
+                self.gather()?;
+            }
+            self.waiting.push(stage);
+            return self.device.check();
+        }
+        self.gather()?;
         if let Stage::Flood(z) = stage {
             return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
         }
         self.device.count_stage();
-        let steps = Arc::clone(&self.state().steps[&stage]);
+        let steps = Arc::clone(&self.state().steps[&(stage, 1)]);
         let Some(timer) = &mut self.timer else { return self.record(&steps) };
         timer.begin(stage);
         if timer.has_clock() {
@@ -354,13 +534,16 @@ impl Backend for Gpu {
         Ok(())
     }
 
-    fn change(&mut self) -> Result<u64> {
-        self.run(Stage::Change)?;
-        let sums = self.state().buffers.change_sums.clone();
-        let rows = self.state().plan.levels[0].height;
-        let requested = self.request(&[(sums, 0..8 * rows as u64)])?;
-        let words = self.device.collect(requested)?;
-        Ok(words[0].chunks_exact(2).map(|half| u64::from(half[1]) << 32 | u64::from(half[0])).sum())
+    fn settled(&mut self, wait: bool) -> Result<bool> {
+        // Where times are kept, idle iterations are not to be among them.
+        Ok((wait || self.timer.is_some()) && self.convergence()?.settled())
+    }
+
+    fn idle_iterations(&mut self) -> Result<u32> {
+        if self.state().plan.settled_change().is_none() {
+            return Ok(0);
+        }
+        Ok(self.convergence()?.idle())
     }
 
     fn wait(&mut self) -> Result<()> {
@@ -372,25 +555,28 @@ impl Backend for Gpu {
         self.map_values(map)
     }
 
-    fn set_right_labels(&mut self, labels: &Plane<i32>) -> Result<()> {
-        self.write_map(Map::RightLabel, labels)
-    }
-
     fn request_maps(&mut self) -> Result<Ticket> {
         let b = &self.state().buffers;
         let (disparity, raw, flags) = (b.disparity.clone(), b.raw.clone(), b.flags.clone());
-        let rows = self.request_rows(&[&disparity, &raw, &flags])?;
+        let mut parts: Vec<_> = [disparity, raw, flags].iter().flat_map(Rows::own).collect();
+        parts.extend(self.state().plan.settled_change().map(|_| self.convergence_at()));
+        let parts = self.request(&parts)?;
         let shape = self.map_shape();
-        Ok(self.requests.add(RequestedMaps { rows, shape }))
+        Ok(self.requests.add(RequestedMaps { parts, shape }))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<Maps> {
-        let RequestedMaps { rows, shape: (width, height, pitch) } = self.requests.take(&ticket);
-        let words = self.collect_rows(rows)?;
-        let plane = |i: usize| Plane::from_fn(width, height, |x, y| words[i][y * pitch + x].cast_signed());
-        let byte =
-            |bit: u32| Plane::from_fn(width, height, |x, y| (words[2][y * pitch + x] >> bit & 0xff) as u8);
-        Ok(Maps { disparity: plane(0), raw: plane(1), confidence: byte(8), validity: byte(0), right: None })
+    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
+        let RequestedMaps { parts, shape } = self.requests.take(&ticket);
+        self.device.read(parts, |words| {
+            let maps = Maps {
+                disparity: plane(words[0], shape, u32::cast_signed),
+                raw: plane(words[1], shape, u32::cast_signed),
+                confidence: plane(words[2], shape, |word| (word >> 8) as u8),
+                validity: plane(words[2], shape, |word| word as u8),
+                right: None,
+            };
+            (maps, words.get(3).map_or(0, |words| Convergence::of(words).idle()))
+        })
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {

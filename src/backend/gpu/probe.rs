@@ -2,11 +2,13 @@
 
 use super::Gpu;
 use super::buffers::Rows;
+use super::graph;
 use super::upload::window_words;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::backend::{Backend, Map};
 use crate::error::{Error, Result};
+use crate::graph::{LevelGraph, NO_MEMBER};
 use crate::image::Plane;
 use crate::plan::Plan;
 use std::time::{Duration, Instant};
@@ -55,17 +57,57 @@ impl Probe for Gpu {
 
     fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
         let (runs, rows) = self.state().plan.levels[level].windows();
-        let buffer = self.state().buffers.levels[level].windows.clone();
-        let requested = self.request(&[(buffer, 0..4 * (runs * rows) as u64)])?;
-        let words = self.device.collect(requested)?.remove(0);
-        let windows = words.into_iter().map(|word| [word as u16, (word >> 16) as u16]).collect();
+        let windows = self.state().buffers.levels[level].windows.clone();
+        let words = self.rows(&[&windows])?.remove(0);
+        let windows = words[..runs * rows].iter().map(|&word| [word as u16, (word >> 16) as u16]).collect();
         Ok(Plane::new(runs, rows, windows))
     }
 
     fn set_windows(&mut self, level: usize, windows: &Plane<[u16; 2]>) -> Result<()> {
         self.submit()?;
-        let buffer = self.state().buffers.levels[level].windows.clone();
-        self.device.write(&buffer, bytemuck::cast_slice(&window_words(windows)))
+        let [(buffer, place)] = &self.state().buffers.levels[level].windows.own()[..] else {
+            unreachable!("one row is in one part")
+        };
+        self.device.write_at(buffer, place.start, bytemuck::cast_slice(&window_words(windows)))
+    }
+
+    fn change(&mut self) -> Result<u64> {
+        Ok(self.convergence()?.sum())
+    }
+
+    fn graph(&mut self, level: usize) -> Result<LevelGraph> {
+        let here = &self.state().buffers.levels[level];
+        let (members, pitch) = (here.members.clone(), here.params.member_pitch as usize);
+        let words = self.rows(&[&members])?.remove(0);
+        let plan = &self.state().plan;
+        let (neighbours, l) = (plan.neighbours, &plan.levels[level]);
+        let code = |x: usize, y: usize, i: usize| {
+            (words[y * pitch + x * neighbours.div_ceil(4) + i / 4] >> (8 * (i % 4))) as u8
+        };
+        let pixels = (0..l.height).flat_map(|y| (0..l.width).map(move |x| (x, y)));
+        let codes = pixels.flat_map(|(x, y)| (0..neighbours).map(move |i| (x, y, i)));
+        let codes = codes.map(|(x, y, i)| code(x, y, i)).collect();
+        Ok(LevelGraph::new(l.width, l.height, neighbours, codes))
+    }
+
+    fn set_graph(&mut self, level: usize, graph: &LevelGraph) -> Result<()> {
+        self.submit()?;
+        let state = self.state.take().expect("prepare comes before every stage");
+        let (here, neighbours) = (&state.buffers.levels[level], state.plan.neighbours);
+        let pitch = here.params.member_pitch as usize;
+        let mut words = vec![u32::MAX; pitch * graph.height()];
+        for (factor, codes) in graph.codes().chunks_exact(neighbours.max(1)).enumerate() {
+            let (x, y) = (factor % graph.width(), factor / graph.width());
+            for (i, &code) in codes.iter().enumerate() {
+                let word = &mut words[y * pitch + x * neighbours.div_ceil(4) + i / 4];
+                *word ^= u32::from(code ^ NO_MEMBER) << (8 * (i % 4));
+            }
+        }
+        here.members.write(&mut self.device, &words)?;
+        let steps =
+            self.recorded(level, &state.plan, &state.buffers, None, |recorder| graph::transpose(recorder))?;
+        self.state = Some(state);
+        self.record(&steps)
     }
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
@@ -84,7 +126,7 @@ impl Probe for Gpu {
 
     fn poison(&mut self, byte: u8) -> Result<()> {
         self.submit()?;
-        let all = self.state().buffers.all().to_vec();
+        let all = self.state().buffers.written().to_vec();
         for buffer in all {
             self.device.write(&buffer, &vec![byte; buffer.size() as usize])?;
         }

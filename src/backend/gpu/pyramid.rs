@@ -11,7 +11,7 @@ use crate::plan::Plan;
 
 const SHADER: &str = include_str!("../../../shaders/pyramid.wgsl");
 
-uniform! { fine: LevelParams, padding: [u32; 2], label_offset: i32 }
+uniform! { fine: LevelParams, label_offset: i32 }
 
 pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
     let kernel = Kernel::new("pyramid", "main", SHADER)
@@ -22,8 +22,7 @@ pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (finer, here, l) = (r.finer(), r.here(), r.params());
-    let own =
-        Uniform { fine: finer.params, label_offset: r.plan.label_offset(r.level), ..Uniform::default() };
+    let own = Uniform { fine: finer.params, label_offset: r.plan.label_offset(r.level) };
     r.rows(&jobs(r.plan, r.level)[0], &own, 2 * l.width * l.quads, |rows| {
         let fine_rows = 2 * rows.start..(2 * rows.end).min(finer.params.height);
         vec![(1, finer.cost.bind(&with_halo(&fine_rows, 2, finer.params.height))), (2, here.cost.bind(rows))]

@@ -3,33 +3,42 @@
 //! Floor, for a fine label of level 1: 3 + 3/8 bytes moved, 17 asked for (words of four labels, once a label and once more after
 //! the minimum), 100 operations for four labels.
 
+use super::buffers::Shared;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::{LevelParams, uniform};
 use crate::error::Result;
 use crate::plan::{Plan, TruncationRule};
+use std::ops::Range;
 
 const SHADER: &str = include_str!("../../../shaders/resolution.wgsl");
 
-uniform! { fine: LevelParams, padding: [u32; 2], label_offset: i32, tau: u32 }
+uniform! { fine: LevelParams, label_offset: i32, tau: u32, fine_at: u32 }
 
-pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
-    let (coarse, fine) = (plan.levels[level].stride, plan.levels[level - 1].stride);
+impl Uniform {
+    fn of(r: &Recorder, level: usize) -> Self {
+        Self {
+            fine: r.buffers.levels[level - 1].params,
+            label_offset: r.plan.label_offset(level),
+            tau: r.plan.resolution.tau.into(),
+            fine_at: 0,
+        }
+    }
+}
+
+pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
+    // The finest levels have the most labels.
+    let (coarse, fine) = (plan.levels[1].stride, plan.levels[0].stride);
     let kernel = Kernel::new("resolution", "main", SHADER)
         .of_width(plan.volume_width)
         .with("ABSOLUTE", plan.resolution.rule == TruncationRule::Absolute)
         .with("INTERPOLATING", plan.interpolating());
-    vec![Job::new::<Uniform>(kernel, fine + 3 * coarse + fine / 2)]
+    vec![Job::new::<Uniform>(kernel, fine + 3 * coarse + fine / 2).over_levels(plan)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (finer, here, l) = (r.finer(), r.here(), r.params());
-    let own = Uniform {
-        fine: finer.params,
-        label_offset: r.plan.label_offset(r.level),
-        tau: r.plan.resolution.tau.into(),
-        ..Uniform::default()
-    };
+    let own = Uniform::of(r, r.level);
     r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
         let fine_rows = 2 * rows.start..(2 * rows.end).min(finer.params.height);
         vec![
@@ -39,4 +48,15 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
             (4, here.up.bind(rows)),
         ]
     })
+}
+
+/// The same for all of `levels` at once.
+pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
+    let own = levels.clone().map(|z| {
+        let (_, (fine_at, _)) = r.buffers.levels[z - 1].shared_params(r.plan);
+        (Uniform { fine_at, ..Uniform::of(r, z) }, r.buffers.levels[z].params.width)
+    });
+    let (own, first): (Vec<_>, _) = (own.collect(), levels.start);
+    let bound = [(1, &shared.belief), (2, &shared.belief), (3, &shared.down), (4, &shared.up)];
+    r.levels(&jobs(r.plan, 1)[0], levels, |z| own[z - first], &bound)
 }

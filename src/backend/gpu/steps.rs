@@ -21,9 +21,17 @@ pub(super) enum Step {
 pub(super) struct Dispatch {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bind_group: wgpu::BindGroup,
-    pub(super) groups: (u32, u32),
+    pub(super) groups: Groups,
     /// Largest total number of loop iterations of all invocations.
     pub(super) work: u64,
+}
+
+/// Workgroups of a dispatch.
+pub(super) enum Groups {
+    /// So many in x and y.
+    Fixed(u32, u32),
+    /// As many as stand at this place of [`Buffers::groups`]: none, once the label map has settled.
+    UntilSettled(usize),
 }
 
 /// Compiled kernels.
@@ -37,19 +45,37 @@ pub struct Job {
     /// Largest total number of loop iterations of one invocation. Mesa 22 stops a shader silently after about
     /// 65,000.
     pub loops: usize,
-    /// The uniform that it reads.
+    /// The uniform that it reads: one, or an array of one for each of so many levels.
     pub uniform: UniformLayout,
+    sections: Option<usize>,
 }
 
 impl Job {
     /// `kernel` with `U` as the stage's own uniform, and at most `loops` loop iterations.
     pub(super) fn new<U: Layout>(kernel: Kernel, loops: usize) -> Self {
-        Self { kernel, loops, uniform: UniformLayout::of::<U>() }
+        Self { kernel, loops, uniform: UniformLayout::of::<U>(), sections: None }
+    }
+
+    /// The same for a kernel that may go over as many levels at once as `plan` has.
+    pub(super) fn over_levels(self, plan: &Plan) -> Self {
+        let levels = plan.levels.len();
+        Self { kernel: self.kernel.with("SECTIONS", levels as u32), sections: Some(levels), ..self }
     }
 }
 
 /// Buffers to bind, each with its binding number in the shader.
 pub(super) type Bindings = Vec<(u32, Binding)>;
+
+/// What a dispatch does at a level.
+struct Section<U> {
+    level: LevelParams,
+    rows: Range<u32>,
+    /// Invocations in each of so many rows.
+    size: (u32, u32),
+    /// Where volumes and dependency messages begin in what is bound, in quads.
+    at: (u32, u32),
+    own: U,
+}
 
 /// Collects the commands of a stage at a level.
 pub(super) struct Recorder<'a> {
@@ -58,6 +84,8 @@ pub(super) struct Recorder<'a> {
     pub(super) plan: &'a Plan,
     pub(super) buffers: &'a Buffers,
     pub(super) level: usize,
+    /// Where the workgroups of dispatches go that end when the label map has settled.
+    pub(super) endings: Option<&'a mut Vec<[u32; 3]>>,
     pub(super) steps: Vec<Step>,
 }
 
@@ -174,13 +202,61 @@ impl<'a> Recorder<'a> {
         size: (u32, u32),
         bindings: &[(u32, Binding)],
     ) -> Result<()> {
+        self.dispatch_sections(
+            job,
+            &[Section { level: self.params(), rows, size, at: (0, 0), own: *own }],
+            bindings,
+        )
+    }
+
+    /// Dispatches `job` for all rows of `levels` at once, which [share](super::buffers::Shared) their buffers. `own` gives the
+    /// parameters of a level and its number of invocations in a row.
+    pub(super) fn levels<U: Layout>(
+        &mut self,
+        job: &Job,
+        levels: Range<usize>,
+        own: impl Fn(usize) -> (U, u32),
+        bindings: &[(u32, &wgpu::Buffer)],
+    ) -> Result<()> {
+        let sections = levels.map(|z| {
+            let (here, (own, threads)) = (&self.buffers.levels[z], own(z));
+            let (level, at) = here.shared_params(self.plan);
+            Section { level, rows: 0..level.height, size: (threads, level.height), at, own }
+        });
+        let bindings: Bindings = bindings.iter().map(|(place, b)| (*place, Binding::whole(b))).collect();
+        self.dispatch_sections(job, &sections.collect::<Vec<_>>(), &bindings)
+    }
+
+    fn dispatch_sections<U: Layout>(
+        &mut self,
+        job: &Job,
+        sections: &[Section<U>],
+        bindings: &[(u32, Binding)],
+    ) -> Result<()> {
         let pipeline = self.pipeline(job)?;
-        let row_groups = size.0.div_ceil(WORKGROUP).max(1);
-        let total = u64::from(row_groups) * u64::from(size.1);
-        let most = u64::from(self.device.max_groups);
-        let grid = total.min(most).max(1) as u32;
-        let band = Band { first_row: rows.start, rows: rows.end - rows.start, row_groups, grid };
-        let bytes = uniform::bytes(&Header { level: self.params(), band, ..Header::default() }, own);
+        let row_groups = |section: &Section<U>| section.size.0.div_ceil(WORKGROUP).max(1);
+        let groups = |section: &Section<U>| u64::from(row_groups(section)) * u64::from(section.size.1);
+        let total: u64 = sections.iter().map(groups).sum();
+        let grid = total.min(u64::from(self.device.max_groups)).max(1) as u32;
+        let (mut bytes, mut first_group) = (Vec::new(), 0);
+        for section in sections {
+            let Section { level, rows, at: (volume_at, dependency_at), own, .. } = section;
+            let band = Band {
+                first_row: rows.start,
+                rows: rows.end - rows.start,
+                row_groups: row_groups(section),
+                grid,
+                first_group,
+                sections: sections.len() as u32,
+                volume_at: *volume_at,
+                dependency_at: *dependency_at,
+            };
+            bytes.extend(uniform::bytes(&Header { level: *level, band }, own));
+            first_group += groups(section) as u32;
+        }
+        // The shader's array has room for all levels.
+        bytes.resize(bytes.len() / sections.len() * job.sections.unwrap_or(1), 0);
+        let work: u64 = sections.iter().map(|s| u64::from(s.size.0) * u64::from(s.size.1)).sum();
         let device = self.device.inner()?;
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("uniform"),
@@ -201,11 +277,19 @@ impl<'a> Recorder<'a> {
             entries: &entries,
         });
         self.device.write(&uniform, &bytes)?;
+        let height = total.div_ceil(u64::from(grid)) as u32;
+        let groups = match &mut self.endings {
+            None => Groups::Fixed(grid, height),
+            Some(endings) => {
+                endings.push([grid, height, 1]);
+                Groups::UntilSettled(endings.len() - 1)
+            }
+        };
         self.steps.push(Step::Dispatch(Dispatch {
             pipeline,
             bind_group,
-            groups: (grid, total.div_ceil(u64::from(grid)) as u32),
-            work: job.loops.max(1) as u64 * u64::from(size.0) * u64::from(size.1),
+            groups,
+            work: job.loops.max(1) as u64 * work,
         }));
         Ok(())
     }

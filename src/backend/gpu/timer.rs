@@ -95,7 +95,7 @@ impl Timer {
     pub(super) fn times(&mut self, device: &mut Device) -> Result<Vec<(Stage, Duration)>> {
         if let (Some(clock), Some(tick)) = (&mut self.clock, device.tick) {
             for (passes, log) in clock.logs.drain(..) {
-                let requested = device.request(vec![log]);
+                let requested = device.request(vec![log])?;
                 let words = device.collect(requested)?;
                 let ticks: Vec<u64> =
                     words[0].chunks_exact(2).map(|w| u64::from(w[1]) << 32 | u64::from(w[0])).collect();

@@ -57,10 +57,12 @@ pub(super) struct LevelParams {
     pub(super) dependency_pitch: u32,
     pub(super) member_pitch: u32,
     pub(super) pixel_pitch: u32,
-    pub(super) starts_pitch: u32,
+    pub(super) members_at: u32,
+    pub(super) incoming_at: u32,
+    pub(super) windows_at: u32,
 }
 
-layout!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch, pixel_pitch, starts_pitch);
+layout!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch, pixel_pitch, members_at, incoming_at, windows_at);
 
 impl LevelParams {
     /// Parameters of `level`.
@@ -78,7 +80,7 @@ impl LevelParams {
             dependency_pitch: pitch(level.width * plan.slots() * quads),
             member_pitch: pitch(level.width * plan.neighbours.div_ceil(4)),
             pixel_pitch: pitch(level.width),
-            starts_pitch: pitch(level.width + 1),
+            ..Self::default()
         }
     }
 }
@@ -91,20 +93,23 @@ pub(super) struct Band {
     pub(super) rows: u32,
     pub(super) row_groups: u32,
     pub(super) grid: u32,
+    pub(super) first_group: u32,
+    pub(super) sections: u32,
+    pub(super) volume_at: u32,
+    pub(super) dependency_at: u32,
 }
 
-layout!(Band: first_row, rows, row_groups, grid);
+layout!(Band: first_row, rows, row_groups, grid, first_group, sections, volume_at, dependency_at);
 
 /// The header of every uniform.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub(super) struct Header {
     pub(super) level: LevelParams,
-    pub(super) padding: [u32; 2],
     pub(super) band: Band,
 }
 
-layout!(Header: level, padding, band);
+layout!(Header: level, band);
 
 /// The layout of a uniform, as a shader declares it.
 #[derive(Clone, Debug, PartialEq, Eq)]

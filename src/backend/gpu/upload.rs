@@ -1,10 +1,55 @@
-//! Images, graphs and label ranges as the shaders read them.
+//! The pair and its label ranges on their way to the device.
+//!
+//! Images of whole 8-bit levels go up in one word a pixel, and the device takes these apart.
 
-use super::uniform::{ALIGN_WORDS, LevelParams};
-use crate::graph::LevelGraph;
-use crate::image::{Image, Plane};
+use super::shader::Kernel;
+use super::steps::{Job, Recorder};
+use super::uniform::LevelParams;
+use crate::error::Result;
+use crate::image::{Image, Pixel, Plane};
+use crate::plan::Plan;
 
-/// Pixels as the shaders read them: red | green << 16, blue | grey << 16, 1 if masked, 0.
+const SHADER: &str = include_str!("../../../shaders/upload.wgsl");
+
+pub(super) fn jobs(_: &Plan) -> Vec<Job> {
+    vec![Job::new::<()>(Kernel::new("upload", "main", SHADER), 0)]
+}
+
+/// Takes the words of the pair apart. They are in the spare maps, which no stage needs before.
+pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let (b, l) = (r.buffers, r.params());
+    r.rows(&jobs(r.plan)[0], &(), l.width, |rows| {
+        vec![
+            (1, b.spare_disparity.bind(rows)),
+            (2, b.spare_flags.bind(rows)),
+            (3, b.left.bind(rows)),
+            (4, b.right.bind(rows)),
+        ]
+    })
+}
+
+/// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`, as long as that says all: as long as they are
+/// in whole 8-bit levels, and grey follows from colour. Returns whether it does.
+pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool {
+    let mut rows = words.chunks_exact_mut(pitch as usize).enumerate();
+    rows.all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
+}
+
+#[pulp::with_simd(narrow_row = pulp::Arch::new())]
+#[inline(always)]
+fn narrow_row_on<S: pulp::Simd>(_: S, pixels: &[Pixel], masked: &[bool], words: &mut [u32]) -> bool {
+    let mut missed = 0;
+    for ((word, pixel), &masked) in words.iter_mut().zip(pixels).zip(masked) {
+        let [r, g, b, grey] = pixel.map(u32::from);
+        // The grey of the colour, times 1000 and before it is rounded down.
+        let above = (299 * r + 587 * g + 114 * b + 500).wrapping_sub(1000 * grey);
+        missed |= (r | g | b) & 0xff | u32::from(above >= 1000);
+        *word = r >> 8 | g | b << 8 | u32::from(masked) << 24;
+    }
+    missed == 0
+}
+
+/// Pixels as the stages read them: red | green << 16, blue | grey << 16, 1 if masked, 0.
 pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
     let pitch = 4 * pitch as usize;
     let mut words = vec![0; pitch * image.height()];
@@ -16,50 +61,6 @@ pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
         }
     }
     words
-}
-
-/// Codes of the factors' neighbours, four per word.
-pub(super) fn member_words(graph: &LevelGraph, params: &LevelParams) -> Vec<u32> {
-    let neighbours = graph.slots() - 1;
-    let (per_pixel, pitch) = (neighbours.div_ceil(4), params.member_pitch as usize);
-    let mut words = vec![u32::MAX; pitch * graph.height()];
-    if neighbours > 0 {
-        for (factor, codes) in graph.codes().chunks_exact(neighbours).enumerate() {
-            let (x, y) = (factor % graph.width(), factor / graph.width());
-            for (slot, &code) in codes.iter().enumerate() {
-                let word = &mut words[y * pitch + x * per_pixel + slot / 4];
-                let shift = 8 * (slot % 4);
-                *word = *word & !(0xff << shift) | u32::from(code) << shift;
-            }
-        }
-    }
-    words
-}
-
-/// The transposed table, as the shader reads it.
-pub(super) struct Incoming {
-    /// Start of each pixel's entries, with one more per row.
-    pub(super) starts: Vec<u32>,
-    pub(super) entries: Vec<u32>,
-    /// Start of each row's entries, aligned so that any range of rows can be bound, and the end.
-    pub(super) rows: Vec<u32>,
-}
-
-pub(super) fn transposed(graph: &LevelGraph, params: &LevelParams) -> Incoming {
-    let (width, pitch) = (graph.width(), params.starts_pitch as usize);
-    let mut starts = vec![0; pitch * graph.height()];
-    let mut entries = Vec::with_capacity(graph.incoming().len() + ALIGN_WORDS * graph.height());
-    let mut rows = vec![0];
-    for (y, starts) in starts.chunks_exact_mut(pitch).enumerate() {
-        for (x, start) in starts[..width].iter_mut().enumerate() {
-            *start = entries.len() as u32;
-            entries.extend(graph.incoming_of(y * width + x).iter().map(|entry| u32::from(entry.bits())));
-        }
-        starts[width] = entries.len() as u32;
-        entries.resize(entries.len().next_multiple_of(ALIGN_WORDS), 0);
-        rows.push(entries.len() as u32);
-    }
-    Incoming { starts, entries, rows }
 }
 
 /// First and last label of each pixel, first | last << 16.

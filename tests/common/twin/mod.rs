@@ -5,7 +5,6 @@
 //! Volumes are `Vec<u32>` in the layout of [`mrfgs::low_level::backend::probe::Volume`]: \[y\]\[x\]\[slot\]\[label\].
 
 pub mod census;
-pub mod graph;
 
 macro_rules! declare {
     (

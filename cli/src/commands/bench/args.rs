@@ -40,7 +40,8 @@ const METHOD: &str = "A preset, or a TOML file whose keys replace those of the p
 /// method: `name`, `method`, `width`, `height`, `labels` and `devices` (as --device names them, null without the memory:
 /// `ran_on`, `iterations`, `labels_kept` (% by level), `median_ms`, `min_ms`, `max_ms`, `runs_ms`, `processor_ms`, `stages` (ms by stage and level),
 /// `message_ms`, `label_updates`, `message_gupdates_per_s`, `match_gupdates_per_s`, `message_bytes`, `message_gb_per_s`,
-/// `copy_gb_per_s`, `copy_share` (%), `plan_bytes`, `peak_bytes`, `device_bytes`).
+/// `copy_gb_per_s`, `copy_share` (%), `plan_bytes`, `peak_bytes`, `device_bytes`,
+/// `dispatches`, `submissions`, `bytes_up`, `bytes_down`).
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, mut_arg("method", |method| method.help(METHOD)))]
 pub(crate) struct Args {

@@ -132,11 +132,11 @@ impl Case<'_> {
             matcher.keep_time(timings);
             matcher.run(pair, range)
         };
-        let Matched { plan, tiles, iterations, ran_on, traffic, cells, .. } = run(false)?;
+        let Matched { plan, tiles, iterations, ran_on, mut traffic, cells, .. } = run(false)?;
         let (mut runs_ms, mut processor, mut timed) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..self.args.repeats {
             let (start, before) = (Instant::now(), processor_time());
-            run(false)?;
+            traffic = run(false)?.traffic;
             runs_ms.push(ms(start.elapsed()));
             processor
                 .extend(processor_time().zip(before).map(|(after, before)| ms(after.saturating_sub(before))));
@@ -167,6 +167,7 @@ impl Case<'_> {
             let all = of_tiles(&|plan| plan.levels[z].cells());
             100.0 * kept as f64 / all as f64
         });
+        let of_device = |count: u64| (traffic.bytes_held > 0).then_some(count);
         let median_ms = median(runs_ms.iter().copied());
         let giga_per_s = |count: u64, ms: f64| giga(1000.0 * count as f64 / ms);
         let message_gb_per_s = giga_per_s(message_bytes, message_ms);
@@ -189,7 +190,11 @@ impl Case<'_> {
             copy_share: 100.0 * message_gb_per_s / copy_gb_per_s,
             plan_bytes: tiles.bytes(),
             peak_bytes,
-            device_bytes: Some(traffic.bytes_held).filter(|&bytes| bytes > 0),
+            device_bytes: of_device(traffic.bytes_held),
+            dispatches: of_device(traffic.dispatches),
+            submissions: of_device(traffic.submissions),
+            bytes_up: of_device(traffic.bytes_up),
+            bytes_down: of_device(traffic.bytes_down),
             runs_ms,
         })
     }

@@ -53,12 +53,16 @@ pub(super) struct Figures {
     pub(super) plan_bytes: u64,
     pub(super) peak_bytes: Option<u64>,
     pub(super) device_bytes: Option<u64>,
+    pub(super) dispatches: Option<u64>,
+    pub(super) submissions: Option<u64>,
+    pub(super) bytes_up: Option<u64>,
+    pub(super) bytes_down: Option<u64>,
 }
 
 /// A line of the table: its name, and its cell for the figures of a device.
 type Line = (&'static str, fn(&Figures) -> String);
 
-const LINES: [Line; 17] = [
+const LINES: [Line; 21] = [
     ("match, median (ms)", |f| format!("{:.1}", f.median_ms)),
     ("  least", |f| format!("{:.1}", f.min_ms)),
     ("  most", |f| format!("{:.1}", f.max_ms)),
@@ -79,10 +83,18 @@ const LINES: [Line; 17] = [
     ("memory: plan", |f| size(Some(f.plan_bytes))),
     ("  peak of the process", |f| size(f.peak_bytes)),
     ("  buffers on the device", |f| size(f.device_bytes)),
+    ("dispatches of a match", |f| count(f.dispatches)),
+    ("  submissions", |f| count(f.submissions)),
+    ("  bytes to the device", |f| size(f.bytes_up)),
+    ("  bytes from the device", |f| size(f.bytes_down)),
 ];
 
 fn size(count: Option<u64>) -> String {
     count.map_or_else(|| "-".into(), bytes)
+}
+
+fn count(count: Option<u64>) -> String {
+    count.map_or_else(|| "-".into(), |count| count.to_string())
 }
 
 fn giga(count: u64) -> f64 {

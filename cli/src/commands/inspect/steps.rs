@@ -43,6 +43,7 @@ impl Steps {
     fn show(&mut self, inspection: &mut Inspection) -> Result<()> {
         match inspection {
             Inspection::Prepared(prepared) => self.prepared(prepared),
+            Inspection::Stage(backend, Stage::Graph(z)) => self.degree(*z, &backend.probe().graph(*z)?),
             Inspection::Stage(backend, Stage::Evidence(z)) => {
                 if *z == 0 {
                     self.change(*backend, 0)?;
@@ -73,12 +74,9 @@ impl Steps {
     }
 
     fn prepared(&self, prepared: &Prepared) -> Result<()> {
-        let Prepared { pair, graphs, label_ranges, zones } = prepared;
+        let Prepared { pair, label_ranges, zones } = prepared;
         if self.plan.method.front.illumination != Illumination::None {
             self.corrected(pair)?;
-        }
-        for (z, graph) in graphs.iter().enumerate() {
-            self.degree(z, graph)?;
         }
         if let Some((zones, matches)) = zones {
             self.zones(pair, zones, matches)?;

@@ -1,0 +1,12 @@
+use super::Finest;
+
+/// The labels of the left view, mirrored, as those of the right one.
+pub fn mirror_labels(maps: &mut Finest) {
+    let (width, height) = maps.label.size();
+    for y in 0..height {
+        for x in 0..width {
+            maps.right_label[(x, y)] = maps.label[(width - 1 - x, y)];
+            maps.right_best[(x, y)] = maps.best[(width - 1 - x, y)];
+        }
+    }
+}
