@@ -399,7 +399,7 @@ fn inspect_names_every_stage() {
     let row = |name: &str| table.lines().find(|l| l.starts_with(name)).map(str::to_owned);
     for stage in [
         "stage ",
-        "graph ",
+        "graph, level 0",
         "cost ",
         "pyramid, level 5",
         "flood, level 0",

@@ -6,10 +6,10 @@
 //!
 //! Where they fit, levels share buffers, so that one dispatch can go over several of them.
 
-use super::change::Convergence;
+use super::convergence::Convergence;
 use super::device::Device;
 use super::uniform::{ALIGN_WORDS, LevelParams};
-use super::upload::window_words;
+use super::words::window_words;
 use crate::error::{MemoryError, Result};
 use crate::image::Plane;
 use crate::plan::{GRAPH_WINDOW, LevelPlan, Plan};

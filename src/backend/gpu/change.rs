@@ -6,42 +6,10 @@ use super::steps::{Job, Recorder};
 use super::uniform::uniform;
 use crate::error::Result;
 use crate::plan::Plan;
-use bytemuck::{Pod, Zeroable};
 
 const SHADER: &str = include_str!("../../../shaders/change.wgsl");
 
 uniform! { most_low: u32, most_high: u32, may_settle: u32, endings: u32 }
-
-/// What the stage has found so far, as the shader keeps it.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct Convergence {
-    sum: [u32; 2],
-    runs: u32,
-    settled: u32,
-    idle: u32,
-}
-
-impl Convergence {
-    /// What these words say.
-    pub(super) fn of(words: &[u32]) -> Self {
-        *bytemuck::from_bytes(&bytemuck::cast_slice(words)[..size_of::<Self>()])
-    }
-
-    /// The last sum of squared changes.
-    pub(super) fn sum(self) -> u64 {
-        u64::from(self.sum[1]) << 32 | u64::from(self.sum[0])
-    }
-
-    pub(super) fn settled(self) -> bool {
-        self.settled != 0
-    }
-
-    /// How often the map had settled before.
-    pub(super) fn idle(self) -> u32 {
-        self.idle
-    }
-}
 
 /// `labels`, `sums` and `settle`.
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {

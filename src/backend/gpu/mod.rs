@@ -9,6 +9,7 @@
 //! messages empty.
 
 mod buffers;
+mod convergence;
 mod device;
 mod probe;
 mod shader;
@@ -16,6 +17,7 @@ mod steps;
 mod timer;
 mod uniform;
 mod upload;
+mod words;
 
 use super::probe::Probe;
 use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
@@ -26,7 +28,7 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
 use buffers::{Buffers, LevelBuffers, Rows, Shared};
-use change::Convergence;
+use convergence::Convergence;
 use device::Device;
 pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
 pub use shader::{Constant, Kernel};
@@ -39,7 +41,7 @@ use steps::{Groups, Pipelines, Recorder, Step};
 pub use steps::{Job, MAX_LOOP_ITERATIONS};
 use timer::{PASSES_PER_SUBMIT, Timer};
 pub use uniform::UniformLayout;
-use upload::{image_words, label_range_words, narrow_words};
+use words::{image_words, label_range_words, narrow_words};
 
 macro_rules! declare {
     (

@@ -3,7 +3,7 @@
 use super::Gpu;
 use super::buffers::Rows;
 use super::graph;
-use super::upload::window_words;
+use super::words::window_words;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::backend::{Backend, Map};
