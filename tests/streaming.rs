@@ -47,7 +47,7 @@ fn streamed_maps_are_those_of_whole_levels() {
     let mut random = Random::new(17);
     let (mut streamed, mut differ) = (0, 0);
     for _ in 0..60 {
-        let size = (random.within(1, 70) as usize, random.within(60, 190) as usize);
+        let size = (random.within(1, 70) as usize, random.within(100, 260) as usize);
         let labels = random.pick(&[1, 16, 17, 40, 40, 70]);
         let method = method(&mut random);
         let plan = random::plan(size, random.within(0, 20).cast_signed() - 10, labels, &method);
@@ -71,11 +71,11 @@ fn streamed_maps_are_those_of_whole_levels() {
 #[test]
 fn nothing_is_left_over_from_the_pair_before() {
     let mut random = Random::new(18);
-    let plan = random::plan((60, 150), -3, 40, &Method::default());
+    let plan = random::plan((60, 250), -3, 40, &Method::default());
     assert!(!solver::streamed(&plan).holds_all_rows());
     let mut backend = Cpu::default();
     for byte in [0xff, 0, 0x7f] {
-        let pair = random::pair(&mut random, 60, 150);
+        let pair = random::pair(&mut random, 60, 250);
         let expected = maps(&mut Cpu::default(), &plan, &pair, true);
         assert!(expected == maps(&mut backend, &plan, &pair, false));
         backend.probe().poison(byte).unwrap();

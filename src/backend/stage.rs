@@ -13,8 +13,8 @@ macro_rules! for_every_stage {
     ($then:ident) => {
         $then! {
             levels {
-                /// The members of the dependency factors of a level, chosen as [`crate::graph`] says from the level's guide. The guide
-                /// of level 0 is the left image, that of a coarser level [`crate::graph::downsample`] of the next finer one.
+                /// The members of the dependency factors of a level, chosen as `graph` says from the level's guide. The guide
+                /// of level 0 is the left image, that of a coarser level `graph::downsample` of the next finer one.
                 Graph graph;
                 /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
                 /// 256 times).

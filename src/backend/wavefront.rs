@@ -10,7 +10,7 @@ use crate::plan::{GRAPH_WINDOW, Plan};
 use std::ops::Range;
 
 /// Rows of level 0 that each stage of a wavefront computes in a step: enough for the threads to share.
-pub const BAND: usize = 16;
+pub const BAND: usize = 32;
 
 /// Stages that go down an image together.
 #[derive(Clone, Debug)]
