@@ -19,21 +19,12 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, rows: Range<usize
     let evidence = windows.rows_mut(&mut l.evidence, 1, 1, rows.clone()).into_par_iter();
     let rows = evidence.zip(windows.rows_mut(&mut l.belief, 1, 1, rows.clone())).zip(rows);
     if level > 0 {
-        let cells = plan.width * plan.stride;
         rows.for_each(|((evidence, belief), y)| {
-            evidence_row(plan, windows, y, Costs::OfAll(&l.cost[y * cells..][..cells]), evidence, belief);
+            evidence_row(plan, windows, y, Costs::stored(&l.cost, y, plan), evidence, belief);
         });
     } else if v.plan.holds_all_rows() {
-        let cells = plan.width * plan.stride;
         rows.for_each(|((evidence, belief), y)| {
-            evidence_row(
-                plan,
-                windows,
-                y,
-                Costs::OfAll(&v.fine_cost[y * cells..][..cells]),
-                evidence,
-                belief,
-            );
+            evidence_row(plan, windows, y, Costs::stored(&v.fine_cost, y, plan), evidence, belief);
         });
     } else {
         rows.for_each_init(Vec::new, |costs, ((evidence, belief), y)| {
@@ -54,6 +45,12 @@ enum Costs<'a, C> {
 }
 
 impl<'a, C> Costs<'a, C> {
+    /// Row `y` of a volume that holds the costs of all labels.
+    fn stored(volume: &'a [C], y: usize, level: &LevelPlan) -> Self {
+        let cells = level.width * level.stride;
+        Self::OfAll(&volume[y * cells..][..cells])
+    }
+
     /// Those of the pixel at column `x`, for the labels of its window.
     #[inline(always)]
     fn of(&self, x: usize, window: Window, level: &LevelPlan) -> &'a [C] {

@@ -146,8 +146,8 @@ impl Backend for Cpu {
         let mut times = vec![Duration::ZERO; sent.len()];
         for (i, rows) in wavefront.parts() {
             let stage = wavefront.stages()[i];
-            let level = on_volumes!(self, v => v.plan.levels[stage.level().unwrap_or(0)].height);
-            before(stage, rows.len() as f64 / level as f64)?;
+            let height = on_volumes!(self, v => v.plan.levels[stage.level().unwrap_or(0)].height);
+            before(stage, rows.len() as f64 / height as f64)?;
             let start = Instant::now();
             on_volumes!(self, v => v.run_rows(stage, sent[i], rows));
             times[i] += start.elapsed();
