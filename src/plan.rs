@@ -41,6 +41,10 @@ pub const CENSUS_RADIUS_Y: u32 = 3;
 pub const CENSUS_PLACES: u32 = (2 * CENSUS_RADIUS_X + 1) * (2 * CENSUS_RADIUS_Y + 1);
 /// Fractional bits of the costs of level 1 and coarser.
 pub const COST_FRACTION_BITS: u32 = 8;
+/// Rows that a device keeps together where it holds only some of level 0 at a time.
+pub const RING_PART: usize = 32;
+/// Rows of all that a device holds begin at multiples of this many bytes, as its bindings do.
+pub const ROW_ALIGN: usize = 256;
 /// Side of the window that holds a dependency factor's members.
 pub const GRAPH_WINDOW: usize = 7;
 /// Labels are stored in blocks of this many; the last block is padded.
@@ -361,6 +365,13 @@ impl Plan {
         if level == 0 { self.held } else { self.levels[level].height }
     }
 
+    /// Parts of a ring, of `part` rows each and with a halo on either side, that hold all rows of level 0 that are needed at the
+    /// same time: the first of the next part to be overwritten is that of a halo, and all before it must be done.
+    #[must_use]
+    pub fn ring_parts(&self, part: usize) -> usize {
+        (self.held + 2 * (GRAPH_WINDOW / 2)).div_ceil(part) + 1
+    }
+
     /// The same plan with all rows held.
     #[must_use]
     pub fn whole(&self) -> Self {
@@ -456,28 +467,34 @@ impl Plan {
         2 * self.levels[level].min - self.levels[level - 1].min
     }
 
-    /// Bytes taken by the volumes and the graph of `level`; where not all rows of level 0 are held, with what its costs are
-    /// computed from.
+    /// Largest number of bytes taken by the volumes and the graph of `level`, on the CPU path or on a device; where not all rows of
+    /// level 0 are held, with what its costs are computed from.
     #[must_use]
     pub fn level_bytes(&self, level: usize) -> u64 {
         let l = &self.levels[level];
-        let (all, held) = (l.height, self.rows_held(level));
-        // In a ring a pair of rows is replaced as a whole, and does not pass its end.
-        let rows = if held < all { all.min(held + 4) } else { all };
-        let cells = (rows * l.width * l.stride) as u64;
-        let (cost, features) = match level {
-            0 if held < all => (0, l.height * (2 * l.width + 2 * 12 * (l.width + 2 * l.stride))),
-            0 => (1, 0),
-            _ => (2, 0),
-        };
+        let streamed = self.rows_held(level) < l.height;
+        let halo = GRAPH_WINDOW / 2;
+        // The ring of the CPU path is shorter.
+        let rows = if streamed { self.ring_parts(RING_PART) * (RING_PART + 2 * halo) } else { l.height };
         let width = self.volume_width.bytes();
-        let up = if level == 0 { 0 } else { width };
-        let down = if level + 1 == self.levels.len() { 0 } else { width };
-        let volumes = cost + 1 + width + up + down + self.slots() * width;
-        // The member codes, and the transposed table with its row starts. A device needs less for these; what members are chosen by
-        // takes the rest there, and on the CPU path what its maps leave.
-        let graph = l.pixels() * (self.neighbours + 4 * self.slots() + 4);
-        cells * volumes as u64 + (features + graph) as u64
+        let has = |is_there: bool| usize::from(is_there);
+        // Cost, evidence, beliefs with the messages from above and below, and the messages of the factors.
+        let cost = if level == 0 { 1 } else { 2 };
+        let messages = 1 + has(level > 0);
+        let labels = l.width * l.stride;
+        let row =
+            (cost + 1 + width * (1 + messages)) * aligned(labels) + width * aligned(self.slots() * labels);
+        let features = if streamed { l.height * (2 * l.width + 24 * (l.width + 2 * l.stride)) } else { 0 };
+        // The member codes, and the transposed table with its row starts, and the guide.
+        let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9);
+        // A device needs less for these, but keeps candidates and label ranges as well. The guide of level 1 is there twice, and that of
+        // level 0 is a map.
+        let guides = [0, 2, 1][level.min(2)];
+        let maps = 2 + 4 * guides + has(level > 0) + has(self.limits_labels());
+        let on_device = maps * aligned(4 * l.width) + aligned(4 * l.width * self.neighbours.div_ceil(4));
+        let (runs, window_rows) = l.windows();
+        let windows = 2 * aligned(4 * runs * window_rows);
+        (rows * row + features + l.height * on_host.max(on_device) + windows) as u64
     }
 
     /// Largest number of bytes taken by the images and all maps.
@@ -485,7 +502,9 @@ impl Plan {
     pub fn map_bytes(&self) -> u64 {
         // The maps of the left view, and both views mirrored, while those of the right view are made.
         let right = if self.method.refinement.right_map { 10 + 2 * 9 } else { 0 };
-        (100 + right) * self.levels[0].pixels() as u64
+        let (width, height) = self.size();
+        // Beside them, what a device keeps of each row, and its tables.
+        ((100 + right) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14)) as u64
     }
 
     /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
@@ -521,6 +540,11 @@ impl Plan {
     pub fn bytes(&self) -> u64 {
         self.map_bytes() + (0..self.levels.len()).map(|z| self.level_bytes(z)).sum::<u64>()
     }
+}
+
+/// Bytes of a row with its padding.
+fn aligned(bytes: usize) -> usize {
+    bytes.next_multiple_of(ROW_ALIGN)
 }
 
 /// A truncation in units, at least 1.

@@ -5,6 +5,7 @@
 
 mod common;
 
+use common::devices;
 use common::random::{self, Random};
 use mrfgs::image::Pair;
 use mrfgs::low_level::backend::Backend;
@@ -30,6 +31,13 @@ fn maps(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, whole: bool) -> Map
     maps
 }
 
+/// The plan of a match that may take so little memory that a device, which would rather hold all rows, does not either.
+fn plan(size: (usize, usize), min: i32, labels: usize, method: &Method) -> Plan {
+    let mut method = method.clone();
+    method.tiles.memory = 1;
+    random::plan(size, min, labels, &method)
+}
+
 /// Any method whose level 0 is streamed: it takes the levels one after the other and compares by a census.
 fn method(random: &mut Random) -> Method {
     let neighbours = random.pick(&[0, 2, 2, 4]);
@@ -46,20 +54,28 @@ fn method(random: &mut Random) -> Method {
 fn streamed_maps_are_those_of_whole_levels() {
     let mut random = Random::new(17);
     let (mut streamed, mut differ) = (0, 0);
-    for _ in 0..60 {
-        let size = (random.within(1, 70) as usize, random.within(100, 260) as usize);
+    for i in 0..50 {
+        let size = (random.within(1, 70) as usize, random.within(120, 420) as usize);
         let labels = random.pick(&[1, 16, 17, 40, 40, 70]);
         let method = method(&mut random);
-        let plan = random::plan(size, random.within(0, 20).cast_signed() - 10, labels, &method);
+        let plan = plan(size, random.within(0, 20).cast_signed() - 10, labels, &method);
         let pair = random::pair(&mut random, size.0, size.1);
         let expected = maps(&mut Cpu::default(), &plan, &pair, true);
-        assert!(
-            expected == maps(&mut Cpu::default(), &plan, &pair, false),
-            "{size:?}, {labels} labels, {method:?}"
-        );
         let held = solver::streamed(&plan);
         streamed += usize::from(!held.holds_all_rows());
         assert!(held.bytes() <= plan.bytes());
+        // A device takes longer.
+        for (name, mut backend) in devices::backends().into_iter().take(if i % 3 == 0 { 2 } else { 1 }) {
+            assert!(
+                expected == maps(&mut *backend, &plan, &pair, false),
+                "{name}: {size:?}, {labels} labels, {method:?}"
+            );
+            let (took, bound) = (backend.traffic().bytes_held, held.bytes());
+            assert!(
+                took <= bound,
+                "{name} holds {took} of {bound} bytes: {size:?}, {labels} labels, {method:?}"
+            );
+        }
         // Control: what is compared differs from pair to pair.
         let other = random::pair(&mut random, size.0, size.1);
         differ += usize::from(expected != maps(&mut Cpu::default(), &plan, &other, false));
@@ -69,16 +85,31 @@ fn streamed_maps_are_those_of_whole_levels() {
 }
 
 #[test]
+fn a_device_that_may_take_enough_holds_all_rows() {
+    let Some(mut gpu) = devices::gpu() else { return };
+    let mut random = Random::new(19);
+    let pair = random::pair(&mut random, 64, 400);
+    let held = [1, 4096].map(|memory| {
+        let mut method = Method::default();
+        method.tiles.memory = memory;
+        maps(&mut gpu, &random::plan((64, 400), 0, 64, &method), &pair, false);
+        gpu.traffic().bytes_held
+    });
+    assert!(held[0] < held[1] * 3 / 4, "{held:?}");
+}
+
+#[test]
 fn nothing_is_left_over_from_the_pair_before() {
     let mut random = Random::new(18);
-    let plan = random::plan((60, 250), -3, 40, &Method::default());
+    let plan = plan((60, 330), -3, 40, &Method::default());
     assert!(!solver::streamed(&plan).holds_all_rows());
-    let mut backend = Cpu::default();
-    for byte in [0xff, 0, 0x7f] {
-        let pair = random::pair(&mut random, 60, 250);
-        let expected = maps(&mut Cpu::default(), &plan, &pair, true);
-        assert!(expected == maps(&mut backend, &plan, &pair, false));
-        backend.probe().poison(byte).unwrap();
+    for (name, mut backend) in devices::backends() {
+        for byte in [0xff, 0, 0x7f] {
+            let pair = random::pair(&mut random, 60, 330);
+            let expected = maps(&mut Cpu::default(), &plan, &pair, true);
+            assert!(expected == maps(&mut *backend, &plan, &pair, false), "{name}");
+            backend.probe().poison(byte).unwrap();
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::engine::{Solution, solve, solve_tiles};
 use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::solver::streamed;
 use mrfgs::low_level::tiles::{OVERLAP, Tiles};
 use mrfgs::low_level::watch::Progress;
 use mrfgs::maps::{Maps, has_disparity};
@@ -38,6 +39,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
     let memory = u64::from(whole.method.tiles.memory) << 20;
     let ensure = |holds: bool, what: &str| if holds { Ok(()) } else { Err(what.to_owned()) };
     ensure(tiles.bytes() <= memory, "within the memory")?;
+    let bytes = |plan: &Plan| streamed(plan).bytes();
     let grid = 1 << (whole.levels.len() - 1);
     let mut covered = Plane::filled(width, height, 0u8);
     for tile in tiles.list() {
@@ -57,7 +59,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         let (left, right) = (i64::from(range.max.max(0)), i64::from(-range.min.min(0)));
         ensure(holds(&crop.y, &core.y, overlap, overlap, height), "the overlap above and below")?;
         ensure(holds(&crop.x, &core.x, overlap + left, overlap + right, width), "overlap and matches")?;
-        ensure(tile.plan.bytes() <= memory, "each tile within the memory")?;
+        ensure(bytes(&tile.plan) <= memory, "each tile within the memory")?;
         let (w, h) = crop.size();
         let expected = Plan {
             core: core.x.start - crop.x.start..core.x.end - crop.x.start,
@@ -67,7 +69,7 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         ensure(overlap == 0 || tile.plan == expected, "the plan of the crop")?;
     }
     ensure(covered.data().iter().all(|&n| n == 1), "every pixel in one core")?;
-    let one = whole.bytes() <= memory;
+    let one = bytes(whole) <= memory;
     ensure(one == (tiles.count() == 1), "in one piece if and only if that fits")
 }
 

@@ -86,12 +86,7 @@ pub trait Backend {
         &mut self,
         wavefront: &Wavefront,
         before: &mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Result<()> {
-        wavefront.schedule().iter().try_for_each(|&stage| {
-            before(stage, 1.0)?;
-            self.run(stage)
-        })
-    }
+    ) -> Result<()>;
 
     /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
     /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.

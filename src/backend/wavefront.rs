@@ -108,6 +108,18 @@ fn reach(stage: Stage) -> Option<usize> {
     }
 }
 
+/// Whether `stage` needs volumes of level 0 that are not there where not all of its rows are held. (Costs alone are computed
+/// where they are needed.)
+#[must_use]
+pub fn needs_level_0(stage: Stage) -> bool {
+    match stage {
+        Stage::Evidence(z) | Stage::Dependency(z) | Stage::Belief(z) | Stage::Flood(z) => z == 0,
+        Stage::Resolution(z) => z == 1,
+        Stage::Change | Stage::WinnerTakesAll | Stage::RightView => true,
+        _ => false,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,6 +189,38 @@ mod tests {
                     nearer.lags[i..].iter_mut().for_each(|lag| *lag -= 4);
                     assert!(broken(&nearer).is_some(), "stage {i} four rows nearer must be noticed");
                 }
+            }
+        }
+    }
+
+    /// Whether a ring of so many parts keeps each part until nobody needs it any more: a part is there from its upper halo on.
+    fn fits_ring(wavefront: &Wavefront, part: usize, count: usize) -> bool {
+        let (stages, height) = (wavefront.stages(), wavefront.heights[0]);
+        let mut there = vec![0; count];
+        wavefront.parts().all(|(i, rows)| {
+            rows.into_iter().all(|row| {
+                let [own, _] = seen(stages[i], row, height);
+                if i == 0 {
+                    let newest = (own.end - 1 + GRAPH_WINDOW / 2).min(height - 1) / part;
+                    there[newest % count] = newest;
+                }
+                own.clone().all(|row| there[row / part % count] == row / part)
+            })
+        })
+    }
+
+    #[test]
+    fn rings_keep_what_is_needed() {
+        for height in [61, 300, 401] {
+            let range = DisparityRange::new(0, 63).unwrap();
+            let plan = Plan::new(40, height, range, &Method::default()).unwrap();
+            let wavefront = Wavefront::new(&plan, stages()).unwrap();
+            let plan = Plan { held: wavefront.rows(), ..plan };
+            for part in [2, 8, 32] {
+                let count = plan.ring_parts(part);
+                assert!(fits_ring(&wavefront, part, count), "{count} parts of {part} rows, height {height}");
+                let fewer = count * 2 / 3;
+                assert!(height < 300 || !fits_ring(&wavefront, part, fewer), "{fewer} parts of {part} rows");
             }
         }
     }

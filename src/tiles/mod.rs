@@ -18,6 +18,7 @@ pub mod mosaic;
 use crate::error::{BudgetError, Result};
 use crate::image::Rect;
 use crate::plan::Plan;
+use crate::solver::streamed;
 use std::ops::Range;
 
 /// Width of the overlap in pixels, rounded up to whole pixels of the coarsest level (32 of them by default).
@@ -68,7 +69,7 @@ impl Tiles {
         let (width, height) = whole.size();
         let memory = u64::from(whole.method.tiles.memory) << 20;
         let all = Rect::whole((width, height));
-        if whole.bytes() <= memory {
+        if streamed(whole).bytes() <= memory {
             let tile = Tile { core: all.clone(), crop: all, plan: whole.clone() };
             return Ok(Self { whole: whole.clone(), tiles: vec![tile] });
         }
@@ -78,7 +79,8 @@ impl Tiles {
         let across = Axis::new(width, [overlap + reach(range.max), overlap + reach(-range.min)], step);
         let down = Axis::new(height, [overlap; 2], step);
 
-        let bytes = |(width, height): (usize, usize)| beside(whole) + whole.resized(width, height).bytes();
+        let bytes =
+            |(width, height): (usize, usize)| beside(whole) + streamed(&whole.resized(width, height)).bytes();
         let candidates = (1..=across.most()).filter_map(|columns| {
             let width = across.crop(columns);
             // The smallest number of rows of tiles that fits.
@@ -87,7 +89,8 @@ impl Tiles {
             Some((across.cropped(size.0) * down.cropped(size.1), size))
         });
         let Some((_, (width, height))) = candidates.min_by_key(|&(pixels, _)| pixels) else {
-            let least = bytes((across.crop(across.most()), down.crop(down.most()))).min(whole.bytes());
+            let least =
+                bytes((across.crop(across.most()), down.crop(down.most()))).min(streamed(whole).bytes());
             return Err(BudgetError::NoTileFits {
                 memory: whole.method.tiles.memory,
                 width: all.x.len(),
@@ -130,11 +133,12 @@ impl Tiles {
         self.tiles.len()
     }
 
-    /// The plan that takes the most memory: the plan of the whole image where there is one tile.
+    /// The plan that takes the most memory, as a match follows it that nobody looks into: the plan of the whole image where there
+    /// is one tile.
     #[must_use]
-    pub fn largest(&self) -> &Plan {
-        let plans = self.tiles.iter().map(|tile| &tile.plan);
-        plans.max_by_key(|plan| plan.bytes()).unwrap_or(&self.whole)
+    pub fn largest(&self) -> Plan {
+        let plans = self.tiles.iter().map(|tile| streamed(&tile.plan));
+        plans.max_by_key(Plan::bytes).unwrap_or_else(|| self.whole.clone())
     }
 
     /// Largest number of bytes that the match takes.

@@ -5,6 +5,7 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::low_level::backend::probe::Probe;
+use mrfgs::low_level::backend::wavefront::Wavefront;
 use mrfgs::low_level::backend::{Backend, Map, Stage, Ticket, Traffic};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
@@ -78,6 +79,14 @@ impl Backend for Pooled {
 
     fn run(&mut self, stage: Stage) -> Result<()> {
         self.gpu().run(stage)
+    }
+
+    fn run_wavefront(
+        &mut self,
+        wavefront: &Wavefront,
+        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Result<()> {
+        self.gpu().run_wavefront(wavefront, before)
     }
 
     fn settled(&mut self, wait: bool) -> Result<bool> {

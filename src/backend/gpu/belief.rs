@@ -2,7 +2,8 @@
 //!
 //! Floor, a label: 6 bytes moved and asked for, 20 operations for four; beside that the graph: 8 bytes a pixel, and 4 a member.
 
-use super::buffers::{Binding, HALO, Rows, Shared, with_halo};
+use super::buffers::Shared;
+use super::rows::{Binding, HALO, Rows, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;

@@ -1,190 +1,21 @@
 //! The buffers of a match, allocated once, from the plan alone.
 //!
-//! A volume larger than the device's largest buffer is split into parts of whole rows. Each part also holds a
-//! halo: a few rows of its neighbours, so that a stage that reads around a pixel finds everything in one
-//! part. A stage that writes a volume with a halo ends with copies that update those rows.
-//!
 //! Where they fit, levels share buffers, so that one dispatch can go over several of them.
 
 use super::convergence::Convergence;
 use super::device::Device;
+use super::rows::{HALO, Pool, Rows};
 use super::uniform::{ALIGN_WORDS, LevelParams};
 use super::words::window_words;
 use crate::error::{MemoryError, Result};
 use crate::image::Plane;
-use crate::plan::{GRAPH_WINDOW, LevelPlan, Plan};
+use crate::plan::{LevelPlan, Plan, RING_PART};
 use crate::weights::MedianWeights;
 use std::array;
-use std::num::NonZero;
-use std::ops::Range;
-
-/// Halo of a part, in rows on either side: as far as any stage reads around a pixel in a volume.
-pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
 
 /// What stages and copies do with buffers.
 const USAGE: wgpu::BufferUsages =
     wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);
-
-/// `rows` with up to `halo` rows above and below.
-pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32> {
-    rows.start.saturating_sub(halo)..rows.end.saturating_add(halo).min(height)
-}
-
-/// Data stored row by row, in as few buffers as the device allows.
-#[derive(Clone)]
-pub(super) struct Rows {
-    parts: Vec<Part>,
-    row_bytes: u64,
-}
-
-#[derive(Clone)]
-struct Part {
-    buffer: wgpu::Buffer,
-    /// The rows that it owns.
-    own: Range<u32>,
-    /// The rows that it holds, halo included.
-    held: Range<u32>,
-    /// Where they begin in the buffer, in bytes.
-    offset: u64,
-}
-
-impl Part {
-    /// Where `row` begins in the buffer.
-    fn at(&self, row: u32, row_bytes: u64) -> u64 {
-        self.offset + u64::from(row - self.held.start) * row_bytes
-    }
-}
-
-/// A range of a buffer to bind, at a byte offset that is a multiple of 256.
-#[derive(Clone)]
-pub(super) struct Binding {
-    buffer: wgpu::Buffer,
-    bytes: Range<u64>,
-}
-
-impl Binding {
-    pub(super) fn whole(buffer: &wgpu::Buffer) -> Self {
-        Self { buffer: buffer.clone(), bytes: 0..buffer.size() }
-    }
-
-    /// Number of bytes that are bound.
-    pub(super) fn size(&self) -> u64 {
-        let end = self.bytes.end.min(self.buffer.size());
-        end.saturating_sub(self.bytes.start)
-    }
-
-    pub(super) fn resource(&self) -> wgpu::BindingResource<'_> {
-        wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-            buffer: &self.buffer,
-            offset: self.bytes.start,
-            size: NonZero::new(self.size()),
-        })
-    }
-}
-
-/// A copy of bytes from one buffer to another.
-#[derive(Clone)]
-pub(super) struct Copy {
-    pub(super) from: (wgpu::Buffer, u64),
-    pub(super) to: (wgpu::Buffer, u64),
-    pub(super) bytes: u64,
-}
-
-impl Rows {
-    /// Binds `rows`, which one part owns, with as much of their halo as that part holds: for a stage that
-    /// writes the rows, or reads around them.
-    pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
-        let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;
-        let part = self.parts.iter().find(|p| within(&p.own)).or(self.parts.iter().find(|p| within(&p.held)));
-        let part = part.expect("bands stay within parts, and halos within what parts hold");
-        let at = |row: u32| part.at(row, self.row_bytes);
-        Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
-    }
-
-    /// Copies that update the halos of all parts.
-    pub(super) fn exchange(&self) -> Vec<Copy> {
-        let mut copies = Vec::new();
-        for (i, to) in self.parts.iter().enumerate() {
-            for (j, from) in self.parts.iter().enumerate() {
-                let rows = to.held.start.max(from.own.start)..to.held.end.min(from.own.end);
-                if i != j && !rows.is_empty() {
-                    let at = |part: &Part| part.at(rows.start, self.row_bytes);
-                    copies.push(Copy {
-                        from: (from.buffer.clone(), at(from)),
-                        to: (to.buffer.clone(), at(to)),
-                        bytes: rows.len() as u64 * self.row_bytes,
-                    });
-                }
-            }
-        }
-        copies
-    }
-
-    /// Copies of all rows to `to`, which has the same rows.
-    pub(super) fn copy_to(&self, to: &Self) -> Vec<Copy> {
-        let pairs = self.parts.iter().zip(&to.parts);
-        pairs
-            .map(|(from, to)| Copy {
-                from: (from.buffer.clone(), from.offset),
-                to: (to.buffer.clone(), to.offset),
-                bytes: from.held.len() as u64 * self.row_bytes,
-            })
-            .collect()
-    }
-
-    /// First row of each part.
-    pub(super) fn starts(&self) -> impl Iterator<Item = u32> {
-        self.parts.iter().map(|p| p.own.start)
-    }
-
-    pub(super) fn buffers(&self) -> impl Iterator<Item = &wgpu::Buffer> {
-        self.parts.iter().map(|p| &p.buffer)
-    }
-
-    /// Each part's buffer, and the byte range of its own rows in it.
-    pub(super) fn own(&self) -> Vec<(wgpu::Buffer, Range<u64>)> {
-        let at = |p: &Part, row: u32| p.at(row, self.row_bytes);
-        self.parts.iter().map(|p| (p.buffer.clone(), at(p, p.own.start)..at(p, p.own.end))).collect()
-    }
-
-    /// Each part's buffer, and the byte range of all its rows in it.
-    pub(super) fn held(&self) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
-        let at = |p: &Part, row: u32| p.at(row, self.row_bytes);
-        self.parts.iter().map(move |p| (&p.buffer, at(p, p.held.start)..at(p, p.held.end)))
-    }
-
-    /// Where the first row begins in its buffer, in elements of so many bytes.
-    fn start(&self, bytes: u64) -> u32 {
-        (self.parts[0].offset / bytes) as u32
-    }
-
-    /// Writes the words of all rows.
-    pub(super) fn write(&self, device: &mut Device, words: &[u32]) -> Result<()> {
-        let per_row = self.row_bytes as usize / 4;
-        for part in &self.parts {
-            let held = part.held.start as usize * per_row..part.held.end as usize * per_row;
-            device.write_at(&part.buffer, part.offset, bytemuck::cast_slice(&words[held]))?;
-        }
-        Ok(())
-    }
-}
-
-/// One buffer for several levels, coarsest first.
-struct Pool {
-    buffer: wgpu::Buffer,
-    /// Words that are taken.
-    taken: u64,
-}
-
-impl Pool {
-    /// The next `height` rows of `words` words each.
-    fn rows(&mut self, words: u32, height: u32) -> Rows {
-        let (all, offset) = (0..height, 4 * self.taken);
-        self.taken += u64::from(words) * u64::from(height);
-        let part = Part { buffer: self.buffer.clone(), own: all.clone(), held: all, offset };
-        Rows { parts: vec![part], row_bytes: 4 * u64::from(words) }
-    }
-}
 
 /// The buffers that the coarser levels share.
 pub(super) struct Shared {
@@ -337,14 +168,15 @@ impl Allocator<'_> {
 
     /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height.
     fn rows(&mut self, label: &str, words: u32, starts: &[u32]) -> Result<Rows> {
-        let height = starts[starts.len() - 1];
-        let parts = starts.windows(2).map(|ends| {
-            let own = ends[0]..ends[1];
-            let held = with_halo(&own, HALO, height);
-            let buffer = self.buffer(label, u64::from(words) * held.len() as u64)?;
-            Ok(Part { buffer, own, held, offset: 0 })
-        });
-        Ok(Rows { parts: parts.collect::<Result<_>>()?, row_bytes: 4 * u64::from(words) })
+        Rows::in_parts(words, starts, |_, rows| self.buffer(label, u64::from(words) * rows))
+    }
+
+    /// The same, where the rows of `count` parts are needed at a time.
+    fn ring(&mut self, label: &str, words: u32, starts: &[u32], count: usize) -> Result<Rows> {
+        let rows = u64::from(starts[1] - starts[0] + 2 * HALO);
+        let buffers = starts[1..].iter().take(count).map(|_| self.buffer(label, u64::from(words) * rows));
+        let buffers: Vec<_> = buffers.collect::<Result<_>>()?;
+        Rows::in_parts(words, starts, |i, _| Ok(buffers[i % count].clone()))
     }
 }
 
@@ -369,6 +201,8 @@ const WINDOWS: usize = 5;
 const GUIDE: usize = 6;
 const MEMBERS: usize = 7;
 const INCOMING: usize = 8;
+/// Those with a value for each label.
+const VOLUMES: [usize; 5] = [EVIDENCE, DEPENDENCY, DOWN, UP, BELIEF];
 
 /// The sizes of what a level may share.
 struct Words {
@@ -404,16 +238,14 @@ fn full_windows(level: &LevelPlan) -> Vec<u32> {
     words
 }
 
-/// First rows of the parts of a level, and its height. They are even, so that the two rows of a coarser pixel
-/// stay together.
-fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec<u32>> {
-    let bytes = plan.volume_width.bytes() as u32;
-    let widest = (bytes * params.dependency_pitch).max(2 * params.pitch);
+/// First rows of the parts of a level, and its height, where the widest rows have so many words. They are even, so that the two
+/// rows of a coarser pixel stay together; none has more than `most`.
+fn part_starts(device: &Device, plan: &Plan, height: u32, widest: u32, most: u32) -> Result<Vec<u32>> {
     let fitting = device.max_buffer / (4 * u64::from(widest));
-    if fitting >= u64::from(params.height) {
-        return Ok(vec![0, params.height]);
+    if fitting.min(u64::from(most)) >= u64::from(height) {
+        return Ok(vec![0, height]);
     }
-    let own = fitting.saturating_sub(2 * u64::from(HALO)) as u32 & !1;
+    let own = fitting.saturating_sub(2 * u64::from(HALO)).min(u64::from(most)) as u32 & !1;
     if own == 0 {
         let rows = 2 + 2 * HALO;
         return Err(MemoryError::Buffer {
@@ -424,7 +256,7 @@ fn part_starts(device: &Device, plan: &Plan, params: &LevelParams) -> Result<Vec
         }
         .into());
     }
-    Ok((0..params.height).step_by(own as usize).chain([params.height]).collect())
+    Ok((0..height).step_by(own as usize).chain([height]).collect())
 }
 
 impl Buffers {
@@ -445,11 +277,22 @@ impl Buffers {
         let mut levels = Vec::new();
         for (z, level) in plan.levels.iter().enumerate().rev() {
             let p = LevelParams::new(plan, level);
-            let starts = part_starts(a.device, plan, &p)?;
             let words = Words::of(plan, z);
+            let narrow = words.in_row[INCOMING].max(words.in_row[MEMBERS]);
+            let wide = words.in_row[DEPENDENCY].max(2 * p.pitch);
+            let streamed = z == 0 && !plan.holds_all_rows();
+            let starts =
+                part_starts(a.device, plan, p.height, if streamed { narrow } else { wide }, u32::MAX)?;
+            // The parts of the volumes, and how many of them there is room for.
+            let most = if streamed { RING_PART as u32 } else { u32::MAX };
+            let in_turns = part_starts(a.device, plan, p.height, wide, most)?;
+            let count = if streamed { plan.ring_parts(in_turns[1] as usize) } else { usize::MAX };
             let windows = full_windows(level);
             let mut rows = |kind: usize, starts: &[u32]| match &mut shared {
                 Some(pools) if z >= finest => Ok(pools[kind].rows(words.in_row[kind], words.rows[kind])),
+                _ if streamed && VOLUMES.contains(&kind) => {
+                    a.ring(SHARED[kind], words.in_row[kind], &in_turns, count)
+                }
                 _ => a.rows(SHARED[kind], words.in_row[kind], starts),
             };
             let whole = [0, p.height];
@@ -466,7 +309,11 @@ impl Buffers {
                 // What a level does not have still needs a binding in the shaders.
                 up: up.map_or_else(|| a.rows(SHARED[UP], words.in_row[UP], &none), Ok)?,
                 full_windows: a.constant("full label windows", &windows)?,
-                cost: a.rows("cost", if z == 0 { p.pitch } else { 2 * p.pitch }, &starts)?,
+                cost: match z {
+                    0 if streamed => a.ring("cost", p.pitch, &in_turns, count)?,
+                    0 => a.rows("cost", p.pitch, &starts)?,
+                    _ => a.rows("cost", 2 * p.pitch, &starts)?,
+                },
                 candidates: a.rows("candidates", p.pixel_pitch, if z == 0 { &none } else { &starts })?,
                 label_range: a.rows(
                     "label ranges",
@@ -534,7 +381,9 @@ impl Buffers {
         let most = a.device.max_binding.min(a.device.max_buffer) / 4;
         let mut sizes = [0; SHARED.len()];
         let mut finest = plan.levels.len();
-        while finest > 0 {
+        // A level of which some rows are held at a time keeps them for itself.
+        let first = usize::from(!plan.holds_all_rows());
+        while finest > first {
             let words = Words::of(plan, finest - 1);
             let more: [u64; SHARED.len()] = array::from_fn(|kind| sizes[kind] + words.all(kind));
             if more.iter().any(|&words| words > most) {
@@ -551,14 +400,14 @@ impl Buffers {
         }
         let mut pools = Vec::new();
         for (label, words) in SHARED.iter().zip(sizes) {
-            pools.push(Pool { buffer: a.buffer(label, words)?, taken: 0 });
+            pools.push(Pool::new(a.buffer(label, words)?));
         }
         Ok((finest, pools.try_into().ok()))
     }
 
     /// A guide of these parameters on its way to its level.
     pub(super) fn next_guide(&self, params: &LevelParams) -> Rows {
-        Pool { buffer: self.next_guide.clone(), taken: 0 }.rows(4 * params.pixel_pitch, params.height)
+        Pool::new(self.next_guide.clone()).rows(4 * params.pixel_pitch, params.height)
     }
 
     /// Makes room for the workgroups of the dispatches that end when the map has settled.

@@ -1,6 +1,6 @@
 //! How much the label map changed, and whether it has settled: see [`Stage::Change`](crate::backend::Stage::Change).
 
-use super::buffers::Binding;
+use super::rows::Binding;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;

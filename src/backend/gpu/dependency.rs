@@ -3,7 +3,8 @@
 //! Floor, a label and three members: 7 bytes moved, 15 asked for (the beliefs of three members, all of it again after the
 //! minimum), 50 operations for four labels.
 
-use super::buffers::{HALO, Shared, with_halo};
+use super::buffers::Shared;
+use super::rows::{HALO, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;

@@ -2,6 +2,7 @@
 //!
 //! Floor, a label: 3 bytes moved, 4 asked for (the costs twice, for their minimum), 25 operations for four.
 
+use super::cost;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
@@ -30,6 +31,12 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         down: scale.down,
         cap: scale.cap.into(),
     };
+    if r.level == 0 && !r.plan.holds_all_rows() {
+        // What these rows take the place of goes.
+        cost::record_costs(r)?;
+        r.clear(&here.dependency);
+        r.clear(&here.down);
+    }
     r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
         vec![
             (1, here.cost.bind(rows)),

@@ -1,6 +1,6 @@
 //! Disparities for what is invalid: see [`Stage::Fill`](crate::backend::Stage::Fill).
 
-use super::buffers::Binding;
+use super::rows::Binding;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;

@@ -1,6 +1,7 @@
 //! The graph of a level: see [`Stage::Graph`](crate::backend::Stage::Graph).
 
-use super::buffers::{HALO, Shared, with_halo};
+use super::buffers::Shared;
+use super::rows::{HALO, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::{LevelParams, uniform};

@@ -2,7 +2,7 @@
 //!
 //! Windows that hold all labels are there from the start.
 
-use super::buffers::{HALO, with_halo};
+use super::rows::{HALO, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;

@@ -2,7 +2,7 @@
 //!
 //! Floor, a pixel: 28 bytes moved; in each of up to nine passes 3,000 bytes asked for (the 105 places) and 2,500 operations.
 
-use super::buffers::{Binding, with_halo};
+use super::rows::{Binding, with_halo};
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;

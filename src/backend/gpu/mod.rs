@@ -11,15 +11,21 @@
 mod buffers;
 mod convergence;
 mod device;
+mod gather;
+mod levels;
 mod probe;
+mod queue;
+mod rows;
 mod shader;
 mod steps;
 mod timer;
 mod uniform;
 mod upload;
+mod wave;
 mod words;
 
 use super::probe::Probe;
+use super::wavefront::{Wavefront, needs_level_0};
 use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
@@ -27,19 +33,21 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
-use buffers::{Buffers, LevelBuffers, Rows, Shared};
+use buffers::{Buffers, LevelBuffers};
+
 use convergence::Convergence;
 use device::Device;
 pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
+use levels::{can_share, next_level, record_levels};
+use rows::Rows;
 pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
-use std::mem;
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-use steps::{Groups, Pipelines, Recorder, Step};
+use std::time::Duration;
 pub use steps::{Job, MAX_LOOP_ITERATIONS};
-use timer::{PASSES_PER_SUBMIT, Timer};
+use steps::{Pipelines, Recorder, Step};
+use timer::Timer;
 pub use uniform::UniformLayout;
 use words::{image_words, label_range_words, narrow_words};
 
@@ -98,56 +106,20 @@ pub struct Gpu {
 /// The steps of a stage at its level and the next ones, so many together.
 type Steps = HashMap<(Stage, usize), Arc<[Step]>>;
 
-/// Records a stage at several levels at once.
-type RecordLevels = fn(&mut Recorder, &Shared, Range<usize>) -> Result<()>;
-
-/// How `stage` goes over levels at once, where it can.
-fn record_levels(stage: Stage) -> Option<RecordLevels> {
-    match stage {
-        Stage::Graph(_) => Some(graph::record_levels),
-        Stage::Dependency(_) => Some(dependency::record_levels),
-        Stage::Resolution(_) => Some(resolution::record_levels),
-        Stage::Belief(_) => Some(belief::record_levels),
-        _ => None,
-    }
-}
-
-/// Whether all that `stage` reads and writes is shared.
-fn can_share(stage: Stage, shared: &Shared) -> bool {
-    match stage {
-        Stage::Resolution(z) => z > shared.finest,
-        stage => stage.level().is_some_and(|z| z >= shared.finest),
-    }
-}
-
-/// The same stage at the next coarser level, where the two can run together.
-fn next_level(stage: Stage) -> Option<Stage> {
-    match stage {
-        Stage::Graph(z) => Some(Stage::Graph(z + 1)),
-        Stage::Dependency(z) => Some(Stage::Dependency(z + 1)),
-        Stage::Resolution(z) => Some(Stage::Resolution(z + 1)),
-        Stage::Belief(z) => Some(Stage::Belief(z + 1)),
-        Stage::Flood(z) => Some(Stage::Flood(z + 1)),
-        _ => None,
-    }
-}
+/// The steps of a stage for some rows of its level.
+type PartSteps = HashMap<(Stage, Range<u32>), Arc<[Step]>>;
 
 /// Everything that belongs to one plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
     steps: Steps,
+    /// Those of some rows.
+    part_steps: PartSteps,
     /// Those of [`upload`].
     upload: Arc<[Step]>,
     /// Words of an image on their way up.
     words: Vec<u32>,
-}
-
-impl State {
-    /// Whether `stage` may wait for others that run together with it.
-    fn may_wait(&self, stage: Stage) -> bool {
-        next_level(stage).is_some() && self.buffers.shared.as_ref().is_some_and(|s| can_share(stage, s))
-    }
 }
 
 impl Gpu {
@@ -187,7 +159,8 @@ impl Gpu {
     fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Steps> {
         let mut steps = HashMap::new();
         let mut endings = Vec::new();
-        for stage in Stage::all(plan).into_iter().filter(|stage| *stage != Stage::Change) {
+        let runs_whole = |stage: &Stage| plan.holds_all_rows() || !needs_level_0(*stage);
+        for stage in Stage::all(plan).into_iter().filter(|s| *s != Stage::Change).filter(runs_whole) {
             let is_message = matches!(stage, Stage::Dependency(_) | Stage::Resolution(_) | Stage::Belief(_));
             let ends = is_message && plan.settled_change().is_some();
             let ending = ends.then_some(&mut endings);
@@ -206,7 +179,9 @@ impl Gpu {
         }
         // This stage makes the dispatches of messages empty: it comes when these are known.
         buffers.end_when_settled(&mut self.device, &endings)?;
-        steps.insert((Stage::Change, 1), self.steps(Stage::Change, plan, buffers)?);
+        if runs_whole(&Stage::Change) {
+            steps.insert((Stage::Change, 1), self.steps(Stage::Change, plan, buffers)?);
+        }
         Ok(steps)
     }
 
@@ -220,149 +195,10 @@ impl Gpu {
         record: impl FnOnce(&mut Recorder<'a>) -> Result<()>,
     ) -> Result<Arc<[Step]>> {
         let Self { device, pipelines, .. } = self;
-        let mut recorder = Recorder { device, pipelines, plan, buffers, level, endings, steps: Vec::new() };
+        let mut recorder =
+            Recorder { device, pipelines, plan, buffers, level, only: None, endings, steps: Vec::new() };
         record(&mut recorder)?;
         Ok(recorder.steps.into())
-    }
-
-    fn encoder(&mut self) -> Result<&mut wgpu::CommandEncoder> {
-        if self.encoder.is_none() {
-            let descriptor = wgpu::CommandEncoderDescriptor::default();
-            self.encoder = Some(self.device.inner()?.create_command_encoder(&descriptor));
-        }
-        Ok(self.encoder.as_mut().expect("just made"))
-    }
-
-    /// Records steps, and submits whenever enough is recorded.
-    fn record(&mut self, steps: &[Step]) -> Result<()> {
-        let mut rest = steps;
-        while let Some(first) = rest.first() {
-            let mut recorded = 1;
-            match first {
-                Step::Copy(copy) => {
-                    let (from, to) = (&copy.from, &copy.to);
-                    self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
-                }
-                Step::Dispatch(_) => {
-                    let mut timer = self.timer.take();
-                    let writes = timer.as_mut().and_then(Timer::pass);
-                    let (mut work, most) = (self.work, self.device.work_per_submit);
-                    let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
-                    {
-                        let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                            label: None,
-                            timestamp_writes: writes,
-                        });
-                        recorded = 0;
-                        while let Some(Step::Dispatch(dispatch)) = rest.get(recorded) {
-                            pass.set_pipeline(&dispatch.pipeline);
-                            pass.set_bind_group(0, &dispatch.bind_group, &[]);
-                            match &dispatch.groups {
-                                Groups::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
-                                Groups::UntilSettled(at) => {
-                                    let groups = groups.as_ref().expect("a stage has a state to run on");
-                                    pass.dispatch_workgroups_indirect(groups, 12 * *at as u64);
-                                }
-                            }
-                            work += dispatch.work;
-                            recorded += 1;
-                            if work >= most {
-                                break;
-                            }
-                        }
-                    }
-                    self.timer = timer;
-                    self.work = work;
-                    self.passes += 1;
-                    self.device.traffic.dispatches += recorded as u64;
-                }
-            }
-            rest = &rest[recorded..];
-            let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
-            if timed || self.work >= self.device.work_per_submit {
-                self.submit_recorded()?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Records the stages that wait.
-    fn gather(&mut self) -> Result<()> {
-        let waiting = mem::take(&mut self.waiting);
-        let Some(&first) = waiting.first() else { return Ok(()) };
-        let parts = if matches!(first, Stage::Flood(_)) { 0..2 } else { 0..1 };
-        for part in parts {
-            let stages = waiting.iter().map(|&stage| match stage {
-                Stage::Flood(z) => flood::parts(z)[part],
-                stage => stage,
-            });
-            let stages: Vec<Stage> = stages.collect();
-            let state = self.state();
-            let steps = match state.steps.get(&(stages[0], stages.len())) {
-                Some(steps) => vec![Arc::clone(steps)],
-                None => stages.iter().map(|stage| Arc::clone(&state.steps[&(*stage, 1)])).collect(),
-            };
-            for steps in steps {
-                self.record(&steps)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Submits everything.
-    fn submit(&mut self) -> Result<()> {
-        self.gather()?;
-        self.submit_recorded()
-    }
-
-    fn submit_recorded(&mut self) -> Result<()> {
-        (self.passes, self.work) = (0, 0);
-        if let Some(mut encoder) = self.encoder.take() {
-            if let Some(timer) = &mut self.timer {
-                timer.submit(&self.device, &mut encoder)?;
-            }
-            self.device.submit(encoder)?;
-        }
-        self.device.check()
-    }
-
-    /// Asks for each range of bytes, after everything recorded so far.
-    fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
-        self.gather()?;
-        let mut staged = Vec::new();
-        for (buffer, bytes) in ranges {
-            let size = bytes.end - bytes.start;
-            let staging = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("staging"),
-                size,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            self.encoder()?.copy_buffer_to_buffer(buffer, bytes.start, &staging, 0, size);
-            staged.push(staging);
-        }
-        self.submit()?;
-        self.device.request(staged)
-    }
-
-    /// Asks for the words of all rows.
-    fn request_rows(&mut self, rows: &[&Rows]) -> Result<RequestedRows> {
-        let parts: Vec<_> = rows.iter().flat_map(|r| r.own()).collect();
-        let counts = rows.iter().map(|r| r.own().len()).collect();
-        Ok(RequestedRows { counts, parts: self.request(&parts)? })
-    }
-
-    /// The words of all rows that were asked for.
-    fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
-        let mut words = self.device.collect(rows.parts)?.into_iter();
-        let joined = |n| words.by_ref().take(n).reduce(|all, part| [all, part].concat()).unwrap_or_default();
-        Ok(rows.counts.into_iter().map(joined).collect())
-    }
-
-    /// The words of all rows.
-    fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
-        let requested = self.request_rows(rows)?;
-        self.collect_rows(requested)
     }
 
     fn state(&self) -> &State {
@@ -393,7 +229,9 @@ impl Gpu {
                 level.label_range.write(device, &prepared.label_ranges.get(z).map_or_else(all, words))?;
             }
         }
-        let zeroed = buffers.levels.iter().flat_map(LevelBuffers::messages).chain([&buffers.labels]);
+        // Where not all rows are held, those of a part become 0 when it is entered.
+        let held = buffers.levels.iter().skip(usize::from(!plan.holds_all_rows()));
+        let zeroed = held.flat_map(LevelBuffers::messages).chain([&buffers.labels]);
         let encoder = self.encoder()?;
         for (buffer, place) in zeroed.flat_map(Rows::held) {
             encoder.clear_buffer(buffer, place.start, Some(place.end - place.start));
@@ -434,12 +272,6 @@ impl Gpu {
     }
 }
 
-/// Rows on their way from the device, each in so many parts.
-struct RequestedRows {
-    counts: Vec<usize>,
-    parts: device::Requested,
-}
-
 /// A plane of what `value` makes of the words of a map, which has so many (columns, rows, words a row).
 fn plane<T>(
     words: &[u32],
@@ -470,6 +302,7 @@ impl Backend for Gpu {
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
+        let plan = &self.held(plan);
         if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
             // The maps stay, as all that was asked for leaves them.
             self.submit()?;
@@ -481,8 +314,11 @@ impl Backend for Gpu {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
-                    let steps = self.steps(Stage::RightView, plan, &state.buffers)?;
-                    state.steps.insert((Stage::RightView, 1), steps);
+                    if plan.holds_all_rows() {
+                        let steps = self.steps(Stage::RightView, plan, &state.buffers)?;
+                        state.steps.insert((Stage::RightView, 1), steps);
+                    }
+                    state.part_steps.retain(|(stage, _), _| *stage != Stage::RightView);
                 }
                 state
             }
@@ -490,13 +326,20 @@ impl Backend for Gpu {
                 // What the last match holds goes before the next one asks for more.
                 drop(other);
                 if self.device.software {
-                    memory::check(plan.whole().bytes(), Purpose::Match)?;
+                    memory::check(plan.bytes(), Purpose::Match)?;
                 }
                 let mut buffers = Buffers::new(&mut self.device, plan)?;
                 let steps = self.all_steps(plan, &mut buffers)?;
                 let upload = self.recorded(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
                 let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
-                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
+                State {
+                    plan: plan.clone(),
+                    buffers,
+                    steps,
+                    part_steps: HashMap::new(),
+                    upload,
+                    words: vec![0; words],
+                }
             }
         };
         self.load(&mut state, &prepared)?;
@@ -520,20 +363,22 @@ impl Backend for Gpu {
         if let Stage::Flood(z) = stage {
             return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
         }
-        self.device.count_stage();
         let steps = Arc::clone(&self.state().steps[&(stage, 1)]);
-        let Some(timer) = &mut self.timer else { return self.record(&steps) };
-        timer.begin(stage);
-        if timer.has_clock() {
-            return self.record(&steps);
+        self.perform(stage, &steps)
+    }
+
+    fn run_wavefront(
+        &mut self,
+        wavefront: &Wavefront,
+        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Result<()> {
+        if !self.state().plan.holds_all_rows() {
+            return self.run_parts(wavefront, before);
         }
-        let start = Instant::now();
-        self.record(&steps)?;
-        self.wait()?;
-        if let Some(timer) = &mut self.timer {
-            timer.measured(start.elapsed());
-        }
-        Ok(())
+        wavefront.schedule().iter().try_for_each(|&stage| {
+            before(stage, 1.0)?;
+            self.run(stage)
+        })
     }
 
     fn settled(&mut self, wait: bool) -> Result<bool> {

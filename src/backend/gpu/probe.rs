@@ -1,8 +1,8 @@
 //! Reads and writes volumes and maps on a device, and measures its copy rate.
 
 use super::Gpu;
-use super::buffers::Rows;
 use super::graph;
+use super::rows::Rows;
 use super::words::window_words;
 use crate::backend::probe::Probe;
 use crate::backend::volume::{PaddedRows, Volume, volume_shape};

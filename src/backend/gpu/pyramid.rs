@@ -2,7 +2,8 @@
 //!
 //! Floor, for a fine label of level 1: 1 + 2/8 bytes moved, 31 asked for (the 5 x 5 window), 100 operations for four labels.
 
-use super::buffers::with_halo;
+use super::cost;
+use super::rows::with_halo;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::{LevelParams, uniform};
@@ -21,6 +22,14 @@ pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    if r.level > 1 || r.plan.holds_all_rows() {
+        return record_rows(r);
+    }
+    cost::record_as_needed(r, 2, |r, fine| r.at(1, fine.start / 2..fine.end.div_ceil(2), record_rows))
+}
+
+/// From costs that are there.
+fn record_rows(r: &mut Recorder) -> Result<()> {
     let (finer, here, l) = (r.finer(), r.here(), r.params());
     let own = Uniform { fine: finer.params, label_offset: r.plan.label_offset(r.level) };
     r.rows(&jobs(r.plan, r.level)[0], &own, 2 * l.width * l.quads, |rows| {

@@ -2,7 +2,7 @@
 //!
 //! Regions are found anew in every band, among its rows and so many around it that a region which leaves them is large enough.
 
-use super::buffers::{Rows, with_halo};
+use super::rows::{Rows, with_halo};
 use super::shader::Kernel;
 use super::steps::{Bindings, Job, Recorder};
 use super::uniform::uniform;

@@ -1,7 +1,8 @@
 //! Turns stages into dispatches, in bands of rows where a buffer exceeds the device's largest binding.
 
-use super::buffers::{Binding, Buffers, Copy, LevelBuffers, Rows};
+use super::buffers::{Buffers, LevelBuffers};
 use super::device::Device;
+use super::rows::{Binding, Copy, Rows};
 use super::shader::{Kernel, WORKGROUP};
 use super::uniform::{self, Band, Header, Layout, LevelParams, UniformLayout};
 use crate::error::{DeviceError, MemoryError, Result};
@@ -16,6 +17,8 @@ pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 pub(super) enum Step {
     Dispatch(Dispatch),
     Copy(Copy),
+    /// Makes a range of bytes 0.
+    Clear(wgpu::Buffer, Range<u64>),
 }
 
 pub(super) struct Dispatch {
@@ -84,6 +87,8 @@ pub(super) struct Recorder<'a> {
     pub(super) plan: &'a Plan,
     pub(super) buffers: &'a Buffers,
     pub(super) level: usize,
+    /// The rows of the level to record; `None` for all.
+    pub(super) only: Option<Range<u32>>,
     /// Where the workgroups of dispatches go that end when the label map has settled.
     pub(super) endings: Option<&'a mut Vec<[u32; 3]>>,
     pub(super) steps: Vec<Step>,
@@ -105,7 +110,7 @@ impl<'a> Recorder<'a> {
         self.here().params
     }
 
-    /// Dispatches `job` for all rows of the level, with `threads` invocations per row and one dispatch per
+    /// Dispatches `job` for the rows of the level, with `threads` invocations per row and one dispatch per
     /// band. `bind` gives the buffers for a range of rows.
     pub(super) fn rows<U: Layout>(
         &mut self,
@@ -142,20 +147,47 @@ impl<'a> Recorder<'a> {
         self.steps.extend(copies.into_iter().map(Step::Copy));
     }
 
-    /// Updates the halos of `written`.
-    pub(super) fn renew(&mut self, written: &Rows) {
-        self.copies(written.exchange());
+    /// The rows to record.
+    fn own_rows(&self) -> Range<u32> {
+        self.only.clone().unwrap_or(0..self.params().height)
     }
 
-    /// Rows at which a band must end: the starts of the parts of the level's volumes and of those of the next
-    /// finer level, and the height.
+    /// Updates the halos of `written` around the rows of the level.
+    pub(super) fn renew(&mut self, written: &Rows) {
+        self.copies(written.exchange(&self.own_rows()));
+    }
+
+    /// Makes the rows of `volume` 0, halos included.
+    pub(super) fn clear(&mut self, volume: &Rows) {
+        let rows = self.own_rows();
+        self.steps.extend(volume.within(&rows).map(|(buffer, bytes)| Step::Clear(buffer.clone(), bytes)));
+        self.renew(volume);
+    }
+
+    /// Does `record` at another level, for these rows of it.
+    pub(super) fn at<T>(
+        &mut self,
+        level: usize,
+        rows: Range<u32>,
+        record: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
+        let here = (self.level, self.only.replace(rows));
+        self.level = level;
+        let out = record(self);
+        (self.level, self.only) = here;
+        out
+    }
+
+    /// Rows at which a band must end: the first and the last one, and between them the starts of the parts of the level's volumes,
+    /// of its graph and of the volumes of the next finer level.
     fn cuts(&self) -> Vec<u32> {
-        let mut cuts: BTreeSet<u32> = self.here().belief.starts().collect();
+        let (here, rows) = (self.here(), self.own_rows());
+        let mut cuts: BTreeSet<u32> = here.belief.starts().chain(here.members.starts()).collect();
         if self.level > 0 {
             cuts.extend(self.finer().belief.starts().map(|row| row / 2));
         }
-        cuts.insert(self.params().height);
-        cuts.into_iter().collect()
+        let between = cuts.into_iter().filter(|row| rows.start < *row && *row < rows.end);
+        [rows.start].into_iter().chain(between).chain([rows.end]).collect()
     }
 
     /// Bands of all rows, as few as possible, such that no binding exceeds the device's largest. For bindings

@@ -1,6 +1,7 @@
 //! Disparities between the labels: see [`Stage::SubPixel`](crate::backend::Stage::SubPixel).
 
-use super::buffers::with_halo;
+use super::cost;
+use super::rows::with_halo;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
@@ -16,6 +17,9 @@ pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    if r.only.is_none() && !r.plan.holds_all_rows() {
+        return cost::record_as_needed(r, 1, |r, rows| r.at(0, rows, record));
+    }
     let (b, here, l) = (r.buffers, r.here(), r.params());
     let own = Uniform { is_on: r.plan.method.refinement.sub_pixel.into() };
     r.rows(&jobs(r.plan, 0)[0], &own, l.width, |rows| {

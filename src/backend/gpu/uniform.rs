@@ -1,12 +1,11 @@
 //! The parameters of a kernel: one uniform buffer per dispatch. All begin with the same header; the rest
 //! belongs to the stage.
 
-use crate::plan::{LABEL_BLOCK, LevelPlan, Plan};
+use crate::plan::{LABEL_BLOCK, LevelPlan, Plan, ROW_ALIGN};
 use bytemuck::{Pod, Zeroable};
 
-/// Rows of every buffer start at a multiple of this many 32-bit words, the alignment of bindings on every
-/// device.
-pub(super) const ALIGN_WORDS: usize = 64;
+/// Rows of every buffer start at a multiple of this many 32-bit words.
+pub(super) const ALIGN_WORDS: usize = ROW_ALIGN / 4;
 
 /// Declares fields with their names and offsets, for the tests that compare them with the shaders.
 macro_rules! layout {

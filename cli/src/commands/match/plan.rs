@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::solver;
 use mrfgs::low_level::tiles::Tiles;
 use mrfgs::options::Order;
 
@@ -13,7 +12,7 @@ use crate::text::{bytes, plural};
 /// The plan in words and tables.
 pub(super) fn describe(tiles: &Tiles) -> String {
     let mut out = String::new();
-    let plan = tiles.largest();
+    let plan = &tiles.largest();
     let ((width, height), range) = (tiles.whole().size(), plan.range);
     let labels = range.labels();
     let _ = writeln!(
@@ -47,8 +46,10 @@ fn memory(tiles: &Tiles, plan: &Plan) -> Table {
         table.row(["whole image", "", "", &bytes(tiles.bytes() - plan.bytes())]);
     }
     table.row(["all", "", "", &bytes(tiles.bytes())]);
-    let cpu = solver::streamed(plan).bytes() + (tiles.bytes() - plan.bytes());
-    table.row(["on the CPU", "", "", &format!("{} at most", bytes(cpu))]);
+    if !plan.holds_all_rows() {
+        let whole = tiles.bytes() - plan.bytes() + plan.whole().bytes();
+        table.row(["with all rows held", "", "", &bytes(whole)]);
+    }
     table
 }
 

@@ -1,0 +1,156 @@
+//! Puts commands in the queue of the device: records the steps of stages, submits them, and asks for what they leave.
+
+use super::rows::Rows;
+use super::steps::{Groups, Step};
+use super::timer::{PASSES_PER_SUBMIT, Timer};
+use super::{Gpu, device};
+use crate::backend::{Backend, Stage};
+use crate::error::Result;
+use std::ops::Range;
+use std::time::Instant;
+
+/// Rows on their way from the device, each in so many parts.
+struct RequestedRows {
+    counts: Vec<usize>,
+    parts: device::Requested,
+}
+
+impl Gpu {
+    pub(super) fn encoder(&mut self) -> Result<&mut wgpu::CommandEncoder> {
+        if self.encoder.is_none() {
+            let descriptor = wgpu::CommandEncoderDescriptor::default();
+            self.encoder = Some(self.device.inner()?.create_command_encoder(&descriptor));
+        }
+        Ok(self.encoder.as_mut().expect("just made"))
+    }
+
+    /// Records steps, and submits whenever enough is recorded.
+    pub(super) fn record(&mut self, steps: &[Step]) -> Result<()> {
+        let mut rest = steps;
+        while let Some(first) = rest.first() {
+            let mut recorded = 1;
+            match first {
+                Step::Copy(copy) => {
+                    let (from, to) = (&copy.from, &copy.to);
+                    self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
+                }
+                Step::Clear(buffer, bytes) => {
+                    let size = bytes.end - bytes.start;
+                    self.encoder()?.clear_buffer(buffer, bytes.start, Some(size));
+                }
+                Step::Dispatch(_) => {
+                    let mut timer = self.timer.take();
+                    let writes = timer.as_mut().and_then(Timer::pass);
+                    let (mut work, most) = (self.work, self.device.work_per_submit);
+                    let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
+                    {
+                        let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                            label: None,
+                            timestamp_writes: writes,
+                        });
+                        recorded = 0;
+                        while let Some(Step::Dispatch(dispatch)) = rest.get(recorded) {
+                            pass.set_pipeline(&dispatch.pipeline);
+                            pass.set_bind_group(0, &dispatch.bind_group, &[]);
+                            match &dispatch.groups {
+                                Groups::Fixed(x, y) => pass.dispatch_workgroups(*x, *y, 1),
+                                Groups::UntilSettled(at) => {
+                                    let groups = groups.as_ref().expect("a stage has a state to run on");
+                                    pass.dispatch_workgroups_indirect(groups, 12 * *at as u64);
+                                }
+                            }
+                            work += dispatch.work;
+                            recorded += 1;
+                            if work >= most {
+                                break;
+                            }
+                        }
+                    }
+                    self.timer = timer;
+                    self.work = work;
+                    self.passes += 1;
+                    self.device.traffic.dispatches += recorded as u64;
+                }
+            }
+            rest = &rest[recorded..];
+            let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
+            if timed || self.work >= self.device.work_per_submit {
+                self.submit_recorded()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Records the steps of `stage`, and takes its time where that is wanted.
+    pub(super) fn perform(&mut self, stage: Stage, steps: &[Step]) -> Result<()> {
+        self.device.count_stage();
+        let Some(timer) = &mut self.timer else { return self.record(steps) };
+        timer.begin(stage);
+        if timer.has_clock() {
+            return self.record(steps);
+        }
+        let start = Instant::now();
+        self.record(steps)?;
+        self.wait()?;
+        if let Some(timer) = &mut self.timer {
+            timer.measured(start.elapsed());
+        }
+        Ok(())
+    }
+
+    /// Submits everything.
+    pub(super) fn submit(&mut self) -> Result<()> {
+        self.gather()?;
+        self.submit_recorded()
+    }
+
+    fn submit_recorded(&mut self) -> Result<()> {
+        (self.passes, self.work) = (0, 0);
+        if let Some(mut encoder) = self.encoder.take() {
+            if let Some(timer) = &mut self.timer {
+                timer.submit(&self.device, &mut encoder)?;
+            }
+            self.device.submit(encoder)?;
+        }
+        self.device.check()
+    }
+
+    /// Asks for each range of bytes, after everything recorded so far.
+    pub(super) fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
+        self.gather()?;
+        let mut staged = Vec::new();
+        for (buffer, bytes) in ranges {
+            let size = bytes.end - bytes.start;
+            let staging = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("staging"),
+                size,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            self.encoder()?.copy_buffer_to_buffer(buffer, bytes.start, &staging, 0, size);
+            staged.push(staging);
+        }
+        self.submit()?;
+        self.device.request(staged)
+    }
+
+    /// Asks for the words of all rows.
+    fn request_rows(&mut self, rows: &[&Rows]) -> Result<RequestedRows> {
+        let parts: Vec<_> = rows.iter().flat_map(|r| r.own()).collect();
+        let counts = rows.iter().map(|r| r.own().len()).collect();
+        Ok(RequestedRows { counts, parts: self.request(&parts)? })
+    }
+
+    /// The words of all rows that were asked for.
+    fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
+        let mut words = self.device.collect(rows.parts)?.into_iter();
+        let joined = |n| words.by_ref().take(n).reduce(|all, part| [all, part].concat()).unwrap_or_default();
+        Ok(rows.counts.into_iter().map(joined).collect())
+    }
+
+    /// The words of all rows.
+    pub(super) fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
+        let requested = self.request_rows(rows)?;
+        self.collect_rows(requested)
+    }
+}

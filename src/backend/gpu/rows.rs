@@ -1,0 +1,210 @@
+//! Data stored row by row on a device, and what stages bind of it.
+//!
+//! Data larger than the device's largest buffer is split into parts of whole rows. Each part also holds a
+//! halo: a few rows of its neighbours, so that a stage that reads around a pixel finds everything in one
+//! part. A stage that writes data with a halo ends with copies that update those rows. Where only some rows are needed at a
+//! time, several parts take turns in a buffer.
+
+use super::device::Device;
+use crate::error::Result;
+use crate::plan::GRAPH_WINDOW;
+use std::num::NonZero;
+use std::ops::Range;
+
+/// Halo of a part, in rows on either side: as far as any stage reads around a pixel in a volume.
+pub(super) const HALO: u32 = GRAPH_WINDOW as u32 / 2;
+
+/// `rows` with up to `halo` rows above and below.
+pub(super) fn with_halo(rows: &Range<u32>, halo: u32, height: u32) -> Range<u32> {
+    rows.start.saturating_sub(halo)..rows.end.saturating_add(halo).min(height)
+}
+
+/// The rows that are in both.
+pub(super) fn common(a: &Range<u32>, b: &Range<u32>) -> Range<u32> {
+    a.start.max(b.start)..a.end.min(b.end)
+}
+
+/// Data stored row by row, in as few buffers as the device allows.
+#[derive(Clone)]
+pub(super) struct Rows {
+    parts: Vec<Part>,
+    row_bytes: u64,
+}
+
+#[derive(Clone)]
+struct Part {
+    buffer: wgpu::Buffer,
+    /// The rows that it owns.
+    own: Range<u32>,
+    /// The rows that it holds, halo included.
+    held: Range<u32>,
+    /// Where they begin in the buffer, in bytes.
+    offset: u64,
+}
+
+impl Part {
+    /// Where `row` begins in the buffer.
+    fn at(&self, row: u32, row_bytes: u64) -> u64 {
+        self.offset + u64::from(row - self.held.start) * row_bytes
+    }
+}
+
+/// A range of a buffer to bind, at a byte offset that is a multiple of 256.
+#[derive(Clone)]
+pub(super) struct Binding {
+    buffer: wgpu::Buffer,
+    bytes: Range<u64>,
+}
+
+impl Binding {
+    pub(super) fn whole(buffer: &wgpu::Buffer) -> Self {
+        Self { buffer: buffer.clone(), bytes: 0..buffer.size() }
+    }
+
+    /// Number of bytes that are bound.
+    pub(super) fn size(&self) -> u64 {
+        let end = self.bytes.end.min(self.buffer.size());
+        end.saturating_sub(self.bytes.start)
+    }
+
+    pub(super) fn resource(&self) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &self.buffer,
+            offset: self.bytes.start,
+            size: NonZero::new(self.size()),
+        })
+    }
+}
+
+/// A copy of bytes from one buffer to another.
+#[derive(Clone)]
+pub(super) struct Copy {
+    pub(super) from: (wgpu::Buffer, u64),
+    pub(super) to: (wgpu::Buffer, u64),
+    pub(super) bytes: u64,
+}
+
+impl Rows {
+    /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height. `allocate` gives the buffer
+    /// of the part with this index, for so many rows.
+    pub(super) fn in_parts(
+        words: u32,
+        starts: &[u32],
+        mut allocate: impl FnMut(usize, u64) -> Result<wgpu::Buffer>,
+    ) -> Result<Self> {
+        let height = starts[starts.len() - 1];
+        let parts = starts.windows(2).enumerate().map(|(i, ends)| {
+            let own = ends[0]..ends[1];
+            let held = with_halo(&own, HALO, height);
+            let buffer = allocate(i, held.len() as u64)?;
+            Ok(Part { buffer, own, held, offset: 0 })
+        });
+        Ok(Self { parts: parts.collect::<Result<_>>()?, row_bytes: 4 * u64::from(words) })
+    }
+
+    /// Binds `rows`, which one part owns, with as much of their halo as that part holds: for a stage that
+    /// writes the rows, or reads around them.
+    pub(super) fn bind(&self, rows: &Range<u32>) -> Binding {
+        let within = |outer: &Range<u32>| outer.start <= rows.start && rows.end <= outer.end;
+        let part = self.parts.iter().find(|p| within(&p.own)).or(self.parts.iter().find(|p| within(&p.held)));
+        let part = part.expect("bands stay within parts, and halos within what parts hold");
+        let at = |row: u32| part.at(row, self.row_bytes);
+        Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
+    }
+
+    /// Copies of `written` rows to the halos of the parts that hold them too.
+    pub(super) fn exchange(&self, written: &Range<u32>) -> Vec<Copy> {
+        let mut copies = Vec::new();
+        for (i, to) in self.parts.iter().enumerate() {
+            // Parts of two rows, the smallest that there are, are seen from the next but one.
+            for (j, from) in self.parts.iter().enumerate().take(i + 3).skip(i.saturating_sub(2)) {
+                let rows = common(&common(&to.held, &from.own), written);
+                if i != j && !rows.is_empty() {
+                    let at = |part: &Part| part.at(rows.start, self.row_bytes);
+                    copies.push(Copy {
+                        from: (from.buffer.clone(), at(from)),
+                        to: (to.buffer.clone(), at(to)),
+                        bytes: rows.len() as u64 * self.row_bytes,
+                    });
+                }
+            }
+        }
+        copies
+    }
+
+    /// Copies of all rows to `to`, which has the same rows.
+    pub(super) fn copy_to(&self, to: &Self) -> Vec<Copy> {
+        let pairs = self.parts.iter().zip(&to.parts);
+        pairs
+            .map(|(from, to)| Copy {
+                from: (from.buffer.clone(), from.offset),
+                to: (to.buffer.clone(), to.offset),
+                bytes: from.held.len() as u64 * self.row_bytes,
+            })
+            .collect()
+    }
+
+    /// First row of each part.
+    pub(super) fn starts(&self) -> impl Iterator<Item = u32> {
+        self.parts.iter().map(|p| p.own.start)
+    }
+
+    pub(super) fn buffers(&self) -> impl Iterator<Item = &wgpu::Buffer> {
+        self.parts.iter().map(|p| &p.buffer)
+    }
+
+    /// Each part's buffer, and the byte range of its own rows in it.
+    pub(super) fn own(&self) -> Vec<(wgpu::Buffer, Range<u64>)> {
+        let at = |p: &Part, row: u32| p.at(row, self.row_bytes);
+        self.parts.iter().map(|p| (p.buffer.clone(), at(p, p.own.start)..at(p, p.own.end))).collect()
+    }
+
+    /// The byte range of each part of `rows` in its buffer, halo excluded.
+    pub(super) fn within(&self, rows: &Range<u32>) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
+        let parts =
+            self.parts.iter().map(move |p| (p, common(&p.own, rows))).filter(|(_, rows)| !rows.is_empty());
+        parts.map(|(p, rows)| (&p.buffer, p.at(rows.start, self.row_bytes)..p.at(rows.end, self.row_bytes)))
+    }
+
+    /// Each part's buffer, and the byte range of all its rows in it.
+    pub(super) fn held(&self) -> impl Iterator<Item = (&wgpu::Buffer, Range<u64>)> {
+        let at = |p: &Part, row: u32| p.at(row, self.row_bytes);
+        self.parts.iter().map(move |p| (&p.buffer, at(p, p.held.start)..at(p, p.held.end)))
+    }
+
+    /// Where the first row begins in its buffer, in elements of so many bytes.
+    pub(super) fn start(&self, bytes: u64) -> u32 {
+        (self.parts[0].offset / bytes) as u32
+    }
+
+    /// Writes the words of all rows.
+    pub(super) fn write(&self, device: &mut Device, words: &[u32]) -> Result<()> {
+        let per_row = self.row_bytes as usize / 4;
+        for part in &self.parts {
+            let held = part.held.start as usize * per_row..part.held.end as usize * per_row;
+            device.write_at(&part.buffer, part.offset, bytemuck::cast_slice(&words[held]))?;
+        }
+        Ok(())
+    }
+}
+
+/// One buffer for several levels, coarsest first.
+pub(super) struct Pool {
+    pub(super) buffer: wgpu::Buffer,
+    /// Words that are taken.
+    taken: u64,
+}
+
+impl Pool {
+    pub(super) fn new(buffer: wgpu::Buffer) -> Self {
+        Self { buffer, taken: 0 }
+    }
+
+    /// The next `height` rows of `words` words each.
+    pub(super) fn rows(&mut self, words: u32, height: u32) -> Rows {
+        let (all, offset) = (0..height, 4 * self.taken);
+        self.taken += u64::from(words) * u64::from(height);
+        let part = Part { buffer: self.buffer.clone(), own: all.clone(), held: all, offset };
+        Rows { parts: vec![part], row_bytes: 4 * u64::from(words) }
+    }
+}

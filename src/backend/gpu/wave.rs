@@ -1,0 +1,68 @@
+//! Level 0 where it is not held whole: the stages that need it run on some of its rows at a time, in a
+//! [wavefront](crate::backend::wavefront), and its volumes are rings of parts.
+
+use super::{Gpu, Step, record};
+use crate::backend::Stage;
+use crate::backend::wavefront::Wavefront;
+use crate::error::{Purpose, Result};
+use crate::memory;
+use crate::plan::Plan;
+use std::ops::Range;
+use std::sync::Arc;
+
+impl Gpu {
+    /// The plan by which this device matches: it holds all rows where they fit in the memory that a match may take, and in its
+    /// own, since that takes fewer dispatches.
+    pub(super) fn held(&self, plan: &Plan) -> Plan {
+        let known = self.state.as_ref().map(|state| &state.plan);
+        let whole = plan.whole();
+        if plan.holds_all_rows() || known.is_some_and(|known| whole.fits(known)) {
+            return whole;
+        }
+        if known.is_some_and(|known| plan.fits(known)) {
+            return plan.clone();
+        }
+        let bytes = whole.bytes();
+        let fits = bytes <= u64::from(plan.method.tiles.memory) << 20
+            && self.device.memory.is_none_or(|memory| bytes <= memory)
+            && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok());
+        if fits { whole } else { plan.clone() }
+    }
+
+    /// Runs the stages of `wavefront` on the rows of its parts.
+    pub(super) fn run_parts(
+        &mut self,
+        wavefront: &Wavefront,
+        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Result<()> {
+        self.gather()?;
+        for (i, rows) in wavefront.parts() {
+            let stage = wavefront.stages()[i];
+            let height = self.state().plan.levels[stage.level().unwrap_or(0)].height;
+            before(stage, rows.len() as f64 / height as f64)?;
+            let steps = self.steps_of(stage, rows.start as u32..rows.end as u32)?;
+            self.perform(stage, &steps)?;
+        }
+        Ok(())
+    }
+
+    /// The steps of `stage` for these rows, recorded on first use.
+    fn steps_of(&mut self, stage: Stage, rows: Range<u32>) -> Result<Arc<[Step]>> {
+        let mut state = self.state.take().expect("prepare comes before every stage");
+        let key = (stage, rows.clone());
+        let steps = match state.part_steps.get(&key) {
+            Some(steps) => Ok(Arc::clone(steps)),
+            None => {
+                self.recorded(stage.level().unwrap_or(0), &state.plan, &state.buffers, None, |recorder| {
+                    recorder.only = Some(rows);
+                    record(recorder, stage)
+                })
+            }
+        };
+        if let Ok(steps) = &steps {
+            state.part_steps.insert(key, Arc::clone(steps));
+        }
+        self.state = Some(state);
+        steps
+    }
+}
