@@ -40,6 +40,12 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if block >= blocks || id.y >= params.band.rows {
         return;
     }
+    let y = params.band.first_row + id.y;
+    let window = window_of(x, y);
+    let own = quads_of(window);
+    if first + QUADS <= own.x || first >= own.y {
+        return;
+    }
     let row = params.band.volume_at + id.y * params.level.pitch;
     var sums: array<vec4<u32>, QUADS>;
     for (var i = 0u; i < QUADS; i++) {
@@ -52,7 +58,6 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             sums[i] += unpack(up[at]);
         }
     }
-    let y = params.band.first_row + id.y;
     let top = halo_start(RADIUS);
     var factors = vec2(1u << CENTRE, 0u);
     if SLOTS > 1u {
@@ -79,7 +84,6 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             sums[i] += unpack(dependency[message + i * width]);
         }
     }
-    let window = window_of(x, y);
     for (var i = 0u; i < QUADS; i++) {
         let sum = min(sums[i], vec4(params.most));
         belief[row + place_of(first + i, x)] = pack(select(vec4(MOST), sum, are_in(window, first + i)));

@@ -1,7 +1,7 @@
 // Messages of the dependency factors. One invocation per factor. A factor reads old beliefs and its own old
 // messages and writes only its own messages, so flooding in place is exact.
 
-#import band volume messages sections
+#import band volume windows messages sections
 
 struct Params {
     level: Level,
@@ -14,6 +14,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> members: array<u32>;
 @group(0) @binding(2) var<storage, read> belief: array<Quad>;
 @group(0) @binding(3) var<storage, read_write> messages: array<Quad>;
+@group(0) @binding(4) var<storage, read> windows: array<u32>;
 
 const ABSENT: u32 = 0xffffffffu;
 
@@ -45,6 +46,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let beliefs = params.band.volume_at;
     bases[0] = beliefs + (y - top) * params.level.pitch + id.x;
     var present = 1u;
+    // What any member has: messages at other labels reach nobody.
+    var spanned = quads_of(window_of(id.x, y));
     let codes = params.level.members_at + id.y * params.level.member_pitch + id.x * ((SLOTS + 2u) / 4u);
     for (var slot = 1u; slot < SLOTS; slot++) {
         let code = (members[codes + (slot - 1u) / 4u] >> (8u * ((slot - 1u) % 4u))) & 0xffu;
@@ -54,6 +57,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             let py = y + code / WINDOW - RADIUS;
             bases[slot] = beliefs + (py - top) * params.level.pitch + px;
             present += 1u;
+            let theirs = quads_of(window_of(px, py));
+            spanned = vec2(min(spanned.x, theirs.x), max(spanned.y, theirs.y));
         }
     }
     if present < 2u {
@@ -68,7 +73,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             floors[slot] = 0u;
             if bases[slot] != ABSENT {
                 var least = vec4(MOST);
-                for (var quad = 0u; quad < quads; quad++) {
+                for (var quad = spanned.x; quad < spanned.y; quad++) {
                     let q = to_factor(bases[slot] + quad * width, own + (slot * quads + quad) * width, 0u);
                     let has = unpack(belief[bases[0] + quad * width]) != vec4(MOST);
                     least = min(least, select(vec4(MOST), q, has));
@@ -84,7 +89,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         least[slot] = vec4(MOST);
     }
     var q: array<vec4<u32>, SLOTS>;
-    for (var quad = 0u; quad < quads; quad++) {
+    for (var quad = spanned.x; quad < spanned.y; quad++) {
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
@@ -107,7 +112,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         high[slot] = low[slot] + params.tau;
     }
 
-    for (var quad = 0u; quad < quads; quad++) {
+    for (var quad = spanned.x; quad < spanned.y; quad++) {
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {

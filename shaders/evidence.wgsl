@@ -40,14 +40,19 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let pitch = params.level.pitch;
     let row = id.y * select(2u * pitch, pitch, FINE_NARROW);
     let window = window_of(id.x, params.band.first_row + id.y);
+    let own = quads_of(window);
     var least = vec4(1u << 16u);
-    for (var quad = 0u; quad < quads; quad++) {
+    for (var quad = own.x; quad < own.y; quad++) {
         let c = load_cost(row, place_of(quad, id.x));
         least = min(least, select(vec4(1u << 16u), c, are_in(window, quad)));
     }
     let base = vec4(smallest(least));
     for (var quad = 0u; quad < quads; quad++) {
         let index = place_of(quad, id.x);
+        if quad < own.x || quad >= own.y {
+            belief[id.y * pitch + index] = pack(vec4(MOST));
+            continue;
+        }
         let c = load_cost(row, index);
         let difference = min(max(c, base) - base, vec4(params.limit));
         let product = ((difference << vec4(params.up)) * params.multiplier) >> vec4(16u);

@@ -1,7 +1,7 @@
 // Label windows, first label | number of labels with padding << 16: `within` label ranges; or, from the next
 // coarser level, `candidates` and then `around` them.
 
-#import band volume messages
+#import band volume windows messages
 
 struct Params {
     level: Level,
@@ -21,7 +21,9 @@ struct Params {
 @group(0) @binding(3) var<storage, read> candidates_in: array<u32>;
 // First and last label of each pixel, first | last << 16.
 @group(0) @binding(4) var<storage, read> label_range: array<u32>;
-@group(0) @binding(5) var<storage, read_write> windows: array<u32>;
+@group(0) @binding(5) var<storage, read_write> windows_out: array<u32>;
+// Those of the coarser level.
+@group(0) @binding(6) var<storage, read> windows: array<u32>;
 
 // The window that holds the labels from `least` to `most`.
 fn holding(least: i32, most: i32) -> u32 {
@@ -40,15 +42,16 @@ fn candidates(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
         return;
     }
     let row = id.y * params.level.pitch;
+    let own = quads_of(window_of(id.x, params.band.first_row + id.y));
     var least = vec4(MOST);
-    for (var quad = 0u; quad < params.level.quads; quad++) {
+    for (var quad = own.x; quad < own.y; quad++) {
         least = min(least, unpack(belief[row + place_of(quad, id.x)]));
     }
     // Labels that the pixel does not have are infinite.
     let end = vec4(min(smallest(least) + SLACK + 1u, MOST));
     var lowest = vec4(0xffffu);
     var highest = vec4(0u);
-    for (var quad = 0u; quad < params.level.quads; quad++) {
+    for (var quad = own.x; quad < own.y; quad++) {
         let near = unpack(belief[row + place_of(quad, id.x)]) < end;
         lowest = min(lowest, select(vec4(0xffffu), labels_of(quad), near));
         highest = max(highest, select(vec4(0u), labels_of(quad), near));
@@ -78,8 +81,8 @@ fn around(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
             most = max(most, candidates >> 16u);
         }
     }
-    let ends = 2 * vec2(i32(least), i32(most)) + vec2(params.label_offset);
-    windows[y * params.runs + id.x] = holding(ends.x - MARGIN, ends.y + MARGIN);
+    let needed = 2 * vec2(i32(least), i32(most)) + vec2(params.label_offset);
+    windows_out[y * params.runs + id.x] = holding(needed.x - MARGIN, needed.y + MARGIN);
 }
 
 // One invocation per window and row; those of every second row do nothing.
@@ -96,10 +99,10 @@ fn within(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     var most = 0u;
     for (var v = y; v < end.y; v++) {
         for (var u = WINDOW_RUN * id.x; u < end.x; u++) {
-            let ends = label_range[(v - top) * params.level.pixel_pitch + u];
-            least = min(least, ends & 0xffffu);
-            most = max(most, ends >> 16u);
+            let range = label_range[(v - top) * params.level.pixel_pitch + u];
+            least = min(least, range & 0xffffu);
+            most = max(most, range >> 16u);
         }
     }
-    windows[y / 2u * params.runs + id.x] = holding(i32(least), i32(most));
+    windows_out[y / 2u * params.runs + id.x] = holding(i32(least), i32(most));
 }

@@ -2,7 +2,7 @@
 // invocation per coarse pixel; a vector holds one value for each of its up to 2 x 2 children, in raster
 // order. Where no label agrees, sums are infinite: the largest value, at which they saturate.
 
-#import band volume messages sections
+#import band volume windows messages sections
 
 struct Params {
     level: Level,
@@ -20,6 +20,8 @@ struct Params {
 @group(0) @binding(2) var<storage, read> coarse_belief: array<u32>;
 @group(0) @binding(3) var<storage, read_write> down: array<u32>;
 @group(0) @binding(4) var<storage, read_write> up: array<u32>;
+@group(0) @binding(5) var<storage, read> windows: array<u32>;
+@group(0) @binding(6) var<storage, read> fine_windows: array<u32>;
 
 // First word of each child; children outside the image share the first child's.
 var<private> children_at: vec4<u32>;
@@ -29,26 +31,47 @@ var<private> parent_at: u32;
 var<private> child_floor: vec4<u32>;
 var<private> parent_floor: u32;
 
+// The words that were read last, of several labels each.
+var<private> child_word: u32;
+var<private> child_beliefs: vec4<u32>;
+var<private> child_messages: vec4<u32>;
+var<private> parent_word: u32;
+var<private> parent_belief: u32;
+var<private> parent_message: u32;
+
+// Forgets them.
+fn rewind() {
+    child_word = 0xffffffffu;
+    parent_word = 0xffffffffu;
+}
+
 // The children's messages to the factor for the fine label with this index.
 fn from_children(index: i32) -> vec4<u32> {
     if index < 0 || index >= i32(params.fine.labels) {
         return vec4(MOST);
     }
     let label = u32(index);
-    let at = children_at + vec4(word_of(label, params.fine.width));
-    let beliefs = vec4(
-        pick(fine_belief[at.x], label), pick(fine_belief[at.y], label),
-        pick(fine_belief[at.z], label), pick(fine_belief[at.w], label));
-    let messages = vec4(
-        pick(down[at.x], label), pick(down[at.y], label), pick(down[at.z], label), pick(down[at.w], label));
-    let q = max(beliefs - messages, child_floor) - child_floor;
+    if label / PER_WORD != child_word {
+        child_word = label / PER_WORD;
+        let at = children_at + vec4(word_of(label, params.fine.width));
+        child_beliefs = vec4(fine_belief[at.x], fine_belief[at.y], fine_belief[at.z], fine_belief[at.w]);
+        child_messages = vec4(down[at.x], down[at.y], down[at.z], down[at.w]);
+    }
+    let shift = vec4(BITS * (label % PER_WORD));
+    let beliefs = (child_beliefs >> shift) & vec4(MOST);
+    let q = max(beliefs - ((child_messages >> shift) & vec4(MOST)), child_floor) - child_floor;
     return select(q, vec4(MOST), beliefs == vec4(MOST));
 }
 
 fn from_parent(label: u32) -> u32 {
-    let at = parent_at + word_of(label, params.level.width);
-    let b = pick(coarse_belief[at], label);
-    return select(max(b - pick(up[at], label), parent_floor) - parent_floor, MOST, b == MOST);
+    if label / PER_WORD != parent_word {
+        parent_word = label / PER_WORD;
+        let at = parent_at + word_of(label, params.level.width);
+        parent_belief = coarse_belief[at];
+        parent_message = up[at];
+    }
+    let b = pick(parent_belief, label);
+    return select(max(b - pick(parent_message, label), parent_floor) - parent_floor, MOST, b == MOST);
 }
 
 // One step over the coarse labels: sums to the parent and to the children for the label with index z.
@@ -148,25 +171,34 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     child_floor = vec4<u32>();
     parent_floor = 0u;
     let labels = params.level.labels;
+    // The children share a window.
+    let own = ends(window_of(id.x, params.band.first_row + id.y));
+    let theirs = ends(fine_windows[window_place(fine, x, 2u * params.band.first_row + y)]);
+    // All coarse labels that either window needs, from a whole word on, of which the fine labels start a word too.
+    let start = min(own.x, theirs.x / 8u * 4u);
+    let end = max(own.y, theirs.y / 2u + 1u);
+    rewind();
 
     if ABSOLUTE {
         var least = vec4(MOST);
-        for (var d = 0; d < i32(fine.labels); d++) {
-            least = min(least, from_children(d));
+        for (var d = theirs.x; d < theirs.y; d++) {
+            least = min(least, from_children(i32(d)));
         }
         var parent = MOST;
-        for (var z = 0u; z < labels; z++) {
+        for (var z = own.x; z < min(own.y, labels); z++) {
             parent = min(parent, from_parent(z));
         }
         child_floor = least;
         parent_floor = parent;
+        rewind();
     }
 
     // The smallest sums, over the labels that the pixel has.
     var least_up = MOST;
     var least_down = vec4(MOST);
-    between = from_children(params.label_offset - 1);
-    for (var z = 0u; z < labels; z++) {
+    let before = 2 * i32(start) + params.label_offset - 1;
+    between = from_children(before);
+    for (var z = start; z < min(end, labels); z++) {
         let sums = advance(z);
         least_up = min(least_up, select(MOST, sums.parent, sums.parent_has));
         least_down = min(least_down, select(vec4(MOST), sums.children, sums.children_have));
@@ -174,11 +206,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
 
     up_word = 0u;
     down_words = vec4<u32>();
-    between = from_children(params.label_offset - 1);
+    rewind();
+    between = from_children(before);
     var last = vec4(MOST);
-    // Two fine labels per coarse label, until the padding of both levels is written.
-    let steps = max(4u * params.level.quads, 2u * fine.quads + 1u);
-    for (var z = 0u; z < steps; z++) {
+    // Two fine labels per coarse label, padding included.
+    for (var z = start; z < end; z++) {
         var sums = Sums(MOST, vec4(MOST), false, vec4<bool>());
         if z < labels {
             sums = advance(z);

@@ -1,15 +1,31 @@
-// The labels that each pixel has.
+// The labels that each pixel has. All others have an infinite belief from the moment the level joins, so stages leave these
+// alone.
 
 #import volume
 
-// The label window of the pixel at (x, y): first label | number of labels with padding << 16.
+// Place of the window of the pixel at (x, y) of a level: first label | number of labels with padding << 16.
+fn window_place(level: Level, x: u32, y: u32) -> u32 {
+    return level.windows_at + y / 2u * ((level.width + WINDOW_RUN - 1u) / WINDOW_RUN) + x / WINDOW_RUN;
+}
+
+// That of a pixel of the stage's level.
 fn window_of(x: u32, y: u32) -> u32 {
-    return windows[params.level.windows_at + y / 2u * ((params.level.width + WINDOW_RUN - 1u) / WINDOW_RUN) + x / WINDOW_RUN];
+    return windows[window_place(params.level, x, y)];
+}
+
+// The first label of a window, and the one behind its last.
+fn ends(window: u32) -> vec2<u32> {
+    let first = window & 0xffffu;
+    return vec2(first, first + (window >> 16u));
+}
+
+// Its first quad, and the one behind its last: windows consist of whole quads.
+fn quads_of(window: u32) -> vec2<u32> {
+    return ends(window) / 4u;
 }
 
 // Which entries of a quad are labels in this window.
 fn are_in(window: u32, quad: u32) -> vec4<bool> {
-    let first = window & 0xffffu;
     let labels = labels_of(quad);
-    return (labels >= vec4(first)) & (labels < vec4(min(first + (window >> 16u), params.level.labels)));
+    return (labels >= vec4(window & 0xffffu)) & (labels < vec4(min(ends(window).y, params.level.labels)));
 }

@@ -38,7 +38,12 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let own = Uniform { tau: r.plan.dependency.tau.into() };
     r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
         let seen = with_halo(rows, HALO, l.height);
-        vec![(1, here.members.bind(rows)), (2, here.belief.bind(&seen)), (3, here.dependency.bind(rows))]
+        vec![
+            (1, here.members.bind(rows)),
+            (2, here.belief.bind(&seen)),
+            (3, here.dependency.bind(rows)),
+            (4, here.windows.bind(&(0..1))),
+        ]
     })?;
     r.renew(&here.dependency);
     Ok(())
@@ -48,6 +53,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
     let (plan, buffers) = (r.plan, r.buffers);
     let own = |z: usize| (Uniform { tau: plan.dependency.tau.into() }, buffers.levels[z].params.width);
-    let bound = [(1, &shared.members), (2, &shared.belief), (3, &shared.dependency)];
+    let bound =
+        [(1, &shared.members), (2, &shared.belief), (3, &shared.dependency), (4, &shared.windows)];
     r.levels(&jobs(plan, 0)[0], levels, own, &bound)
 }

@@ -17,7 +17,6 @@ pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
     let kernel = |entry, reach: u32| {
         Kernel::new("label_window", entry, SHADER)
             .of_width(plan.volume_width)
-            .with("WINDOW_RUN", WINDOW_RUN as u32)
             .with("WINDOW_STEP", WINDOW_STEP as u32)
             .with("LABEL_BLOCK", LABEL_BLOCK as u32)
             .with("MARGIN", WINDOW_MARGIN)
@@ -51,7 +50,11 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
             r.level += 1;
             let (coarse, c) = (r.here(), r.params());
             r.rows(candidates, &own, c.width, |rows| {
-                vec![(1, coarse.belief.bind(rows)), (2, coarse.candidates.bind(rows))]
+                vec![
+                    (1, coarse.belief.bind(rows)),
+                    (2, coarse.candidates.bind(rows)),
+                    (6, coarse.windows.bind(&(0..1))),
+                ]
             })?;
             r.renew(&coarse.candidates);
             r.rows(around, &own, runs, |rows| {

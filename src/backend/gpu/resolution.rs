@@ -46,6 +46,8 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
             (2, here.belief.bind(rows)),
             (3, finer.down.bind(&fine_rows)),
             (4, here.up.bind(rows)),
+            (5, here.windows.bind(&(0..1))),
+            (6, finer.windows.bind(&(0..1))),
         ]
     })
 }
@@ -53,10 +55,11 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 /// The same for all of `levels` at once.
 pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
     let own = levels.clone().map(|z| {
-        let (_, (fine_at, _)) = r.buffers.levels[z - 1].shared_params(r.plan);
-        (Uniform { fine_at, ..Uniform::of(r, z) }, r.buffers.levels[z].params.width)
+        let (fine, (fine_at, _)) = r.buffers.levels[z - 1].shared_params(r.plan);
+        (Uniform { fine, fine_at, ..Uniform::of(r, z) }, r.buffers.levels[z].params.width)
     });
     let (own, first): (Vec<_>, _) = (own.collect(), levels.start);
-    let bound = [(1, &shared.belief), (2, &shared.belief), (3, &shared.down), (4, &shared.up)];
-    r.levels(&jobs(r.plan, 1)[0], levels, |z| own[z - first], &bound)
+    let s = shared;
+    let bound = [&s.belief, &s.belief, &s.down, &s.up, &s.windows, &s.windows];
+    r.levels(&jobs(r.plan, 1)[0], levels, |z| own[z - first], &(1..).zip(bound).collect::<Vec<_>>())
 }

@@ -19,6 +19,6 @@ pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, here, l) = (r.buffers, r.here(), r.params());
     r.rows(&jobs(r.plan, 0)[0], &(), l.width, |rows| {
-        vec![(1, here.belief.bind(rows)), (2, b.optima.bind(rows))]
+        vec![(1, here.belief.bind(rows)), (2, b.optima.bind(rows)), (3, here.windows.bind(&(0..1)))]
     })
 }
