@@ -31,19 +31,27 @@ var<private> parent_at: u32;
 var<private> child_floor: vec4<u32>;
 var<private> parent_floor: u32;
 
-// The words that were read last, of several labels each.
+// The words that were read last, of several labels each: beliefs less messages.
 var<private> child_word: u32;
-var<private> child_beliefs: vec4<u32>;
-var<private> child_messages: vec4<u32>;
+var<private> children: vec4<u32>;
 var<private> parent_word: u32;
-var<private> parent_belief: u32;
-var<private> parent_message: u32;
+var<private> parent: u32;
 
 // Forgets them.
 fn rewind() {
     child_word = 0xffffffffu;
     parent_word = 0xffffffffu;
 }
+
+// The values of a word of beliefs less those of a word of messages, none of which is larger; infinite where the belief is.
+fn less(beliefs: u32, messages: u32) -> u32 {
+    let highest = TOPS & beliefs & ((beliefs & ~TOPS) + BOTTOMS);
+    return beliefs - (messages & ~((highest >> (BITS - 1u)) * MOST));
+}
+
+// The lowest and the highest bit of each value in a word.
+const BOTTOMS: u32 = 0xffffffffu / MOST;
+const TOPS: u32 = BOTTOMS << (BITS - 1u);
 
 // The children's messages to the factor for the fine label with this index.
 fn from_children(index: i32) -> vec4<u32> {
@@ -54,24 +62,22 @@ fn from_children(index: i32) -> vec4<u32> {
     if label / PER_WORD != child_word {
         child_word = label / PER_WORD;
         let at = children_at + vec4(word_of(label, params.fine.width));
-        child_beliefs = vec4(fine_belief[at.x], fine_belief[at.y], fine_belief[at.z], fine_belief[at.w]);
-        child_messages = vec4(down[at.x], down[at.y], down[at.z], down[at.w]);
+        children = vec4(
+            less(fine_belief[at.x], down[at.x]), less(fine_belief[at.y], down[at.y]),
+            less(fine_belief[at.z], down[at.z]), less(fine_belief[at.w], down[at.w]));
     }
-    let shift = vec4(BITS * (label % PER_WORD));
-    let beliefs = (child_beliefs >> shift) & vec4(MOST);
-    let q = max(beliefs - ((child_messages >> shift) & vec4(MOST)), child_floor) - child_floor;
-    return select(q, vec4(MOST), beliefs == vec4(MOST));
+    let q = (children >> vec4(BITS * (label % PER_WORD))) & vec4(MOST);
+    return select(max(q, child_floor) - child_floor, vec4(MOST), q == vec4(MOST));
 }
 
 fn from_parent(label: u32) -> u32 {
     if label / PER_WORD != parent_word {
         parent_word = label / PER_WORD;
         let at = parent_at + word_of(label, params.level.width);
-        parent_belief = coarse_belief[at];
-        parent_message = up[at];
+        parent = less(coarse_belief[at], up[at]);
     }
-    let b = pick(parent_belief, label);
-    return select(max(b - pick(parent_message, label), parent_floor) - parent_floor, MOST, b == MOST);
+    let q = pick(parent, label);
+    return select(max(q, parent_floor) - parent_floor, MOST, q == MOST);
 }
 
 // One step over the coarse labels: sums to the parent and to the children for the label with index z.
@@ -84,15 +90,15 @@ struct Sums {
 }
 
 // The children's messages at the fine label just above the last coarse label's centre.
-var<private> between: vec4<u32>;
+var<private> between: Quad;
 
 fn advance(z: u32) -> Sums {
     let centre = 2 * i32(z) + params.label_offset;
     var best = from_children(centre);
     if INTERPOLATING {
         let above = from_children(centre + 1);
-        best = min(min(best, between), above);
-        between = above;
+        best = min(min(best, unpack(between)), above);
+        between = pack(above);
     }
     let have = best != vec4(MOST);
     best = select(vec4<u32>(), best, exists);
@@ -184,12 +190,12 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         for (var d = theirs.x; d < theirs.y; d++) {
             least = min(least, from_children(i32(d)));
         }
-        var parent = MOST;
+        var least_of_parent = MOST;
         for (var z = own.x; z < min(own.y, labels); z++) {
-            parent = min(parent, from_parent(z));
+            least_of_parent = min(least_of_parent, from_parent(z));
         }
         child_floor = least;
-        parent_floor = parent;
+        parent_floor = least_of_parent;
         rewind();
     }
 
@@ -197,7 +203,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var least_up = MOST;
     var least_down = vec4(MOST);
     let before = 2 * i32(start) + params.label_offset - 1;
-    between = from_children(before);
+    between = pack(from_children(before));
     for (var z = start; z < min(end, labels); z++) {
         let sums = advance(z);
         least_up = min(least_up, select(MOST, sums.parent, sums.parent_has));
@@ -207,8 +213,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     up_word = 0u;
     down_words = vec4<u32>();
     rewind();
-    between = from_children(before);
-    var last = vec4(MOST);
+    between = pack(from_children(before));
+    var last = pack(vec4(MOST));
     // Two fine labels per coarse label, padding included.
     for (var z = start; z < end; z++) {
         var sums = Sums(MOST, vec4(MOST), false, vec4<bool>());
@@ -219,8 +225,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             emit_up(z, select(params.tau, cut_message(sums.parent, least_up), z < labels));
         }
         let centre = 2 * i32(z) + params.label_offset;
-        emit_down(centre - 1, select(vec4(MOST), min(last, sums.children), INTERPOLATING), least_down);
+        emit_down(centre - 1, select(vec4(MOST), min(unpack(last), sums.children), INTERPOLATING), least_down);
         emit_down(centre, sums.children, least_down);
-        last = sums.children;
+        last = pack(sums.children);
     }
 }
