@@ -32,8 +32,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if params.is_on == 1u && label > 0 && label + 1 < i32(params.level.labels) {
         var sums = vec3<i32>();
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
-            for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {
-                if abs(i32(optima[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 1 {
+            for (var u = max(x - 3, 0); u <= min(x + 3, i32(params.level.width) - 1); u++) {
+                if abs(i32(optima[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 2 {
                     let row = u32(v - top) * params.level.pitch;
                     for (var i = 0; i < 3; i++) {
                         let at = u32(label - 1 + i);
@@ -44,10 +44,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         let slope = max(sums.x, sums.z) - sums.y;
         if slope > 0 {
-            // Half a pixel is added first, so the dividend is not negative and the quotient rounds towards
-            // minus infinity.
-            let difference = clamp(sums.x - sums.z, -slope, slope);
-            offset = (FRACTION * (difference + slope) + slope) / (2 * slope) - FRACTION / 2;
+            // A pixel is added first, so the dividend is not negative and the quotient rounds towards minus
+            // infinity.
+            let most = 2 * slope;
+            let difference = clamp(sums.x - sums.z, -most, most);
+            offset = (FRACTION * (difference + most) + slope) / most - FRACTION;
         }
     }
     let fixed = FRACTION * (params.level.low + label) + offset;
