@@ -142,9 +142,9 @@ macro_rules! for_every_stage {
                 /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
                 /// [`crate::options::RefinementOptions::confidence_floor`].
                 Confidence confidence;
-                /// Fills [`Map::Disparity`](super::Map::Disparity) on every invalid pixel that is not masked with the smaller of the nearest valid
+                /// Fills [`Map::Disparity`](super::Map::Disparity) on every invalid pixel that is not masked with the farther of the nearest valid
                 /// disparities to the left and to the right on its row, or the one there is: what is occluded belongs to the
-                /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
+                /// farther surface. The smaller of two is farther, or the larger where [`crate::options::RefinementOptions::nearer`] says so. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
                 /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
                 Fill fill;
                 /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
