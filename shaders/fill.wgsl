@@ -9,6 +9,8 @@ struct Params {
     // Rows of the map that `fill` takes values from.
     source_first_row: u32,
     source_rows: u32,
+    // 1 where the larger of two disparities is the farther one, else 0.
+    farther_is_larger: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -88,12 +90,14 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             right++;
         }
         if left > 0u || right < params.level.width {
-            value = 0x7fffffff;
             if left > 0u {
                 value = source_disparity[row + left - 1u];
             }
             if right < params.level.width {
-                value = min(value, source_disparity[row + right]);
+                let other = source_disparity[row + right];
+                if left == 0u || (params.farther_is_larger == 1u) == (other > value) {
+                    value = other;
+                }
             }
             validity |= FILLED;
         }

@@ -30,24 +30,32 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let label = i32(optima[u32(y - top) * pitch + id.x].x & 0xffffu);
     var offset = 0;
     if params.is_on == 1u && label > 0 && label + 1 < i32(params.level.labels) {
-        var sums = vec3<i32>();
+        // The costs at the label below, at the label and above are bytes of one word, or of two. Where it is
+        // one, the other is the same, and what its shift adds is cut off.
+        let first = u32(label - 1);
+        let shift = 8u * (first % 4u);
+        // Below and above, in 16 bits each, and at the label.
+        var outer = 0u;
+        var inner = 0u;
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
-            for (var u = max(x - 1, 0); u <= min(x + 1, i32(params.level.width) - 1); u++) {
-                if abs(i32(optima[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 1 {
+            for (var u = max(x - 3, 0); u <= min(x + 3, i32(params.level.width) - 1); u++) {
+                if abs(i32(optima[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 2 {
                     let row = u32(v - top) * params.level.pitch;
-                    for (var i = 0; i < 3; i++) {
-                        let at = u32(label - 1 + i);
-                        sums[i] += i32((cost[row + place_of(at / 4u, u32(u))] >> (8u * (at % 4u))) & 0xffu);
-                    }
+                    let low = cost[row + place_of(first / 4u, u32(u))] >> shift;
+                    let high = cost[row + place_of((first + 2u) / 4u, u32(u))] << ((32u - shift) & 31u);
+                    outer += (low | high) & 0xff00ffu;
+                    inner += ((low | high) >> 8u) & 0xffu;
                 }
             }
         }
+        let sums = vec3(i32(outer & 0xffffu), i32(inner), i32(outer >> 16u));
         let slope = max(sums.x, sums.z) - sums.y;
         if slope > 0 {
-            // Half a pixel is added first, so the dividend is not negative and the quotient rounds towards
-            // minus infinity.
-            let difference = clamp(sums.x - sums.z, -slope, slope);
-            offset = (FRACTION * (difference + slope) + slope) / (2 * slope) - FRACTION / 2;
+            // A pixel is added first, so the dividend is not negative and the quotient rounds towards minus
+            // infinity.
+            let most = 2 * slope;
+            let difference = clamp(sums.x - sums.z, -most, most);
+            offset = (FRACTION * (difference + most) + slope) / most - FRACTION;
         }
     }
     let fixed = FRACTION * (params.level.low + label) + offset;

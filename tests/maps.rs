@@ -56,7 +56,7 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     twin::speckle_filter::speckle_filter(plan, maps);
     twin::confidence::confidence(plan, maps);
     if plan.method.refinement.fill != Fill::None {
-        twin::fill::fill(maps);
+        twin::fill::fill(plan, maps);
     }
     if plan.method.refinement.fill == Fill::Median {
         twin::fill_median::fill_median(plan, pair, maps);

@@ -104,10 +104,12 @@ macro_rules! for_every_stage {
                 /// for it, its offset.
                 ///
                 /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
-                /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 3 x 3
-                /// neighbourhood, as far as it is inside, whose own label is at most one away. With s = max(a, c) - b it is
-                /// floor((256 (a - c) + s) / (2 s)), clamped to -128 ..= 128, and 0 where s <= 0, at an end of the range, or without a label. (The cost and
-                /// not the belief: the truncation of the messages flattens the belief beside its optimum and draws a fit to whole labels.)
+                /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 7 x 3
+                /// neighbourhood, as far as it is inside, whose own label is at most two away. With s = max(a, c) - b it is
+                /// floor((256 (a - c) + s) / (2 s)), clamped to -256 ..= 256, and 0 where s <= 0, at an end of the range, or without a label. (The cost and
+                /// not the belief: the truncation of the messages flattens the belief beside its optimum and draws a fit to whole labels. Up to a
+                /// whole label: beside a step between labels, messages often leave a pixel on the wrong side of it. More columns
+                /// than rows: on the ground, disparities differ from row to row.)
                 SubPixel sub_pixel;
                 /// The views exchange roles, both mirrored, so that the right view becomes the left one and its matches lie to the
                 /// left again. Each image takes the place of the other, and with x counted from the other side
@@ -140,9 +142,9 @@ macro_rules! for_every_stage {
                 /// [`flag::LOW_CONFIDENCE`](crate::maps::flag::LOW_CONFIDENCE) on valid pixels below
                 /// [`crate::options::RefinementOptions::confidence_floor`].
                 Confidence confidence;
-                /// Fills [`Map::Disparity`](super::Map::Disparity) on every invalid pixel that is not masked with the smaller of the nearest valid
+                /// Fills [`Map::Disparity`](super::Map::Disparity) on every invalid pixel that is not masked with the farther of the nearest valid
                 /// disparities to the left and to the right on its row, or the one there is: what is occluded belongs to the
-                /// farther surface. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
+                /// farther surface. The smaller of two is farther, or the larger where [`crate::options::RefinementOptions::nearer`] says so. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
                 /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
                 Fill fill;
                 /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels

@@ -32,7 +32,7 @@ pub use messages::{Agreement, MessageOptions, Potential};
 pub use method::{GROUPS, Method};
 pub use presets::PRESETS;
 pub use range::{DisparityRange, MAX_DISPARITY, MAX_LABELS};
-pub use refinement::{Fill, LeftRightCheck, Median, RefinementOptions};
+pub use refinement::{Fill, LeftRightCheck, Median, Nearer, RefinementOptions};
 pub use row::{Group, Key, Takes, Word};
 pub use schedule::{Order, ScheduleOptions};
 pub use tiles::{MAX_MEMORY, TileOptions};

@@ -19,11 +19,22 @@ words! {
     Fill {
         /// They stay invalid.
         None = "none",
-        /// They take the smaller of the nearest valid disparities to the left and to the right on the row.
+        /// They take the farther of the nearest valid disparities to the left and to the right on the row.
         Row = "row",
         /// As row, then a weighted median over a window four times as wide and high, so that filled pixels follow the colours
         /// around them and not their row alone.
         Median = "median",
+    }
+}
+
+words! {
+    /// Which disparities belong to nearer surfaces, counted as x in the left view minus x in the right one. Fill needs to know
+    /// it, since what one view does not see belongs to the farther surface.
+    Nearer {
+        /// The larger ones: the right view was taken from the right of the left one.
+        Larger = "larger",
+        /// The smaller ones: it was taken from the left, as from an aircraft on its way back.
+        Smaller = "smaller",
     }
 }
 
@@ -51,6 +62,8 @@ options! {
         sub_pixel: bool = true, takes Takes::Switch, source "open";
         /// What happens to invalid pixels.
         fill: Fill = Fill::Median, takes one_of(Fill::WORDS), source "row in the paper";
+        /// Which disparities belong to nearer surfaces; the fill takes the farther ones.
+        nearer: Nearer = Nearer::Larger, takes one_of(Nearer::WORDS), source "not in the paper";
         /// Which pixels the weighted median changes.
         median: Median = Median::All, takes one_of(Median::WORDS), source "section 2.5: all";
         /// Side of the median's window; it uses every second row of the window.

@@ -8,7 +8,8 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{
-    Agreement, DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential, Pyramid,
+    Agreement, DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Nearer, Order, Potential,
+    Pyramid,
 };
 use std::ops::Range;
 
@@ -168,6 +169,7 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     m.refinement.speckle_size = random.pick(&[0, 3, 20]);
     m.refinement.sub_pixel = random.pick(&[false, true]);
     m.refinement.fill = random.pick(&[Fill::None, Fill::Row, Fill::Median, Fill::Median]);
+    m.refinement.nearer = random.pick(&[Nearer::Larger, Nearer::Smaller]);
     m.refinement.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
     m.refinement.median_window = random.pick(&[3, 5, 15]);
     m.refinement.median_sigma_space = random.log_within(0.3, 30.0);

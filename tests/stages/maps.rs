@@ -9,7 +9,7 @@ use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
-use mrfgs::options::{Median, Method};
+use mrfgs::options::{Median, Method, Nearer};
 
 const SIZES: &[(usize, usize)] = &[(1, 1), (1, 9), (13, 1), (2, 2), (17, 11), (24, 31), (150, 4)];
 
@@ -114,16 +114,11 @@ fn control_changes_are_found() {
     unflagged.validity = unflagged.validity.map(|v| v & i32::from(flag::OCCLUDED));
     let region: Twin = |plan, _, maps| twin::speckle_filter::speckle_filter(plan, maps);
     let confidence: Twin = |plan, _, maps| twin::confidence::confidence(plan, maps);
-    // The larger of two instead of the smaller.
-    let larger: Twin = |_, _, maps| {
-        maps.disparity = maps.disparity.map(|d| -d);
-        twin::fill::fill(maps);
-        maps.disparity = maps.disparity.map(|d| -d);
-    };
+    let fill: Twin = |plan, _, maps| twin::fill::fill(plan, maps);
     let changes: &[Control] = &[
         (Stage::LeftRightCheck, false, twin::left_right_check::left_right_check, |p| p.range.min += 1),
         (Stage::SpeckleFilter, true, region, |p| p.method.refinement.speckle_size += 1),
-        (Stage::Fill, false, larger, |_| ()),
+        (Stage::Fill, false, fill, |p| p.method.refinement.nearer = Nearer::Smaller),
         (Stage::Confidence, false, confidence, |p| p.method.refinement.confidence_floor += 4),
         (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.refinement.median_window = 7),
         (Stage::FillMedian, false, twin::fill_median::fill_median, |p| {

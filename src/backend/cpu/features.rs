@@ -1,6 +1,7 @@
 //! What the costs of the census and of colour are computed from, row by row, and the costs themselves.
 
 use super::finest::Optimum;
+use super::sub_pixel::FAR;
 use super::units::{Blocks, block, block_mut, each_lane};
 use super::windows::{Window, Windows};
 use crate::image::{Image, Pair};
@@ -42,7 +43,7 @@ impl Features {
         window_row(plan, &self.rows[y], windows.row(y), out);
     }
 
-    /// Those around the labels of `optima`, a byte each from two labels below on. Those outside the range are undefined.
+    /// Those around the labels of `optima`, a byte each from [`FAR`] labels below on. Those outside the range are undefined.
     pub(super) fn costs_near(&self, plan: &Plan, y: usize, optima: &[Optimum], out: &mut [u64]) {
         near_row(plan, &self.rows[y], optima, out);
     }
@@ -85,9 +86,9 @@ fn near_row_on<'a, S: pulp::Simd>(
     let last = plan.levels[0].stride - LABEL_BLOCK;
     for (x, (optimum, out)) in optima.iter().zip(out).enumerate() {
         let label = usize::from(optimum.label);
-        let from = label.saturating_sub(2).min(last);
-        let mut costs = [0; 2 + LABEL_BLOCK + size_of::<u64>()];
-        row.costs_of(x, from, &mut costs[2..2 + LABEL_BLOCK]);
+        let from = label.saturating_sub(FAR).min(last);
+        let mut costs = [0; FAR + LABEL_BLOCK + size_of::<u64>()];
+        row.costs_of(x, from, &mut costs[FAR..FAR + LABEL_BLOCK]);
         // A pixel of the right view may have no label.
         *out = u64::from_le_bytes(*block(&costs, (label - from).min(LABEL_BLOCK)));
     }

@@ -3,10 +3,15 @@
 use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
+use crate::options::Nearer;
 use crate::plan::Plan;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut Finest, _: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
+    let farther = match plan.method.refinement.nearer {
+        Nearer::Larger => i32::min,
+        Nearer::Smaller => i32::max,
+    };
     let Finest { disparity, validity: flags, .. } = maps;
     let (width, height) = disparity.size();
     let valid_rows: Vec<usize> =
@@ -15,7 +20,7 @@ pub(super) fn run(maps: &mut Finest, _: &Plan, _: &Image) {
         return;
     }
     let filled_rows: Vec<Vec<i32>> =
-        valid_rows.par_iter().map(|&y| fill_row(disparity.row(y), flags.row(y))).collect();
+        valid_rows.par_iter().map(|&y| fill_row(disparity.row(y), flags.row(y), farther)).collect();
     let rows = disparity.data_mut().par_chunks_mut(width).zip(flags.data_mut().par_chunks_mut(width));
     rows.enumerate().for_each(|(y, (disparity, flags))| {
         let below = valid_rows.partition_point(|&row| row < y);
@@ -31,7 +36,7 @@ pub(super) fn run(maps: &mut Finest, _: &Plan, _: &Image) {
 }
 
 /// Fills the invalid pixels of a row that has at least one valid one.
-fn fill_row(disparity: &[i32], flags: &[u8]) -> Vec<i32> {
+fn fill_row(disparity: &[i32], flags: &[u8], farther: fn(i32, i32) -> i32) -> Vec<i32> {
     let nearest = |order: &mut dyn Iterator<Item = usize>| {
         let mut last = None;
         let mut out = vec![None; disparity.len()];
@@ -48,7 +53,7 @@ fn fill_row(disparity: &[i32], flags: &[u8]) -> Vec<i32> {
     left.into_iter()
         .zip(right)
         .map(|sides| match sides {
-            (Some(l), Some(r)) => l.min(r),
+            (Some(l), Some(r)) => farther(l, r),
             (l, r) => l.or(r).unwrap_or_default(),
         })
         .collect()

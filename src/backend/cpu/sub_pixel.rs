@@ -1,16 +1,15 @@
 //! Disparities between the labels: see [`crate::backend::Stage::SubPixel`].
 //!
-//! A neighbour counts where its label is at most one away, so the sums need no more of its costs than those up to two labels from its own.
-//! These five are packed into a word of 12-bit fields. Shifted to the label of the centre, the words of all neighbours add up to the
-//! three sums at once.
+//! A neighbour counts where its label is at most [`NEAR`] away, so the sums need of its costs only those up to [`FAR`] labels from its
+//! own. The costs at each distance from the own label are a plane: neighbouring pixels are the lanes of vectors, and which
+//! plane of a neighbour a pixel takes depends on how far their labels are apart.
 
-use super::features::Features;
 use super::finest::{Finest, Optimum};
-use super::units::Units;
+use super::units::{Units, block, each_lane};
 use super::volumes::Volumes;
 use crate::backend::volume::NO_LABEL;
 use crate::maps::FRACTION;
-use crate::plan::{LevelPlan, Plan};
+use crate::plan::LevelPlan;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -26,133 +25,146 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let cells = BAND * level.width;
     let raw = raw.rows_mut(rows.clone()).par_chunks_mut(cells);
     let bands = raw.zip(disparity.rows_mut(rows.clone()).par_chunks_mut(cells));
-    bands.enumerate().for_each_init(Scratch::default, |Scratch { near, sums }, (band, (raw, disparity))| {
-        let first = rows.start + band * BAND;
-        if plan.method.refinement.sub_pixel {
-            near.resize_with(raw.len() / level.width + 2, Near::default);
-            for (near, y) in near.iter_mut().zip(first..) {
-                near.clear(level.width);
-                if let Some(y) = y.checked_sub(1).filter(|&y| y < level.height) {
-                    if plan.holds_all_rows() {
-                        near.collect(level, fine_cost, y, optima.row(y));
-                    } else {
-                        near.compute(plan, features, y, optima.row(y));
+    bands.enumerate().for_each_init(
+        Scratch::default,
+        |Scratch { near, words, sums }, (band, (raw, disparity))| {
+            let first = rows.start + band * BAND;
+            if plan.method.refinement.sub_pixel {
+                words.resize(level.width, 0);
+                near.resize_with(raw.len() / level.width + 2, Near::default);
+                for (near, y) in near.iter_mut().zip(first..) {
+                    near.clear(level.width);
+                    if let Some(y) = y.checked_sub(1).filter(|&y| y < level.height) {
+                        if plan.holds_all_rows() {
+                            collect(level, fine_cost, y, optima.row(y), words);
+                        } else {
+                            features.costs_near(plan, y, optima.row(y), words);
+                        }
+                        near.fill(optima.row(y), words);
                     }
                 }
             }
-        }
-        sums.resize(level.width, 0);
-        for (y, raw) in raw.chunks_exact_mut(level.width).enumerate() {
-            if plan.method.refinement.sub_pixel {
-                sum_row([&near[y], &near[y + 1], &near[y + 2]], sums);
+            sums.resize(level.width.div_ceil(LANES), Sums::default());
+            for (y, raw) in raw.chunks_exact_mut(level.width).enumerate() {
+                if plan.method.refinement.sub_pixel {
+                    sum_row([&near[y], &near[y + 1], &near[y + 2]], sums);
+                }
+                let optima = optima.row(first + y).chunks(LANES);
+                for ((raw, optima), sums) in raw.chunks_mut(LANES).zip(optima).zip(&*sums) {
+                    for (i, (raw, &Optimum { label, .. })) in raw.iter_mut().zip(optima).enumerate() {
+                        let inside = label > 0 && usize::from(label) + 1 < level.labels;
+                        let offset = if inside { offset(sums.map(|sum| sum[i].into())) } else { 0 };
+                        *raw = FRACTION * (plan.range.min + i32::from(label)) + offset;
+                    }
+                }
             }
-            for ((raw, optimum), &sums) in raw.iter_mut().zip(optima.row(first + y)).zip(&*sums) {
-                let label = optimum.label;
-                let inside = label > 0 && usize::from(label) + 1 < level.labels;
-                *raw = FRACTION * (plan.range.min + i32::from(label)) + if inside { offset(sums) } else { 0 };
-            }
-        }
-        disparity.copy_from_slice(raw);
-    });
+            disparity.copy_from_slice(raw);
+        },
+    );
 }
 
 /// Number of rows that are processed together.
 const BAND: usize = 8;
-/// Bits of a sum of nine costs.
-const SUM_BITS: u32 = 12;
+/// How many columns away a neighbour may be.
+const RADIUS: usize = 3;
+/// How far the label of a neighbour may be away.
+const NEAR: u16 = 2;
+/// How far from its own label the costs of a neighbour are needed.
+pub(super) const FAR: usize = NEAR as usize + 1;
+/// Stands for "no label" here: far from every label, also where differences wrap.
+const NOWHERE: u16 = 1 << 15;
+/// Number of pixels whose costs are summed together, in vectors of 16 bits.
+const LANES: usize = 16;
+
+/// Of [`LANES`] pixels, the sums of the costs at the label below, at the label and above; 0 where nothing is placed between
+/// the labels.
+type Sums = [[u16; LANES]; 3];
 
 #[derive(Default)]
 struct Scratch {
     near: Vec<Near>,
-    /// Of a row; 0 where nothing is placed between the labels.
-    sums: Vec<u64>,
+    words: Vec<u64>,
+    sums: Vec<Sums>,
 }
 
-/// The costs around the labels of a row, with a pixel without a label at either end.
+/// The costs around the labels of a row, with pixels without a label at either end.
 #[derive(Default)]
 struct Near {
-    /// [`SUM_BITS`] times the label, far from all others where there is none.
-    labels: Vec<i64>,
-    /// From two labels below the label to two above it, [`SUM_BITS`] each. Those outside the range are never used.
-    costs: Vec<u64>,
+    labels: Vec<u16>,
+    /// From [`FAR`] labels below the label to as many above it. Those outside the range are never used.
+    costs: [Vec<u16>; 2 * FAR + 1],
 }
 
 impl Near {
     /// The same as without any labels.
     fn clear(&mut self, width: usize) {
+        let cells = width.next_multiple_of(LANES) + 2 * RADIUS;
         self.labels.clear();
-        self.costs.clear();
-        self.labels.resize(width + 2, i64::MIN / 4);
-        self.costs.resize(width + 2, 0);
+        self.labels.resize(cells, NOWHERE);
+        self.costs.iter_mut().for_each(|costs| costs.resize(cells, 0));
     }
 
-    fn place(&mut self, optima: &[Optimum]) {
-        for (to, &Optimum { label, .. }) in self.labels[1..].iter_mut().zip(optima) {
-            if label != NO_LABEL {
-                *to = i64::from(SUM_BITS) * i64::from(label);
+    /// Takes the labels of a row, and a word of costs for each.
+    fn fill(&mut self, optima: &[Optimum], words: &[u64]) {
+        for (to, &Optimum { label, .. }) in self.labels[RADIUS..].iter_mut().zip(optima) {
+            *to = if label == NO_LABEL { NOWHERE } else { label };
+        }
+        for (k, costs) in self.costs.iter_mut().enumerate() {
+            for (to, word) in costs[RADIUS..].iter_mut().zip(words) {
+                *to = (word >> (8 * k)) as u16 & 0xff;
             }
         }
     }
+}
 
-    /// Computes the costs of row `y`.
-    fn compute(&mut self, plan: &Plan, features: &Features, y: usize, optima: &[Optimum]) {
-        self.place(optima);
-        features.costs_near(plan, y, optima, &mut self.costs[1..]);
-        spread(&mut self.costs);
-    }
-
-    /// Collects them from those of all pixels.
-    fn collect(&mut self, level: &LevelPlan, cost: &[u8], y: usize, optima: &[Optimum]) {
-        self.place(optima);
-        let cells = (y * level.width * level.stride..).step_by(level.stride);
-        for ((&Optimum { label, .. }, start), costs) in optima.iter().zip(cells).zip(&mut self.costs[1..]) {
-            if label == NO_LABEL {
-                continue;
-            }
-            let first = (start + usize::from(label)).wrapping_sub(2);
-            let bytes = cost.get(first..).and_then(|cells| cells.first_chunk());
-            // At the ends of the volume, one by one.
-            let one = |k: usize| cost.get(first.wrapping_add(k)).copied().unwrap_or(0);
-            *costs = u64::from_le_bytes(bytes.copied().unwrap_or_else(|| std::array::from_fn(one)));
+/// Collects the costs around the labels of row `y` from those of all pixels, a byte each.
+fn collect(level: &LevelPlan, cost: &[u8], y: usize, optima: &[Optimum], words: &mut [u64]) {
+    let cells = (y * level.width * level.stride..).step_by(level.stride);
+    for ((&Optimum { label, .. }, start), word) in optima.iter().zip(cells).zip(words) {
+        if label == NO_LABEL {
+            continue;
         }
-        spread(&mut self.costs);
+        let first = (start + usize::from(label)).wrapping_sub(FAR);
+        let bytes = cost.get(first..).and_then(|cells| cells.first_chunk());
+        // At the ends of the volume, one by one.
+        let one = |k: usize| cost.get(first.wrapping_add(k)).copied().unwrap_or(0);
+        *word = u64::from_le_bytes(bytes.copied().unwrap_or_else(|| std::array::from_fn(one)));
     }
 }
 
-/// The first five bytes of each word, apart by [`SUM_BITS`].
-fn spread(words: &mut [u64]) {
-    for word in words {
-        let byte = |k: u32| (*word >> (u8::BITS * k) & 0xff) << (SUM_BITS * k);
-        *word = byte(0) | byte(1) | byte(2) | byte(3) | byte(4);
-    }
-}
-
-/// The sums of a row from its own costs and those of the rows around it: of the costs at the label below, at the label and above.
+/// The sums of a row from its own costs and those of the rows around it.
 #[pulp::with_simd(sum_row = pulp::Arch::new())]
 #[inline(always)]
-fn sum_row_on<'a, S: pulp::Simd>(_: S, near: [&'a Near; 3], sums: &'a mut [u64]) {
-    let width = sums.len();
-    sums.fill(0);
-    let centres = &near[1].labels[1..=width];
-    for Near { labels, costs } in near {
-        for column in 0..3 {
-            let there = labels[column..][..width].iter().zip(&costs[column..][..width]);
-            for ((sum, centre), (label, costs)) in sums.iter_mut().zip(centres).zip(there) {
-                let shift = centre + i64::from(SUM_BITS) - label;
-                let counts = 0 <= shift && shift <= 2 * i64::from(SUM_BITS);
-                *sum = sum.wrapping_add(costs.wrapping_shr(shift as u32) & u64::from(counts).wrapping_neg());
+fn sum_row_on<'a, S: pulp::Simd>(_: S, near: [&'a Near; 3], sums: &'a mut [Sums]) {
+    for (x, sums) in (0..).step_by(LANES).zip(sums) {
+        let centres: &[u16; LANES] = block(&near[1].labels, x + RADIUS);
+        let mut all = Sums::default();
+        for Near { labels, costs } in near {
+            for column in x..=x + 2 * RADIUS {
+                let labels: &[u16; LANES] = block(labels, column);
+                let costs: [&[u16; LANES]; 2 * FAR + 1] = costs.each_ref().map(|costs| block(costs, column));
+                // By how much the label of the centre is above that of the neighbour, from -NEAR on.
+                let above: [u16; LANES] =
+                    each_lane(|i| centres[i].wrapping_sub(labels[i]).wrapping_add(NEAR));
+                for apart in 0..=2 * usize::from(NEAR) {
+                    let counts: [u16; LANES] =
+                        each_lane(|i| u16::from(above[i] == apart as u16).wrapping_neg());
+                    for (k, sum) in all.iter_mut().enumerate() {
+                        *sum = each_lane(|i| sum[i] + (costs[apart + k][i] & counts[i]));
+                    }
+                }
             }
         }
+        *sums = all;
     }
 }
 
 /// How far the disparity is above the label.
 #[inline(always)]
-fn offset(sums: u64) -> i32 {
-    let [below, at, above] = [0, 1, 2].map(|k| (sums >> (SUM_BITS * k)) as i32 & ((1 << SUM_BITS) - 1));
+fn offset([below, at, above]: [i32; 3]) -> i32 {
     let slope = below.max(above) - at;
     if slope <= 0 {
         return 0;
     }
-    (FRACTION * (below - above) + slope).div_euclid(2 * slope).clamp(-FRACTION / 2, FRACTION / 2)
+    (FRACTION * (below - above) + slope).div_euclid(2 * slope).clamp(-FRACTION, FRACTION)
 }

@@ -5,11 +5,12 @@ use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
 use crate::error::Result;
+use crate::options::Nearer;
 use crate::plan::Plan;
 
 const SHADER: &str = include_str!("../../../shaders/fill.wgsl");
 
-uniform! { source_first_row: u32, source_rows: u32 }
+uniform! { source_first_row: u32, source_rows: u32, farther_is_larger: u32 }
 
 /// `rows`, `sources` and `fill`.
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
@@ -27,7 +28,11 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     r.dispatch(sources, &none, 0..l.height, (l.height, 1), &tables)?;
     // A row may take its values from any other: every band from every band.
     for source in r.map_bands(|rows| vec![(2, b.flags.bind(rows))])? {
-        let own = Uniform { source_first_row: source.start, source_rows: source.end - source.start };
+        let own = Uniform {
+            source_first_row: source.start,
+            source_rows: source.end - source.start,
+            farther_is_larger: (r.plan.method.refinement.nearer == Nearer::Smaller).into(),
+        };
         r.rows(fill, &own, l.width, |rows| {
             vec![
                 (1, b.disparity.bind(rows)),

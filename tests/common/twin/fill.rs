@@ -1,5 +1,7 @@
 use super::Finest;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
+use mrfgs::options::Nearer;
 
 /// Whether a pixel's disparity is rejected before the fill.
 pub fn invalid(validity: i32) -> bool {
@@ -9,7 +11,7 @@ pub fn invalid(validity: i32) -> bool {
 }
 
 /// Fills the invalid pixels that are not masked.
-pub fn fill(maps: &mut Finest) {
+pub fn fill(plan: &Plan, maps: &mut Finest) {
     let (width, height) = maps.disparity.size();
     let (old, old_flags) = (maps.disparity.clone(), maps.validity.clone());
     let valid = |x: usize, y: usize| !invalid(old_flags[(x, y)]);
@@ -17,7 +19,11 @@ pub fn fill(maps: &mut Finest) {
     let on_row = |x: usize, y: usize| {
         let left = (0..=x).rev().find(|&x| valid(x, y)).map(|x| old[(x, y)]);
         let right = (x..width).find(|&x| valid(x, y)).map(|x| old[(x, y)]);
-        left.into_iter().chain(right).min()
+        let sides = left.into_iter().chain(right);
+        match plan.method.refinement.nearer {
+            Nearer::Larger => sides.min(),
+            Nearer::Smaller => sides.max(),
+        }
     };
     for y in 0..height {
         for x in 0..width {

@@ -2,8 +2,28 @@ use super::Finest;
 use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 
+/// Which pixels count, and how far the disparity may be from the label.
+#[derive(Clone, Copy)]
+pub struct Fit {
+    /// Columns and rows to either side.
+    pub reach: (i64, i64),
+    /// Labels between a neighbour and the centre.
+    pub near: i64,
+    /// In 1/256 px.
+    pub most: f64,
+}
+
+impl Fit {
+    pub const DEFINED: Self = Self { reach: (3, 1), near: 2, most: 256.0 };
+}
+
 /// The disparity of each pixel, in 1/256 px.
 pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
+    sub_pixel_by(&Fit::DEFINED, plan, cost, maps);
+}
+
+/// The same by another fit.
+pub fn sub_pixel_by(fit: &Fit, plan: &Plan, cost: &[u32], maps: &mut Finest) {
     let level = &plan.levels[0];
     let (width, height, labels) = (level.width as i64, level.height as i64, level.labels as i64);
     let offset = |x: usize, y: usize| {
@@ -13,12 +33,12 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
         }
         let sum_at = |wanted: i64| {
             let mut sum = 0;
-            for v in y as i64 - 1..=y as i64 + 1 {
-                for u in x as i64 - 1..=x as i64 + 1 {
+            for v in y as i64 - fit.reach.1..=y as i64 + fit.reach.1 {
+                for u in x as i64 - fit.reach.0..=x as i64 + fit.reach.0 {
                     if u < 0 || v < 0 || u >= width || v >= height {
                         continue;
                     }
-                    if (i64::from(maps.label[(u as usize, v as usize)]) - label).abs() <= 1 {
+                    if (i64::from(maps.label[(u as usize, v as usize)]) - label).abs() <= fit.near {
                         sum += i64::from(cost[((v * width + u) * labels + wanted) as usize]);
                     }
                 }
@@ -33,7 +53,7 @@ pub fn sub_pixel(plan: &Plan, cost: &[u32], maps: &mut Finest) {
         // Floats represent these fractions exactly enough, because a quotient by 2 s is never closer to a
         // whole number than 1 / (2 s), unless it is one.
         let exact = (256 * (a - c) + s) as f64 / (2 * s) as f64;
-        exact.floor().clamp(-128.0, 128.0) as i32
+        exact.floor().clamp(-fit.most, fit.most) as i32
     };
     maps.raw = Plane::from_fn(level.width, level.height, |x, y| {
         let whole = 256 * (plan.range.min + maps.label[(x, y)]);
