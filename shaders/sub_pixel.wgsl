@@ -38,7 +38,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         var outer = 0u;
         var inner = 0u;
         for (var v = max(y - 1, 0); v <= min(y + 1, i32(params.level.height) - 1); v++) {
-            for (var u = max(x - 3, 0); u <= min(x + 3, i32(params.level.width) - 1); u++) {
+            for (var u = max(x - 2, 0); u <= min(x + 2, i32(params.level.width) - 1); u++) {
                 if abs(i32(optima[u32(v - top) * pitch + u32(u)].x & 0xffffu) - label) <= 2 {
                     let row = u32(v - top) * params.level.pitch;
                     let low = cost[row + place_of(first / 4u, u32(u))] >> shift;

@@ -104,7 +104,7 @@ macro_rules! for_every_stage {
                 /// for it, its offset.
                 ///
                 /// The offset is the tip of the symmetric V, the steeper side setting the slope of both, through three sums of
-                /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 7 x 3
+                /// matching cost: a, b and c at the label below, at the label and above, each over those pixels of the 5 x 3
                 /// neighbourhood, as far as it is inside, whose own label is at most two away. With s = max(a, c) - b it is
                 /// floor((256 (a - c) + s) / (2 s)), clamped to -256 ..= 256, and 0 where s <= 0, at an end of the range, or without a label. (The cost and
                 /// not the belief: the truncation of the messages flattens the belief beside its optimum and draws a fit to whole labels. Up to a

@@ -63,8 +63,8 @@ fn control_a_changed_fit_is_found() {
     };
     let base = fitted(&Fit::DEFINED);
     for (name, fit) in [
-        ("columns", Fit { reach: (2, 1), ..Fit::DEFINED }),
-        ("rows", Fit { reach: (3, 0), ..Fit::DEFINED }),
+        ("columns", Fit { reach: (1, 1), ..Fit::DEFINED }),
+        ("rows", Fit { reach: (2, 0), ..Fit::DEFINED }),
         ("labels", Fit { near: 1, ..Fit::DEFINED }),
         ("bound", Fit { most: 255.0, ..Fit::DEFINED }),
     ] {

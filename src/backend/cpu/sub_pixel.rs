@@ -66,7 +66,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
 /// Number of rows that are processed together.
 const BAND: usize = 8;
 /// How many columns away a neighbour may be.
-const RADIUS: usize = 3;
+const RADIUS: usize = 2;
 /// How far the label of a neighbour may be away.
 const NEAR: u16 = 2;
 /// How far from its own label the costs of a neighbour are needed.

@@ -13,7 +13,7 @@ const SHADER: &str = include_str!("../../../shaders/sub_pixel.wgsl");
 uniform! { is_on: u32 }
 
 pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
-    vec![Job::new::<Uniform>(Kernel::new("sub_pixel", "main", SHADER), 3 + 3 * 7)]
+    vec![Job::new::<Uniform>(Kernel::new("sub_pixel", "main", SHADER), 3 + 3 * 5)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {

@@ -14,7 +14,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    pub const DEFINED: Self = Self { reach: (3, 1), near: 2, most: 256.0 };
+    pub const DEFINED: Self = Self { reach: (2, 1), near: 2, most: 256.0 };
 }
 
 /// The disparity of each pixel, in 1/256 px.
