@@ -134,10 +134,16 @@ pub(super) fn each_lane<T: Copy + Default, const N: usize>(mut lane: impl FnMut(
 /// The smallest values in each of `LABEL_BLOCK` lanes.
 pub(super) type Least<U> = [U; LABEL_BLOCK];
 
-/// The smallest of all lanes, of each. (Not inlined: inlined, the compiler makes it a chain of single bytes.)
-#[inline(never)]
-pub(super) fn least_of<U: Units, const N: usize>(each: &[Least<U>; N]) -> [U; N] {
-    each.map(|lanes| smallest(&lanes))
+/// The smallest of all lanes, in each of them.
+#[inline(always)]
+pub(super) fn least_in_all<U: Units>(lanes: Least<U>) -> Least<U> {
+    least_of_pairs::<U, 1>(least_of_pairs::<U, 2>(least_of_pairs::<U, 4>(least_of_pairs::<U, 8>(lanes))))
+}
+
+/// The smaller of each lane and the one `APART` from it. (A constant, so that it becomes a shuffle.)
+#[inline(always)]
+fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
+    each_lane(|i| lanes[i].min(lanes[i ^ APART]))
 }
 
 /// The smaller, lane by lane, of `least` and all of `values`.
@@ -197,6 +203,24 @@ impl<U: Units> Blocks for Truncating<'_, U> {
         let sums = block::<U, N>(self.sums, at);
         *block_mut(self.out, at) = each_lane::<U, N>(|i| sums[i].min(self.high).less(self.low));
     }
+}
+
+/// Index of the smallest value of whole blocks, the lowest on ties.
+#[inline(always)]
+pub(super) fn first_smallest<U: Units>(row: &[U]) -> usize {
+    let blocks: &[Least<U>] = row.as_chunks().0;
+    let mut least = [U::MOST; LABEL_BLOCK];
+    for block in blocks {
+        keep_least(&mut least, block);
+    }
+    let least = smallest(&least);
+    // The first place of each lane that holds it: an earlier block replaces what a later one has found.
+    let mut places = [u16::MAX; LABEL_BLOCK];
+    for (i, block) in blocks.iter().enumerate().rev() {
+        let at = i * LABEL_BLOCK;
+        places = each_lane(|lane| if block[lane] == least { (at + lane) as u16 } else { places[lane] });
+    }
+    places.iter().fold(u16::MAX, |first, &place| first.min(place)).into()
 }
 
 /// Index and value of the smallest value, the lowest index on ties.
