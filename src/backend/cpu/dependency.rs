@@ -4,9 +4,7 @@
 //! is exact. The messages to all members are stored for the labels of the factor's own pixel: at all others its
 //! belief is infinite, and the message is tau.
 
-use super::units::{
-    Blocks, Least, Truncating, Units, block, block_mut, each_lane, keep_least, least_in_all, smallest,
-};
+use super::units::{Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate};
 use super::volumes::{Level, Sent, Volumes};
 use super::windows::{Seen, Window, Windows};
 use crate::backend::Stage;
@@ -207,11 +205,11 @@ impl<U: Units> Three<'_, U> {
     /// Writes the messages of the factor.
     #[inline(always)]
     fn send<const SAME: bool>(&self, cut: Truncation, messages: &mut [U], scratch: &mut [U]) {
-        let (stride, tau) = (self.stride, U::of(cut.tau.into()));
+        let stride = self.stride;
         if stride == LABEL_BLOCK {
             let (sums, own) = self.sums::<SAME>(messages, 0);
             for slot in 0..3 {
-                let (low, high) = bounds(own[slot], tau);
+                let (low, high) = bounds(own[slot], cut);
                 *block_mut(messages, slot * stride) = cut_block(&sums[slot], &low, &high);
             }
             return;
@@ -225,7 +223,7 @@ impl<U: Units> Three<'_, U> {
             }
         }
         for (slot, least) in least.into_iter().enumerate() {
-            let (low, high) = bounds(least, tau);
+            let (low, high) = bounds(least, cut);
             for at in (slot * stride..(slot + 1) * stride).step_by(LABEL_BLOCK) {
                 *block_mut(messages, at) = cut_block(block(scratch, at), &low, &high);
             }
@@ -241,20 +239,6 @@ fn plus<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
 #[inline(always)]
 fn or<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
     each_lane(|i| a[i] | b[i])
-}
-
-/// [`Truncation::bounds`] by [`TruncationRule::Relative`], (low, high), in every lane. This keeps the bounds of a
-/// message in vectors. When they passed through single values, a factor waited longer than it computed.
-#[inline(always)]
-fn bounds<U: Units>(least: Least<U>, tau: U) -> (Least<U>, Least<U>) {
-    let least = least_in_all(least);
-    let low = each_lane(|i| least[i].min(U::MOST.less(tau)));
-    (low, each_lane(|i| low[i].plus(tau)))
-}
-
-#[inline(always)]
-fn cut_block<U: Units>(sums: &Block<U>, low: &Least<U>, high: &Least<U>) -> Block<U> {
-    each_lane(|i| sums[i].min(high[i]).less(low[i]))
 }
 
 /// The messages of a factor of any number of members.
@@ -291,16 +275,17 @@ fn any<'a, U: Units>(
         here.copy_from_slice(&next[..stride]);
         add(here, &q[at + stride..][..stride]);
     }
-    let (sum, own) = sums.split_at_mut(stride);
+    let sum = &mut sums[..stride];
     before[..stride].fill(U::default());
     for (i, &slot) in slots.iter().enumerate() {
         sum.copy_from_slice(&after[i * stride..][..stride]);
         add(sum, before);
         add(before, &q[i * stride..][..stride]);
-        let outside = &outside[i * stride..][..stride];
-        own[..stride].iter_mut().zip(&*sum).zip(outside).for_each(|((own, &sum), &out)| *own = sum | out);
-        let least = smallest(&own[..stride]);
-        Truncating::new(sum, least, cut, &mut messages[slot * stride..][..stride]).all(stride);
+        let mut least = [U::MOST; LABEL_BLOCK];
+        for at in (0..stride).step_by(LABEL_BLOCK) {
+            keep_least(&mut least, &or(block(sum, at), block(outside, i * stride + at)));
+        }
+        truncate(sum, least, cut, &mut messages[slot * stride..][..stride]);
     }
 }
 

@@ -2,9 +2,7 @@
 //!
 //! Rows of labels are processed with their padding; values that belong to no label count as infinite.
 
-use super::units::{
-    Blocks, Truncating, Units, block, block_mut, each_lane, keep_least, least_in_all, padding, smallest,
-};
+use super::units::{Units, block, block_mut, each_lane, keep_least, padding, smallest, truncate};
 use super::volumes::{Level, Sent, Volumes};
 use super::windows::{Window, Windows};
 use crate::backend::Stage;
@@ -189,7 +187,7 @@ fn factor<U: Units>(
             *block_mut(sums, z) = all;
         }
     }
-    Truncating::new(&sums[0], least_in_all(least)[0], cut, up).all(own.stride());
+    truncate(&sums[0], least, cut, up);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
             // The label below the parent's first agrees with it too.
@@ -208,8 +206,7 @@ fn factor<U: Units>(
                 (block::<U, LABEL_BLOCK>(fine, d), block::<U, LABEL_BLOCK>(fine_padding, d));
             keep_least(&mut least, &each_lane::<U, LABEL_BLOCK>(|i| sums[i] | padding[i]));
         }
-        let least = least_in_all(least)[0];
-        Truncating::new(fine, least, cut, &mut down[at..][..theirs.stride()]).all(theirs.stride());
+        truncate(fine, least, cut, &mut down[at..][..theirs.stride()]);
     }
 }
 
