@@ -58,10 +58,10 @@ fn step_on<'a, S: pulp::Simd>(
         let at = i * LABEL_BLOCK;
         let inside = &mut sums[columns.margin..];
         if let Some(views) = &enters {
-            views.each_difference(at, inside, |sum, difference| sum.plus(difference));
+            views.each_difference(at, inside, Sum::plus);
         }
         if let Some(views) = &leaves {
-            views.each_difference(at, inside, |sum, difference| sum.less(difference));
+            views.each_difference(at, inside, Sum::less);
         }
         if let Some((centre, costs)) = &mut costs {
             cost_block(centre, at, sums, columns.margin, means, costs);
@@ -165,17 +165,17 @@ impl Views<'_> {
         let pixels = self.left.pixels.row(self.y).iter().zip(self.left.masked.row(self.y));
         for (x, (sum, (pixel, &masked))) in sums.iter_mut().zip(pixels).enumerate() {
             if !masked {
-                *sum = change(sum, &self.difference(pixel, self.place(x) + at));
+                *sum = change(sum, &self.difference(*pixel, self.place(x) + at));
             }
         }
     }
 
     /// The differences of a left pixel from the right ones from `place` on.
     #[inline(always)]
-    fn difference(&self, pixel: &Pixel, place: usize) -> Sum {
+    fn difference(&self, pixel: Pixel, place: usize) -> Sum {
         let seen: Block<u16> = *block(&self.right.seen, place);
         let mut differences = Block::<u32>::default();
-        for (channel, &here) in self.right.channels.iter().zip(pixel) {
+        for (channel, here) in self.right.channels.iter().zip(pixel) {
             let there: &Block<u16> = block(channel, place);
             let apart: Block<u16> =
                 each_lane(|i| (here.saturating_sub(there[i]) | there[i].saturating_sub(here)) & seen[i]);

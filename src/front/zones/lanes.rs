@@ -131,3 +131,34 @@ impl Signed for Lanes {
         self.0.iter().all(|v| v.is_sign_negative())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustfft::FftPlannerScalar;
+
+    #[test]
+    fn a_lane_has_the_bits_of_a_single_transform() {
+        // Large factors go another way than small ones.
+        for length in [1, 2, 30, 194, 450, 2 * 149] {
+            let value = |i: usize| ((i * 7919) % 1013) as f32 / 13.0 - 30.0;
+            let number =
+                |lane: usize, i: usize| Complex { re: value(lane * 911 + i), im: value(lane * 13 + 5 * i) };
+            let mut together: Vec<_> =
+                (0..length).map(|i| Lanes::complex(from_fn(|lane| number(lane, i)))).collect();
+            FftPlannerScalar::new().plan_fft_inverse(length).process(&mut together);
+            for lane in 0..LANES {
+                let mut single: Vec<_> = (0..length).map(|i| number(lane, i)).collect();
+                FftPlannerScalar::new().plan_fft_inverse(length).process(&mut single);
+                let bits = |n: Complex<f32>| [n.re.to_bits(), n.im.to_bits()];
+                for (together, single) in together.iter().zip(single) {
+                    assert_eq!(
+                        bits(Lanes::at(*together, lane)),
+                        bits(single),
+                        "length {length}, lane {lane}"
+                    );
+                }
+            }
+        }
+    }
+}
