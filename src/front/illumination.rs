@@ -43,23 +43,39 @@ pub fn homomorphic(image: &Image) -> Image {
         return image.clone();
     }
     let darkest = DARKEST * sum as f64 / count as f64;
-    // Weighted logarithm and weight: the quotient of their low-passes is the mean over unmasked pixels.
     let log = |(p, masked): (&Pixel, &bool)| {
-        if *masked { [0.0; 2] } else { [libm::log(f64::from(p[3]).max(darkest) / darkest), 1.0] }
+        if *masked { 0.0 } else { libm::log(f64::from(p[3]).max(darkest) / darkest) }
     };
-    let logs = pixels.par_iter().zip(masked).map(log).collect();
+    let plane = |values| Plane::new(image.width(), image.height(), values);
     let kernel = gaussian(SIGMA, RADIUS);
-    let low = smooth(&Plane::new(image.width(), image.height(), logs), [&kernel, &kernel]);
-    let correct = |((p, masked), [log, weight]): ((&Pixel, &bool), &[f64; 2])| {
-        if *masked {
-            return *p;
+    let low_pass = |values: &Plane<f64>| smooth(values, [&kernel, &kernel]);
+    let logs = low_pass(&plane(pixels.par_iter().zip(masked).map(log).collect()));
+    // The quotient of the low-passes of logarithm and weight is the mean over unmasked pixels. Without any masked, the weight is that
+    // of a single pixel everywhere.
+    let weights =
+        masked.contains(&true).then(|| low_pass(&plane(masked.iter().map(|m| f64::from(!m)).collect())));
+    let one = low_pass(&Plane::filled(1, 1, 1.0))[(0, 0)];
+    let width = image.width();
+    let mut corrected = image.clone();
+    corrected.pixels.data_mut().par_chunks_exact_mut(width).enumerate().for_each(|(y, pixels)| {
+        let weight = |x: usize| weights.as_ref().map_or(one, |weights| weights[(x, y)]);
+        let gain = |(x, log): (usize, &f64)| MID_GREY / darkest * libm::exp(-log / weight(x));
+        let gains: Vec<f64> = logs.row(y).iter().enumerate().map(gain).collect();
+        correct(image.masked.row(y), &gains, pixels);
+    });
+    corrected
+}
+
+/// Multiplies the colours of unmasked pixels by their gains.
+#[pulp::with_simd(correct = pulp::Arch::new())]
+#[inline(always)]
+fn correct_on<'a, S: pulp::Simd>(_: S, masked: &'a [bool], gains: &'a [f64], pixels: &'a mut [Pixel]) {
+    for ((pixel, gain), masked) in pixels.iter_mut().zip(gains).zip(masked) {
+        if !masked {
+            let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(|v| (f64::from(v) * gain).round() as u16);
+            *pixel = [r, g, b, grey(r, g, b)];
         }
-        let gain = MID_GREY / darkest * libm::exp(-log / weight);
-        let [r, g, b] = [p[0], p[1], p[2]].map(|v| (f64::from(v) * gain).round() as u16);
-        [r, g, b, grey(r, g, b)]
-    };
-    let corrected = pixels.par_iter().zip(masked).zip(low.data()).map(correct).collect();
-    Image { pixels: Plane::new(image.width(), image.height(), corrected), masked: image.masked.clone() }
+    }
 }
 
 /// Weights of a Gaussian of `sigma` pixels at -`radius` ..= `radius`; they sum to 1.
@@ -81,34 +97,33 @@ fn reflected(i: isize, n: usize) -> usize {
 
 /// A plane convolved across and down with symmetric kernels of odd length, reflected at its borders. Rows run
 /// in parallel. Each sum is taken in one order, so the number of threads changes nothing.
-pub(super) fn smooth<const N: usize>(
-    plane: &Plane<[f64; N]>,
-    [across, down]: [&[f64]; 2],
-) -> Plane<[f64; N]> {
+pub(super) fn smooth(plane: &Plane<f64>, [across, down]: [&[f64]; 2]) -> Plane<f64> {
     let (width, height) = plane.size();
-    let add = |sum: &mut [f64; N], weight: f64, value: &[f64; N]| {
-        for (sum, value) in sum.iter_mut().zip(value) {
-            *sum += weight * value;
-        }
-    };
     let (right, below) = (across.len() / 2, down.len() / 2);
-    let mut rows = Plane::filled(width, height, [0.0; N]);
+    let mut rows = Plane::filled(width, height, 0.0);
     rows.data_mut().par_chunks_exact_mut(width).enumerate().for_each(|(y, out)| {
         let row = plane.row(y);
         let at = |i: usize| row[reflected(i as isize - right as isize, width)];
         let extended: Vec<_> = (0..width + 2 * right).map(at).collect();
-        for (sum, window) in out.iter_mut().zip(extended.windows(across.len())) {
-            across.iter().zip(window).for_each(|(weight, value)| add(sum, *weight, value));
-        }
+        let terms: Vec<_> = extended.windows(width).collect();
+        add_all(across, &terms, out);
     });
-    let mut smoothed = Plane::filled(width, height, [0.0; N]);
+    let mut smoothed = Plane::filled(width, height, 0.0);
     smoothed.data_mut().par_chunks_exact_mut(width).enumerate().for_each(|(y, out)| {
-        for (i, weight) in down.iter().enumerate() {
-            let row = rows.row(reflected((y + i) as isize - below as isize, height));
-            out.iter_mut().zip(row).for_each(|(sum, value)| add(sum, *weight, value));
-        }
+        let row = |i: usize| rows.row(reflected((y + i) as isize - below as isize, height));
+        let terms: Vec<_> = (0..down.len()).map(row).collect();
+        add_all(down, &terms, out);
     });
     smoothed
+}
+
+/// Adds weighted rows, one after the other.
+#[pulp::with_simd(add_all = pulp::Arch::new())]
+#[inline(always)]
+fn add_all_on<'a, S: pulp::Simd>(_: S, weights: &'a [f64], rows: &'a [&'a [f64]], out: &'a mut [f64]) {
+    for (weight, row) in weights.iter().zip(rows) {
+        out.iter_mut().zip(*row).for_each(|(sum, value)| *sum += weight * value);
+    }
 }
 
 #[cfg(test)]
@@ -124,7 +139,7 @@ mod tests {
 
     #[test]
     fn smoothing_is_the_sum_over_the_window() {
-        let plane = Plane::from_fn(5, 4, |x, y| [((x * 7 + y * 13) % 11) as f64]);
+        let plane = Plane::from_fn(5, 4, |x, y| ((x * 7 + y * 13) % 11) as f64);
         let (across, down) = (gaussian(2.0, 6), gaussian(1.0, 3));
         let smoothed = smooth(&plane, [&across, &down]);
         for y in 0..4 {
@@ -133,10 +148,10 @@ mod tests {
                 for (j, wy) in down.iter().enumerate() {
                     for (i, wx) in across.iter().enumerate() {
                         let (x, y) = (x as isize + i as isize - 6, y as isize + j as isize - 3);
-                        sum += wx * wy * plane[(reflected(x, 5), reflected(y, 4))][0];
+                        sum += wx * wy * plane[(reflected(x, 5), reflected(y, 4))];
                     }
                 }
-                let actual = smoothed[(x, y)][0];
+                let actual = smoothed[(x, y)];
                 assert!((actual - sum).abs() < 1e-12, "({x}, {y}): {actual} instead of {sum}");
             }
         }

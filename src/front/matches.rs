@@ -157,9 +157,9 @@ impl View {
         let (mut sums, mut norms) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0.0));
         let rows = sums.data_mut().par_chunks_mut(width).zip(norms.data_mut().par_chunks_mut(width));
         rows.enumerate().for_each(|(y, (sums, norms))| {
-            let sum = box_sums(&grey, y, RADIUS, |x, y| grey[(x, y)] as i32);
-            let squares = box_sums(&grey, y, RADIUS, |x, y| (grey[(x, y)] as i32).pow(2));
-            let masked = box_sums(&grey, y, RADIUS, |x, y| image.masked[(x, y)] as i32);
+            let sum = sums_of(&grey, y, |&v| i32::from(v));
+            let squares = sums_of(&grey, y, |&v| i32::from(v).pow(2));
+            let masked = sums_of(&image.masked, y, |&v| i32::from(v));
             for (x, norm) in norms.iter_mut().enumerate() {
                 let variance = WINDOW_PIXELS * squares[x] as i64 - (sum[x] as i64).pow(2);
                 *norm = if masked[x] == 0 { (variance as f64).sqrt() } else { 0.0 };
@@ -173,17 +173,12 @@ impl View {
     /// fit.
     fn eigenvalues(&self, y: usize) -> Vec<f64> {
         let g = &self.grey;
-        let gradient = |x: usize, y: usize| {
-            let inside = (1..g.width() - 1).contains(&x);
-            let dx = if inside { (g[(x + 1, y)] - g[(x - 1, y)]) as i32 } else { 0 };
-            (dx, (g[(x, y + 1)] - g[(x, y - 1)]) as i32)
-        };
         if y < RADIUS || y + RADIUS >= g.height() {
             return vec![0.0; g.width()];
         }
-        let xx = box_sums(g, y, TENSOR_RADIUS, |x, y| gradient(x, y).0.pow(2));
-        let xy = box_sums(g, y, TENSOR_RADIUS, |x, y| gradient(x, y).0 * gradient(x, y).1);
-        let yy = box_sums(g, y, TENSOR_RADIUS, |x, y| gradient(x, y).1.pow(2));
+        let xx = gradient_sums(g, y, |dx, _| dx * dx);
+        let xy = gradient_sums(g, y, |dx, dy| dx * dy);
+        let yy = gradient_sums(g, y, |_, dy| dy * dy);
         let eigenvalue = |x: usize| {
             let [xx, xy, yy] = [&xx, &xy, &yy].map(|sums| sums[x] as f64);
             let root = ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt();
@@ -193,15 +188,39 @@ impl View {
     }
 }
 
-/// Sums of `value(x, y)` over the squares around the pixels of row `y`; 0 where a square leaves the plane.
-fn box_sums<T>(plane: &Plane<T>, y: usize, radius: usize, value: impl Fn(usize, usize) -> i32) -> Vec<i32> {
-    let (width, height) = plane.size();
+/// Sums of `value` over the correlation windows around the pixels of row `y`; 0 where a window leaves the plane.
+fn sums_of<T>(plane: &Plane<T>, y: usize, value: impl Fn(&T) -> i32) -> Vec<i32> {
+    box_sums(plane.size(), y, RADIUS, |y, columns| {
+        columns.iter_mut().zip(plane.row(y)).for_each(|(sum, v)| *sum += value(v));
+    })
+}
+
+/// Sums of a product of gradients over the windows of the tensors of row `y`. Tensors count only where the correlation window fits,
+/// so none has a gradient at either end of a row.
+fn gradient_sums(grey: &Plane<i16>, y: usize, product: impl Fn(i32, i32) -> i32) -> Vec<i32> {
+    box_sums(grey.size(), y, TENSOR_RADIUS, |y, columns| {
+        let across = grey.row(y)[2..].iter().zip(grey.row(y));
+        let down = grey.row(y + 1)[1..].iter().zip(&grey.row(y - 1)[1..]);
+        for ((sum, (right, left)), (below, above)) in columns[1..].iter_mut().zip(across).zip(down) {
+            *sum += product(i32::from(right - left), i32::from(below - above));
+        }
+    })
+}
+
+/// Sums over the squares around the pixels of row `y` of a plane, to whose columns `add` adds the values of a row; 0 where a square
+/// leaves the plane.
+fn box_sums(
+    (width, height): (usize, usize),
+    y: usize,
+    radius: usize,
+    add: impl Fn(usize, &mut [i32]),
+) -> Vec<i32> {
     let mut out = vec![0; width];
     if y < radius || y + radius >= height || width <= 2 * radius {
         return out;
     }
-    let columns: Vec<i32> =
-        (0..width).map(|x| (y - radius..=y + radius).map(|y| value(x, y)).sum()).collect();
+    let mut columns = vec![0; width];
+    (y - radius..=y + radius).for_each(|y| add(y, &mut columns));
     let mut sum: i32 = columns[..2 * radius].iter().sum();
     for x in radius..width - radius {
         sum += columns[x + radius];

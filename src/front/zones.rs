@@ -10,11 +10,12 @@
 
 mod gabor;
 mod kmeans;
+mod lanes;
 
 use rayon::prelude::*;
 
 use crate::image::{Image, Plane};
-use gabor::Response;
+use gabor::{ORIENTATIONS, Response};
 
 /// The zone of masked pixels. It is not counted.
 pub const MASKED: u8 = 255;
@@ -34,6 +35,8 @@ const LEAST_DEVIATION: f64 = 1.0 / 64.0;
 const SAMPLES: usize = 4096;
 /// Smallest number of samples per zone. Smaller images get fewer zones: a zone of a few pixels is useless.
 const SAMPLES_PER_ZONE: usize = 16;
+/// Values of a pixel are padded to a multiple of this.
+const VECTOR: usize = 16;
 /// Bits of the interpolation weights, across and down.
 const WEIGHT_BITS: u32 = 8;
 
@@ -94,16 +97,15 @@ pub fn segment(image: &Image, options: &Options) -> Zones {
     let centroids = kmeans::cluster(&points, dimensions, zones, options);
 
     let mut map = Plane::filled(width, height, MASKED);
-    map.data_mut().par_chunks_exact_mut(width).enumerate().for_each(|(y, zones)| {
-        let values = features.row(y);
-        for ((zone, point), masked) in
-            zones.iter_mut().zip(values.chunks_exact(dimensions)).zip(image.masked.row(y))
-        {
-            if !masked {
-                *zone = kmeans::nearest(point, &centroids).0 as u8;
+    map.data_mut().par_chunks_exact_mut(width).enumerate().for_each_init(
+        || vec![0; width],
+        |nearest, (y, zones)| {
+            kmeans::assign(&centroids, &features.row(y), nearest);
+            for ((zone, nearest), masked) in zones.iter_mut().zip(nearest).zip(image.masked.row(y)) {
+                *zone = if *masked { MASKED } else { *nearest as u8 };
             }
-        }
-    });
+        },
+    );
     let count = renumber(&mut map);
     Zones { map, count }
 }
@@ -138,14 +140,17 @@ fn samples(masked: &Plane<bool>) -> Vec<(usize, usize)> {
 
 /// Standardised features of every pixel, in 1/64 of a standard deviation, -512 ..= 512.
 struct Features {
-    bank: Vec<Magnitude>,
+    octaves: Vec<Octave>,
     /// By x, then by y.
     coordinates: [Vec<i16>; 2],
 }
 
-/// One filter's smoothed magnitude at its nodes, and the position of the pixels among them.
-struct Magnitude {
-    nodes: Plane<i16>,
+/// A vector of features: all orientations of a wavelength, and two more places.
+const LANES: usize = ORIENTATIONS + 2;
+
+/// The smoothed magnitudes of the filters of a wavelength at their nodes, and the position of the pixels among them.
+struct Octave {
+    nodes: Plane<[i16; LANES]>,
     across: Vec<Place>,
     down: Vec<Place>,
 }
@@ -160,48 +165,87 @@ struct Place {
 impl Features {
     /// Features whose mean and standard deviation are those of the samples.
     fn new(image: &Image, samples: &[(usize, usize)]) -> Self {
-        let magnitude = |response: Response| {
+        let bank = gabor::bank(&contrast(image));
+        let octave = |responses: &[Response]| {
             let [across, down] = [0, 1].map(|axis| {
-                let (pixels, nodes) = (response.pixels[axis], response.nodes_per_period[axis]);
+                let (pixels, nodes) = (responses[0].pixels[axis], responses[0].nodes_per_period[axis]);
                 (0..pixels).map(|x| Place::new(x * nodes, 2 * pixels)).collect::<Vec<_>>()
             });
-            let nearby = |&(x, y): &(usize, usize)| response.nodes[(across[x].node, down[y].node)];
-            let scale = Scale::new(samples.iter().map(nearby), LEAST_DEVIATION);
-            Magnitude { nodes: response.nodes.map(|v| scale.apply(*v)), across, down }
+            let scaled = |Response { nodes, .. }: &Response| {
+                let nearby = |&(x, y): &(usize, usize)| nodes[(across[x].node, down[y].node)];
+                let scale = Scale::new(samples.iter().map(nearby), LEAST_DEVIATION);
+                let mut scaled = vec![0; nodes.data().len()];
+                apply_all(scale, nodes.data(), &mut scaled);
+                scaled
+            };
+            let scaled: Vec<Vec<i16>> = responses.par_iter().map(scaled).collect();
+            let (width, height) = responses[0].nodes.size();
+            let mut nodes = Plane::filled(width, height, [0; LANES]);
+            for (lane, scaled) in scaled.iter().enumerate() {
+                nodes.data_mut().iter_mut().zip(scaled).for_each(|(node, v)| node[lane] = *v);
+            }
+            Octave { nodes, across, down }
         };
-        let bank = gabor::bank(&contrast(image)).into_par_iter().map(magnitude).collect();
+        let octaves = bank.par_chunks(ORIENTATIONS).map(octave).collect();
         let x = Scale::new(samples.iter().map(|s| s.0 as f64), 1.0);
         let y = Scale::new(samples.iter().map(|s| s.1 as f64), 1.0);
         let along = |scale: Scale, n: usize| (0..n).map(|i| scale.apply(i as f64)).collect();
-        Self { bank, coordinates: [along(x, image.width()), along(y, image.height())] }
+        Self { octaves, coordinates: [along(x, image.width()), along(y, image.height())] }
     }
 
-    /// Number of features per pixel.
+    /// Number of values per pixel: the features, and 0 up to whole vectors.
     fn dimensions(&self) -> usize {
-        self.bank.len() + 2
+        (self.octaves.len() * ORIENTATIONS + 2).next_multiple_of(VECTOR)
     }
 
     /// The features of row `y`, \[x\]\[feature\].
     fn row(&self, y: usize) -> Vec<i16> {
         let [by_x, by_y] = &self.coordinates;
         let dimensions = self.dimensions();
-        let mut row = vec![by_y[y]; by_x.len() * dimensions];
-        for (values, x) in row.chunks_exact_mut(dimensions).zip(by_x) {
-            values[dimensions - 2] = *x;
+        let mut row = vec![0; by_x.len() * dimensions];
+        let mut line = Vec::new();
+        for (i, octave) in self.octaves.iter().enumerate() {
+            line.resize(octave.nodes.width(), [0; LANES]);
+            interpolate(octave, y, &mut line, &mut row[i * ORIENTATIONS..], dimensions);
         }
-        for (feature, Magnitude { nodes, across, down }) in self.bank.iter().enumerate() {
-            let Place { node, weight } = down[y];
-            let blend = |(a, b): (&i16, &i16)| blend(i32::from(*a), i32::from(*b), weight);
-            let line: Vec<i32> = nodes.row(node).iter().zip(nodes.row(node + 1)).map(blend).collect();
-            for (values, place) in row.chunks_exact_mut(dimensions).zip(across) {
-                values[feature] = place.between(&line);
-            }
+        // In the two places after the features of the last octave.
+        for (values, x) in row.chunks_exact_mut(dimensions).zip(by_x) {
+            values[self.octaves.len() * ORIENTATIONS..][..2].copy_from_slice(&[*x, by_y[y]]);
         }
         row
     }
 }
 
+/// The features of an octave for row `y`, `dimensions` apart; each pixel's two more places are the next octave's to fill. `line` is
+/// for the row's nodes.
+#[pulp::with_simd(interpolate = pulp::Arch::new())]
+#[inline(always)]
+fn interpolate_on<'a, S: pulp::Simd>(
+    _: S,
+    octave: &'a Octave,
+    y: usize,
+    line: &'a mut [[i32; LANES]],
+    out: &'a mut [i16],
+    dimensions: usize,
+) {
+    let Octave { nodes, across, down } = octave;
+    let Place { node, weight } = down[y];
+    for ((line, a), b) in line.iter_mut().zip(nodes.row(node)).zip(nodes.row(node + 1)) {
+        for lane in 0..LANES {
+            line[lane] = blend(a[lane].into(), b[lane].into(), weight);
+        }
+    }
+    for (values, place) in out.chunks_mut(dimensions).zip(across) {
+        let (a, b) = (&line[place.node], &line[place.node + 1]);
+        for lane in 0..LANES {
+            let value = blend(a[lane], b[lane], place.weight);
+            values[lane] = ((value + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as i16;
+        }
+    }
+}
+
 /// `a` and `b` weighted, times 256.
+#[inline(always)]
 fn blend(a: i32, b: i32, weight: i32) -> i32 {
     (a << WEIGHT_BITS) + (b - a) * weight
 }
@@ -211,12 +255,6 @@ impl Place {
     fn new(numerator: usize, denominator: usize) -> Self {
         let weight = ((numerator % denominator) << WEIGHT_BITS) / denominator;
         Self { node: numerator / denominator, weight: weight as i32 }
-    }
-
-    /// The value at this position, interpolated from a line of nodes times 256, rounded.
-    fn between(self, line: &[i32]) -> i16 {
-        let value = blend(line[self.node], line[self.node + 1], self.weight);
-        ((value + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as i16
     }
 }
 
@@ -236,10 +274,18 @@ impl Scale {
         Self { mean, factor: UNITS / variance.sqrt().max(least) }
     }
 
+    #[inline(always)]
     fn apply(self, value: f64) -> i16 {
         let reach = REACH * UNITS;
         ((value - self.mean) * self.factor).round().clamp(-reach, reach) as i16
     }
+}
+
+/// [`Scale::apply`] to many values.
+#[pulp::with_simd(apply_all = pulp::Arch::new())]
+#[inline(always)]
+fn apply_all_on<'a, S: pulp::Simd>(_: S, scale: Scale, values: &'a [f64], out: &'a mut [i16]) {
+    out.iter_mut().zip(values).for_each(|(out, value)| *out = scale.apply(*value));
 }
 
 /// Grey in 8-bit levels less its mean over the unmasked pixels; 0 where masked.

@@ -52,12 +52,15 @@ impl<'a, U: Units> Summands<'a, U> {
 
 /// The beliefs of row `y`, from the dependency messages of the factors, `dependency` being those from the cell `first` on.
 /// `None` means that the factors have not sent any yet.
-pub(super) fn row<U: Units>(
-    summands: &Summands<U>,
+#[pulp::with_simd(row = pulp::Arch::new())]
+#[inline(always)]
+pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
+    _: S,
+    summands: &'a Summands<'a, U>,
     y: usize,
     first: usize,
-    dependency: Option<&[U]>,
-    belief: &mut [U],
+    dependency: Option<&'a [U]>,
+    belief: &'a mut [U],
 ) {
     let Summands { graph, windows, evidence, down, up, .. } = summands;
     let (width, row) = (graph.width(), windows.start(y));
@@ -72,26 +75,40 @@ pub(super) fn row<U: Units>(
         let start = windows.start(lowest) - first;
         touch(&dependency[graph.slots() * start..][..graph.slots() * windows.length(lowest)]);
     }
+    // Where the messages of the factors that hold a pixel start.
+    let mut messages = [0; GRAPH_WINDOW * GRAPH_WINDOW];
     for (x, &window) in windows.row(y).iter().enumerate() {
         let own = window.cells();
         let cells = row + own.start..row + own.end;
+        let incoming = if dependency.is_some() { graph.incoming_of(y * width + x) } else { &[] };
+        let mut same = true;
+        for (start, entry) in messages.iter_mut().zip(incoming) {
+            let (dx, dy, slot) = entry.parts();
+            let row = REACH.wrapping_add_signed(dy);
+            let factor = near[row][x.wrapping_add_signed(dx)];
+            *start = starts[row] + graph.slots() * factor.start() + slot * factor.stride();
+            same &= factor.matches(window);
+        }
         let mut sum = Sum {
             summands,
             window,
-            x,
-            near: &near,
-            starts: &starts,
             evidence: &evidence[cells.clone()],
             down: down.get(cells.clone()),
             up: up.get(cells),
             dependency: dependency.unwrap_or_default(),
-            incoming: if dependency.is_some() { graph.incoming_of(y * width + x) } else { &[] },
+            messages: &messages[..incoming.len()],
             belief: &mut belief[own],
         };
-        if sum.incoming.iter().all(|&entry| sum.factor(entry).0.matches(window)) {
+        if same {
             sum.all(window.stride());
         } else {
-            (0..window.stride()).step_by(LABEL_BLOCK).for_each(|at| sum.block_in_window(at));
+            let window_of = |entry: Incoming| {
+                let (dx, dy, _) = entry.parts();
+                near[REACH.wrapping_add_signed(dy)][x.wrapping_add_signed(dx)]
+            };
+            for at in (0..window.stride()).step_by(LABEL_BLOCK) {
+                sum.block_in_window(at, incoming.iter().map(|&entry| window_of(entry)));
+            }
         }
     }
 }
@@ -113,34 +130,24 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows:
 struct Sum<'a, U> {
     summands: &'a Summands<'a, U>,
     window: Window,
-    x: usize,
-    /// Windows of the rows around, and where the messages of these rows start in `dependency`.
-    near: &'a [&'a [Window]; GRAPH_WINDOW],
-    starts: &'a [usize; GRAPH_WINDOW],
     evidence: &'a [u8],
     down: Option<&'a [U]>,
     up: Option<&'a [U]>,
     dependency: &'a [U],
-    incoming: &'a [Incoming],
+    /// Where in `dependency` the message of each factor that holds the pixel starts.
+    messages: &'a [usize],
     belief: &'a mut [U],
 }
 
 impl<U: Units> Sum<'_, U> {
-    /// The window of the factor of an entry, and where its messages to the pixel start.
-    #[inline(always)]
-    fn factor(&self, entry: Incoming) -> (Window, usize) {
-        let (dx, dy, slot) = entry.parts();
-        let row = REACH.wrapping_add_signed(dy);
-        let window = self.near[row][self.x.wrapping_add_signed(dx)];
-        let start = self.starts[row] + self.summands.graph.slots() * window.start();
-        (window, start + slot * window.stride())
-    }
-
     #[inline(always)]
     fn own_terms<const N: usize>(&self, at: usize) -> [U; N] {
         let evidence = block::<u8, N>(self.evidence, at);
         let mut sum: [U; N] = each_lane(|i| U::from(evidence[i]));
-        for message in [self.down, self.up].into_iter().flatten() {
+        if let Some(message) = self.down {
+            sum = plus(sum, block(message, at));
+        }
+        if let Some(message) = self.up {
             sum = plus(sum, block(message, at));
         }
         sum
@@ -155,11 +162,10 @@ impl<U: Units> Sum<'_, U> {
 
     /// The block of labels at `at`, from factors whose windows differ.
     #[inline(always)]
-    fn block_in_window(&mut self, at: usize) {
+    fn block_in_window(&mut self, at: usize, factors: impl Iterator<Item = Window>) {
         let Summands { windows, tau, .. } = self.summands;
         let mut sum: [U; LABEL_BLOCK] = self.own_terms(at);
-        for &entry in self.incoming {
-            let (window, start) = self.factor(entry);
+        for (window, &start) in factors.zip(self.messages) {
             let seen = Seen::new(windows, window, self.dependency, start, self.window.first());
             let (m, outside) = seen.block(at);
             sum = plus(sum, &each_lane(|i| m[i] & !outside[i] | *tau & outside[i]));
@@ -174,8 +180,8 @@ impl<U: Units> Blocks for Sum<'_, U> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, at: usize) {
         let mut sum: [U; N] = self.own_terms(at);
-        for &entry in self.incoming {
-            sum = plus(sum, block(self.dependency, self.factor(entry).1 + at));
+        for &start in self.messages {
+            sum = plus(sum, block(self.dependency, start + at));
         }
         self.store(at, sum);
     }

@@ -4,9 +4,9 @@
 //! is exact. The messages to all members are stored for the labels of the factor's own pixel: at all others its
 //! belief is infinite, and the message is tau.
 
-use super::units::{Blocks, Least, Truncating, Units, block, block_mut, each_lane, keep_least, smallest};
+use super::units::{Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate};
 use super::volumes::{Level, Sent, Volumes};
-use super::windows::{Seen, Windows};
+use super::windows::{Seen, Window, Windows};
 use crate::backend::Stage;
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
@@ -84,34 +84,41 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows:
 }
 
 /// The messages of the factors of row `y`.
-pub(super) fn row<U: Units>(
-    factors: &Factors,
+#[pulp::with_simd(row = pulp::Arch::new())]
+#[inline(always)]
+pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
+    _: S,
+    factors: &'a Factors<'a>,
     y: usize,
-    around: &Around<U>,
-    messages: &mut [U],
-    scratch: &mut Scratch<U>,
+    around: &'a Around<'a, U>,
+    messages: &'a mut [U],
+    scratch: &'a mut Scratch<U>,
 ) {
     let Factors { graph, windows, cut } = *factors;
     let slots = graph.slots();
-    let near = windows.around(y);
+    let near = Near { windows, rows: windows.around(y), around };
     let offsets: [(isize, usize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
         let (dx, dy) = offset(code as u8);
         (dx as isize, REACH.wrapping_add_signed(dy as isize))
     });
     touch(around[2 * REACH]);
-    for (x, &window) in near[REACH].iter().enumerate() {
+    for (x, &window) in near.rows[REACH].iter().enumerate() {
         let messages = &mut messages[slots * window.start()..][..slots * window.stride()];
-        let window_at = |(dx, row): (isize, usize)| near[row][x.wrapping_add_signed(dx)];
-        let member = |place: (isize, usize)| {
-            let (theirs, cells) = (window_at(place), around[place.1]);
-            Seen::new(windows, theirs, cells, theirs.start(), window.first())
+        let place = |code: u8| {
+            let (dx, row) = offsets[usize::from(code)];
+            (x.wrapping_add_signed(dx), row)
         };
-        let place = |code: u8| offsets[usize::from(code)];
         match *graph.neighbours_of(x, y) {
             [a, b] if b != NO_MEMBER && a != NO_MEMBER && cut.rule == TruncationRule::Relative => {
-                let (a, b) = (place(a), place(b));
-                let factor = Three { members: [(0, REACH), a, b].map(member), stride: window.stride() };
-                if [a, b].into_iter().all(|place| window_at(place).matches(window)) {
+                let (a, b) = (near.window(place(a)), near.window(place(b)));
+                // One by one: mapped, they would be copied through memory.
+                let members = [
+                    near.seen((window, around[REACH]), window.first()),
+                    near.seen(a, window.first()),
+                    near.seen(b, window.first()),
+                ];
+                let factor = Three { members, stride: window.stride() };
+                if a.0.matches(window) && b.0.matches(window) {
                     factor.send::<true>(cut, messages, &mut scratch.sums);
                 } else {
                     factor.send::<false>(cut, messages, &mut scratch.sums);
@@ -123,12 +130,35 @@ pub(super) fn row<U: Units>(
                 scratch.slots.push(0);
                 scratch.slots.extend(present.map(|(slot, _)| slot));
                 if scratch.slots.len() > 1 {
-                    let member =
-                        |slot: usize| member(if slot == 0 { (0, REACH) } else { place(codes[slot - 1]) });
+                    let member = |slot: usize| {
+                        let place = if slot == 0 { (x, REACH) } else { place(codes[slot - 1]) };
+                        near.seen(near.window(place), window.first())
+                    };
                     any(cut, window.stride(), member, messages, scratch);
                 }
             }
         }
+    }
+}
+
+/// The pixels around those of a row.
+struct Near<'a, U> {
+    windows: &'a Windows,
+    rows: [&'a [Window]; GRAPH_WINDOW],
+    around: &'a Around<'a, U>,
+}
+
+impl<'a, U: Units> Near<'a, U> {
+    /// The window of the pixel in column `x` of a row, and the beliefs of that row.
+    #[inline(always)]
+    fn window(&self, (x, row): (usize, usize)) -> (Window, &'a [U]) {
+        (self.rows[row][x], self.around[row])
+    }
+
+    /// The beliefs of that pixel, for labels counted from `first`.
+    #[inline(always)]
+    fn seen(&self, (window, beliefs): (Window, &'a [U]), first: usize) -> Seen<'a, U> {
+        Seen::new(self.windows, window, beliefs, window.start(), first)
     }
 }
 
@@ -175,11 +205,11 @@ impl<U: Units> Three<'_, U> {
     /// Writes the messages of the factor.
     #[inline(always)]
     fn send<const SAME: bool>(&self, cut: Truncation, messages: &mut [U], scratch: &mut [U]) {
-        let (stride, tau) = (self.stride, U::of(cut.tau.into()));
+        let stride = self.stride;
         if stride == LABEL_BLOCK {
             let (sums, own) = self.sums::<SAME>(messages, 0);
             for slot in 0..3 {
-                let (low, high) = bounds(own[slot], tau);
+                let (low, high) = bounds(own[slot], cut);
                 *block_mut(messages, slot * stride) = cut_block(&sums[slot], &low, &high);
             }
             return;
@@ -193,7 +223,7 @@ impl<U: Units> Three<'_, U> {
             }
         }
         for (slot, least) in least.into_iter().enumerate() {
-            let (low, high) = bounds(least, tau);
+            let (low, high) = bounds(least, cut);
             for at in (slot * stride..(slot + 1) * stride).step_by(LABEL_BLOCK) {
                 *block_mut(messages, at) = cut_block(block(scratch, at), &low, &high);
             }
@@ -209,32 +239,6 @@ fn plus<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
 #[inline(always)]
 fn or<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
     each_lane(|i| a[i] | b[i])
-}
-
-/// [`Truncation::bounds`] by [`TruncationRule::Relative`], (low, high), in every lane. This keeps the bounds of a
-/// message in vectors. When they passed through single values, a factor waited longer than it computed.
-#[inline(always)]
-fn bounds<U: Units>(least: Least<U>, tau: U) -> (Least<U>, Least<U>) {
-    let least = least_in_all(least);
-    let low = each_lane(|i| least[i].min(U::MOST.less(tau)));
-    (low, each_lane(|i| low[i].plus(tau)))
-}
-
-#[inline(always)]
-fn cut_block<U: Units>(sums: &Block<U>, low: &Least<U>, high: &Least<U>) -> Block<U> {
-    each_lane(|i| sums[i].min(high[i]).less(low[i]))
-}
-
-/// The smallest of all lanes, in each of them.
-#[inline(always)]
-fn least_in_all<U: Units>(lanes: Least<U>) -> Least<U> {
-    least_of_pairs::<U, 1>(least_of_pairs::<U, 2>(least_of_pairs::<U, 4>(least_of_pairs::<U, 8>(lanes))))
-}
-
-/// The smaller of each lane and the one `APART` from it. (A constant, so that it becomes a shuffle.)
-#[inline(always)]
-fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
-    each_lane(|i| lanes[i].min(lanes[i ^ APART]))
 }
 
 /// The messages of a factor of any number of members.
@@ -271,16 +275,17 @@ fn any<'a, U: Units>(
         here.copy_from_slice(&next[..stride]);
         add(here, &q[at + stride..][..stride]);
     }
-    let (sum, own) = sums.split_at_mut(stride);
+    let sum = &mut sums[..stride];
     before[..stride].fill(U::default());
     for (i, &slot) in slots.iter().enumerate() {
         sum.copy_from_slice(&after[i * stride..][..stride]);
         add(sum, before);
         add(before, &q[i * stride..][..stride]);
-        let outside = &outside[i * stride..][..stride];
-        own[..stride].iter_mut().zip(&*sum).zip(outside).for_each(|((own, &sum), &out)| *own = sum | out);
-        let least = smallest(&own[..stride]);
-        Truncating::new(sum, least, cut, &mut messages[slot * stride..][..stride]).all(stride);
+        let mut least = [U::MOST; LABEL_BLOCK];
+        for at in (0..stride).step_by(LABEL_BLOCK) {
+            keep_least(&mut least, &or(block(sum, at), block(outside, i * stride + at)));
+        }
+        truncate(sum, least, cut, &mut messages[slot * stride..][..stride]);
     }
 }
 

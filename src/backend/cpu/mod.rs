@@ -4,6 +4,7 @@ mod features;
 mod finest;
 mod pages;
 mod probe;
+mod sad;
 mod units;
 mod volumes;
 mod windows;

@@ -2,11 +2,9 @@
 //!
 //! Rows of labels are processed with their padding; values that belong to no label count as infinite.
 
-use super::units::{
-    Blocks, Truncating, Units, block, block_mut, each_lane, keep_least, least_of, padding, smallest,
-};
+use super::units::{Units, block, block_mut, each_lane, keep_least, padding, smallest, truncate};
 use super::volumes::{Level, Sent, Volumes};
-use super::windows::Window;
+use super::windows::{Window, Windows};
 use crate::backend::Stage;
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use rayon::prelude::*;
@@ -83,22 +81,39 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows:
                 down.fill(U::default());
             }
             let coarse = windows.row_of(coarse_belief, y);
-            let start = fine_windows.start(2 * y);
-            let fine = &fine_belief[start..][..down.len()];
-            let (own, theirs) = (windows.row(y), fine_windows.row(2 * y));
-            for x in 0..cl.width {
-                // All children share a window.
-                let (own, theirs) = (own[x], &theirs[2 * x..]);
-                let children = [0, 1, 2, 3].map(|c| {
-                    let (fx, fy) = (2 * x + c % 2, 2 * y + c / 2);
-                    let inside = fx < fl.width && fy < fl.height;
-                    inside.then(|| fine_windows.start(fy) - start + theirs[c % 2].start())
-                });
-                let (up, belief) = (&mut up[own.cells()], &coarse[own.cells()]);
-                factor(&between, [own, theirs[0]], children, fine, belief, down, up, scratch);
-            }
+            let fine = &fine_belief[fine_windows.start(2 * y)..][..down.len()];
+            row(&between, [fine_windows, windows], [fine, coarse], y, down, up, scratch);
         },
     );
+}
+
+/// The messages of the factors of coarse row `y`, from the windows and the beliefs of the finer and the coarser level.
+#[pulp::with_simd(row = pulp::Arch::new())]
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "volumes of both levels")]
+fn row_on<'a, S: pulp::Simd, U: Units>(
+    _: S,
+    between: &'a Between<U>,
+    [fine_windows, windows]: [&'a Windows; 2],
+    [fine_belief, coarse_belief]: [&'a [U]; 2],
+    y: usize,
+    down: &'a mut [U],
+    up: &'a mut [U],
+    scratch: &'a mut Scratch<U>,
+) {
+    let start = fine_windows.start(2 * y);
+    let theirs = fine_windows.row(2 * y);
+    for (x, &own) in windows.row(y).iter().enumerate() {
+        // All children share a window.
+        let theirs = &theirs[2 * x..];
+        let child = |dx: usize, dy: usize| {
+            let inside = dx < theirs.len() && 2 * y + dy < fine_windows.height();
+            inside.then(|| fine_windows.start(2 * y + dy) - start + theirs[dx].start())
+        };
+        let children = [child(0, 0), child(1, 0), child(0, 1), child(1, 1)];
+        let (up, belief) = (&mut up[own.cells()], &coarse_belief[own.cells()]);
+        factor(between, [own, theirs[0]], children, fine_belief, belief, down, up, scratch);
+    }
 }
 
 /// The messages of the factor between a pixel and its children, whose windows are `own` and `theirs`; `children` says where
@@ -152,7 +167,8 @@ fn factor<U: Units>(
     // Saturated sums cannot be undone by subtraction, so each sum is taken over the others.
     let mut least = [U::MOST; LABEL_BLOCK];
     for z in (0..own.stride()).step_by(LABEL_BLOCK) {
-        let [u0, u1, u2, u3] = best.each_ref().map(|best| *block::<U, LABEL_BLOCK>(best, z));
+        let [u0, u1, u2, u3] =
+            [*block(&best[0], z), *block(&best[1], z), *block(&best[2], z), *block(&best[3], z)];
         let parent = *block::<U, LABEL_BLOCK>(parent, z);
         let padding = block::<U, LABEL_BLOCK>(coarse_padding, z);
         let add =
@@ -171,7 +187,7 @@ fn factor<U: Units>(
             *block_mut(sums, z) = all;
         }
     }
-    Truncating::new(&sums[0], least_of(&[least])[0], cut, up).all(own.stride());
+    truncate(&sums[0], least, cut, up);
     for ((place, t), fine) in children.into_iter().zip(&sums[1..]).zip(fine.iter_mut()) {
         if place.is_some() {
             // The label below the parent's first agrees with it too.
@@ -181,18 +197,16 @@ fn factor<U: Units>(
             }
         }
     }
-    let fine = fine.each_ref().map(|fine| &fine[first..][..theirs.stride()]);
-    let mut least = [[U::MOST; LABEL_BLOCK]; 4];
-    for d in (0..theirs.stride()).step_by(LABEL_BLOCK) {
-        let padding = block::<U, LABEL_BLOCK>(fine_padding, d);
-        for (least, fine) in least.iter_mut().zip(fine) {
-            let sums = block::<U, LABEL_BLOCK>(fine, d);
-            keep_least(least, &each_lane::<U, LABEL_BLOCK>(|i| sums[i] | padding[i]));
-        }
-    }
-    for ((place, fine), least) in children.into_iter().zip(fine).zip(least_of(&least)) {
+    for (place, fine) in children.into_iter().zip(&*fine) {
         let Some(at) = place else { continue };
-        Truncating::new(fine, least, cut, &mut down[at..][..theirs.stride()]).all(theirs.stride());
+        let fine = &fine[first..][..theirs.stride()];
+        let mut least = [U::MOST; LABEL_BLOCK];
+        for d in (0..theirs.stride()).step_by(LABEL_BLOCK) {
+            let (sums, padding) =
+                (block::<U, LABEL_BLOCK>(fine, d), block::<U, LABEL_BLOCK>(fine_padding, d));
+            keep_least(&mut least, &each_lane::<U, LABEL_BLOCK>(|i| sums[i] | padding[i]));
+        }
+        truncate(fine, least, cut, &mut down[at..][..theirs.stride()]);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Cost values in the two widths of volumes, and operations on rows of them.
 
-use crate::plan::{LABEL_BLOCK, Truncation};
+use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
 use std::ops::{BitAnd, BitOr, Not};
 
 /// A cost in units, as a volume stores it. Sums saturate, and differences stop at 0.
@@ -134,10 +134,16 @@ pub(super) fn each_lane<T: Copy + Default, const N: usize>(mut lane: impl FnMut(
 /// The smallest values in each of `LABEL_BLOCK` lanes.
 pub(super) type Least<U> = [U; LABEL_BLOCK];
 
-/// The smallest of all lanes, of each. (Not inlined: inlined, the compiler makes it a chain of single bytes.)
-#[inline(never)]
-pub(super) fn least_of<U: Units, const N: usize>(each: &[Least<U>; N]) -> [U; N] {
-    each.map(|lanes| smallest(&lanes))
+/// The smallest of all lanes, in each of them.
+#[inline(always)]
+fn least_in_all<U: Units>(lanes: Least<U>) -> Least<U> {
+    least_of_pairs::<U, 1>(least_of_pairs::<U, 2>(least_of_pairs::<U, 4>(least_of_pairs::<U, 8>(lanes))))
+}
+
+/// The smaller of each lane and the one `APART` from it. (A constant, so that it becomes a shuffle.)
+#[inline(always)]
+fn least_of_pairs<U: Units, const APART: usize>(lanes: Least<U>) -> Least<U> {
+    each_lane(|i| lanes[i].min(lanes[i ^ APART]))
 }
 
 /// The smaller, lane by lane, of `least` and all of `values`.
@@ -175,28 +181,48 @@ pub(super) trait Blocks {
     }
 }
 
-/// Truncates sums to a message.
-pub(super) struct Truncating<'a, U> {
-    sums: &'a [U],
-    high: U,
-    low: U,
-    out: &'a mut [U],
-}
-
-impl<'a, U: Units> Truncating<'a, U> {
-    #[inline(always)]
-    pub(super) fn new(sums: &'a [U], least: U, cut: Truncation, out: &'a mut [U]) -> Self {
-        let (high, low) = cut.bounds(least.into(), U::MOST.into());
-        Self { sums, high: U::of(high), low: U::of(low), out }
+/// Truncates sums to a message, with [`Truncation::bounds`] for the smallest of `least`.
+#[inline(always)]
+pub(super) fn truncate<U: Units>(sums: &[U], least: Least<U>, cut: Truncation, out: &mut [U]) {
+    let (low, high) = bounds(least, cut);
+    for at in (0..out.len()).step_by(LABEL_BLOCK) {
+        *block_mut(out, at) = cut_block(block(sums, at), &low, &high);
     }
 }
 
-impl<U: Units> Blocks for Truncating<'_, U> {
-    #[inline(always)]
-    fn block<const N: usize>(&mut self, at: usize) {
-        let sums = block::<U, N>(self.sums, at);
-        *block_mut(self.out, at) = each_lane::<U, N>(|i| sums[i].min(self.high).less(self.low));
+/// [`Truncation::bounds`], (low, high), in every lane. This keeps the bounds of a message in vectors. When they passed through
+/// single values, a factor waited longer than it computed.
+#[inline(always)]
+pub(super) fn bounds<U: Units>(least: Least<U>, cut: Truncation) -> (Least<U>, Least<U>) {
+    let tau = U::of(cut.tau.into());
+    match cut.rule {
+        TruncationRule::Relative => {
+            let least = least_in_all(least);
+            let low = each_lane(|i| least[i].min(U::MOST.less(tau)));
+            (low, each_lane(|i| low[i].plus(tau)))
+        }
+        TruncationRule::Absolute => ([U::default(); LABEL_BLOCK], [tau; LABEL_BLOCK]),
     }
+}
+
+#[inline(always)]
+pub(super) fn cut_block<U: Units>(sums: &Least<U>, low: &Least<U>, high: &Least<U>) -> Least<U> {
+    each_lane(|i| sums[i].min(high[i]).less(low[i]))
+}
+
+/// Index of the smallest value of whole blocks, the lowest on ties.
+#[inline(always)]
+pub(super) fn first_smallest<U: Units>(row: &[U]) -> usize {
+    let mut least = [u32::MAX; LABEL_BLOCK];
+    for (i, block) in row.as_chunks::<LABEL_BLOCK>().0.iter().enumerate() {
+        let at = (i * LABEL_BLOCK) as u32;
+        // Value and index in one number.
+        let keys: [u32; LABEL_BLOCK] =
+            each_lane(|lane| Into::<u32>::into(block[lane]) << u16::BITS | (at + lane as u32));
+        least = each_lane(|lane| least[lane].min(keys[lane]));
+    }
+    let first = least.iter().fold(u32::MAX, |first, &key| first.min(key));
+    usize::from(first as u16)
 }
 
 /// Index and value of the smallest value, the lowest index on ties.

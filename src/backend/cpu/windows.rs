@@ -7,7 +7,7 @@
 //! Where not all rows are held at the same time, a volume is a ring: a row takes the place of one that is no longer needed.
 //! The two rows that share windows stay side by side.
 
-use super::units::{Units, argmin, each_lane};
+use super::units::{Units, each_lane};
 use crate::image::Plane;
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, LevelPlan, WINDOW_RUN};
 use std::array::from_fn;
@@ -131,12 +131,6 @@ impl Windows {
     #[inline(always)]
     pub(super) fn range(&self, window: Window) -> Range<usize> {
         window.first()..window.first() + self.labels(window)
-    }
-
-    /// The label with the smallest belief of a pixel, the lowest on ties; `row` holds the beliefs of its row.
-    #[inline(always)]
-    pub(super) fn winner<U: Units>(&self, window: Window, row: &[U]) -> u16 {
-        (window.first() + argmin(&row[window.start()..][..self.labels(window)]).0) as u16
     }
 
     /// Where the cells of row `y` start.

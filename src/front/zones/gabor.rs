@@ -6,10 +6,11 @@
 //! phase of the response but not its magnitude. The magnitude is therefore sampled at only as many nodes as
 //! its bandwidth needs: about a fourth of them for each octave of wavelength.
 //!
-//! Single precision is deliberate. The transforms are scalar code of additions and multiplications, the same
+//! Single precision is deliberate. The transforms are plain code of additions and multiplications, the same
 //! on every CPU except for their sines and cosines, which `rustfft` takes from the platform in double
 //! precision. Rounding to single precision removes the platforms' differences in the last place.
 
+use std::array::from_fn;
 use std::f64::consts::SQRT_2;
 use std::sync::Arc;
 
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlannerScalar};
 
+use super::lanes::{LANES, Lanes};
 use crate::front::illumination::{gaussian, smooth};
 use crate::image::Plane;
 
@@ -45,8 +47,11 @@ pub(super) struct Response {
     pub(super) nodes: Plane<f64>,
 }
 
+/// Number of orientations (paper, section 3.1).
+pub(super) const ORIENTATIONS: usize = 6;
+
 /// Cosine and sine of 0, 30, .. 150 degrees.
-fn orientations() -> [[f64; 2]; 6] {
+fn orientations() -> [[f64; 2]; ORIENTATIONS] {
     let long = 3.0f64.sqrt() / 2.0;
     [[1.0, 0.0], [long, 0.5], [0.5, long], [0.0, 1.0], [-0.5, long], [-long, 0.5]]
 }
@@ -96,24 +101,35 @@ struct Spectrum {
 }
 
 impl Spectrum {
-    fn new(plane: &Plane<f32>, planner: &mut FftPlannerScalar<f32>) -> Self {
+    fn new(plane: &Plane<f32>, planner: &mut FftPlannerScalar<Lanes>) -> Self {
         let (width, height) = plane.size();
         let (across, down) = (planner.plan_fft_forward(2 * width), planner.plan_fft_forward(2 * height));
         // The lower half repeats the upper one: its rows need no transform of their own.
         let mut rows = vec![Complex::default(); 2 * width * height];
-        rows.par_chunks_exact_mut(2 * width).enumerate().for_each(|(y, out)| {
-            let row = plane.row(y);
-            for (out, v) in out.iter_mut().zip(row.iter().chain(row.iter().rev())) {
-                *out = Complex::from(*v);
+        rows.par_chunks_mut(LANES * 2 * width).enumerate().for_each_init(Vec::new, |lanes, (group, out)| {
+            // The last group may repeat the last row.
+            let group = from_fn(|i| plane.row((LANES * group + i).min(height - 1)));
+            let values = |x: usize| Lanes(group.map(|row: &[f32]| row[x]));
+            lanes.clear();
+            lanes.extend(
+                (0..width).chain((0..width).rev()).map(|x| Complex { re: values(x), im: Lanes::of(0.0) }),
+            );
+            across.process(lanes);
+            for (i, out) in out.chunks_exact_mut(2 * width).enumerate() {
+                out.iter_mut().zip(&*lanes).for_each(|(out, lanes)| *out = Lanes::at(*lanes, i));
             }
-            across.process(out);
         });
         let mut data = vec![Complex::default(); 4 * width * height];
-        data.par_chunks_exact_mut(2 * height).enumerate().for_each(|(u, column)| {
-            for (v, out) in column.iter_mut().enumerate() {
-                *out = rows[v.min(2 * height - 1 - v) * 2 * width + u];
+        data.par_chunks_mut(LANES * 2 * height).enumerate().for_each_init(Vec::new, |lanes, (group, out)| {
+            lanes.clear();
+            lanes.extend((0..2 * height).map(|v| {
+                let row = &rows[v.min(2 * height - 1 - v) * 2 * width..][..2 * width];
+                Lanes::complex(from_fn(|i| row[(LANES * group + i).min(2 * width - 1)]))
+            }));
+            down.process(lanes);
+            for (i, out) in out.chunks_exact_mut(2 * height).enumerate() {
+                out.iter_mut().zip(&*lanes).for_each(|(out, lanes)| *out = Lanes::at(*lanes, i));
             }
-            down.process(column);
         });
         Self { pixels: [width, height], data }
     }
@@ -126,7 +142,7 @@ struct Filter {
     /// Cosine and sine of the orientation.
     direction: [f64; 2],
     /// The transforms from its band to its nodes, across and down.
-    inverse: [Arc<dyn Fft<f32>>; 2],
+    inverse: [Arc<dyn Fft<Lanes>>; 2],
 }
 
 impl Filter {
@@ -140,23 +156,38 @@ impl Filter {
         });
 
         let period = 2 * spectrum.pixels[1];
-        let mut rows = vec![Complex::default(); lines * across.len()];
-        let mut column = vec![Complex::default(); down.len()];
-        for (i, (u, pass_u)) in bands[0].iter().enumerate() {
+        // Groups of lines side by side, each from left to right.
+        let mut groups =
+            vec![Lanes::complex([Complex::default(); LANES]); lines.div_ceil(LANES) * across.len()];
+        let mut column = vec![Lanes::complex([Complex::default(); LANES]); down.len()];
+        for (group, us) in bands[0].chunks(LANES).enumerate() {
+            // The last group may repeat its last column.
+            let us: [(usize, f32); LANES] = from_fn(|i| us[i.min(us.len() - 1)]);
             for (out, (v, pass_v)) in column.iter_mut().zip(&bands[1]) {
-                *out = spectrum.data[u * period + v] * (pass_u * pass_v);
+                *out =
+                    Lanes::complex(us.map(|(u, pass_u)| spectrum.data[u * period + v] * (pass_u * pass_v)));
             }
             down.process(&mut column);
             for j in 0..lines {
-                rows[j * across.len() + i] = column[j % column.len()];
+                let values = column[j % column.len()];
+                let out = &mut groups[j / LANES * across.len()..][..across.len()][LANES * group..];
+                for (i, out) in out.iter_mut().take(LANES).enumerate() {
+                    let value = Lanes::at(values, i);
+                    (out.re.0[j % LANES], out.im.0[j % LANES]) = (value.re, value.im);
+                }
             }
         }
-        across.process(&mut rows);
-        let magnitude = |i: usize, j: usize| {
-            let Complex { re, im } = rows[j * across.len() + i % across.len()];
-            [f64::from((re * re + im * im).sqrt())]
-        };
-        let magnitudes = Plane::from_fn(columns, lines, magnitude);
+        across.process(&mut groups);
+        let mut magnitudes = Plane::filled(columns, lines, 0.0);
+        let groups = groups.chunks_exact(across.len());
+        for (out, group) in magnitudes.data_mut().chunks_mut(LANES * columns).zip(groups) {
+            for i in 0..columns {
+                let Complex { re: Lanes(re), im: Lanes(im) } = group[i % across.len()];
+                let magnitude: [f32; LANES] =
+                    from_fn(|lane| (re[lane] * re[lane] + im[lane] * im[lane]).sqrt());
+                out[i..].iter_mut().step_by(columns).zip(magnitude).for_each(|(out, v)| *out = v.into());
+            }
+        }
 
         let kernels = [0, 1].map(|axis| {
             let spacing = (2 * spectrum.pixels[axis]) as f64 / nodes_per_period[axis] as f64;
@@ -164,7 +195,7 @@ impl Filter {
             gaussian(sigma, (SMOOTHING_REACH * sigma).ceil() as usize)
         });
         let smoothed = smooth(&magnitudes, [&kernels[0], &kernels[1]]);
-        Response { pixels: spectrum.pixels, nodes_per_period, nodes: smoothed.map(|v| v[0]) }
+        Response { pixels: spectrum.pixels, nodes_per_period, nodes: smoothed }
     }
 
     /// The frequencies of the band on one axis, as indices into the spectrum, and the filter's gain at each.

@@ -9,37 +9,92 @@ use rayon::prelude::*;
 
 use super::Options;
 
+/// Points that a thread takes at a time.
+const CHUNK: usize = 512;
+
 /// The centroids of the points, whose `dimensions` values are up to 512 in size, one after the other. There
 /// are at most `count` of them, and fewer where there are fewer different points. The replicate with the
 /// smallest sum of squared distances is taken, the first one on a tie.
-pub(super) fn cluster(points: &[i16], dimensions: usize, count: usize, options: &Options) -> Vec<Vec<i16>> {
-    let points: Vec<&[i16]> = points.chunks_exact(dimensions).collect();
+pub(super) fn cluster(points: &[i16], dimensions: usize, count: usize, options: &Options) -> Centroids {
     (0..options.replicates.max(1) as u64)
         .into_par_iter()
         .map(|replicate| {
             let mut random = Random(options.seed.wrapping_add(replicate << 32));
-            let (inertia, centroids) =
-                lloyd(&points, starts(&points, count, &mut random), options.iterations);
+            let starts = starts(points, dimensions, count, &mut random);
+            let (inertia, centroids) = lloyd(points, Centroids::new(starts, dimensions), options.iterations);
             ((inertia, replicate), centroids)
         })
         .min_by_key(|(key, _)| *key)
         .map(|(_, centroids)| centroids)
-        .unwrap_or_default()
+        .expect("there is a replicate")
 }
 
-/// Index of the centroid nearest to a point, the first one on a tie, and the squared distance to it.
-pub(super) fn nearest(point: &[i16], centroids: &[Vec<i16>]) -> (usize, u32) {
-    let mut best = (0, u32::MAX);
-    for (i, centroid) in centroids.iter().enumerate() {
-        let distance = squared_distance(point, centroid);
-        if distance < best.1 {
-            best = (i, distance);
-        }
+/// Centroids, and how far they are apart.
+pub(super) struct Centroids {
+    dimensions: usize,
+    /// One after the other.
+    values: Vec<i16>,
+    /// Of each centroid all others, nearest first, with the squared distance.
+    others: Vec<Vec<(u32, usize)>>,
+}
+
+impl Centroids {
+    fn new(values: Vec<i16>, dimensions: usize) -> Self {
+        let centroids = || values.chunks_exact(dimensions).enumerate();
+        let others_of = |(i, centroid): (usize, &[i16])| {
+            let others = centroids().filter(|(j, _)| *j != i);
+            let mut others: Vec<_> =
+                others.map(|(j, other)| (squared_distance(centroid, other), j)).collect();
+            others.sort_unstable();
+            others
+        };
+        let others = centroids().map(others_of).collect();
+        Self { dimensions, values, others }
     }
-    best
+
+    #[inline(always)]
+    fn at(&self, i: usize) -> &[i16] {
+        &self.values[i * self.dimensions..][..self.dimensions]
+    }
+
+    /// Index of the centroid nearest to a point, the first one on a tie, and the squared distance to it. The search starts from the
+    /// centroid `guess`. A centroid that is more than twice as far from it as the point is farther from the point, by the triangle
+    /// inequality, and so are all that follow.
+    #[inline(always)]
+    fn nearest(&self, point: &[i16], guess: usize) -> (usize, u32) {
+        let from_guess = squared_distance(point, self.at(guess));
+        let mut best = (from_guess, guess);
+        for &(apart, i) in &self.others[guess] {
+            if apart > 4 * from_guess {
+                break;
+            }
+            best = best.min((squared_distance(point, self.at(i)), i));
+        }
+        (best.1, best.0)
+    }
+}
+
+/// Replaces each guess by the index of the centroid nearest to the point, the first one on a tie. Returns the sum of squared
+/// distances.
+#[pulp::with_simd(assign = pulp::Arch::new())]
+#[inline(always)]
+pub(super) fn assign_on<'a, S: pulp::Simd>(
+    _: S,
+    centroids: &'a Centroids,
+    points: &'a [i16],
+    guesses: &'a mut [usize],
+) -> u64 {
+    let mut sum = 0;
+    for (point, guess) in points.chunks_exact(centroids.dimensions).zip(guesses) {
+        let (nearest, distance) = centroids.nearest(point, *guess);
+        *guess = nearest;
+        sum += u64::from(distance);
+    }
+    sum
 }
 
 /// For values up to 512 in size: a square fits in 20 bits.
+#[inline(always)]
 fn squared_distance(a: &[i16], b: &[i16]) -> u32 {
     let square = |(a, b): (&i16, &i16)| {
         // Two 16-bit factors, for the multiply-add that every vector unit has.
@@ -51,14 +106,13 @@ fn squared_distance(a: &[i16], b: &[i16]) -> u32 {
 
 /// Starting points: each next one is drawn with a probability proportional to its squared distance from those
 /// already drawn.
-fn starts(points: &[&[i16]], count: usize, random: &mut Random) -> Vec<Vec<i16>> {
-    let mut centroids = vec![points[random.below(points.len() as u64) as usize].to_vec()];
-    let mut distances = vec![u32::MAX; points.len()];
-    while centroids.len() < count {
-        let latest = &centroids[centroids.len() - 1];
-        for (distance, point) in distances.iter_mut().zip(points) {
-            *distance = squared_distance(point, latest).min(*distance);
-        }
+fn starts(points: &[i16], dimensions: usize, count: usize, random: &mut Random) -> Vec<i16> {
+    let number = points.len() / dimensions;
+    let point = |i: usize| &points[i * dimensions..][..dimensions];
+    let mut centroids = point(random.below(number as u64) as usize).to_vec();
+    let mut distances = vec![u32::MAX; number];
+    while centroids.len() < count * dimensions {
+        approach(points, &centroids[centroids.len() - dimensions..], &mut distances);
         let total = distances.iter().map(|d| u64::from(*d)).sum();
         if total == 0 {
             break;
@@ -69,39 +123,61 @@ fn starts(points: &[&[i16]], count: usize, random: &mut Random) -> Vec<Vec<i16>>
             left = left.wrapping_sub(u64::from(*d));
             here
         });
-        centroids.extend(drawn.map(|i| points[i].to_vec()));
+        centroids.extend(drawn.into_iter().flat_map(point));
     }
     centroids
 }
 
+/// Lowers the distance of each point to the one from `centroid`.
+#[pulp::with_simd(approach = pulp::Arch::new())]
+#[inline(always)]
+fn approach_on<'a, S: pulp::Simd>(_: S, points: &'a [i16], centroid: &'a [i16], distances: &'a mut [u32]) {
+    for (distance, point) in distances.iter_mut().zip(points.chunks_exact(centroid.len())) {
+        *distance = squared_distance(point, centroid).min(*distance);
+    }
+}
+
 /// Assigns and averages until nothing changes. Returns the sum of squared distances, and the centroids
 /// rounded to integers.
-fn lloyd(points: &[&[i16]], mut centroids: Vec<Vec<i16>>, iterations: usize) -> (u64, Vec<Vec<i16>>) {
-    let dimensions = points[0].len();
-    let mut assigned = vec![usize::MAX; points.len()];
+fn lloyd(points: &[i16], mut centroids: Centroids, iterations: usize) -> (u64, Centroids) {
+    let dimensions = centroids.dimensions;
+    let count = centroids.others.len();
+    // Before the first assignment, no point counts.
+    let mut assigned = vec![0; points.len() / dimensions];
+    let mut sums = vec![0; count * dimensions];
+    let mut counts = vec![0; count];
     let mut inertia = u64::MAX;
-    for _ in 0..iterations {
-        let mut sums = vec![vec![0i64; dimensions]; centroids.len()];
-        let mut counts = vec![0i64; centroids.len()];
-        let mut changed = false;
-        inertia = 0;
-        for (point, assigned) in points.iter().zip(&mut assigned) {
-            let (zone, distance) = nearest(point, &centroids);
-            changed |= zone != *assigned;
-            *assigned = zone;
-            inertia += u64::from(distance);
-            counts[zone] += 1;
-            sums[zone].iter_mut().zip(*point).for_each(|(sum, v)| *sum += i64::from(*v));
-        }
-        if !changed {
+    for iteration in 0..iterations {
+        let mut zones = assigned.clone();
+        let chunks = points.par_chunks(CHUNK * dimensions).zip(zones.par_chunks_mut(CHUNK));
+        inertia = chunks.map(|(points, zones)| assign(&centroids, points, zones)).sum();
+        if iteration > 0 && zones == assigned {
             break;
         }
+        // Only the points that move change the sums.
+        for ((point, &from), &to) in points.chunks_exact(dimensions).zip(&assigned).zip(&zones) {
+            let mut add = |zone: usize, sign: i64| {
+                counts[zone] += sign;
+                let sums = &mut sums[zone * dimensions..][..dimensions];
+                sums.iter_mut().zip(point).for_each(|(sum, v)| *sum += sign * i64::from(*v));
+            };
+            if iteration == 0 {
+                add(to, 1);
+            } else if from != to {
+                add(from, -1);
+                add(to, 1);
+            }
+        }
+        assigned = zones;
         // A centroid without points stays where it is.
-        for ((centroid, sum), n) in centroids.iter_mut().zip(&sums).zip(&counts).filter(|(_, n)| **n > 0) {
-            for (v, sum) in centroid.iter_mut().zip(sum) {
+        let mut values = centroids.values;
+        let means = values.chunks_exact_mut(dimensions).zip(sums.chunks_exact(dimensions)).zip(&counts);
+        for ((centroid, sums), n) in means.filter(|(_, n)| **n > 0) {
+            for (v, sum) in centroid.iter_mut().zip(sums) {
                 *v = (2 * sum + n).div_euclid(2 * n) as i16;
             }
         }
+        centroids = Centroids::new(values, dimensions);
     }
     (inertia, centroids)
 }
@@ -139,8 +215,10 @@ mod tests {
     fn heaps_are_told_apart_and_centroids_are_their_means() {
         let points = heaps();
         let centroids = cluster(&points, 2, 3, &Options::default());
-        assert_eq!(centroids.len(), 3);
-        let zone = |i: usize| nearest(&points[2 * i..][..2], &centroids).0;
+        assert_eq!(centroids.others.len(), 3);
+        let mut zones = vec![0; 150];
+        assign(&centroids, &points, &mut zones);
+        let zone = |i: usize| zones[i];
         for i in 0..150 {
             assert_eq!(zone(i), zone(i % 3));
         }
@@ -148,7 +226,8 @@ mod tests {
         for heap in 0..3 {
             let sum: i32 = (0..50).map(|i| i32::from(points[2 * (3 * i + heap)])).sum();
             let mean = f64::from(sum) / 50.0;
-            assert!((f64::from(centroids[zone(heap)][0]) - mean).abs() <= 0.5, "{mean}: {centroids:?}");
+            let centroid = f64::from(centroids.at(zone(heap))[0]);
+            assert!((centroid - mean).abs() <= 0.5, "{mean}: {centroid}");
         }
     }
 
@@ -157,7 +236,7 @@ mod tests {
         let points = heaps();
         let inertia = |replicates| -> u64 {
             let centroids = cluster(&points, 2, 7, &Options { replicates, ..Options::default() });
-            points.chunks_exact(2).map(|p| u64::from(nearest(p, &centroids).1)).sum()
+            assign(&centroids, &points, &mut [0; 150])
         };
         let all: Vec<u64> = [1, 2, 5, 20].map(inertia).to_vec();
         assert!(all.is_sorted_by(|a, b| a >= b), "{all:?}");
@@ -166,7 +245,25 @@ mod tests {
 
     #[test]
     fn equal_points_make_one_centroid_and_ties_go_to_the_first() {
-        assert_eq!(cluster(&[3, -5].repeat(40), 2, 15, &Options::default()), [[3, -5]]);
-        assert_eq!(nearest(&[0, 0], &[vec![2, 0], vec![0, 1], vec![1, 0]]), (1, 1));
+        assert_eq!(cluster(&[3, -5].repeat(40), 2, 15, &Options::default()).values, [3, -5]);
+        let centroids = Centroids::new(vec![2, 0, 0, 1, 1, 0], 2);
+        for guess in 0..3 {
+            assert_eq!(centroids.nearest(&[0, 0], guess), (1, 1));
+        }
+    }
+
+    #[test]
+    fn any_guess_finds_the_nearest() {
+        let mut random = Random(3);
+        let mut draw = |count: usize| (0..count).map(|_| random.below(7) as i16).collect::<Vec<_>>();
+        for _ in 0..200 {
+            let (centroids, point) = (Centroids::new(draw(3 * 6), 3), draw(3));
+            let distances: Vec<u32> = (0..6).map(|i| squared_distance(&point, centroids.at(i))).collect();
+            let least = *distances.iter().min().unwrap();
+            let expected = (distances.iter().position(|d| *d == least).unwrap(), least);
+            for guess in 0..6 {
+                assert_eq!(centroids.nearest(&point, guess), expected, "{distances:?} from {guess}");
+            }
+        }
     }
 }
