@@ -1,7 +1,6 @@
 //! What the costs of the census and of colour are computed from, row by row, and the costs themselves.
 
 use super::finest::Optimum;
-use super::sub_pixel::FAR;
 use super::units::{Blocks, block, block_mut, each_lane};
 use super::windows::{Window, Windows};
 use crate::image::{Image, Pair};
@@ -14,6 +13,9 @@ use std::ops::Range;
 
 const CENSUS_X: usize = CENSUS_RADIUS_X as usize;
 const CENSUS_Y: isize = CENSUS_RADIUS_Y as isize;
+
+/// How far from a label the costs [near](Features::costs_near) it go.
+pub(super) const FAR: usize = 3;
 
 /// What the costs of all rows are computed from, where they are not stored themselves.
 #[derive(Default)]

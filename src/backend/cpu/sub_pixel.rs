@@ -4,6 +4,7 @@
 //! own. The costs at each distance from the own label are a plane: neighbouring pixels are the lanes of vectors, and which
 //! plane of a neighbour a pixel takes depends on how far their labels are apart.
 
+use super::features::FAR;
 use super::finest::{Finest, Optimum};
 use super::units::{Units, block, each_lane};
 use super::volumes::Volumes;
@@ -69,8 +70,8 @@ const BAND: usize = 8;
 const RADIUS: usize = 2;
 /// How far the label of a neighbour may be away.
 const NEAR: u16 = 2;
-/// How far from its own label the costs of a neighbour are needed.
-pub(super) const FAR: usize = NEAR as usize + 1;
+// Its costs are needed one label further.
+const _: () = assert!(FAR == NEAR as usize + 1);
 /// Stands for "no label" here: far from every label, also where differences wrap.
 const NOWHERE: u16 = 1 << 15;
 /// Number of pixels whose costs are summed together, in vectors of 16 bits.

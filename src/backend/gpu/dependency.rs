@@ -53,7 +53,6 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
     let (plan, buffers) = (r.plan, r.buffers);
     let own = |z: usize| (Uniform { tau: plan.dependency.tau.into() }, buffers.levels[z].params.width);
-    let bound =
-        [(1, &shared.members), (2, &shared.belief), (3, &shared.dependency), (4, &shared.windows)];
+    let bound = [(1, &shared.members), (2, &shared.belief), (3, &shared.dependency), (4, &shared.windows)];
     r.levels(&jobs(plan, 0)[0], levels, own, &bound)
 }
