@@ -205,7 +205,7 @@ fn hardly_anything_differs_from_one_piece() {
         // A plain wall is estimated from its borders, however far they are.
         let most = if folder.ends_with("wall") { 0.5 } else { 0.03 };
         for (quarters, overlap) in [(3, OVERLAP), (2, OVERLAP), (2, 0)] {
-            let memory = (whole.bytes() >> 20) as u32 * quarters / 4;
+            let memory = (streamed(&whole).bytes() >> 20) as u32 * quarters / 4;
             let tiles =
                 Tiles::with_overlap(&plan(pair.size(), range, &Method::default(), memory), overlap).unwrap();
             let differ = difference(&in_tiles(&mut cpu, &tiles, &pair).maps, &expected.maps);

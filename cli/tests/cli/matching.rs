@@ -362,7 +362,7 @@ fn little_memory_makes_tiles() {
     let with = |more: &[&str]| run(folder.path(), &[&args[..], more].concat());
     let one = with(&["--dry-run"]).succeeded();
     assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
-    let tiled = with(&["--dry-run", "--memory", "12MiB"]).succeeded();
+    let tiled = with(&["--dry-run", "--memory", "14MiB"]).succeeded();
     for words in
         ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "all"]
     {
@@ -370,11 +370,11 @@ fn little_memory_makes_tiles() {
     }
     let told = with(&[]).succeeded();
     assert!(told.stderr.contains("32 labels, 18 iterations"), "{told:?}");
-    let told = with(&["--memory", "12MiB"]).succeeded();
+    let told = with(&["--memory", "14MiB"]).succeeded();
     assert!(told.stderr.contains("32 labels, 4 tiles, 18 iterations"), "{told:?}");
     assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (240, 180));
     let inspect = |more: &[&str]| {
-        let args = ["inspect", &left, &right, "--device", "cpu", "--memory", "12MiB"];
+        let args = ["inspect", &left, &right, "--device", "cpu", "--memory", "14MiB"];
         run(folder.path(), &[&args[..], more].concat())
     };
     let told = inspect(&[]).succeeded();

@@ -1,7 +1,7 @@
 //! Messages between two levels: see [`Stage::Resolution`](crate::backend::Stage::Resolution).
 //!
-//! Floor, for a fine label of level 1: 3 + 3/8 bytes moved, 17 asked for (words of four labels, once a label and once more after
-//! the minimum), 100 operations for four labels.
+//! Floor, for a fine label of level 1: 3 + 3/8 bytes moved, 5.6 asked for (all that is read again after the minimum), 100 operations
+//! for four labels.
 
 use super::buffers::Shared;
 use super::shader::Kernel;
