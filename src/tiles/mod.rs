@@ -39,7 +39,8 @@ pub struct Tile {
     /// The pixels that are matched. The crop starts at a whole pixel of the coarsest level, so that the
     /// pyramid's grids are those of the whole image.
     pub crop: Rect,
-    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop.
+    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop, and its method what a tile may take
+    /// of the memory.
     pub plan: Plan,
 }
 
@@ -108,7 +109,8 @@ impl Tiles {
                 let core = Rect { x: core_x.clone(), y: core_y.clone() };
                 let crop = Rect { x: crop_x.clone(), y: crop_y.clone() };
                 let (width, height) = crop.size();
-                let plan = Plan { core: core.within(&crop).x, ..whole.resized(width, height) };
+                let mut plan = Plan { core: core.within(&crop).x, ..whole.resized(width, height) };
+                plan.method.tiles.memory -= beside(whole).div_ceil(1 << 20) as u32;
                 tiles.push(Tile { core, crop, plan });
             }
         }
