@@ -85,6 +85,21 @@ fn streamed_maps_are_those_of_whole_levels() {
 }
 
 #[test]
+fn a_device_streams_images_of_any_height() {
+    let Some(mut gpu) = devices::gpu() else { return };
+    let mut random = Random::new(20);
+    for height in (320..=353).step_by(3).chain([321, 322, 352]) {
+        let mut method = Method::default();
+        (method.refinement.right_map, method.schedule.final_iterations) = (true, random.pick(&[0, 3]));
+        let plan = plan((40, height), 0, 24, &method);
+        assert!(!solver::streamed(&plan).holds_all_rows());
+        let pair = random::pair(&mut random, 40, height);
+        let expected = maps(&mut Cpu::default(), &plan, &pair, true);
+        assert!(expected == maps(&mut gpu, &plan, &pair, false), "height {height}");
+    }
+}
+
+#[test]
 fn a_device_that_may_take_enough_holds_all_rows() {
     let Some(mut gpu) = devices::gpu() else { return };
     let mut random = Random::new(19);

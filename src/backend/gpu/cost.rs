@@ -116,8 +116,11 @@ pub(super) fn record_as_needed(
     for start in (0..height).step_by(BAND) {
         let rows = start..(start + BAND as u32).min(height);
         let end = (rows.end + around).min(height);
-        r.at(0, computed..end, record_costs)?;
-        computed = end;
+        // The last few rows may have been around those before.
+        if computed < end {
+            r.at(0, computed..end, record_costs)?;
+            computed = end;
+        }
         then(r, rows)?;
     }
     Ok(())
