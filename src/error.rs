@@ -261,15 +261,12 @@ pub enum BudgetError {
         /// The least that would do.
         needed: u64,
     },
-    /// The steps of a match are inspected, and the image is cut into tiles.
+    /// The steps of a match are inspected, and the memory does not hold all of its volumes.
     #[error(
-        "only a match in one piece can show its steps, and this one is cut into {tiles} tiles: one piece needs {needed} \
-         MiB of memory"
+        "only a match in one piece with all of its volumes in memory can show its steps: that needs {needed} MiB"
     )]
-    StepsOfTiles {
-        /// The number of tiles.
-        tiles: usize,
-        /// What one piece would take.
+    Steps {
+        /// What would do.
         needed: u64,
     },
 }
@@ -493,7 +490,7 @@ mod tests {
             ExecutionError::NoThreads.into(),
             ExecutionError::Threads("limit reached".into()).into(),
             BudgetError::NoTileFits { memory: 1, width: 60, height: 40, labels: 9, needed: 7 }.into(),
-            BudgetError::StepsOfTiles { tiles: 4, needed: 70 }.into(),
+            BudgetError::Steps { needed: 70 }.into(),
             Error::Calibration("does not say baseline".into()),
             Error::Mismatch("the sizes differ".into()),
             DeviceError::NoDriver.into(),

@@ -9,18 +9,18 @@
 //! and their sums are stored in 8 bits, or in 16 where the method needs them ([`VolumeWidth`]). Sums
 //! saturate; a label whose cost saturates is no longer a candidate, so its exact cost does not matter.
 
+mod arithmetic;
+mod memory;
+
 use crate::error::Result;
 use crate::options::{
-    Agreement, DisparityRange, Illumination, LeftRightCheck, MatchingCost, Method, Order, Potential, Pyramid,
+    Agreement, DisparityRange, LeftRightCheck, MatchingCost, Method, Order, Potential, Pyramid,
 };
 use std::ops::Range;
 
-/// Units of cost in one nat.
-pub const UNITS_PER_NAT: f64 = 4.0;
-/// Truncation of a hard potential's messages, in units. It is the largest for which no belief saturates in 16
-/// bits, even for a pixel that is a member of all 49 factors of its window, with two resolution messages and
-/// the largest evidence.
-pub const HARD_CAP: u16 = 1023;
+use arithmetic::units;
+pub use arithmetic::{EvidenceScale, HARD_CAP, Truncation, TruncationRule, UNITS_PER_NAT, VolumeWidth};
+
 /// Largest matching cost at level 0, in cost units.
 pub const COST_MAX: u8 = 254;
 /// Cost units that stand for a matching cost of 1 where the cost uses the census.
@@ -113,112 +113,6 @@ impl LevelPlan {
     #[must_use]
     pub fn windows(&self) -> (usize, usize) {
         (self.width.div_ceil(WINDOW_RUN), self.height.div_ceil(2))
-    }
-}
-
-/// Conversion from cost to evidence in 16-bit steps. With c in 1/256 cost units and D = min(c(d) - min c,
-/// `limit`), e(d) = min(((D << `up`) * `multiplier` >> 16) + (1 << `down` >> 1) >> `down`, `cap`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EvidenceScale {
-    /// Evidence units per 1/256 cost unit, times 2^(16 + `down` - `up`); below 2^15.
-    pub multiplier: u16,
-    /// The smallest cost difference that reaches the cap; larger differences are clamped to it.
-    pub limit: u16,
-    /// The largest shift that keeps `limit` in 16 bits.
-    pub up: u32,
-    /// Fractional bits of the product.
-    pub down: u32,
-    /// Largest evidence, in units.
-    pub cap: u8,
-}
-
-impl EvidenceScale {
-    fn new(gain: f64, cost_units: f64, method: &Method) -> Self {
-        let per_cost = gain * UNITS_PER_NAT / (method.messages.temperature * cost_units * 256.0);
-        let cap = (method.messages.evidence_cap * UNITS_PER_NAT + 0.5).floor();
-        let limit = (cap / per_cost).ceil().clamp(1.0, u16::MAX.into()) as u16;
-        let up = limit.leading_zeros();
-        let unshifted = per_cost * 65536.0 / f64::from(1u32 << up);
-        // The multiplier uses all of 15 bits, so that product and rounding fit in 16.
-        let mut down = 0;
-        while down < 15 && unshifted * f64::from(2u32 << down) < 32767.0 {
-            down += 1;
-        }
-        let multiplier = (unshifted * f64::from(1u32 << down) + 0.5).floor().clamp(1.0, 32767.0) as u16;
-        Self { multiplier, limit, up, down, cap: cap as u8 }
-    }
-
-    /// Evidence for a cost `difference` above the pixel's cheapest label, in 1/256 cost units.
-    #[must_use]
-    #[inline]
-    pub fn apply(self, difference: u16) -> u8 {
-        let product = (u32::from(difference.min(self.limit) << self.up) * u32::from(self.multiplier)) >> 16;
-        // Both fit in 15 bits.
-        let e = (product as u16 + (1 << self.down >> 1)) >> self.down;
-        e.min(self.cap.into()) as u8
-    }
-}
-
-/// Storage width of messages and beliefs, which is also where their sums saturate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum VolumeWidth {
-    /// 8 bits.
-    Narrow,
-    /// 16 bits.
-    Wide,
-}
-
-impl VolumeWidth {
-    /// Bytes per value.
-    #[must_use]
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::Narrow => 1,
-            Self::Wide => 2,
-        }
-    }
-
-    /// The largest value, which stands for infinity.
-    #[must_use]
-    pub fn most(self) -> u16 {
-        match self {
-            Self::Narrow => u8::MAX.into(),
-            Self::Wide => u16::MAX,
-        }
-    }
-}
-
-/// Truncation of a sum of messages s to a message m(d) = min(s(d), high) - low. Where the sum is infinite, the
-/// message is tau.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Truncation {
-    /// Cost of disagreement, in units.
-    pub tau: u16,
-    /// Where the sum is truncated.
-    pub rule: TruncationRule,
-}
-
-/// Where a message is truncated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TruncationRule {
-    /// At tau above the smallest sum, which counts as at most infinity less tau: high = min s + tau, low = min s.
-    Relative,
-    /// At tau, given that the members' messages have minimum 0: high = tau, low = 0.
-    Absolute,
-}
-
-impl Truncation {
-    /// (high, low) for the smallest sum `min`, where `most` is infinite.
-    #[must_use]
-    pub fn bounds(self, min: u32, most: u32) -> (u32, u32) {
-        let tau = u32::from(self.tau);
-        match self.rule {
-            TruncationRule::Relative => {
-                let low = min.min(most - tau);
-                (low + tau, low)
-            }
-            TruncationRule::Absolute => (tau, 0),
-        }
     }
 }
 
@@ -365,13 +259,6 @@ impl Plan {
         if level == 0 { self.held } else { self.levels[level].height }
     }
 
-    /// Parts of a ring, of `part` rows each and with a halo on either side, that hold all rows of level 0 that are needed at the
-    /// same time: the first of the next part to be overwritten is that of a halo, and all before it must be done.
-    #[must_use]
-    pub fn ring_parts(&self, part: usize) -> usize {
-        (self.held + 2 * (GRAPH_WINDOW / 2)).div_ceil(part) + 1
-    }
-
     /// The same plan with all rows held.
     #[must_use]
     pub fn whole(&self) -> Self {
@@ -466,90 +353,6 @@ impl Plan {
     pub fn label_offset(&self, level: usize) -> i32 {
         2 * self.levels[level].min - self.levels[level - 1].min
     }
-
-    /// Largest number of bytes taken by the volumes and the graph of `level`, on the CPU path or on a device; where not all rows of
-    /// level 0 are held, with what its costs are computed from.
-    #[must_use]
-    pub fn level_bytes(&self, level: usize) -> u64 {
-        let l = &self.levels[level];
-        let streamed = self.rows_held(level) < l.height;
-        let halo = GRAPH_WINDOW / 2;
-        // The ring of the CPU path is shorter.
-        let rows = if streamed { self.ring_parts(RING_PART) * (RING_PART + 2 * halo) } else { l.height };
-        let width = self.volume_width.bytes();
-        let has = |is_there: bool| usize::from(is_there);
-        // Cost, evidence, beliefs with the messages from above and below, and the messages of the factors.
-        let cost = if level == 0 { 1 } else { 2 };
-        let messages = 1 + has(level > 0);
-        let labels = l.width * l.stride;
-        let row =
-            (cost + 1 + width * (1 + messages)) * aligned(labels) + width * aligned(self.slots() * labels);
-        let features = if streamed { l.height * (2 * l.width + 24 * (l.width + 2 * l.stride)) } else { 0 };
-        // The member codes, and the transposed table with its row starts, and the guide.
-        let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9);
-        // A device needs less for these, but keeps candidates and label ranges as well. The guide of level 1 is there twice, and that of
-        // level 0 is a map.
-        let guides = [0, 2, 1][level.min(2)];
-        let maps = 2 + 4 * guides + has(level > 0) + has(self.limits_labels());
-        let on_device = maps * aligned(4 * l.width) + aligned(4 * l.width * self.neighbours.div_ceil(4));
-        let (runs, window_rows) = l.windows();
-        let windows = 2 * aligned(4 * runs * window_rows);
-        (rows * row + features + l.height * on_host.max(on_device) + windows) as u64
-    }
-
-    /// Largest number of bytes taken by the images and all maps.
-    #[must_use]
-    pub fn map_bytes(&self) -> u64 {
-        // The maps of the left view, and both views mirrored, while those of the right view are made.
-        let right = if self.method.refinement.right_map { 10 + 2 * 9 } else { 0 };
-        let (width, height) = self.size();
-        // Beside them, what a device keeps of each row, and its tables.
-        ((100 + right) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14)) as u64
-    }
-
-    /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
-    /// correct the illumination (48 for one view, 18 for the corrected pair), and 200 to find texture zones
-    /// (spectrum and responses).
-    #[must_use]
-    pub fn front_bytes(&self) -> u64 {
-        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
-        let zones = if self.limits_labels() { 200 } else { 0 };
-        (corrected + zones) * self.levels[0].pixels() as u64
-    }
-
-    /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks.
-    #[must_use]
-    pub fn pair_bytes(&self) -> u64 {
-        18 * self.levels[0].pixels() as u64
-    }
-
-    /// Largest number of bytes taken by the maps of an image that is matched tile by tile. A pixel takes 20
-    /// in the maps that the tiles write and those derived from them (label, best, runner-up, right label and
-    /// its belief 2 each, raw and final disparity 4 each, validity and confidence 1 each), and 12 while they
-    /// are made; 9 more where the left view is corrected.
-    #[must_use]
-    pub fn mosaic_bytes(&self) -> u64 {
-        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
-        // Disparities of the right view, its image and its maps.
-        let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
-        (20 + 12 + corrected + right) * self.levels[0].pixels() as u64
-    }
-
-    /// Bytes taken by all volumes, graphs and maps together.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.map_bytes() + (0..self.levels.len()).map(|z| self.level_bytes(z)).sum::<u64>()
-    }
-}
-
-/// Bytes of a row with its padding.
-fn aligned(bytes: usize) -> usize {
-    bytes.next_multiple_of(ROW_ALIGN)
-}
-
-/// A truncation in units, at least 1.
-fn units(nats: f64) -> u16 {
-    ((nats * UNITS_PER_NAT + 0.5).floor() as u16).clamp(1, HARD_CAP)
 }
 
 #[cfg(test)]

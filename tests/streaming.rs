@@ -7,14 +7,17 @@ mod common;
 
 use common::devices;
 use common::random::{self, Random};
+use mrfgs::error::BudgetError;
 use mrfgs::image::Pair;
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
+use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::solver;
 use mrfgs::maps::Maps;
 use mrfgs::options::{MatchingCost, Method, Order};
+use mrfgs::{Error, Matcher};
 use std::ops::ControlFlow;
 
 /// The maps of a match; `whole` holds all rows, because somebody looks in.
@@ -99,6 +102,23 @@ fn a_device_streams_images_of_any_height() {
     }
 }
 
+/// Where buffers are small, the parts of a ring have fewer rows.
+#[test]
+fn a_device_streams_in_small_buffers() {
+    let mut random = Random::new(21);
+    let plan = plan((40, 300), 0, 300, &Method::default());
+    assert!(!solver::streamed(&plan).holds_all_rows());
+    let pair = random::pair(&mut random, 40, 300);
+    let expected = maps(&mut Cpu::default(), &plan, &pair, true);
+    // 14 rows of dependency messages in a buffer; 57, of which 7 can be bound.
+    for (buffer, binding) in [(1 << 19, 1 << 19), (1 << 21, 1 << 18)] {
+        let faults =
+            FaultInjection { max_buffer: Some(buffer), max_binding: Some(binding), ..Default::default() };
+        let Some(mut gpu) = devices::open(faults) else { return };
+        assert!(expected == maps(&mut gpu, &plan, &pair, false), "buffers of {buffer} bytes");
+    }
+}
+
 #[test]
 fn a_device_that_may_take_enough_holds_all_rows() {
     let Some(mut gpu) = devices::gpu() else { return };
@@ -124,6 +144,31 @@ fn nothing_is_left_over_from_the_pair_before() {
             let expected = maps(&mut Cpu::default(), &plan, &pair, true);
             assert!(expected == maps(&mut *backend, &plan, &pair, false), "{name}");
             backend.probe().poison(byte).unwrap();
+        }
+    }
+}
+
+/// Steps show all rows, and so need memory for them.
+#[test]
+fn steps_are_declined_where_not_all_rows_fit() {
+    let mut random = Random::new(22);
+    let pair = random::pair(&mut random, 64, 400);
+    let mib = |plan: &Plan| plan.bytes().div_ceil(1 << 20) as u32;
+    let whole = random::plan((64, 400), 0, 64, &Method::default());
+    let (least, enough) = (mib(&solver::streamed(&whole)), mib(&whole));
+    assert!(least < enough);
+    for (memory, fits) in [(least, false), (enough - 1, false), (enough, true)] {
+        let mut method = Method::default();
+        method.tiles.memory = memory;
+        let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
+        assert_eq!(matcher.job(&pair, 0..=63).run().unwrap().tiles.count(), 1);
+        let steps = matcher.job(&pair, 0..=63).inspect(|_| Ok(())).run();
+        match steps {
+            Ok(_) => assert!(fits, "{memory} MiB"),
+            Err(e) => {
+                let needed = u64::from(enough);
+                assert!(!fits && e == Error::Budget(BudgetError::Steps { needed }), "{memory} MiB: {e}");
+            }
         }
     }
 }

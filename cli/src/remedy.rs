@@ -75,7 +75,7 @@ fn budget(cause: &BudgetError) -> String {
         BudgetError::NoTileFits { needed, .. } => {
             format!("--memory: {cause}; give at least {needed}MiB, or a smaller image or range")
         }
-        BudgetError::StepsOfTiles { needed, .. } => {
+        BudgetError::Steps { needed } => {
             format!("DIR: {cause}; give --memory {needed}MiB")
         }
         _ => format!("--memory: {cause}"),
@@ -189,7 +189,7 @@ mod tests {
             (said(ExecutionError::NoThreads), ["--threads", "at least 1"]),
             (said(ExecutionError::Threads("limit".into())), ["--threads", "limit"]),
             (said(too_small), ["--memory: 1 MiB", "give at least 7MiB"]),
-            (said(BudgetError::StepsOfTiles { tiles: 4, needed: 70 }), ["DIR", "--memory 70MiB"]),
+            (said(BudgetError::Steps { needed: 70 }), ["DIR", "--memory 70MiB"]),
             (
                 said(read(ReadError::TooManyPixels { width: 9, height: 9, limit: 5 })),
                 ["a.png", "raise --max-pixels"],

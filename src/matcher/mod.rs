@@ -168,9 +168,9 @@ impl Matcher {
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
-        if inspector.is_some() && tiles.count() > 1 {
-            let (tiles, needed) = (tiles.count(), plan.bytes().div_ceil(1 << 20));
-            return Err(BudgetError::StepsOfTiles { tiles, needed }.into());
+        let needed = plan.bytes().div_ceil(1 << 20);
+        if inspector.is_some() && needed > plan.method.tiles.memory.into() {
+            return Err(BudgetError::Steps { needed }.into());
         }
         let Self { pool, gpu, checked, timings, .. } = self;
         let mut note = None;

@@ -143,11 +143,21 @@ impl Tiles {
         plans.max_by_key(Plan::bytes).unwrap_or_else(|| self.whole.clone())
     }
 
-    /// Largest number of bytes that the match takes.
+    /// Largest number of bytes that the match takes on the CPU path.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let whole = if self.count() == 1 { 0 } else { beside(&self.whole) };
-        whole + self.largest().bytes()
+        self.beside() + self.largest().bytes()
+    }
+
+    /// The same on a device.
+    #[must_use]
+    pub fn bytes_on_device(&self) -> u64 {
+        let plans = self.tiles.iter().map(|tile| streamed(&tile.plan).on_device().bytes());
+        self.beside() + plans.max().unwrap_or(0)
+    }
+
+    fn beside(&self) -> u64 {
+        if self.count() == 1 { 0 } else { beside(&self.whole) }
     }
 }
 

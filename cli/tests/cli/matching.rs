@@ -386,7 +386,7 @@ fn little_memory_makes_tiles() {
     // Steps of one piece are what the folder shows.
     let before = listing(folder.path());
     let refused = inspect(&["steps"]);
-    refused.failed(2, &["DIR", "4 tiles", "give --memory"], "the steps of tiles");
+    refused.failed(2, &["DIR", "in one piece", "give --memory"], "the steps of tiles");
     assert!(listing(folder.path()) == before);
 }
 

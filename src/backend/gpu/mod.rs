@@ -18,10 +18,10 @@ mod queue;
 mod rows;
 mod shader;
 mod steps;
+mod streaming;
 mod timer;
 mod uniform;
 mod upload;
-mod wave;
 mod words;
 
 use super::probe::Probe;

@@ -11,22 +11,18 @@ use std::ops::Range;
 use std::sync::Arc;
 
 impl Gpu {
-    /// The plan by which this device matches: it holds all rows where they fit in the memory that a match may take, and in its
-    /// own, since that takes fewer dispatches.
+    /// The plan by which this device matches: [`Plan::on_device`] where its own memory is enough.
     pub(super) fn held(&self, plan: &Plan) -> Plan {
         let known = self.state.as_ref().map(|state| &state.plan);
-        let whole = plan.whole();
-        if plan.holds_all_rows() || known.is_some_and(|known| whole.fits(known)) {
-            return whole;
+        let most = plan.on_device();
+        // What was settled for the last pair stays.
+        if let Some(known) = known.filter(|known| most.fits(known) || plan.fits(known)) {
+            return Plan { core: plan.core.clone(), ..known.clone() };
         }
-        if known.is_some_and(|known| plan.fits(known)) {
-            return plan.clone();
-        }
-        let bytes = whole.bytes();
-        let fits = bytes <= u64::from(plan.method.tiles.memory) << 20
-            && self.device.memory.is_none_or(|memory| bytes <= memory)
+        let bytes = most.bytes();
+        let fits = self.device.memory.is_none_or(|memory| bytes <= memory)
             && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok());
-        if fits { whole } else { plan.clone() }
+        if fits { most } else { plan.clone() }
     }
 
     /// Runs the stages of `wavefront` on the rows of its parts.

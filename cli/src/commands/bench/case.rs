@@ -188,7 +188,7 @@ impl Case<'_> {
             message_gb_per_s,
             copy_gb_per_s,
             copy_share: 100.0 * message_gb_per_s / copy_gb_per_s,
-            plan_bytes: tiles.bytes(),
+            plan_bytes: if traffic.bytes_held > 0 { tiles.bytes_on_device() } else { tiles.bytes() },
             peak_bytes,
             device_bytes: of_device(traffic.bytes_held),
             dispatches: of_device(traffic.dispatches),

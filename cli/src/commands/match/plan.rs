@@ -46,9 +46,8 @@ fn memory(tiles: &Tiles, plan: &Plan) -> Table {
         table.row(["whole image", "", "", &bytes(tiles.bytes() - plan.bytes())]);
     }
     table.row(["all", "", "", &bytes(tiles.bytes())]);
-    if !plan.holds_all_rows() {
-        let whole = tiles.bytes() - plan.bytes() + plan.whole().bytes();
-        table.row(["with all rows held", "", "", &bytes(whole)]);
+    if tiles.bytes_on_device() > tiles.bytes() {
+        table.row(["on a device", "", "", &format!("{} at most", bytes(tiles.bytes_on_device()))]);
     }
     table
 }

@@ -1,0 +1,101 @@
+//! What a match takes of the memory, at most.
+
+use super::{GRAPH_WINDOW, Plan, RING_PART, ROW_ALIGN};
+use crate::options::Illumination;
+
+impl Plan {
+    /// Parts of a ring, of `part` rows each and with a halo on either side, that hold all rows of level 0 that are needed at the
+    /// same time: the first of the next part to be overwritten is that of a halo, and all before it must be done.
+    #[must_use]
+    pub fn ring_parts(&self, part: usize) -> usize {
+        (self.held + 2 * (GRAPH_WINDOW / 2)).div_ceil(part) + 1
+    }
+
+    /// The plan by which a device with enough memory matches: with all rows held where these fit in the memory that the method
+    /// may take, since that takes fewer dispatches.
+    #[must_use]
+    pub fn on_device(&self) -> Self {
+        let whole = self.whole();
+        let fits = whole.bytes() <= u64::from(self.method.tiles.memory) << 20;
+        if fits { whole } else { self.clone() }
+    }
+
+    /// Largest number of bytes taken by the volumes and the graph of `level`, on the CPU path or on a device; where not all rows of
+    /// level 0 are held, with what its costs are computed from.
+    #[must_use]
+    pub fn level_bytes(&self, level: usize) -> u64 {
+        let l = &self.levels[level];
+        let streamed = self.rows_held(level) < l.height;
+        let halo = GRAPH_WINDOW / 2;
+        // The ring of the CPU path is shorter.
+        let rows = if streamed { self.ring_parts(RING_PART) * (RING_PART + 2 * halo) } else { l.height };
+        let width = self.volume_width.bytes();
+        let has = |is_there: bool| usize::from(is_there);
+        // Cost, evidence, beliefs with the messages from above and below, and the messages of the factors.
+        let cost = if level == 0 { 1 } else { 2 };
+        let messages = 1 + has(level > 0);
+        let labels = l.width * l.stride;
+        let row =
+            (cost + 1 + width * (1 + messages)) * aligned(labels) + width * aligned(self.slots() * labels);
+        let features = if streamed { l.height * (2 * l.width + 24 * (l.width + 2 * l.stride)) } else { 0 };
+        // The member codes, and the transposed table with its row starts, and the guide.
+        let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9);
+        // A device needs less for these, but keeps candidates and label ranges as well. The guide of level 1 is there twice, and that of
+        // level 0 is a map.
+        let guides = [0, 2, 1][level.min(2)];
+        let maps = 2 + 4 * guides + has(level > 0) + has(self.limits_labels());
+        let on_device = maps * aligned(4 * l.width) + aligned(4 * l.width * self.neighbours.div_ceil(4));
+        let (runs, window_rows) = l.windows();
+        let windows = 2 * aligned(4 * runs * window_rows);
+        (rows * row + features + l.height * on_host.max(on_device) + windows) as u64
+    }
+
+    /// Largest number of bytes taken by the images and all maps.
+    #[must_use]
+    pub fn map_bytes(&self) -> u64 {
+        // The maps of the left view, and both views mirrored, while those of the right view are made.
+        let right = if self.method.refinement.right_map { 10 + 2 * 9 } else { 0 };
+        let (width, height) = self.size();
+        // Beside them, what a device keeps of each row, and its tables.
+        ((100 + right) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14)) as u64
+    }
+
+    /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
+    /// correct the illumination (48 for one view, 18 for the corrected pair), and 200 to find texture zones
+    /// (spectrum and responses).
+    #[must_use]
+    pub fn front_bytes(&self) -> u64 {
+        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
+        let zones = if self.limits_labels() { 200 } else { 0 };
+        (corrected + zones) * self.levels[0].pixels() as u64
+    }
+
+    /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks.
+    #[must_use]
+    pub fn pair_bytes(&self) -> u64 {
+        18 * self.levels[0].pixels() as u64
+    }
+
+    /// Largest number of bytes taken by the maps of an image that is matched tile by tile. A pixel takes 20
+    /// in the maps that the tiles write and those derived from them (label, best, runner-up, right label and
+    /// its belief 2 each, raw and final disparity 4 each, validity and confidence 1 each), and 12 while they
+    /// are made; 9 more where the left view is corrected.
+    #[must_use]
+    pub fn mosaic_bytes(&self) -> u64 {
+        let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
+        // Disparities of the right view, its image and its maps.
+        let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
+        (20 + 12 + corrected + right) * self.levels[0].pixels() as u64
+    }
+
+    /// Bytes taken by all volumes, graphs and maps together.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.map_bytes() + (0..self.levels.len()).map(|z| self.level_bytes(z)).sum::<u64>()
+    }
+}
+
+/// Bytes of a row with its padding.
+fn aligned(bytes: usize) -> usize {
+    bytes.next_multiple_of(ROW_ALIGN)
+}
