@@ -1,6 +1,6 @@
 //! The change of the label map: see [`crate::backend::Stage::Change`].
 
-use super::units::{Units, first_smallest};
+use super::units::{Units, argmin};
 use super::volumes::{Level, Volumes};
 use super::windows::Window;
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ fn label_row_on<'a, S: pulp::Simd, U: Units>(
     let mut sum = 0;
     for (label, window) in labels.iter_mut().zip(windows) {
         // The belief of padding is the largest value, and behind all labels.
-        let new = (window.first() + first_smallest(&belief[window.cells()])) as u16;
+        let new = (window.first() + argmin(&belief[window.cells()]).0) as u16;
         sum += u64::from(new.abs_diff(*label)).pow(2);
         *label = new;
     }

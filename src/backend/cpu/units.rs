@@ -210,9 +210,9 @@ pub(super) fn cut_block<U: Units>(sums: &Least<U>, low: &Least<U>, high: &Least<
     each_lane(|i| sums[i].min(high[i]).less(low[i]))
 }
 
-/// Index of the smallest value of whole blocks, the lowest on ties.
+/// Index and value of the smallest value of whole blocks, the lowest index on ties.
 #[inline(always)]
-pub(super) fn first_smallest<U: Units>(row: &[U]) -> usize {
+pub(super) fn argmin<U: Units>(row: &[U]) -> (usize, U) {
     let mut least = [u32::MAX; LABEL_BLOCK];
     for (i, block) in row.as_chunks::<LABEL_BLOCK>().0.iter().enumerate() {
         let at = (i * LABEL_BLOCK) as u32;
@@ -221,17 +221,6 @@ pub(super) fn first_smallest<U: Units>(row: &[U]) -> usize {
             each_lane(|lane| Into::<u32>::into(block[lane]) << u16::BITS | (at + lane as u32));
         least = each_lane(|lane| least[lane].min(keys[lane]));
     }
-    let first = least.iter().fold(u32::MAX, |first, &key| first.min(key));
-    usize::from(first as u16)
-}
-
-/// Index and value of the smallest value, the lowest index on ties.
-#[inline(always)]
-pub(super) fn argmin<U: Units>(belief: &[U]) -> (usize, U) {
-    let best = smallest(belief);
-    // Block by block: vectors test whether a block holds it.
-    let holds = |block: &[U]| smallest(block) == best;
-    let block = belief.chunks(LABEL_BLOCK).position(holds);
-    let start = block.unwrap_or(0) * LABEL_BLOCK;
-    (start + belief[start..].iter().position(|&b| b == best).unwrap_or(0), best)
+    let key = least.iter().fold(u32::MAX, |first, &key| first.min(key));
+    (usize::from(key as u16), U::of(key >> u16::BITS))
 }

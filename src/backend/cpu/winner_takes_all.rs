@@ -30,15 +30,17 @@ fn optimum_row_on<'a, S: pulp::Simd, U: Units>(
     let row = windows.row(y);
     for (x, optimum) in optima.iter_mut().enumerate() {
         let window = row[x];
-        *optimum = optimum_of(&beliefs[window.start()..][..windows.labels(window)]);
+        *optimum = optimum_of(&beliefs[window.cells()], windows.labels(window));
         optimum.label += window.first() as u16;
     }
 }
 
-/// The optimum of the beliefs of one window, its label counted from the first.
+/// The optimum of the beliefs of one window, its label counted from the first. The belief of padding is the largest value, and
+/// behind all `labels`.
 #[inline(always)]
-fn optimum_of<U: Units>(belief: &[U]) -> Optimum {
+fn optimum_of<U: Units>(belief: &[U], labels: usize) -> Optimum {
     let (label, best) = argmin(belief);
+    let belief = &belief[..labels];
     let below = &belief[..label.saturating_sub(1)];
     let above = belief.get(label + 2..).unwrap_or_default();
     let runner_up = if below.is_empty() && above.is_empty() {

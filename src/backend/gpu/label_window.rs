@@ -47,21 +47,22 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     match &jobs(r.plan, level)[..] {
         [candidates, around] => {
             let own = own(r.plan.label_offset(level + 1));
-            r.level += 1;
-            let (coarse, c) = (r.here(), r.params());
-            r.rows(candidates, &own, c.width, |rows| {
-                vec![
-                    (1, coarse.belief.bind(rows)),
-                    (2, coarse.candidates.bind(rows)),
-                    (6, coarse.windows.bind(&(0..1))),
-                ]
+            let (coarse, height) = (&r.buffers.levels[level + 1], r.plan.levels[level + 1].height as u32);
+            r.at(level + 1, 0..height, |r| {
+                let width = r.params().width;
+                r.rows(candidates, &own, width, |rows| {
+                    vec![
+                        (1, coarse.belief.bind(rows)),
+                        (2, coarse.candidates.bind(rows)),
+                        (6, coarse.windows.bind(&(0..1))),
+                    ]
+                })?;
+                r.renew(&coarse.candidates);
+                r.rows(around, &own, runs, |rows| {
+                    let near = with_halo(rows, WINDOW_REACH as u32, height);
+                    vec![(3, coarse.candidates.bind(&near)), (5, windows.clone())]
+                })
             })?;
-            r.renew(&coarse.candidates);
-            r.rows(around, &own, runs, |rows| {
-                let near = with_halo(rows, WINDOW_REACH as u32, c.height);
-                vec![(3, coarse.candidates.bind(&near)), (5, windows.clone())]
-            })?;
-            r.level -= 1;
         }
         [within] => {
             let height = r.params().height;
