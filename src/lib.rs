@@ -86,6 +86,7 @@ pub mod maps;
 mod matcher;
 mod memory;
 pub mod options;
+#[cfg_attr(target_arch = "wasm32", path = "pause_in_browser.rs")]
 mod pause;
 mod plan;
 mod roofline;

@@ -2,6 +2,7 @@
 
 mod features;
 mod finest;
+#[cfg_attr(target_arch = "wasm32", path = "pages_in_browser.rs")]
 mod pages;
 mod probe;
 mod sad;
