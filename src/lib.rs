@@ -59,6 +59,19 @@
 //! # }
 //! ```
 //!
+//! A browser lets nobody wait. There, `build_async`, `run_async` and the like take the place of the functions that wait:
+//!
+//! ```
+//! # use mrfgs::{Matcher, Method, Pair};
+//! async fn disparities(pair: &Pair) -> mrfgs::Result<Vec<f32>> {
+//!     let mut matcher = Matcher::builder().method(Method::fast()).build_async().await?;
+//!     let found = matcher.job(pair, 0..=31).run_async().await?;
+//!     Ok(found.disparity().into_data())
+//! }
+//! # let pair = Pair::open("testdata/slanted/im0.png", "testdata/slanted/im1.png").unwrap();
+//! # assert_eq!(pollster::block_on(disparities(&pair)).unwrap().len(), pair.size().0 * pair.size().1);
+//! ```
+//!
 //! - [`Method`] holds every option that determines the bits of the maps; [`options`] describes them all.
 //! - [`Matched`] is what a match gives: maps of disparity, confidence and validity, and what made them.
 //! - [`colour`] shows maps as pictures.

@@ -5,6 +5,8 @@ use crate::matched::Matched;
 use crate::pair::{Range, StereoPair};
 use crate::words::thrown;
 use js_sys::Function;
+use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::options::{DeviceChoice, Execution, Method};
 use mrfgs::{Progress, Result};
 use std::cell::RefCell;
@@ -68,8 +70,9 @@ async fn open(device: &str) -> Result<Matcher> {
         let matcher = mrfgs::Matcher::builder().execution(cpu).build_async().await?;
         return Ok(Matcher { matcher, device: "the CPU path".into() });
     }
-    let gpu = mrfgs::low_level::backend::gpu::Gpu::open_async(None, Default::default()).await?;
-    let device = mrfgs::low_level::backend::Backend::describe(&gpu);
+    // Also a software device, which `auto` would not take.
+    let gpu = Gpu::open_async(None, FaultInjection::default()).await?;
+    let device = gpu.describe();
     Ok(Matcher { matcher: mrfgs::Matcher::on(Ok(gpu), true, &Execution::default())?, device })
 }
 
