@@ -18,8 +18,8 @@ const WEBGPU = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader'];
 // WebGL for the points, by software too.
 const WEBGL = ['--enable-unsafe-swiftshader'];
 
-/** A browser; with `gpu: false` one without WebGPU. */
-export async function launch(name, { gpu = true } = {}) {
+/** A browser that saves downloads in a folder; with `gpu: false` one without WebGPU. */
+export async function launch(name, { gpu = true, downloads } = {}) {
     const executablePath = installed(name);
     // Matches on software drivers take their time.
     const common = { executablePath, headless: true, protocolTimeout: 600_000 };
@@ -32,8 +32,10 @@ export async function launch(name, { gpu = true } = {}) {
                 'dom.webgpu.workers.enabled': gpu,
                 'gfx.webgpu.ignore-blocklist': gpu,
                 'gfx.webgpu.force-enabled': gpu,
+                ...(downloads && { 'browser.download.folderList': 2, 'browser.download.dir': downloads }),
             },
         });
     }
-    return puppeteer.launch({ ...common, args: [...QUIET, ...WEBGL, ...(gpu ? WEBGPU : [])] });
+    const downloadBehavior = downloads && { policy: 'allow', downloadPath: downloads };
+    return puppeteer.launch({ ...common, downloadBehavior, args: [...QUIET, ...WEBGL, ...(gpu ? WEBGPU : [])] });
 }
