@@ -14,6 +14,7 @@ use mrfgs::low_level::backend::{Backend, Stage};
 use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::Method;
+use pollster::block_on;
 use std::ops::ControlFlow;
 use std::time::Duration;
 use synthetic::{LARGE, SMALL, Synthetic};
@@ -58,20 +59,22 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                 .warm_up_time(Duration::from_millis(500));
 
             // Whatever a stage needs is there, and the device is warm.
-            engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match");
+            block_on(engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())))
+                .expect("a match");
             for (stage, stages) in groups(&plan) {
                 group.bench_function(format!("{stage}/{name}"), |b| {
                     b.iter(|| {
                         for &stage in &stages {
                             backend.run(stage).expect("a stage");
                         }
-                        backend.wait().expect("a device that goes on");
+                        block_on(backend.wait()).expect("a device that goes on");
                     });
                 });
             }
             group.bench_function(format!("match/{name}"), |b| {
                 b.iter(|| {
-                    engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())).expect("a match")
+                    block_on(engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())))
+                        .expect("a match")
                 });
             });
             group.finish();

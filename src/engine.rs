@@ -12,7 +12,8 @@ use crate::solver::{self, Inspector, Run};
 use crate::tiles::Tiles;
 use crate::tiles::mosaic::Mosaic;
 use crate::watch::{Observer, Watch};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use web_time::Instant;
 
 /// What a match leaves behind.
 #[derive(Clone, Debug)]
@@ -36,25 +37,30 @@ pub struct Solution {
 /// # Errors
 /// Whatever the backend reports, [`crate::Error::Mismatch`] when the plan is for another size, and
 /// [`crate::Error::Interrupted`] when `observer` breaks.
-pub fn solve(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Solution> {
-    inspect(backend, plan, pair, observer, None)
+pub async fn solve(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer<'_>,
+) -> Result<Solution> {
+    inspect(backend, plan, pair, observer, None).await
 }
 
 /// As [`solve`], and `inspector`, if any, looks into the match on its way.
 ///
 /// # Errors
 /// Those of [`solve`] and of `inspector`.
-pub fn inspect(
+pub async fn inspect(
     backend: &mut dyn Backend,
     plan: &Plan,
     pair: &Pair,
-    observer: Observer,
-    inspector: Option<Inspector>,
+    observer: Observer<'_>,
+    inspector: Option<Inspector<'_>>,
 ) -> Result<Solution> {
     let mut run = Run::new(watch(plan, observer), inspector);
-    let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
-    backend.wait()?;
-    let (maps, idle) = run.watch.host("download", || tickets.collect(backend))?;
+    let (iterations, tickets) = whole(backend, plan, pair, &mut run).await?;
+    backend.wait().await?;
+    let (maps, idle) = run.watch.host_async("download", tickets.collect(backend)).await?;
     let iterations = iterations - idle;
     let (traffic, cells, host_times) = (backend.traffic(), backend.cells(), run.watch.into_times());
     Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
@@ -73,9 +79,14 @@ pub struct Started {
 ///
 /// # Errors
 /// Those of [`solve`].
-pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Observer) -> Result<Started> {
+pub async fn start(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer<'_>,
+) -> Result<Started> {
     let mut run = Run::new(watch(plan, observer), None);
-    let (iterations, tickets) = whole(backend, plan, pair, &mut run)?;
+    let (iterations, tickets) = whole(backend, plan, pair, &mut run).await?;
     let (traffic, cells) = (backend.traffic(), backend.cells());
     Ok(Started { tickets, iterations, host_times: run.watch.into_times(), traffic, cells })
 }
@@ -84,9 +95,9 @@ pub fn start(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, observer: Obse
 ///
 /// # Errors
 /// Whatever the backend reports.
-pub fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
+pub async fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
     let Started { tickets, iterations, host_times, traffic, cells } = started;
-    let (maps, idle) = tickets.collect(backend)?;
+    let (maps, idle) = tickets.collect(backend).await?;
     let iterations = iterations - idle;
     Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
@@ -109,10 +120,10 @@ struct Tickets {
 
 impl Tickets {
     /// The maps, and how many iterations were idle.
-    fn collect(self, backend: &mut dyn Backend) -> Result<(Maps, u32)> {
-        let (mut maps, idle) = backend.maps(self.left)?;
+    async fn collect(self, backend: &mut dyn Backend) -> Result<(Maps, u32)> {
+        let (mut maps, idle) = backend.maps(self.left).await?;
         if let Some(right) = self.right {
-            maps.right = Some(right_map(backend.maps(right)?.0));
+            maps.right = Some(right_map(backend.maps(right).await?.0));
         }
         Ok((maps, idle))
     }
@@ -140,26 +151,31 @@ fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: Pair, run: &mut Run) ->
 }
 
 /// All stages of a match in one piece; the number of iterations, and its maps.
-fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> Result<(u32, Tickets)> {
+async fn whole(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    run: &mut Run<'_, '_>,
+) -> Result<(u32, Tickets)> {
     let plan = &if run.inspector.is_some() { plan.clone() } else { solver::streamed(plan) };
     if matchings(plan) == 2 {
         // The right view becomes the left one, its matches to the left again, when both are mirrored.
         let inspector = run.inspector.take();
         let mirrored = copy(plan, || pair.mirrored())?;
         let mirrored = prepare(backend, plan, mirrored, run)?;
-        solver::estimate(backend, plan, mirrored, run)?;
-        run.stage(backend, plan, Stage::MirrorLabels)?;
+        solver::estimate(backend, plan, mirrored, run).await?;
+        run.stage(backend, plan, Stage::MirrorLabels).await?;
         run.inspector = inspector;
     }
     let prepared = prepare(backend, plan, pair.clone(), run)?;
-    let iterations = solver::estimate(backend, plan, prepared, run)?;
+    let iterations = solver::estimate(backend, plan, prepared, run).await?;
     for stage in solver::post_processing(&plan.method) {
-        run.stage(backend, plan, stage)?;
+        run.stage(backend, plan, stage).await?;
     }
     let mut tickets = Tickets { left: backend.request_maps()?, right: None };
     if plan.method.refinement.right_map {
         for stage in solver::right_view().into_iter().chain(solver::post_processing(&plan.method)) {
-            run.stage(backend, plan, stage)?;
+            run.stage(backend, plan, stage).await?;
         }
         tickets.right = Some(backend.request_maps()?);
     }
@@ -171,11 +187,11 @@ fn whole(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, run: &mut Run) -> 
 ///
 /// # Errors
 /// Those of [`solve`].
-pub fn solve_tiles(
+pub async fn solve_tiles(
     backend: &mut dyn Backend,
     tiles: &Tiles,
     pair: &Pair,
-    observer: Observer,
+    observer: Observer<'_>,
 ) -> Result<Solution> {
     let whole = tiles.whole();
     let all: f64 = tiles.list().iter().map(|tile| solver::work(&tile.plan)).sum();
@@ -193,9 +209,9 @@ pub fn solve_tiles(
             drop(crop);
             let plan = solver::streamed(&tile.plan);
             let prepared = prepare(backend, &plan, mirrored, &mut run)?;
-            solver::estimate(backend, &plan, prepared, &mut run)?;
-            backend.wait()?;
-            run.watch.host("download", || mosaic.place_mirrored(tile, backend))?;
+            solver::estimate(backend, &plan, prepared, &mut run).await?;
+            backend.wait().await?;
+            run.watch.host_async("download", mosaic.place_mirrored(tile, backend)).await?;
             traffic += backend.traffic();
         }
     }
@@ -205,16 +221,16 @@ pub fn solve_tiles(
         let plan = solver::streamed(&tile.plan);
         let prepared = prepare(backend, &plan, crop, &mut run)?;
         let matched = prepared.pair.clone();
-        let all = solver::estimate(backend, &plan, prepared, &mut run)?;
-        iterations = iterations.max(all - backend.idle_iterations()?);
-        backend.wait()?;
-        let seen = run.watch.host("download", || mosaic.place(tile, &matched, backend))?;
+        let all = solver::estimate(backend, &plan, prepared, &mut run).await?;
+        iterations = iterations.max(all - backend.idle_iterations().await?);
+        backend.wait().await?;
+        let seen = run.watch.host_async("download", mosaic.place(tile, &matched, backend)).await?;
         if right_map_wanted && matchings(whole) == 1 {
             for stage in solver::right_view() {
-                run.stage(backend, &plan, stage)?;
+                run.stage(backend, &plan, stage).await?;
             }
-            backend.wait()?;
-            run.watch.host("download", || mosaic.place_right(tile, &seen, backend))?;
+            backend.wait().await?;
+            run.watch.host_async("download", mosaic.place_right(tile, &seen, backend)).await?;
         }
         traffic += backend.traffic();
         cells.iter_mut().zip(backend.cells()).for_each(|(sum, of_tile)| *sum += of_tile);

@@ -86,6 +86,7 @@ pub mod maps;
 mod matcher;
 mod memory;
 pub mod options;
+mod pause;
 mod plan;
 mod roofline;
 mod solver;

@@ -5,10 +5,17 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::error::{MemoryError, Purpose, Result};
 
 /// Bytes that can be had without swapping, where the system says so.
+#[cfg(not(target_arch = "wasm32"))]
 fn available() -> Option<u64> {
     let mut system = sysinfo::System::new();
     system.refresh_memory_specifics(sysinfo::MemoryRefreshKind::nothing().with_ram());
     Some(system.available_memory()).filter(|_| sysinfo::IS_SUPPORTED_SYSTEM)
+}
+
+/// A browser does not say.
+#[cfg(target_arch = "wasm32")]
+fn available() -> Option<u64> {
+    None
 }
 
 /// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end the process

@@ -45,24 +45,24 @@ impl<'a, 'b> Run<'a, 'b> {
     ///
     /// # Errors
     /// Those of the backend and of the inspector, and [`crate::Error::Interrupted`] when the observer breaks.
-    pub fn stage(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
+    pub async fn stage(&mut self, backend: &mut dyn Backend, plan: &Plan, stage: Stage) -> Result<()> {
         if let Some(together) = &mut self.together {
             together.push(stage);
             return Ok(());
         }
         self.watch.begin(stage.name(), work_of(plan, stage))?;
         backend.run(stage)?;
+        backend.keep_up().await?;
         self.inspect(&mut Inspection::Stage(backend, stage))
     }
 
     /// Runs the stages that were gathered since `together` began, if it did.
-    fn run_together(&mut self, backend: &mut dyn Backend, plan: &Plan) -> Result<()> {
+    async fn run_together(&mut self, backend: &mut dyn Backend, plan: &Plan) -> Result<()> {
         let Some(stages) = self.together.take() else { return Ok(()) };
         let wavefront = Wavefront::new(plan, stages).expect("stages that go row by row");
         let watch = &mut self.watch;
-        backend.run_wavefront(&wavefront, &mut |stage, share| {
-            watch.begin(stage.name(), share * work_of(plan, stage))
-        })
+        let mut before = |stage: Stage, share| watch.begin(stage.name(), share * work_of(plan, stage));
+        backend.run_wavefront(&wavefront, &mut before).await
     }
 
     fn inspect(&mut self, inspection: &mut Inspection) -> Result<()> {
@@ -75,24 +75,31 @@ impl<'a, 'b> Run<'a, 'b> {
 ///
 /// # Errors
 /// Those of [`Run::stage`].
-pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run: &mut Run) -> Result<u32> {
+pub async fn estimate(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    prepared: Prepared,
+    run: &mut Run<'_, '_>,
+) -> Result<u32> {
     run.inspect(&mut Inspection::Prepared(&prepared))?;
     run.watch.host("upload", || backend.prepare(plan, prepared))?;
     for z in 0..plan.levels.len() {
-        run.stage(backend, plan, Stage::Graph(z))?;
+        run.stage(backend, plan, Stage::Graph(z)).await?;
     }
     let costs = (0..plan.levels.len()).flat_map(|z| {
         let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
         iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
     });
     for stage in costs {
-        run.stage(backend, plan, stage)?;
+        run.stage(backend, plan, stage).await?;
     }
-    let iterations = flood(backend, plan, run, |backend, run, z| join(backend, plan, run, z))?;
+    let join =
+        async |backend: &mut dyn Backend, run: &mut Run<'_, '_>, z: usize| join(backend, plan, run, z).await;
+    let iterations = flood(backend, plan, run, join).await?;
     for stage in read_out(plan) {
-        run.stage(backend, plan, stage)?;
+        run.stage(backend, plan, stage).await?;
     }
-    run.run_together(backend, plan)?;
+    run.run_together(backend, plan).await?;
     Ok(iterations)
 }
 
@@ -100,12 +107,12 @@ pub fn estimate(backend: &mut dyn Backend, plan: &Plan, prepared: Prepared, run:
 ///
 /// # Errors
 /// Those of [`Run::stage`].
-pub fn join(backend: &mut dyn Backend, plan: &Plan, run: &mut Run, z: usize) -> Result<()> {
-    run.stage(backend, plan, Stage::LabelWindow(z))?;
+pub async fn join(backend: &mut dyn Backend, plan: &Plan, run: &mut Run<'_, '_>, z: usize) -> Result<()> {
+    run.stage(backend, plan, Stage::LabelWindow(z)).await?;
     if z == 0 && !plan.holds_all_rows() {
         run.together = Some(Vec::new());
     }
-    run.stage(backend, plan, Stage::Evidence(z))
+    run.stage(backend, plan, Stage::Evidence(z)).await
 }
 
 /// Runs the flooding of `plan`; `join` is called for each level that joins, coarsest first. Returns the number of iterations,
@@ -113,36 +120,36 @@ pub fn join(backend: &mut dyn Backend, plan: &Plan, run: &mut Run, z: usize) -> 
 ///
 /// # Errors
 /// Those of [`estimate`] and of `join`.
-pub fn flood<'a, 'b>(
+pub async fn flood<'a, 'b>(
     backend: &mut dyn Backend,
     plan: &Plan,
     run: &mut Run<'a, 'b>,
-    join: impl Fn(&mut dyn Backend, &mut Run<'a, 'b>, usize) -> Result<()>,
+    join: impl AsyncFn(&mut dyn Backend, &mut Run<'a, 'b>, usize) -> Result<()>,
 ) -> Result<u32> {
     let mut iterations = 0;
     let mut joined = plan.levels.len();
     for phase in &plan.phases {
         for z in (phase.finest..joined).rev() {
-            join(backend, run, z)?;
+            join(backend, run, z).await?;
         }
         joined = phase.finest;
         for stage in joining(plan, phase) {
-            run.stage(backend, plan, stage)?;
+            run.stage(backend, plan, stage).await?;
         }
         let may_settle = plan.settled_change().is_some() && phase.finest == 0;
         if may_settle {
-            run.stage(backend, plan, Stage::Change)?;
+            run.stage(backend, plan, Stage::Change).await?;
         }
         for i in 0..phase.iterations {
             iterations += 1;
             for stage in iteration(plan, phase, i) {
-                run.stage(backend, plan, stage)?;
+                run.stage(backend, plan, stage).await?;
             }
             run.inspect(&mut Inspection::Iteration(backend, iterations))?;
             if may_settle {
-                run.stage(backend, plan, Stage::Change)?;
+                run.stage(backend, plan, Stage::Change).await?;
                 // Who looks in sees no idle iterations, at the price of time.
-                if backend.settled(run.inspector.is_some())? {
+                if backend.settled(run.inspector.is_some()).await? {
                     break;
                 }
             }

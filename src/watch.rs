@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use web_time::Instant;
 
 /// Progress of a match.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +73,22 @@ impl<'a> Watch<'a> {
         self.begin(name, 0.0)?;
         let clock = Instant::now();
         let done = job()?;
+        self.times.push((name, clock.elapsed()));
+        Ok(done)
+    }
+
+    /// As [`Self::host`], for a step that waits for a device.
+    ///
+    /// # Errors
+    /// Those of [`Self::host`].
+    pub async fn host_async<T>(
+        &mut self,
+        name: &'static str,
+        job: impl Future<Output = Result<T>>,
+    ) -> Result<T> {
+        self.begin(name, 0.0)?;
+        let clock = Instant::now();
+        let done = job.await?;
         self.times.push((name, clock.elapsed()));
         Ok(done)
     }

@@ -17,6 +17,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Execution, Method};
 use mrfgs::{Error, Matched, Matcher, Result};
+use pollster::block_on;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
@@ -40,7 +41,7 @@ fn corner(pair: &Pair) -> Pair {
 fn on(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange) -> Result<Solution> {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
-    solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(()))
+    block_on(solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())))
 }
 
 fn expected(pair: &Pair, range: DisparityRange) -> Maps {

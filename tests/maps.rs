@@ -19,6 +19,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::tiles::Tiles;
 use mrfgs::maps::{Maps, RightMap, flag};
 use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential};
+use pollster::block_on;
 use std::ops::ControlFlow;
 
 /// The maps that the naive twins compute from what a match leaves in `finest`.
@@ -86,7 +87,8 @@ fn solve(pair: &Pair, plan: &Plan) -> Vec<(String, Solution)> {
         .into_iter()
         .map(|(name, mut backend)| {
             let solution =
-                engine::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())).unwrap();
+                block_on(engine::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())))
+                    .unwrap();
             (name, solution)
         })
         .collect()
@@ -112,14 +114,14 @@ fn the_stages_run_in_order() {
             let backend = backend.as_mut();
             let iterations = estimated(backend, &pair, &plan);
             let mut finest = Finest::zero(size);
-            finest.label = backend.map(Map::Label).unwrap();
-            finest.best = backend.map(Map::Best).unwrap();
-            finest.runner_up = backend.map(Map::RunnerUp).unwrap();
+            finest.label = block_on(backend.map(Map::Label)).unwrap();
+            finest.best = block_on(backend.map(Map::Best)).unwrap();
+            finest.runner_up = block_on(backend.map(Map::RunnerUp)).unwrap();
             finest.right_label = match plan.method.refinement.left_right_check {
                 LeftRightCheck::SecondMatch => second_match(&pair, &plan),
-                _ => backend.map(Map::RightLabel).unwrap(),
+                _ => block_on(backend.map(Map::RightLabel)).unwrap(),
             };
-            finest.raw = backend.map(Map::Raw).unwrap();
+            finest.raw = block_on(backend.map(Map::Raw)).unwrap();
             let mut expected = finished(&mut finest, &plan, &pair);
             if plan.method.refinement.right_map {
                 let mut right = right_raw(&finest, &plan, &pair);
@@ -195,7 +197,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
             let mut cpu = Cpu::default();
             if method.refinement.left_right_check == LeftRightCheck::SecondMatch {
                 estimated(&mut cpu, &part(&mirrored(&pair)), &tile.plan);
-                let [labels, raw] = [Map::Label, Map::Raw].map(|map| cpu.map(map).unwrap());
+                let [labels, raw] = [Map::Label, Map::Raw].map(|map| block_on(cpu.map(map)).unwrap());
                 for (x, y) in places(core) {
                     let at = (x - crop.x.start, y - crop.y.start);
                     finest.right_label[(width - 1 - x, y)] = labels[at];
@@ -204,7 +206,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
             }
             iterations = iterations.max(estimated(&mut cpu, &part(&pair), &tile.plan));
             let maps = [Map::Label, Map::Best, Map::RunnerUp, Map::Raw, Map::RightLabel, Map::RightBest]
-                .map(|map| cpu.map(map).unwrap());
+                .map(|map| block_on(cpu.map(map)).unwrap());
             for (x, y) in places(core) {
                 let at = (x - crop.x.start, y - crop.y.start);
                 (finest.label[(x, y)], finest.best[(x, y)]) = (maps[0][at], maps[1][at]);
@@ -234,7 +236,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         }
         for (name, mut backend) in backends() {
             let observer = &mut |_| ControlFlow::Continue(());
-            let actual = engine::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();
+            let actual = block_on(engine::solve_tiles(backend.as_mut(), &tiles, &pair, observer)).unwrap();
             if let Err(e) = compare_all(&actual.maps, &expected) {
                 panic!("{name}, seed {seed}: {e}\n{:?}", plan.method);
             }
@@ -258,7 +260,7 @@ fn places(part: &Rect) -> impl Iterator<Item = (usize, usize)> {
 
 fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
     let observer = &mut |_| ControlFlow::Continue(());
-    engine::solve(&mut Cpu::default(), plan, pair, observer).unwrap().maps
+    block_on(engine::solve(&mut Cpu::default(), plan, pair, observer)).unwrap().maps
 }
 
 /// Runs all stages up to [`Stage::SubPixel`]; returns the number of iterations.
@@ -272,7 +274,7 @@ fn estimated(backend: &mut dyn Backend, pair: &Pair, plan: &Plan) -> u32 {
         }
     }
     let all = common::flood_on_costs(backend, plan).unwrap();
-    let iterations = all - backend.idle_iterations().unwrap();
+    let iterations = all - block_on(backend.idle_iterations()).unwrap();
     for stage in [Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel] {
         backend.run(stage).unwrap();
     }
@@ -509,7 +511,7 @@ fn no_label_agrees_with_none() {
         backend.prepare(&plan, Prepared::new(&pair)).unwrap();
         maps.write(backend.as_mut());
         backend.run(Stage::LeftRightCheck).unwrap();
-        let validity = backend.map(Map::Validity).unwrap();
+        let validity = block_on(backend.map(Map::Validity)).unwrap();
         assert!(validity.data().iter().all(|&f| f == i32::from(flag::OCCLUDED)), "{name}");
     }
 }
@@ -522,6 +524,6 @@ fn a_plan_of_another_size_is_refused() {
     let plan = Plan::new(8, 9, range, &Method::default()).unwrap();
     for (_, mut backend) in backends() {
         let observer = &mut |_| ControlFlow::Continue(());
-        assert!(engine::solve(backend.as_mut(), &plan, &pair, observer).is_err());
+        assert!(block_on(engine::solve(backend.as_mut(), &plan, &pair, observer)).is_err());
     }
 }

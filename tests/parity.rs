@@ -16,6 +16,7 @@ use mrfgs::low_level::engine::{Solution, solve};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
+use pollster::block_on;
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -29,7 +30,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
 fn matched(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, method).unwrap();
-    solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())).unwrap()
+    block_on(solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(()))).unwrap()
 }
 
 /// The outputs in which two matches differ.
@@ -174,7 +175,8 @@ fn poisoned_buffers() {
 /// The maps that the backend holds.
 fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
-    let (maps, traffic, cells) = (backend.maps(requested).unwrap().0, backend.traffic(), backend.cells());
+    let (maps, traffic, cells) =
+        (block_on(backend.maps(requested)).unwrap().0, backend.traffic(), backend.cells());
     Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic, cells }
 }
 
@@ -212,7 +214,7 @@ fn a_device_that_shows_too_little_says_so() {
     let (pair, range) = load(Path::new("testdata/mixed"));
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
-    let result = solve(&mut gpu, &plan, &pair, &mut |_| ControlFlow::Continue(()));
+    let result = block_on(solve(&mut gpu, &plan, &pair, &mut |_| ControlFlow::Continue(())));
     assert!(matches!(&result, Err(Error::Memory(MemoryError::Buffer { .. }))), "{result:?}");
     // The device still serves what fits.
     let small = Pair::new(cut(pair.left(), 20, 15), cut(pair.right(), 20, 15)).unwrap();
@@ -237,7 +239,7 @@ fn the_largest_label_counts() {
             let range = DisparityRange::new(-labels / 2, labels - labels / 2 - 1).unwrap();
             let plan = Plan::new(9, 5, range, &method).unwrap();
             let expected = matched(&mut Cpu::default(), &small, range, &method);
-            match solve(&mut gpu, &plan, &small, &mut |_| ControlFlow::Continue(())) {
+            match block_on(solve(&mut gpu, &plan, &small, &mut |_| ControlFlow::Continue(()))) {
                 Ok(actual) => {
                     served += 1;
                     assert!(differences(&actual, &expected).is_empty(), "{preset}, {labels} labels");

@@ -18,6 +18,7 @@ use mrfgs::low_level::solver;
 use mrfgs::maps::Maps;
 use mrfgs::options::{MatchingCost, Method, Order};
 use mrfgs::{Error, Matcher};
+use pollster::block_on;
 use std::ops::ControlFlow;
 
 /// The maps of a match; `whole` holds all rows, because somebody looks in.
@@ -29,7 +30,7 @@ fn maps(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, whole: bool) -> Map
         Ok(())
     };
     let inspector: Option<solver::Inspector> = if whole { Some(&mut look) } else { None };
-    let maps = engine::inspect(backend, plan, pair, observer, inspector).unwrap().maps;
+    let maps = block_on(engine::inspect(backend, plan, pair, observer, inspector)).unwrap().maps;
     assert_eq!(looks > 0, whole);
     maps
 }

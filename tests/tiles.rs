@@ -18,6 +18,7 @@ use mrfgs::low_level::watch::Progress;
 use mrfgs::maps::{Maps, has_disparity};
 use mrfgs::options::{DisparityRange, LeftRightCheck, Method, PRESETS};
 use mrfgs::{Error, Matcher};
+use pollster::block_on;
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
 
@@ -159,7 +160,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
 }
 
 fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {
-    solve_tiles(backend, tiles, pair, &mut quiet).unwrap()
+    block_on(solve_tiles(backend, tiles, pair, &mut quiet)).unwrap()
 }
 
 /// Percentage of pixels that have a disparity in only one of the maps, or disparities more than one pixel
@@ -212,7 +213,7 @@ fn hardly_anything_differs_from_one_piece() {
         let (pair, range) = load(&folder);
         let mut cpu = Cpu::default();
         let whole = plan(pair.size(), range, &Method::default(), 4096);
-        let expected = solve(&mut cpu, &whole, &pair, &mut quiet).unwrap();
+        let expected = block_on(solve(&mut cpu, &whole, &pair, &mut quiet)).unwrap();
         for (quarters, overlap) in [(3, OVERLAP), (2, OVERLAP), (2, 0)] {
             // A plain wall is estimated from its borders, however far they are.
             let most = match quarters {
@@ -251,7 +252,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
             seen.push(progress);
             ControlFlow::Continue(())
         };
-        solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut observer).unwrap();
+        block_on(solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut observer)).unwrap();
         assert!(seen.is_sorted_by(|a, b| a.done <= b.done) && seen.iter().all(|p| p.done <= 1.0));
         let (first, last) = (seen[0], seen[seen.len() - 1]);
         assert!(first.done == 0.0 && last.done > 0.999 && last.tile.is_none(), "{last:?}");
@@ -260,7 +261,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
         assert_eq!(named, (1..=count).map(|tile| (tile, count)).collect::<Vec<_>>());
         // It stops wherever the observer breaks.
         let stop = |p: Progress| if p.tile == Some((2, count)) { ControlFlow::Break(()) } else { quiet(p) };
-        let stopped = solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop });
+        let stopped = block_on(solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop }));
         assert!(matches!(stopped, Err(Error::Interrupted)));
     }
 }

@@ -17,6 +17,7 @@ use crate::maps::Maps;
 use crate::plan::Plan;
 use probe::Probe;
 pub use stage::Stage;
+use std::pin::Pin;
 use std::time::Duration;
 pub use volume::{Map, NO_LABEL, Volume, volume_shape};
 use wavefront::Wavefront;
@@ -51,6 +52,10 @@ impl std::ops::AddAssign for Traffic {
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ticket(u64);
 
+/// What a backend is going to answer. In a native program it is there as soon as it is asked for: who asks waits meanwhile. In a
+/// browser, where nobody may wait, the thread does other work until then.
+pub type Answer<'a, T> = Pin<Box<dyn Future<Output = Result<T>> + 'a>>;
+
 /// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
 pub trait Backend {
@@ -77,29 +82,33 @@ pub trait Backend {
     /// Runs a stage. Devices may still be at it when this returns.
     fn run(&mut self, stage: Stage) -> Result<()>;
 
+    /// To be awaited between stages: until a device is no more than a few submissions behind, and in a browser until the other work
+    /// of the thread has had its turn.
+    fn keep_up(&mut self) -> Answer<'_, ()>;
+
     /// Runs the stages of a wavefront, the first that follow on the windows of level 0. What they leave of level 0 beside maps
     /// may be gone afterwards. `before` hears of each stage that is about to run, with the share of it that is.
     ///
     /// # Errors
     /// Those of `before`, beside the device's.
-    fn run_wavefront(
-        &mut self,
-        wavefront: &Wavefront,
-        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Result<()>;
+    fn run_wavefront<'a>(
+        &'a mut self,
+        wavefront: &'a Wavefront,
+        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Answer<'a, ()>;
 
     /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
     /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.
-    fn settled(&mut self, wait: bool) -> Result<bool>;
+    fn settled(&mut self, wait: bool) -> Answer<'_, bool>;
 
     /// How many iterations found the map settled already.
-    fn idle_iterations(&mut self) -> Result<u32>;
+    fn idle_iterations(&mut self) -> Answer<'_, u32>;
 
     /// Waits until every stage has run.
-    fn wait(&mut self) -> Result<()>;
+    fn wait(&mut self) -> Answer<'_, ()>;
 
     /// The values of `map`, as they are once all stages before have run.
-    fn map(&mut self, map: Map) -> Result<Plane<i32>>;
+    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>>;
 
     /// Asks for the maps as they are once all stages before have run. The next pair may be prepared before they arrive.
     fn request_maps(&mut self) -> Result<Ticket>;
@@ -109,14 +118,14 @@ pub trait Backend {
     ///
     /// # Panics
     /// When the ticket is of another backend.
-    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)>;
+    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)>;
 
     /// Starts to take the time of every stage, or stops.
     fn keep_time(&mut self, on: bool) -> Result<()>;
 
     /// The time of every run of a stage since [`Backend::keep_time`] was last called, in order: a device's own where it has
     /// a clock.
-    fn times(&mut self) -> Result<Vec<(Stage, Duration)>>;
+    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>>;
 
     /// Cells of a volume of each level, as they are stored: the labels of all pixels, with padding.
     fn cells(&self) -> Vec<u64>;

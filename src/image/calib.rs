@@ -59,7 +59,15 @@ impl Calibration {
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = text::read(path, MAX_BYTES, "calibration file")?;
         // Only the keys known here matter, and they are ASCII.
-        Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::read(path, reason))
+        Self::of_text(path, &String::from_utf8_lossy(&bytes))
+    }
+
+    /// The calibration in the text of a file, which errors call `name`.
+    ///
+    /// # Errors
+    /// [`Error::Read`] when a value is wrong; the error names the line and the key.
+    pub fn of_text(name: &Path, text: &str) -> Result<Self> {
+        Self::parse(text).map_err(|reason| Error::read(name, reason))
     }
 
     /// Parses `key=value` lines. Unknown keys, and lines without `=` that do not begin with a known key, are

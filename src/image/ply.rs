@@ -27,8 +27,9 @@ pub fn write(path: &Path, points: &[Point]) -> Result<()> {
     write::save(path, &encode(points))
 }
 
-/// The bytes of the file.
-fn encode(points: &[Point]) -> Vec<u8> {
+/// The bytes of the file that [`write`](self::write()) would write.
+#[must_use]
+pub fn encode(points: &[Point]) -> Vec<u8> {
     let header = format!(
         "ply\n\
          format binary_little_endian 1.0\n\

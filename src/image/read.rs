@@ -65,7 +65,27 @@ impl Reader {
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
         let (first, second) =
             rayon::join(|| self.decode(left, self.no_data), || self.decode(right, self.no_data));
-        let images = [first?, second?];
+        self.joined([left, right], [first?, second?], mask)
+    }
+
+    /// As [`Reader::pair`], from files that are in memory, each with the name by which errors call it.
+    ///
+    /// # Errors
+    /// Those of [`Reader::pair`].
+    pub fn pair_in_memory(self, left: (&Path, &[u8]), right: (&Path, &[u8])) -> Result<Pair> {
+        let image = |(name, bytes): (&Path, &[u8])| {
+            decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))
+        };
+        self.joined([left.0, right.0], [image(left)?, image(right)?], None)
+    }
+
+    /// The pair of two images from files with these names.
+    fn joined(
+        self,
+        [left, right]: [&Path; 2],
+        images: [Raster<'static>; 2],
+        mask: Option<&Path>,
+    ) -> Result<Pair> {
         let [l, r] = &images;
         if l.size() != r.size() {
             return Err(Error::Mismatch(format!(

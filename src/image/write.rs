@@ -41,15 +41,22 @@ enum Format {
 /// [`Error::Write`] for an unknown extension, a disparity that PNG cannot hold, or a file that cannot be
 /// written.
 pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
-    let bytes = match format(path)? {
-        Format::Pfm => pfm::encode(&map.map(|&d| if d.is_finite() { d } else { f32::INFINITY })),
+    save(path, &encode_disparity(path, map)?)
+}
+
+/// The bytes of the file that [`disparity`] would write to `path`.
+///
+/// # Errors
+/// [`Error::Write`] for an unknown extension, and a disparity that PNG cannot hold.
+pub fn encode_disparity(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
+    match format(path)? {
+        Format::Pfm => Ok(pfm::encode(&map.map(|&d| if d.is_finite() { d } else { f32::INFINITY }))),
         Format::Png => {
             let levels = png_levels(map).map_err(|reason| Error::write(path, reason))?;
-            png(path, bytemuck::cast_slice(&levels), map.size(), ExtendedColorType::L16)?
+            png(path, bytemuck::cast_slice(&levels), map.size(), ExtendedColorType::L16)
         }
-        Format::Tiff => tiff(path, &map.map(|&d| if d.is_finite() { d } else { f32::NAN }))?,
-    };
-    save(path, &bytes)
+        Format::Tiff => tiff(path, &map.map(|&d| if d.is_finite() { d } else { f32::NAN })),
+    }
 }
 
 impl Plane<f32> {
@@ -131,7 +138,15 @@ pub fn check_path(path: &Path) -> Result<()> {
 /// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
 pub fn grey8(path: &Path, plane: &Plane<u8>) -> Result<()> {
     png_extension(path)?;
-    save(path, &png(path, plane.data(), plane.size(), ExtendedColorType::L8)?)
+    save(path, &encode_grey8(path, plane)?)
+}
+
+/// The bytes of the file that [`grey8`] would write to `path`.
+///
+/// # Errors
+/// [`Error::Write`] when PNG cannot hold a picture of this size.
+pub fn encode_grey8(path: &Path, plane: &Plane<u8>) -> Result<Vec<u8>> {
+    png(path, plane.data(), plane.size(), ExtendedColorType::L8)
 }
 
 /// Writes 8-bit colours (red, green, blue) as PNG.

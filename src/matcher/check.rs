@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 
 /// Sees that a device computes a small pair by `method` as the CPU path does, before it matches a large one: a driver that gets
 /// arithmetic, loops or memory wrong says nothing. `checked` is the last method that passed.
-pub(super) fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>) -> Result<()> {
+pub(super) async fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>) -> Result<()> {
     if checked.as_ref() == Some(method) {
         return Ok(());
     }
@@ -28,8 +28,8 @@ pub(super) fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<Method>
     let pair = Pair::new(left, right)?;
     let plan = Plan::new(width, height, DisparityRange::new(-1, 16)?, method)?;
     let quiet = &mut |_| ControlFlow::Continue(());
-    let expected = engine::solve(&mut Cpu::default(), &plan, &pair, quiet)?;
-    let found = engine::solve(gpu, &plan, &pair, quiet)?;
+    let expected = engine::solve(&mut Cpu::default(), &plan, &pair, quiet).await?;
+    let found = engine::solve(gpu, &plan, &pair, quiet).await?;
     if found.maps != expected.maps {
         return Err(DeviceError::WrongMaps { name: gpu.describe() }.into());
     }

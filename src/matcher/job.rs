@@ -2,7 +2,7 @@
 
 use super::search::Search;
 use super::{Matched, Matcher};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
 use crate::solver::Inspection;
@@ -29,6 +29,7 @@ impl Answer for ControlFlow<()> {
 }
 
 type Listener<'a> = Box<dyn FnMut(Progress) -> bool + Send + 'a>;
+type Find<'a> = Box<dyn FnOnce(&Pair) -> Result<DisparityRange> + Send + 'a>;
 type Inspect<'a> = Box<dyn FnMut(&mut Inspection) -> Result<()> + Send + 'a>;
 
 /// A match that has not begun: [`Matcher::job`] makes one, [`Job::run`] does it.
@@ -36,7 +37,7 @@ type Inspect<'a> = Box<dyn FnMut(&mut Inspection) -> Result<()> + Send + 'a>;
 pub struct Job<'a> {
     matcher: &'a mut Matcher,
     pair: &'a Pair,
-    range: Result<DisparityRange>,
+    find: Find<'a>,
     method: Option<&'a Method>,
     cancel: Option<&'a AtomicBool>,
     listener: Option<Listener<'a>>,
@@ -48,20 +49,21 @@ impl Matcher {
     ///
     /// # Errors
     /// Those of [`Job::run`].
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn run(&mut self, pair: &Pair, search: impl Search) -> Result<Matched> {
         self.job(pair, search).run()
     }
 
     /// A match of `pair` that can be watched, stopped and inspected. See [`Matcher::run`].
-    pub fn job<'a>(&'a mut self, pair: &'a Pair, search: impl Search) -> Job<'a> {
+    pub fn job<'a>(&'a mut self, pair: &'a Pair, search: impl Search + 'a) -> Job<'a> {
         Job::new(self, pair, search)
     }
 }
 
 impl<'a> Job<'a> {
-    pub(super) fn new(matcher: &'a mut Matcher, pair: &'a Pair, search: impl Search) -> Self {
-        let range = matcher.pool.install(|| search.range(pair));
-        Self { matcher, pair, range, method: None, cancel: None, listener: None, inspect: None }
+    pub(super) fn new(matcher: &'a mut Matcher, pair: &'a Pair, search: impl Search + 'a) -> Self {
+        let find = Box::new(move |pair: &Pair| search.range(pair));
+        Self { matcher, pair, find, method: None, cancel: None, listener: None, inspect: None }
     }
 
     /// By `method` instead of the matcher's own.
@@ -81,6 +83,7 @@ impl<'a> Job<'a> {
     }
 
     /// `inspect` looks into the match on its way, for diagnosis. It may read any volume and map, at the price of time.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn inspect(self, inspect: impl FnMut(&mut Inspection) -> Result<()> + Send + 'a) -> Self {
         Self { inspect: Some(Box::new(inspect)), ..self }
     }
@@ -92,8 +95,18 @@ impl<'a> Job<'a> {
     /// tile is small enough for the method's memory, [`Error::Device`] where the wanted device fails, [`Error::Memory`] when
     /// the machine or the device cannot hold the match, [`Error::Interrupted`] when it was stopped, and those of
     /// [`Job::inspect`].
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn run(self) -> Result<Matched> {
-        let Self { matcher, pair, range, method, cancel, mut listener, mut inspect } = self;
+        pollster::block_on(self.run_async())
+    }
+
+    /// As `run`, for a browser: between stages the thread does its other work.
+    ///
+    /// # Errors
+    /// Those of `run`.
+    pub async fn run_async(self) -> Result<Matched> {
+        let Self { matcher, pair, find, method, cancel, mut listener, mut inspect } = self;
+        let range = matcher.threads.run(async || find(pair)).await?;
         let own = matcher.method.clone();
         let mut observer = |progress| {
             let stopped = cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
@@ -101,18 +114,19 @@ impl<'a> Job<'a> {
             if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
         let inspector = inspect.as_mut().map(|inspect| &mut **inspect as _);
-        matcher.solve(pair, range?, method.unwrap_or(&own), &mut observer, inspector)
+        matcher.solve(pair, range, method.unwrap_or(&own), &mut observer, inspector).await
     }
 
     /// Matches the pair, and writes the disparities to `out` as well, row by row, in pixels, `+inf` where there is none.
     ///
     /// # Errors
     /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` has not as many elements as the images have pixels.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn run_into(self, out: &mut [f32]) -> Result<Matched> {
         let (width, height) = self.pair.size();
         if out.len() != width * height {
             let reason = format!("{} values for a map of {width} x {height} pixels", out.len());
-            return Err(Error::Mismatch(reason));
+            return Err(crate::Error::Mismatch(reason));
         }
         let matched = self.run()?;
         out.copy_from_slice(matched.disparity().data());

@@ -4,12 +4,13 @@ mod check;
 mod job;
 mod matched;
 mod search;
+mod threads;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
-use crate::backend::gpu::{self, Gpu};
+use crate::backend::gpu::{self, FaultInjection, Gpu};
 use crate::engine::{self, Started};
-use crate::error::{BudgetError, Error, ExecutionError, Result};
+use crate::error::{BudgetError, Error, Result};
 use crate::image::Pair;
 use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
@@ -22,6 +23,7 @@ use matched::summed;
 pub use matched::{Matched, Timing};
 pub use search::Search;
 use std::ops::ControlFlow;
+use threads::Threads;
 
 /// Chooses what a [`Matcher`] does, and where.
 #[derive(Clone, Debug, Default)]
@@ -66,13 +68,25 @@ impl Builder {
     /// # Errors
     /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
     /// driver or the device cannot be opened.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn build(self) -> Result<Matcher> {
+        pollster::block_on(self.build_async())
+    }
+
+    /// As `build`, for a browser, where nobody may wait.
+    ///
+    /// # Errors
+    /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
+    /// driver or the device cannot be opened.
+    pub async fn build_async(self) -> Result<Matcher> {
         let Self { method, execution } = self;
+        let open = |wanted| Gpu::open_async(wanted, FaultInjection::default());
         let (gpu, falls_back) = match &execution.device {
             DeviceChoice::Cpu => (None, false),
-            DeviceChoice::Gpu => (Some(Gpu::new(None)), false),
-            DeviceChoice::Named(name) => (Some(Gpu::new(Some(name))), false),
-            DeviceChoice::Auto => (gpu::has_automatic().then(|| Gpu::new(None)), true),
+            DeviceChoice::Gpu => (Some(open(None).await), false),
+            DeviceChoice::Named(name) => (Some(open(Some(name)).await), false),
+            DeviceChoice::Auto if gpu::has_automatic_async().await => (Some(open(None).await), true),
+            DeviceChoice::Auto => (None, true),
         };
         Matcher::build(method, gpu, falls_back, &execution)
     }
@@ -81,7 +95,7 @@ impl Builder {
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
     method: Method,
-    pool: rayon::ThreadPool,
+    threads: Threads,
     cpu: Cpu,
     gpu: Option<Gpu>,
     /// The last method that the device was seen to compute as the CPU path does.
@@ -98,6 +112,7 @@ impl Matcher {
     ///
     /// # Errors
     /// Those of [`Builder::build`].
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new() -> Result<Self> {
         Self::builder().build()
     }
@@ -121,14 +136,7 @@ impl Matcher {
         falls_back: bool,
         execution: &Execution,
     ) -> Result<Self> {
-        let mut pool = rayon::ThreadPoolBuilder::new();
-        if let Some(threads) = execution.threads {
-            if threads == 0 {
-                return Err(ExecutionError::NoThreads.into());
-            }
-            pool = pool.num_threads(threads);
-        }
-        let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
+        let threads = Threads::new(execution.threads)?;
         let (gpu, given_up) = match gpu.transpose() {
             Ok(gpu) => (gpu, None),
             Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e)),
@@ -136,7 +144,7 @@ impl Matcher {
         };
         Ok(Self {
             method,
-            pool,
+            threads,
             cpu: Cpu::default(),
             gpu,
             checked: None,
@@ -157,13 +165,13 @@ impl Matcher {
     }
 
     /// Matches `pair`, and tells of it as asked.
-    fn solve(
+    async fn solve(
         &mut self,
         pair: &Pair,
         range: DisparityRange,
         method: &Method,
-        observer: Observer,
-        mut inspector: Option<Inspector>,
+        observer: Observer<'_>,
+        mut inspector: Option<Inspector<'_>>,
     ) -> Result<Matched> {
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
@@ -172,21 +180,22 @@ impl Matcher {
         if inspector.is_some() && needed > plan.method.tiles.memory.into() {
             return Err(BudgetError::Steps { needed }.into());
         }
-        let Self { pool, gpu, checked, timings, .. } = self;
+        let Self { threads, gpu, checked, timings, .. } = self;
         let mut note = None;
         if let Some(device) = gpu {
-            let served = pool.install(|| {
-                check(device, &plan.method, checked)?;
-                timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector))
-            });
-            match served {
+            let served = async || {
+                check(device, &plan.method, checked).await?;
+                timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector)).await
+            };
+            match threads.run(served).await {
                 Err(e) => note = Some(self.without_device(e)?),
                 served => return served,
             }
         }
-        let Self { pool, cpu, given_up, timings, .. } = self;
+        let Self { threads, cpu, given_up, timings, .. } = self;
         let note = note.or_else(|| given_up.clone());
-        let matched = pool.install(|| timed(cpu, *timings, &tiles, pair, observer, inspector))?;
+        let served = async || timed(cpu, *timings, &tiles, pair, observer, inspector).await;
+        let matched = threads.run(served).await?;
         Ok(Matched { note, ..matched })
     }
 
@@ -196,7 +205,20 @@ impl Matcher {
     ///
     /// # Errors
     /// Those of [`Job::run`]; the results of all pairs before have been handed out then.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn run_all(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        take: impl FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        pollster::block_on(self.run_all_async(pairs, take))
+    }
+
+    /// As `run_all`, for a browser.
+    ///
+    /// # Errors
+    /// Those of [`Job::run_async`]; the results of all pairs before have been handed out then.
+    pub async fn run_all_async(
         &mut self,
         pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
         mut take: impl FnMut(Matched) -> ControlFlow<()>,
@@ -205,63 +227,63 @@ impl Matcher {
         let observer: Observer = &mut |_| ControlFlow::Continue(());
         let mut last: Option<Flight> = None;
         for (pair, range) in pairs {
-            let started = self.start(&pair, range, method, &mut *observer);
+            let started = self.start(&pair, range, method, &mut *observer).await;
             if let Some(last) = last.take()
-                && take(self.land(last, method, &mut *observer)?).is_break()
+                && take(self.land(last, method, &mut *observer).await?).is_break()
             {
                 return Ok(());
             }
             match started? {
                 Some((tiles, started)) => last = Some(Flight { pair, range, tiles, started }),
                 None => {
-                    if take(self.solve(&pair, range, method, &mut *observer, None)?).is_break() {
+                    if take(self.solve(&pair, range, method, &mut *observer, None).await?).is_break() {
                         return Ok(());
                     }
                 }
             }
         }
         if let Some(last) = last {
-            let _ = take(self.land(last, method, observer)?);
+            let _ = take(self.land(last, method, observer).await?);
         }
         Ok(())
     }
 
     /// Starts a match on the device, where it can be left to itself.
-    fn start(
+    async fn start(
         &mut self,
         pair: &Pair,
         range: DisparityRange,
         method: &Method,
-        observer: Observer,
+        observer: Observer<'_>,
     ) -> Result<Option<(Tiles, Started)>> {
-        let Self { pool, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
+        let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
         if tiles.count() > 1 {
             return Ok(None);
         }
-        let started = pool.install(|| {
-            check(device, &plan.method, checked)?;
+        let started = async || {
+            check(device, &plan.method, checked).await?;
             device.keep_time(false)?;
-            engine::start(device, &plan, pair, observer)
-        });
-        match started {
+            engine::start(device, &plan, pair, observer).await
+        };
+        match threads.run(started).await {
             Ok(started) => Ok(Some((tiles, started))),
             Err(e) => self.without_device(e).map(|_| None),
         }
     }
 
     /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
-    fn land(&mut self, flight: Flight, method: &Method, observer: Observer) -> Result<Matched> {
+    async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
         let Flight { pair, range, tiles, started } = flight;
         if let Some(device) = &mut self.gpu {
-            match self.pool.install(|| engine::finish(device, started)) {
+            match self.threads.run(async || engine::finish(device, started).await).await {
                 Ok(solution) => return Ok(Matched::new(device, &tiles, solution, Vec::new())),
                 Err(e) => self.without_device(e)?,
             };
         }
-        self.solve(&pair, range, method, observer, None)
+        self.solve(&pair, range, method, observer, None).await
     }
 
     /// The failure of a device as a note, where the CPU path may step in: the bits are the same there, so it costs only time.
@@ -289,21 +311,21 @@ struct Flight {
     started: Started,
 }
 
-fn timed(
+async fn timed(
     backend: &mut dyn Backend,
     timings: bool,
     tiles: &Tiles,
     pair: &Pair,
-    observer: Observer,
-    inspector: Option<Inspector>,
+    observer: Observer<'_>,
+    inspector: Option<Inspector<'_>>,
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
     let solution = if tiles.count() == 1 {
-        engine::inspect(backend, tiles.whole(), pair, observer, inspector)?
+        engine::inspect(backend, tiles.whole(), pair, observer, inspector).await?
     } else {
-        engine::solve_tiles(backend, tiles, pair, observer)?
+        engine::solve_tiles(backend, tiles, pair, observer).await?
     };
-    let timings = if timings { summed(&solution, &backend.times()?) } else { Vec::new() };
+    let timings = if timings { summed(&solution, &backend.times().await?) } else { Vec::new() };
     Ok(Matched::new(backend, tiles, solution, timings))
 }
 

@@ -52,16 +52,21 @@ impl Mosaic {
     ///
     /// # Errors
     /// Those of `backend`.
-    pub fn place(&mut self, tile: &Tile, pair: &Pair, backend: &mut dyn Backend) -> Result<Plane<bool>> {
+    pub async fn place(
+        &mut self,
+        tile: &Tile,
+        pair: &Pair,
+        backend: &mut dyn Backend,
+    ) -> Result<Plane<bool>> {
         let Tile { core, crop, .. } = tile;
         let part = core.within(crop);
         for map in [Map::Label, Map::Best, Map::RunnerUp, Map::Raw] {
-            self.maps.write_part(map, &backend.map(map)?, &part, (core.x.start, core.y.start));
+            self.maps.write_part(map, &backend.map(map).await?, &part, (core.x.start, core.y.start));
         }
         let (width, height) = crop.size();
         let mut better = Plane::filled(width, height, false);
         if self.plan.reads_right_view() {
-            let (labels, best) = (backend.map(Map::RightLabel)?, backend.map(Map::RightBest)?);
+            let (labels, best) = (backend.map(Map::RightLabel).await?, backend.map(Map::RightBest).await?);
             for (y, row) in core.y.clone().zip(part.y.clone()) {
                 let old_best = self.maps.right_best.row_mut(y)[crop.x.clone()].iter_mut();
                 let old = old_best.zip(&mut self.maps.right.row_mut(y)[crop.x.clone()]);
@@ -93,13 +98,13 @@ impl Mosaic {
     ///
     /// # Errors
     /// Those of `backend`.
-    pub fn place_right(
+    pub async fn place_right(
         &mut self,
         tile: &Tile,
         better: &Plane<bool>,
         backend: &mut dyn Backend,
     ) -> Result<()> {
-        let raw = backend.map(Map::Raw)?.mirrored();
+        let raw = backend.map(Map::Raw).await?.mirrored();
         for (y, row) in tile.crop.y.clone().zip(0..) {
             let old = self.right_raw.row_mut(y)[tile.crop.x.clone()].iter_mut();
             for ((old, &new), _) in old.zip(raw.row(row)).zip(better.row(row)).filter(|(_, better)| **better)
@@ -115,14 +120,14 @@ impl Mosaic {
     ///
     /// # Errors
     /// Those of `backend`.
-    pub fn place_mirrored(&mut self, tile: &Tile, backend: &mut dyn Backend) -> Result<()> {
+    pub async fn place_mirrored(&mut self, tile: &Tile, backend: &mut dyn Backend) -> Result<()> {
         let (width, _) = self.plan.size();
         let (core, crop) = (tile.core.mirrored(width), tile.crop.mirrored(width));
-        let labels = backend.map(Map::Label)?.mirrored();
+        let labels = backend.map(Map::Label).await?.mirrored();
         let part = core.within(&crop);
         self.maps.write_part(Map::RightLabel, &labels, &part, (core.x.start, core.y.start));
         if self.right.is_some() {
-            let raw = backend.map(Map::Raw)?.mirrored();
+            let raw = backend.map(Map::Raw).await?.mirrored();
             for (y, row) in core.y.clone().zip(part.y) {
                 let from = &raw.row(row)[part.x.clone()];
                 self.right_raw.row_mut(y)[core.x.clone()].copy_from_slice(from);

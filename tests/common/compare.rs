@@ -4,6 +4,7 @@ use super::twin::{Finest, UNDEFINED};
 use mrfgs::image::Plane;
 use mrfgs::low_level::backend::{Backend, Volume, volume_shape};
 use mrfgs::low_level::plan::Plan;
+use pollster::block_on;
 use std::fmt::Debug;
 
 /// Where `actual` first differs from `expected`, both \[y\]\[x\]\[slot\]\[label\] of `volume`, and how often
@@ -38,7 +39,7 @@ pub fn compare(plan: &Plan, volume: Volume, actual: &[u32], expected: &[u32]) ->
 /// The first map of a backend that differs from the twin's.
 pub fn compare_finest(backend: &mut dyn Backend, expected: &Finest) -> Result<(), String> {
     for (map, plane) in expected.planes() {
-        compare_maps(&format!("{map:?}"), &backend.map(map).unwrap(), plane)?;
+        compare_maps(&format!("{map:?}"), &block_on(backend.map(map)).unwrap(), plane)?;
     }
     Ok(())
 }

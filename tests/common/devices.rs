@@ -6,7 +6,7 @@ use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::low_level::backend::probe::Probe;
 use mrfgs::low_level::backend::wavefront::Wavefront;
-use mrfgs::low_level::backend::{Backend, Map, Stage, Ticket, Traffic};
+use mrfgs::low_level::backend::{Answer, Backend, Map, Stage, Ticket, Traffic};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::Maps;
@@ -81,27 +81,31 @@ impl Backend for Pooled {
         self.gpu().run(stage)
     }
 
-    fn run_wavefront(
-        &mut self,
-        wavefront: &Wavefront,
-        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Result<()> {
+    fn keep_up(&mut self) -> Answer<'_, ()> {
+        self.gpu().keep_up()
+    }
+
+    fn run_wavefront<'a>(
+        &'a mut self,
+        wavefront: &'a Wavefront,
+        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Answer<'a, ()> {
         self.gpu().run_wavefront(wavefront, before)
     }
 
-    fn settled(&mut self, wait: bool) -> Result<bool> {
+    fn settled(&mut self, wait: bool) -> Answer<'_, bool> {
         self.gpu().settled(wait)
     }
 
-    fn idle_iterations(&mut self) -> Result<u32> {
+    fn idle_iterations(&mut self) -> Answer<'_, u32> {
         self.gpu().idle_iterations()
     }
 
-    fn wait(&mut self) -> Result<()> {
+    fn wait(&mut self) -> Answer<'_, ()> {
         self.gpu().wait()
     }
 
-    fn map(&mut self, map: Map) -> Result<Plane<i32>> {
+    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>> {
         self.gpu().map(map)
     }
 
@@ -109,7 +113,7 @@ impl Backend for Pooled {
         self.gpu().request_maps()
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
+    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)> {
         self.gpu().maps(ticket)
     }
 
@@ -117,7 +121,7 @@ impl Backend for Pooled {
         self.gpu().keep_time(on)
     }
 
-    fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
+    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>> {
         self.gpu().times()
     }
 

@@ -17,6 +17,7 @@ use mrfgs::low_level::graph::{self, LevelGraph};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::solver::{self, Run};
 use mrfgs::low_level::watch::Watch;
+use pollster::block_on;
 use std::ops::ControlFlow;
 
 /// The graphs of all levels of `plan`, chosen by `image`.
@@ -42,13 +43,15 @@ pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[Le
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     let mut go_on = |_| ControlFlow::Continue(());
     let watch = Watch::new(&mut go_on, 1.0);
-    solver::flood(backend, plan, &mut Run::new(watch, None), |_, _, _| Ok(()))
+    let nothing = async |_: &mut dyn Backend, _: &mut Run<'_, '_>, _| Ok(());
+    block_on(solver::flood(backend, plan, &mut Run::new(watch, None), nothing))
 }
 
 /// The same on the costs that `backend` holds.
 pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
     let mut go_on = |_| ControlFlow::Continue(());
     let watch = Watch::new(&mut go_on, 1.0);
-    let join = |backend: &mut dyn Backend, run: &mut Run, z| solver::join(backend, plan, run, z);
-    solver::flood(backend, plan, &mut Run::new(watch, None), join)
+    let join =
+        async |backend: &mut dyn Backend, run: &mut Run<'_, '_>, z| solver::join(backend, plan, run, z).await;
+    block_on(solver::flood(backend, plan, &mut Run::new(watch, None), join))
 }

@@ -7,6 +7,7 @@ use crate::common::twin::belief::belief_most;
 use crate::on_all;
 use mrfgs::low_level::backend::{Stage, Volume};
 use mrfgs::low_level::front::Prepared;
+use pollster::block_on;
 
 #[test]
 fn change() {
@@ -49,7 +50,7 @@ fn a_map_settles() {
             for (i, (labels, moved, settled)) in steps.into_iter().enumerate() {
                 backend.probe().write(Volume::Belief(0), &belief(labels, moved)).unwrap();
                 backend.run(Stage::Change).unwrap();
-                assert_eq!(backend.settled(true).unwrap(), settled, "{name}, {i}");
+                assert_eq!(block_on(backend.settled(true)).unwrap(), settled, "{name}, {i}");
             }
         }
     }

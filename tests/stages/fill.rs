@@ -10,6 +10,7 @@ use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{Method, Nearer};
+use pollster::block_on;
 
 #[test]
 fn fill() {
@@ -51,7 +52,7 @@ fn fill_in_a_mirror() {
             backend.prepare(plan, Prepared::new(&pair)).unwrap();
             maps.write(backend.as_mut());
             backend.run(Stage::Fill).unwrap();
-            (backend.map(Map::Disparity).unwrap(), backend.map(Map::Validity).unwrap())
+            (block_on(backend.map(Map::Disparity)).unwrap(), block_on(backend.map(Map::Validity)).unwrap())
         };
         let smaller = filled(&plans[1], &maps);
         let mirror = |(disparity, validity): (Plane<i32>, Plane<i32>)| {

@@ -11,6 +11,7 @@ use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{Agreement, MatchingCost, Method, Order, PRESETS, Potential};
+use pollster::block_on;
 use std::collections::HashSet;
 
 /// Message passing continues correctly from volumes that were written, whatever a backend stores in the
@@ -168,7 +169,7 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
         }
         let check = |backend: &mut dyn Backend| -> Result<(), String> {
             let all = crate::common::flood_on_costs(backend, plan).unwrap();
-            let actual = all - backend.idle_iterations().unwrap();
+            let actual = all - block_on(backend.idle_iterations()).unwrap();
             if actual != iterations {
                 return Err(format!("{actual} iterations but the twin did {iterations}"));
             }

@@ -5,6 +5,7 @@ use crate::common::{random, twin};
 use crate::on_all;
 use mrfgs::low_level::backend::{Map, Stage};
 use mrfgs::low_level::front::Prepared;
+use pollster::block_on;
 
 #[test]
 fn mirror_labels() {
@@ -19,7 +20,7 @@ fn mirror_labels() {
         assert_eq!(compare_finest(backend, &unmirrored).is_ok(), unmirrored == maps);
         // They are there when the pair itself is matched.
         backend.prepare(&case.plan, Prepared::new(&case.pair.mirrored())).unwrap();
-        let labels = backend.map(Map::RightLabel).unwrap();
+        let labels = block_on(backend.map(Map::RightLabel)).unwrap();
         if labels != maps.right_label {
             return Err("the labels do not stay".into());
         }

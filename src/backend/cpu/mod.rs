@@ -11,18 +11,21 @@ mod windows;
 
 use super::probe::Probe;
 use super::wavefront::Wavefront;
-use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
+use super::{Answer, Backend, Map, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
 use crate::image::{Image, Plane};
 use crate::maps::Maps;
 use crate::memory;
+use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
 pub(crate) use finest::Finest;
+use std::future::ready;
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use units::Units;
 use volumes::{Sent, Volumes};
+use web_time::Instant;
 
 /// The CPU path.
 #[derive(Default)]
@@ -30,6 +33,7 @@ pub struct Cpu {
     state: Option<State>,
     times: Option<Vec<(Stage, Duration)>>,
     requests: Requests<Maps>,
+    pause: Pause,
 }
 
 /// Volumes in the width that the plan asks for.
@@ -138,41 +142,51 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn run_wavefront(
-        &mut self,
-        wavefront: &Wavefront,
-        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Result<()> {
-        let sent = on_volumes!(self, v => wavefront.stages().iter().map(|&stage| v.begin(stage)).collect::<Vec<_>>());
-        let mut times = vec![Duration::ZERO; sent.len()];
-        for (i, rows) in wavefront.parts() {
-            let stage = wavefront.stages()[i];
-            let height = on_volumes!(self, v => v.plan.levels[stage.level().unwrap_or(0)].height);
-            before(stage, rows.len() as f64 / height as f64)?;
-            let start = Instant::now();
-            on_volumes!(self, v => v.run_rows(stage, sent[i], rows));
-            times[i] += start.elapsed();
-        }
-        if let Some(all) = &mut self.times {
-            all.extend(wavefront.stages().iter().copied().zip(times));
-        }
-        Ok(())
+    fn keep_up(&mut self) -> Answer<'_, ()> {
+        Box::pin(async {
+            self.pause.now_and_then().await;
+            Ok(())
+        })
     }
 
-    fn settled(&mut self, _: bool) -> Result<bool> {
-        Ok(on_volumes!(self, v => v.settled))
+    fn run_wavefront<'a>(
+        &'a mut self,
+        wavefront: &'a Wavefront,
+        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Answer<'a, ()> {
+        Box::pin(async {
+            let sent = on_volumes!(self, v => wavefront.stages().iter().map(|&stage| v.begin(stage)).collect::<Vec<_>>());
+            let mut times = vec![Duration::ZERO; sent.len()];
+            for (i, rows) in wavefront.parts() {
+                let stage = wavefront.stages()[i];
+                let height = on_volumes!(self, v => v.plan.levels[stage.level().unwrap_or(0)].height);
+                before(stage, rows.len() as f64 / height as f64)?;
+                let start = Instant::now();
+                on_volumes!(self, v => v.run_rows(stage, sent[i], rows));
+                times[i] += start.elapsed();
+                self.pause.now_and_then().await;
+            }
+            if let Some(all) = &mut self.times {
+                all.extend(wavefront.stages().iter().copied().zip(times));
+            }
+            Ok(())
+        })
     }
 
-    fn idle_iterations(&mut self) -> Result<u32> {
-        Ok(0)
+    fn settled(&mut self, _: bool) -> Answer<'_, bool> {
+        Box::pin(ready(Ok(on_volumes!(self, v => v.settled))))
     }
 
-    fn wait(&mut self) -> Result<()> {
-        Ok(())
+    fn idle_iterations(&mut self) -> Answer<'_, u32> {
+        Box::pin(ready(Ok(0)))
     }
 
-    fn map(&mut self, map: Map) -> Result<Plane<i32>> {
-        Ok(on_volumes!(self, v => v.maps.read(map)))
+    fn wait(&mut self) -> Answer<'_, ()> {
+        Box::pin(ready(Ok(())))
+    }
+
+    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>> {
+        Box::pin(ready(Ok(on_volumes!(self, v => v.maps.read(map)))))
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
@@ -187,8 +201,8 @@ impl Backend for Cpu {
         Ok(self.requests.add(maps))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
-        Ok((self.requests.take(&ticket), 0))
+    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)> {
+        Box::pin(ready(Ok((self.requests.take(&ticket), 0))))
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {
@@ -196,8 +210,8 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
-        Ok(self.times.clone().unwrap_or_default())
+    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>> {
+        Box::pin(ready(Ok(self.times.clone().unwrap_or_default())))
     }
 
     fn cells(&self) -> Vec<u64> {

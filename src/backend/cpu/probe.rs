@@ -14,7 +14,7 @@ use crate::plan::LevelPlan;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::mem;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Bytes that [`Cpu::copy_rate`] copies, and its number of tries.
 const COPIED_BYTES: usize = 1 << 28;

@@ -2,8 +2,8 @@
 
 use crate::backend::Traffic;
 use crate::error::{DeviceError, Error, ExecutionError, MemoryError, Result};
+use futures_channel::oneshot;
 use std::collections::VecDeque;
-use std::sync::mpsc;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ pub struct DeviceInfo {
     pub name: String,
     /// Discrete GPU, integrated GPU, virtual GPU, software, or other.
     pub kind: &'static str,
-    /// Vulkan or Metal.
+    /// Vulkan, Metal or WebGPU.
     pub api: &'static str,
     /// Driver and its version, as far as the adapter reports them.
     pub driver: String,
@@ -31,11 +31,11 @@ pub struct DeviceInfo {
     pub automatic: bool,
 }
 
-fn adapters() -> Vec<wgpu::Adapter> {
-    adapters_of(wgpu::Backends::VULKAN | wgpu::Backends::METAL)
+async fn adapters() -> Vec<wgpu::Adapter> {
+    adapters_of(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::BROWSER_WEBGPU).await
 }
 
-fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
+async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor {
         backends,
         flags: wgpu::InstanceFlags::empty(),
@@ -48,7 +48,16 @@ fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
         ..wgpu::InstanceDescriptor::new_without_display_handle()
     };
     descriptor.backend_options.noop.enable = backends.contains(wgpu::Backends::NOOP);
-    pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
+    let instance = wgpu::Instance::new(descriptor);
+    if !cfg!(target_arch = "wasm32") {
+        return instance.enumerate_adapters(backends).await;
+    }
+    // A browser shows one of its adapters, the one that is asked for.
+    let wanted = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..Default::default()
+    };
+    instance.request_adapter(&wanted).await.into_iter().collect()
 }
 
 fn kind(device_type: wgpu::DeviceType) -> &'static str {
@@ -65,6 +74,7 @@ fn api(backend: wgpu::Backend) -> &'static str {
     match backend {
         wgpu::Backend::Vulkan => "Vulkan",
         wgpu::Backend::Metal => "Metal",
+        wgpu::Backend::BrowserWebGpu => "WebGPU",
         _ => "other",
     }
 }
@@ -90,15 +100,22 @@ fn preferred(adapters: &[wgpu::Adapter]) -> Option<usize> {
     (0..adapters.len()).min_by_key(|&i| preference(adapters[i].get_info().device_type))
 }
 
-/// Whether `auto` would take a device of this kind.
-fn is_automatic(device_type: wgpu::DeviceType) -> bool {
-    preference(device_type) <= 1
+/// Whether `auto` would take this adapter. A browser does not say of what kind a GPU is.
+fn is_automatic(info: &wgpu::AdapterInfo) -> bool {
+    let in_browser = info.backend == wgpu::Backend::BrowserWebGpu;
+    preference(info.device_type) <= if in_browser { 3 } else { 1 }
 }
 
 /// Every adapter of this machine, in the order of their indices. Empty where there is no driver.
+#[cfg(not(target_arch = "wasm32"))]
 #[must_use]
 pub fn devices() -> Vec<DeviceInfo> {
-    let adapters = adapters();
+    pollster::block_on(devices_async())
+}
+
+/// As `devices`, for a browser, which shows one adapter.
+pub async fn devices_async() -> Vec<DeviceInfo> {
+    let adapters = adapters().await;
     let preferred = preferred(&adapters);
     adapters
         .iter()
@@ -113,7 +130,7 @@ pub fn devices() -> Vec<DeviceInfo> {
                 max_buffer: limits.max_buffer_size,
                 max_binding: limits.max_storage_buffer_binding_size,
                 software: info.device_type == wgpu::DeviceType::Cpu,
-                automatic: preferred == Some(index) && is_automatic(info.device_type),
+                automatic: preferred == Some(index) && is_automatic(&info),
                 name: info.name,
             }
         })
@@ -121,8 +138,8 @@ pub fn devices() -> Vec<DeviceInfo> {
 }
 
 /// The adapter that `wanted` names by its index or a part of its name, or the preferred one.
-fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
-    let mut adapters = adapters();
+async fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
+    let mut adapters = adapters().await;
     if adapters.is_empty() {
         return Err(DeviceError::NoDriver.into());
     }
@@ -160,9 +177,15 @@ pub fn may_have_gpu() -> bool {
 
 /// Whether `auto` finds a suitable device. Where there is no GPU the driver is not asked, because a loader
 /// that finds no display may print to standard error.
+#[cfg(not(target_arch = "wasm32"))]
 #[must_use]
 pub fn has_automatic() -> bool {
-    may_have_gpu() && adapters().iter().any(|a| is_automatic(a.get_info().device_type))
+    pollster::block_on(has_automatic_async())
+}
+
+/// As `has_automatic`, for a browser.
+pub async fn has_automatic_async() -> bool {
+    may_have_gpu() && adapters().await.iter().any(|a| is_automatic(&a.get_info()))
 }
 
 /// Limits and failures injected on purpose: tests run the engine as if on a weaker device, or a failing one.
@@ -217,7 +240,7 @@ pub(super) struct Device {
     pub(super) work_per_submit: u64,
     patience: Duration,
     lost_after: Option<usize>,
-    under_way: VecDeque<wgpu::SubmissionIndex>,
+    under_way: VecDeque<Submission>,
     /// Submissions so far, including those in flight.
     submitted: u64,
     failure: Arc<Mutex<Option<Error>>>,
@@ -225,12 +248,12 @@ pub(super) struct Device {
 }
 
 impl Device {
-    pub(super) fn open(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
+    pub(super) async fn open(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         let adapter = if faults.noop {
-            let noop = adapters_of(wgpu::Backends::NOOP).pop();
+            let noop = adapters_of(wgpu::Backends::NOOP).await.pop();
             noop.ok_or(DeviceError::NoDriver)?
         } else {
-            select(wanted)?
+            select(wanted).await?
         };
         let info = adapter.get_info();
         let offered = adapter.limits();
@@ -248,13 +271,15 @@ impl Device {
         }
         let clock = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
         let features = if faults.no_clock { wgpu::Features::empty() } else { clock };
-        let request = adapter.request_device(&wgpu::DeviceDescriptor {
+        let descriptor = wgpu::DeviceDescriptor {
             label: Some("mrfgs"),
             required_features: features,
             required_limits: limits.clone(),
             ..Default::default()
-        });
-        let (device, queue) = pollster::block_on(request)
+        };
+        let (device, queue) = adapter
+            .request_device(&descriptor)
+            .await
             .map_err(|e| failed(&info.name, &format!("the device cannot be opened: {e}")))?;
         let failure = Arc::new(Mutex::new(None));
         let note = |failure: &Arc<Mutex<Option<Error>>>| {
@@ -333,26 +358,44 @@ impl Device {
     }
 
     pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder) -> Result<()> {
-        while self.under_way.len() >= SUBMISSIONS {
-            self.wait_for_one()?;
+        let queue = self.queue()?;
+        let index = queue.submit([encoder.finish()]);
+        let (sender, done) = oneshot::channel();
+        if cfg!(target_arch = "wasm32") {
+            // Nobody listens if the match was stopped.
+            queue.on_submitted_work_done(move || {
+                let _ = sender.send(());
+            });
         }
-        let index = self.queue()?.submit([encoder.finish()]);
-        self.under_way.push_back(index);
+        self.under_way.push_back(Submission { index, done });
         self.submitted += 1;
         self.traffic.submissions += 1;
         self.check()
     }
 
+    /// Waits until only a few submissions are in flight.
+    pub(super) async fn keep_up(&mut self) -> Result<()> {
+        self.wait_until_left(SUBMISSIONS).await
+    }
+
     /// Waits for everything submitted so far.
-    pub(super) fn wait(&mut self) -> Result<()> {
-        while !self.under_way.is_empty() {
-            self.wait_for_one()?;
+    pub(super) async fn wait(&mut self) -> Result<()> {
+        self.wait_until_left(0).await
+    }
+
+    async fn wait_until_left(&mut self, count: usize) -> Result<()> {
+        while self.under_way.len() > count {
+            self.wait_for_one().await?;
         }
         self.check()
     }
 
-    fn wait_for_one(&mut self) -> Result<()> {
-        let Some(index) = self.under_way.pop_front() else { return Ok(()) };
+    async fn wait_for_one(&mut self) -> Result<()> {
+        let Some(Submission { index, done }) = self.under_way.pop_front() else { return Ok(()) };
+        if cfg!(target_arch = "wasm32") {
+            // The browser ends work that takes too long. The device is lost then.
+            return done.await.map_err(|e| failed(&self.name, &e)).and_then(|()| self.check());
+        }
         let waiting = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.patience) };
         match self.inner()?.poll(waiting) {
             Err(wgpu::PollError::Timeout) => {
@@ -375,38 +418,45 @@ impl Device {
         // A device that is lost says so here, and not that the buffers are wrong.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
         self.check()?;
-        let (sender, mapped) = mpsc::channel();
-        for buffer in &buffers {
+        let mut requested = Requested { buffers: Vec::new(), submitted: self.submitted };
+        for buffer in buffers {
             self.traffic.bytes_down += buffer.size();
-            let sender = sender.clone();
+            let (sender, mapped) = oneshot::channel();
             buffer.map_async(wgpu::MapMode::Read, .., move |result| {
                 // Nobody listens if the wait for it failed.
                 let _ = sender.send(result);
             });
+            requested.buffers.push((buffer, mapped));
         }
-        Ok(Requested { buffers, mapped, submitted: self.submitted })
+        Ok(requested)
     }
 
     /// The words of each requested buffer; later submissions may still be in flight.
-    pub(super) fn collect(&mut self, requested: Requested) -> Result<Vec<Vec<u32>>> {
-        self.read(requested, |all| all.iter().map(|words| words.to_vec()).collect())
+    pub(super) async fn collect(&mut self, requested: Requested) -> Result<Vec<Vec<u32>>> {
+        self.read(requested, |all| all.iter().map(|words| words.to_vec()).collect()).await
     }
 
     /// What `read` makes of the words of all requested buffers.
-    pub(super) fn read<T>(&mut self, requested: Requested, read: impl FnOnce(&[&[u32]]) -> T) -> Result<T> {
-        while self.submitted - (self.under_way.len() as u64) < requested.submitted {
-            self.wait_for_one()?;
-        }
-        self.check()?;
+    pub(super) async fn read<T>(
+        &mut self,
+        requested: Requested,
+        read: impl FnOnce(&[&[u32]]) -> T,
+    ) -> Result<T> {
+        let later = (self.submitted - requested.submitted) as usize;
+        self.wait_until_left(later).await?;
         // Buffers whose submission finished long ago are mapped by any poll.
         self.inner()?.poll(wgpu::PollType::Poll).map_err(|e| failed(&self.name, &e))?;
-        for _ in &requested.buffers {
-            let mapped = requested.mapped.try_recv().map_err(|e| failed(&self.name, &e))?;
-            mapped.map_err(|e| failed(&self.name, &e))?;
-        }
         let mut views = Vec::new();
-        for buffer in &requested.buffers {
-            views.push(buffer.get_mapped_range(..).map_err(|e| failed(&self.name, &e))?);
+        for (buffer, mut mapped) in requested.buffers {
+            let answer =
+                if cfg!(target_arch = "wasm32") { mapped.await.map(Some) } else { mapped.try_recv() };
+            match answer {
+                Ok(Some(Ok(()))) => {}
+                Ok(Some(Err(e))) => return Err(self.unread(&e)),
+                Ok(None) => return Err(self.unread(&"it is not there yet")),
+                Err(e) => return Err(self.unread(&e)),
+            }
+            views.push(buffer.get_mapped_range(..).map_err(|e| self.unread(&e))?);
         }
         let words = views.iter().map(|view| {
             // No bytes need not be aligned.
@@ -416,6 +466,11 @@ impl Device {
         let read = read(&words);
         self.check()?;
         Ok(read)
+    }
+
+    /// The failure to read a buffer, or what is behind it.
+    fn unread(&self, reason: &dyn std::fmt::Display) -> Error {
+        self.check().err().unwrap_or_else(|| failed(&self.name, reason))
     }
 
     fn hung(&self) -> Error {
@@ -433,10 +488,16 @@ impl Device {
     }
 }
 
-/// Buffers being read back from the device.
+/// Commands under way.
+struct Submission {
+    index: wgpu::SubmissionIndex,
+    /// In a browser, where there is nothing to poll, says when they are done.
+    done: oneshot::Receiver<()>,
+}
+
+/// Buffers being read back from the device, and whether each is there.
 pub(super) struct Requested {
-    buffers: Vec<wgpu::Buffer>,
-    mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+    buffers: Vec<(wgpu::Buffer, oneshot::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>)>,
     /// Number of submissions after which they are complete.
     submitted: u64,
 }

@@ -26,7 +26,7 @@ mod words;
 
 use super::probe::Probe;
 use super::wavefront::{Wavefront, needs_level_0};
-use super::{Backend, Map, Requests, Stage, Ticket, Traffic};
+use super::{Answer, Backend, Map, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
 use crate::image::Plane;
@@ -37,7 +37,9 @@ use buffers::{Buffers, LevelBuffers};
 
 use convergence::Convergence;
 use device::Device;
-pub use device::{DeviceInfo, FaultInjection, devices, has_automatic, may_have_gpu};
+pub use device::{DeviceInfo, FaultInjection, devices_async, has_automatic_async, may_have_gpu};
+#[cfg(not(target_arch = "wasm32"))]
+pub use device::{devices, has_automatic};
 use levels::{can_share, next_level, record_levels};
 use rows::Rows;
 pub use shader::{Constant, Kernel};
@@ -128,17 +130,28 @@ impl Gpu {
     /// # Errors
     /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Option`] when no device has
     /// that name.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn new(wanted: Option<&str>) -> Result<Self> {
         Self::with_faults(wanted, FaultInjection::default())
     }
 
-    /// As [`Gpu::new`], with faults.
+    /// As `new`, with faults.
     ///
     /// # Errors
-    /// As [`Gpu::new`].
+    /// As `new`.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn with_faults(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
+        pollster::block_on(Self::open_async(wanted, faults))
+    }
+
+    /// As `with_faults`, for a browser.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Option`] when no device has
+    /// that name.
+    pub async fn open_async(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         Ok(Self {
-            device: Device::open(wanted, faults)?,
+            device: Device::open(wanted, faults).await?,
             pipelines: HashMap::new(),
             encoder: None,
             passes: 0,
@@ -259,10 +272,10 @@ impl Gpu {
     }
 
     /// What [`Stage::Change`] has found so far.
-    fn convergence(&mut self) -> Result<Convergence> {
+    async fn convergence(&mut self) -> Result<Convergence> {
         let at = self.convergence_at();
         let requested = self.request(&[at])?;
-        Ok(Convergence::of(&self.device.collect(requested)?[0]))
+        Ok(Convergence::of(&self.device.collect(requested).await?[0]))
     }
 
     /// Width, height, and elements in a row of maps.
@@ -361,45 +374,63 @@ impl Backend for Gpu {
         }
         self.gather()?;
         if let Stage::Flood(z) = stage {
+            if let Some(timer) = self.timer.as_mut().filter(|timer| !timer.has_clock()) {
+                timer.begin(stage);
+            }
             return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
         }
         let steps = Arc::clone(&self.state().steps[&(stage, 1)]);
         self.perform(stage, &steps)
     }
 
-    fn run_wavefront(
-        &mut self,
-        wavefront: &Wavefront,
-        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Result<()> {
-        if !self.state().plan.holds_all_rows() {
-            return self.run_parts(wavefront, before);
-        }
-        wavefront.schedule().iter().try_for_each(|&stage| {
-            before(stage, 1.0)?;
-            self.run(stage)
+    fn keep_up(&mut self) -> Answer<'_, ()> {
+        Box::pin(async {
+            if self.timer.as_ref().is_some_and(Timer::waits) {
+                self.wait().await?;
+                self.timer.iter_mut().for_each(Timer::end);
+            }
+            self.device.keep_up().await
         })
     }
 
-    fn settled(&mut self, wait: bool) -> Result<bool> {
+    fn run_wavefront<'a>(
+        &'a mut self,
+        wavefront: &'a Wavefront,
+        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
+    ) -> Answer<'a, ()> {
+        Box::pin(async {
+            if !self.state().plan.holds_all_rows() {
+                return self.run_parts(wavefront, before).await;
+            }
+            for &stage in wavefront.schedule() {
+                before(stage, 1.0)?;
+                self.run(stage)?;
+                self.keep_up().await?;
+            }
+            Ok(())
+        })
+    }
+
+    fn settled(&mut self, wait: bool) -> Answer<'_, bool> {
         // Where times are kept, idle iterations are not to be among them.
-        Ok((wait || self.timer.is_some()) && self.convergence()?.settled())
+        let asked = wait || self.timer.is_some();
+        Box::pin(async move { Ok(asked && self.convergence().await?.settled()) })
     }
 
-    fn idle_iterations(&mut self) -> Result<u32> {
-        if self.state().plan.settled_change().is_none() {
-            return Ok(0);
-        }
-        Ok(self.convergence()?.idle())
+    fn idle_iterations(&mut self) -> Answer<'_, u32> {
+        let may_settle = self.state().plan.settled_change().is_some();
+        Box::pin(async move { if may_settle { Ok(self.convergence().await?.idle()) } else { Ok(0) } })
     }
 
-    fn wait(&mut self) -> Result<()> {
-        self.submit()?;
-        self.device.wait()
+    fn wait(&mut self) -> Answer<'_, ()> {
+        Box::pin(async {
+            self.submit()?;
+            self.device.wait().await
+        })
     }
 
-    fn map(&mut self, map: Map) -> Result<Plane<i32>> {
-        self.map_values(map)
+    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>> {
+        Box::pin(self.map_values(map))
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
@@ -412,9 +443,9 @@ impl Backend for Gpu {
         Ok(self.requests.add(RequestedMaps { parts, shape }))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Result<(Maps, u32)> {
+    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)> {
         let RequestedMaps { parts, shape } = self.requests.take(&ticket);
-        self.device.read(parts, |words| {
+        Box::pin(self.device.read(parts, move |words| {
             let maps = Maps {
                 disparity: plane(words[0], shape, u32::cast_signed),
                 raw: plane(words[1], shape, u32::cast_signed),
@@ -423,7 +454,7 @@ impl Backend for Gpu {
                 right: None,
             };
             (maps, words.get(3).map_or(0, |words| Convergence::of(words).idle()))
-        })
+        }))
     }
 
     fn keep_time(&mut self, on: bool) -> Result<()> {
@@ -431,9 +462,14 @@ impl Backend for Gpu {
         Ok(())
     }
 
-    fn times(&mut self) -> Result<Vec<(Stage, Duration)>> {
-        self.wait()?;
-        self.timer.as_mut().map_or(Ok(Vec::new()), |timer| timer.times(&mut self.device))
+    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>> {
+        Box::pin(async {
+            self.wait().await?;
+            match &mut self.timer {
+                Some(timer) => timer.times(&mut self.device).await,
+                None => Ok(Vec::new()),
+            }
+        })
     }
 
     fn cells(&self) -> Vec<u64> {

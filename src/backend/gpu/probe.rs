@@ -11,7 +11,9 @@ use crate::error::{Error, Result};
 use crate::graph::{LevelGraph, NO_MEMBER};
 use crate::image::Plane;
 use crate::plan::Plan;
-use std::time::{Duration, Instant};
+use pollster::block_on;
+use std::time::Duration;
+use web_time::Instant;
 
 /// Bytes that [`Gpu::copy_rate`] copies, its number of tries, and how long the copies of one try must take
 /// together, so that the overhead of a submission no longer counts.
@@ -22,7 +24,7 @@ const LONG_COPY: Duration = Duration::from_millis(100);
 impl Probe for Gpu {
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
         let (buffer, pitch, per_word) = self.volume(volume);
-        let words = self.rows(&[&buffer])?.remove(0);
+        let words = block_on(self.rows(&[&buffer]))?.remove(0);
         let plan = &self.state().plan;
         let (rows, labels, _) = volume_shape(plan, volume);
         let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
@@ -58,7 +60,7 @@ impl Probe for Gpu {
     fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
         let (runs, rows) = self.state().plan.levels[level].windows();
         let windows = self.state().buffers.levels[level].windows.clone();
-        let words = self.rows(&[&windows])?.remove(0);
+        let words = block_on(self.rows(&[&windows]))?.remove(0);
         let windows = words[..runs * rows].iter().map(|&word| [word as u16, (word >> 16) as u16]).collect();
         Ok(Plane::new(runs, rows, windows))
     }
@@ -72,13 +74,13 @@ impl Probe for Gpu {
     }
 
     fn change(&mut self) -> Result<u64> {
-        Ok(self.convergence()?.sum())
+        Ok(block_on(self.convergence())?.sum())
     }
 
     fn graph(&mut self, level: usize) -> Result<LevelGraph> {
         let here = &self.state().buffers.levels[level];
         let (members, pitch) = (here.members.clone(), here.params.member_pitch as usize);
-        let words = self.rows(&[&members])?.remove(0);
+        let words = block_on(self.rows(&[&members]))?.remove(0);
         let plan = &self.state().plan;
         let (neighbours, l) = (plan.neighbours, &plan.levels[level]);
         let code = |x: usize, y: usize, i: usize| {
@@ -112,7 +114,7 @@ impl Probe for Gpu {
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
         let (rows, words, word, bit, mask) = self.place_of(map);
-        let mut data = self.rows(&[&rows])?.remove(0);
+        let mut data = block_on(self.rows(&[&rows]))?.remove(0);
         let (width, height, pitch) = self.map_shape();
         assert_eq!(values.size(), (width, height), "a map of the size of the images");
         for y in 0..height {
@@ -153,7 +155,7 @@ impl Gpu {
             for _ in 0..copies {
                 self.encoder()?.copy_buffer_to_buffer(&from, 0, &to, 0, size);
             }
-            self.wait()?;
+            block_on(self.wait())?;
             Ok::<_, Error>(start.elapsed())
         };
         // Memory is allocated on first access.
@@ -170,9 +172,9 @@ impl Gpu {
     }
 
     /// The values of a map, whose words may hold other maps too.
-    pub(super) fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
+    pub(super) async fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
         let (rows, words, word, bit, mask) = self.place_of(map);
-        let data = self.rows(&[&rows])?.remove(0);
+        let data = self.rows(&[&rows]).await?.remove(0);
         let (width, height, pitch) = self.map_shape();
         let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
         Ok(Plane::from_fn(width, height, value))

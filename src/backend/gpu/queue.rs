@@ -4,10 +4,9 @@ use super::rows::Rows;
 use super::steps::{Groups, Step};
 use super::timer::{PASSES_PER_SUBMIT, Timer};
 use super::{Gpu, device};
-use crate::backend::{Backend, Stage};
+use crate::backend::Stage;
 use crate::error::Result;
 use std::ops::Range;
-use std::time::Instant;
 
 /// Rows on their way from the device, each in so many parts.
 struct RequestedRows {
@@ -84,18 +83,10 @@ impl Gpu {
     /// Records the steps of `stage`, and takes its time where that is wanted.
     pub(super) fn perform(&mut self, stage: Stage, steps: &[Step]) -> Result<()> {
         self.device.count_stage();
-        let Some(timer) = &mut self.timer else { return self.record(steps) };
-        timer.begin(stage);
-        if timer.has_clock() {
-            return self.record(steps);
-        }
-        let start = Instant::now();
-        self.record(steps)?;
-        self.wait()?;
         if let Some(timer) = &mut self.timer {
-            timer.measured(start.elapsed());
+            timer.begin(stage);
         }
-        Ok(())
+        self.record(steps)
     }
 
     /// Submits everything.
@@ -142,15 +133,15 @@ impl Gpu {
     }
 
     /// The words of all rows that were asked for.
-    fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
-        let mut words = self.device.collect(rows.parts)?.into_iter();
+    async fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
+        let mut words = self.device.collect(rows.parts).await?.into_iter();
         let joined = |n| words.by_ref().take(n).reduce(|all, part| [all, part].concat()).unwrap_or_default();
         Ok(rows.counts.into_iter().map(joined).collect())
     }
 
     /// The words of all rows.
-    pub(super) fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
+    pub(super) async fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
         let requested = self.request_rows(rows)?;
-        self.collect_rows(requested)
+        self.collect_rows(requested).await
     }
 }

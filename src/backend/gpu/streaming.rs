@@ -2,8 +2,8 @@
 //! [wavefront](crate::backend::wavefront), and its volumes are rings of parts.
 
 use super::{Gpu, Step, record};
-use crate::backend::Stage;
 use crate::backend::wavefront::Wavefront;
+use crate::backend::{Backend, Stage};
 use crate::error::{Purpose, Result};
 use crate::memory;
 use crate::plan::Plan;
@@ -26,7 +26,7 @@ impl Gpu {
     }
 
     /// Runs the stages of `wavefront` on the rows of its parts.
-    pub(super) fn run_parts(
+    pub(super) async fn run_parts(
         &mut self,
         wavefront: &Wavefront,
         before: &mut dyn FnMut(Stage, f64) -> Result<()>,
@@ -38,6 +38,7 @@ impl Gpu {
             before(stage, rows.len() as f64 / height as f64)?;
             let steps = self.steps_of(stage, rows.start as u32..rows.end as u32)?;
             self.perform(stage, &steps)?;
+            self.keep_up().await?;
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use super::device::Device;
 use crate::backend::Stage;
 use crate::error::Result;
 use std::time::Duration;
+use web_time::Instant;
 
 /// Passes recorded before they are submitted.
 pub(super) const PASSES_PER_SUBMIT: usize = 16;
@@ -11,6 +12,8 @@ pub(super) const PASSES_PER_SUBMIT: usize = 16;
 /// Records the times of passes, and sums those of one run of a stage.
 pub(super) struct Timer {
     clock: Option<Clock>,
+    /// When the current run began, where the host measures.
+    began: Option<Instant>,
     /// The runs so far, with the host's measurement where the device has no timestamps.
     runs: Vec<(Stage, Duration)>,
 }
@@ -29,7 +32,7 @@ const TICKS: u64 = 2 * PASSES_PER_SUBMIT as u64;
 impl Timer {
     pub(super) fn new(device: &Device) -> Result<Self> {
         if device.tick.is_none() {
-            return Ok(Self { clock: None, runs: Vec::new() });
+            return Ok(Self { clock: None, began: None, runs: Vec::new() });
         }
         let inner = device.inner()?;
         let queries = inner.create_query_set(&wgpu::QuerySetDescriptor {
@@ -44,22 +47,31 @@ impl Timer {
             mapped_at_creation: false,
         });
         let clock = Some(Clock { queries, resolved, passes: Vec::new(), logs: Vec::new() });
-        Ok(Self { clock, runs: Vec::new() })
+        Ok(Self { clock, began: None, runs: Vec::new() })
     }
 
-    /// Whether the device has timestamps; otherwise the host measures, waiting for every stage.
+    /// Whether the host measures a run, which has to be waited for.
+    pub(super) fn waits(&self) -> bool {
+        self.began.is_some()
+    }
+
+    /// Whether the device has timestamps; otherwise the host measures.
     pub(super) fn has_clock(&self) -> bool {
         self.clock.is_some()
     }
 
+    /// Begins a run of `stage`. Where the host measures and has not seen the end of the last run, it is a part of that.
     pub(super) fn begin(&mut self, stage: Stage) {
-        self.runs.push((stage, Duration::ZERO));
+        if self.began.is_none() {
+            self.runs.push((stage, Duration::ZERO));
+            self.began = self.clock.is_none().then(Instant::now);
+        }
     }
 
-    /// Records the host's measurement of the current run.
-    pub(super) fn measured(&mut self, time: Duration) {
-        if let Some(run) = self.runs.last_mut() {
-            run.1 = time;
+    /// Ends the run that the host measures, if any.
+    pub(super) fn end(&mut self) {
+        if let (Some(run), Some(began)) = (self.runs.last_mut(), self.began.take()) {
+            run.1 = began.elapsed();
         }
     }
 
@@ -92,11 +104,11 @@ impl Timer {
     }
 
     /// Every run so far and its time. Everything must have been submitted.
-    pub(super) fn times(&mut self, device: &mut Device) -> Result<Vec<(Stage, Duration)>> {
+    pub(super) async fn times(&mut self, device: &mut Device) -> Result<Vec<(Stage, Duration)>> {
         if let (Some(clock), Some(tick)) = (&mut self.clock, device.tick) {
             for (passes, log) in clock.logs.drain(..) {
                 let requested = device.request(vec![log])?;
-                let words = device.collect(requested)?;
+                let words = device.collect(requested).await?;
                 let ticks: Vec<u64> =
                     words[0].chunks_exact(2).map(|w| u64::from(w[1]) << 32 | u64::from(w[0])).collect();
                 for (run, ends) in passes.into_iter().zip(ticks.chunks_exact(2)) {

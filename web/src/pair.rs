@@ -1,0 +1,169 @@
+//! What goes in: a pair, the range to search, and the cameras.
+
+use crate::Thrown;
+use crate::words::{thrown, warning};
+use mrfgs::check;
+use mrfgs::depth::Rig;
+use mrfgs::image::calib::{Calibration, Camera};
+use mrfgs::image::{Pair, Plane, read::Reader};
+use mrfgs::options::DisparityRange;
+use std::path::Path;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+/// A rectified pair.
+#[wasm_bindgen]
+pub struct StereoPair {
+    pub(crate) pair: Pair,
+}
+
+#[wasm_bindgen]
+impl StereoPair {
+    /// The pair in two files, which errors call by their names.
+    ///
+    /// # Errors
+    /// Where a file is no image, or the images differ in size.
+    #[wasm_bindgen(constructor)]
+    pub fn new(left: &[u8], left_name: &str, right: &[u8], right_name: &str) -> Thrown<Self> {
+        let files = ((Path::new(left_name), left), (Path::new(right_name), right));
+        Ok(Self { pair: Reader::default().pair_in_memory(files.0, files.1).map_err(thrown)? })
+    }
+
+    /// Width in pixels.
+    #[wasm_bindgen(getter)]
+    pub fn width(&self) -> usize {
+        self.pair.size().0
+    }
+
+    /// Height in pixels.
+    #[wasm_bindgen(getter)]
+    pub fn height(&self) -> usize {
+        self.pair.size().1
+    }
+
+    /// A view, "left" or "right", as RGBA.
+    #[must_use]
+    pub fn picture(&self, view: &str) -> Vec<u8> {
+        let image = if view == "right" { self.pair.right() } else { self.pair.left() };
+        rgba(&image.to_rgb8())
+    }
+
+    /// The disparities that sparse matches find, if they find enough.
+    ///
+    /// # Errors
+    /// Where there is not enough memory.
+    pub fn range(&self) -> Thrown<Option<Range>> {
+        Ok(check::range(&self.pair).map_err(thrown)?.map(|range| Range { range }))
+    }
+
+    /// What is probably wrong with the pair, and with the range where one was given.
+    #[must_use]
+    pub fn warnings(&self, range: Option<Range>) -> Vec<String> {
+        check::warnings(&self.pair, range.map(|r| r.range)).iter().map(warning).collect()
+    }
+}
+
+/// Disparities to search, in pixels, both ends included.
+#[wasm_bindgen]
+#[derive(Clone, Copy)]
+pub struct Range {
+    pub(crate) range: DisparityRange,
+}
+
+#[wasm_bindgen]
+impl Range {
+    /// The disparities from `min` to `max`.
+    ///
+    /// # Errors
+    /// Where there are none, or too many.
+    #[wasm_bindgen(constructor)]
+    pub fn new(min: i32, max: i32) -> Thrown<Self> {
+        Ok(Self { range: DisparityRange::new(min, max).map_err(thrown)? })
+    }
+
+    /// The least one.
+    #[wasm_bindgen(getter)]
+    pub fn min(&self) -> i32 {
+        self.range.min
+    }
+
+    /// The largest one.
+    #[wasm_bindgen(getter)]
+    pub fn max(&self) -> i32 {
+        self.range.max
+    }
+}
+
+/// The cameras of a pair.
+#[wasm_bindgen]
+pub struct Cameras {
+    camera: Camera,
+    doffs: f64,
+    baseline: f64,
+    pub(crate) rig: Rig,
+}
+
+#[wasm_bindgen]
+impl Cameras {
+    /// Cameras with this focal length and principal point of the left one, and this distance of the principal points along the
+    /// row, all in pixels; `baseline` gives the unit of the points.
+    ///
+    /// # Errors
+    /// Where focal length or baseline are not above 0.
+    #[wasm_bindgen(constructor)]
+    pub fn new(focal_length: f64, cx: f64, cy: f64, doffs: f64, baseline: f64) -> Thrown<Self> {
+        let text = format!(
+            "cam0=[{focal_length} 0 {cx}; 0 {focal_length} {cy}; 0 0 1]\ndoffs={doffs}\nbaseline={baseline}"
+        );
+        Self::read(&text)
+    }
+
+    /// The cameras that a calibration file in Middlebury's format describes.
+    ///
+    /// # Errors
+    /// Where the text is no such file, or lacks a value.
+    pub fn read(text: &str) -> Thrown<Self> {
+        let calibration = Calibration::of_text(Path::new("calib.txt"), text).map_err(thrown)?;
+        let rig = Rig::new(&calibration).map_err(thrown)?;
+        let (Some(camera), Some(doffs), Some(baseline)) =
+            (calibration.camera, calibration.doffs, calibration.baseline)
+        else {
+            unreachable!("a rig has all three")
+        };
+        Ok(Self { camera, doffs, baseline, rig })
+    }
+
+    /// Focal length across, in pixels.
+    #[wasm_bindgen(getter)]
+    pub fn focal_length(&self) -> f64 {
+        self.camera.focal_length[0]
+    }
+
+    /// Column of the principal point.
+    #[wasm_bindgen(getter)]
+    pub fn cx(&self) -> f64 {
+        self.camera.principal_point[0]
+    }
+
+    /// Row of the principal point.
+    #[wasm_bindgen(getter)]
+    pub fn cy(&self) -> f64 {
+        self.camera.principal_point[1]
+    }
+
+    /// Distance of the principal points along the row, in pixels.
+    #[wasm_bindgen(getter)]
+    pub fn doffs(&self) -> f64 {
+        self.doffs
+    }
+
+    /// Distance of the cameras.
+    #[wasm_bindgen(getter)]
+    pub fn baseline(&self) -> f64 {
+        self.baseline
+    }
+}
+
+/// A picture as a canvas takes it.
+pub(crate) fn rgba(picture: &Plane<[u8; 3]>) -> Vec<u8> {
+    picture.data().iter().flat_map(|&[r, g, b]| [r, g, b, u8::MAX]).collect()
+}

@@ -1,0 +1,71 @@
+//! What the page shows beside the maps: version, presets, reasons and colours.
+
+use crate::Thrown;
+use crate::matched::colours;
+use js_sys::{Array, Object, Reflect, Uint8Array};
+use mrfgs::colour::{VALIDITY, preview};
+use mrfgs::image::{Plane, Rect};
+use mrfgs::maps::flag;
+use mrfgs::options::PRESETS;
+use wasm_bindgen::JsValue;
+use wasm_bindgen::prelude::wasm_bindgen;
+
+/// The version of mrfgs.
+#[wasm_bindgen]
+#[must_use]
+pub fn version() -> String {
+    env!("CARGO_PKG_VERSION").into()
+}
+
+/// Name and purpose of each preset: `{ name, about }`.
+#[wasm_bindgen]
+#[must_use]
+pub fn presets() -> Array {
+    PRESETS
+        .iter()
+        .map(|(name, about)| object(&[("name", (*name).into()), ("about", (*about).into())]))
+        .collect()
+}
+
+/// The bits of the validity map: `{ bit, name, about, colour }`. The first that a pixel has, from the top, decides its colour.
+#[wasm_bindgen]
+#[must_use]
+pub fn reasons() -> Array {
+    const ALL: [(u8, &str, &str); 7] = [
+        (0, "measured", "found in both views and trusted"),
+        (flag::OUTSIDE, "outside", "the match is outside the right image"),
+        (flag::OCCLUDED, "occluded", "the right view disagrees: hidden there, or mistaken"),
+        (flag::SPECKLE, "small region", "in a region too small to be trusted"),
+        (flag::LOW_CONFIDENCE, "low confidence", "another disparity is nearly as good"),
+        (flag::FILLED, "filled", "taken from pixels around it"),
+        (flag::MASKED, "masked", "the image holds no data here"),
+    ];
+    let reason = |&(bit, name, about): &(u8, &str, &str)| {
+        let colour = VALIDITY
+            .iter()
+            .find(|entry| entry.0 == u32::from(bit))
+            .map_or(JsValue::UNDEFINED, |entry| Uint8Array::from(&entry.1[..]).into());
+        object(&[("bit", bit.into()), ("name", name.into()), ("about", about.into()), ("colour", colour)])
+    };
+    ALL.iter().map(reason).collect()
+}
+
+/// 256 colours, RGB, from the least to the largest value.
+///
+/// # Errors
+/// Where there are no such colours.
+#[wasm_bindgen]
+pub fn scale(name: &str) -> Thrown<Vec<u8>> {
+    let ramp = Plane::from_fn(256, 1, |x, _| x as f32);
+    let picture = preview(&ramp, 0.0, 255.0, colours(name)?);
+    Ok(picture.crop(&Rect::whole((256, 1))).into_data().into_flattened())
+}
+
+fn object(entries: &[(&str, JsValue)]) -> JsValue {
+    let object = Object::new();
+    for (key, value) in entries {
+        // A plain object takes every key.
+        let _ = Reflect::set(&object, &(*key).into(), value);
+    }
+    object.into()
+}
