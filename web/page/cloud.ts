@@ -55,7 +55,11 @@ export class CloudView {
 
     /** Throws where the browser has no WebGL. */
     constructor(private readonly canvas: HTMLCanvasElement) {
-        this.renderer = new WebGLRenderer({ canvas, antialias: false, powerPreference: 'high-performance' });
+        const context = canvas.getContext('webgl2', { antialias: false, powerPreference: 'high-performance' });
+        if (!context) {
+            throw new Error('this browser offers no WebGL 2 here. Is hardware acceleration switched off in its settings?');
+        }
+        this.renderer = new WebGLRenderer({ canvas, context });
         this.renderer.setClearColor(0x14161a);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.addEventListener('change', () => this.ask());

@@ -54,8 +54,9 @@ export class MapView {
     }
 
     private get fit(): number {
-        const { clientWidth, clientHeight } = this.box;
-        return Math.min(clientWidth / this.size.width, clientHeight / this.size.height);
+        // To a fraction of a pixel; without scroll bars, since what fits has none.
+        const { width, height } = this.box.getBoundingClientRect();
+        return Math.min(width / this.size.width, height / this.size.height);
     }
 
     private get scale(): number {

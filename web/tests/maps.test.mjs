@@ -67,16 +67,15 @@ describe('maps', () => {
         }
     });
 
-    it('takes a range, also below 0, and says what PNG cannot hold', async () => {
+    it('takes a range, also below 0', async () => {
         const views = ['im0.png', 'im1.png'].map((file) => join(scene('slanted'), file));
         const { pfm } = native(...views, ['--min-disparity', '-8', '--max-disparity', '40']);
         await visit.match({ range: [-8, 40] });
         assert.match(await visit.text('#facts'), /range -8 to 40/);
         assert.equal(difference((await visit.save('pfm')).bytes, pfm), undefined);
-        await visit.tab.click('#downloads [data-output=png]');
-        await visit.says('#save-problem', /\w/);
         await visit.match({ range: [0, 31] });
         const png = await visit.save('png');
+        assert.equal(png.name, 'im0-disparity.png');
         assert.equal(png.bytes.readUInt8(24), 16, 'bits');
     });
 });

@@ -41,12 +41,15 @@ describe('a match', () => {
                 }
             };
         });
+        // On a software driver this takes longer than the page waits.
+        await visit.set({ device: 'gpu' });
         await visit.tab.click('#match');
         await visit.state('matching');
+        await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
         await visit.tab.click('#cancel');
         await visit.state('ready');
         await visit.says('#problem', /^Stopped\.$/);
-        await visit.match();
+        await visit.match({ device: 'cpu' });
         assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
     });
 

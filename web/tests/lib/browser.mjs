@@ -32,6 +32,7 @@ export async function launch(name, { gpu = true, downloads } = {}) {
                 'dom.webgpu.workers.enabled': gpu,
                 'gfx.webgpu.ignore-blocklist': gpu,
                 'gfx.webgpu.force-enabled': gpu,
+                'webgl.force-enabled': true,
                 ...(downloads && { 'browser.download.folderList': 2, 'browser.download.dir': downloads }),
             },
         });
