@@ -134,9 +134,9 @@ export class CloudView {
         this.renderer.setSize(clientWidth, clientHeight, false);
         this.camera.aspect = clientWidth / clientHeight;
         if (this.rig) {
-            // All that the left camera sees fits in.
+            // All that the left camera sees fits in, with a margin for the turned view.
             const { cameras, width, height } = this.rig;
-            const half = Math.max(height, width / this.camera.aspect) / 2 / cameras.focalLength;
+            const half = (1.12 * Math.max(height, width / this.camera.aspect)) / 2 / cameras.focalLength;
             this.camera.fov = (360 / Math.PI) * Math.atan(half);
             this.uniform('projection', this.renderer.domElement.height / 2 / half);
         }

@@ -83,6 +83,8 @@ async function start(): Promise<void> {
 async function load(): Promise<void> {
     const mine = ++turn;
     const current = () => mine === turn;
+    app.dataset['turn'] = String(turn);
+    be('loading');
     await client.cancel();
     if (!current()) {
         return;
@@ -100,7 +102,6 @@ async function load(): Promise<void> {
     for (const side of ['left', 'right'] as const) {
         slots.problem(side, undefined);
     }
-    be('loading');
     try {
         const [a, b] = [left.header.size, right.header.size];
         const huge = a && tooLarge(a.width, a.height, left.file.size + right.file.size);
@@ -118,6 +119,7 @@ async function load(): Promise<void> {
         pair = { ...read, generation: client.generation };
         slots.show('left', read.left);
         slots.show('right', read.right);
+        void showView();
         await calibrate(read.left);
         await findRange(current);
         if (current()) {
@@ -317,7 +319,9 @@ async function present(): Promise<void> {
 /** A pair that changes takes its result along. */
 function forget(): void {
     result = undefined;
-    map.clear();
+    if (!pair) {
+        map.clear();
+    }
     legend.none();
     points.result(false);
     by('outcome').hidden = true;
@@ -325,6 +329,7 @@ function forget(): void {
         say(id, undefined);
     }
     by('map').dataset['shown'] = '';
+    void showView();
 }
 
 const colours = (): Colours => by<HTMLSelectElement>('colours').value as Colours;
@@ -346,7 +351,13 @@ async function picture(of: Map): Promise<Picture | undefined> {
 async function showView(): Promise<void> {
     const mine = result;
     const shown = view;
-    if (!mine || !pair || shown === 'points') {
+    if (!pair || shown === 'points') {
+        return;
+    }
+    if (!mine) {
+        // What there is to see before there is a map.
+        map.show(pair.left, pair.left);
+        readOut(undefined);
         return;
     }
     try {
@@ -385,7 +396,7 @@ function select(to: View): void {
 /** Says what is known of a pixel. */
 function readOut(pixel: Pixel | undefined): void {
     if (!result || !facts || !pixel) {
-        say('readout', undefined);
+        say('readout', pair && !result ? 'The left view. Match the pair to see its maps.' : undefined);
         return;
     }
     const at = pixel.y * result.width + pixel.x;

@@ -20,6 +20,16 @@ async function matcher(device: Device): Promise<engine.Matcher> {
     return open;
 }
 
+/** The device's name for people. Browsers hide it, or tell of its maker and architecture alone, which the engine does not see. */
+async function named(device: string): Promise<string> {
+    if (!device.trim().startsWith('(')) {
+        return device;
+    }
+    const gpu = (navigator as unknown as { gpu: { requestAdapter(): Promise<{ info?: Record<string, string> } | null> } }).gpu;
+    const info = (await gpu.requestAdapter())?.info;
+    return [info?.['vendor'], info?.['architecture'], device.trim()].filter(Boolean).join(' ');
+}
+
 function need<T>(value: T | undefined, what: string): T {
     if (value === undefined) {
         throw new Error(`There is no ${what} yet.`);
@@ -75,7 +85,7 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         return { version: engine.version(), presets: engine.presets(), reasons: engine.reasons(), scales };
     },
     async open(device) {
-        return (await matcher(device)).device;
+        return named((await matcher(device)).device);
     },
     async pair(left, leftName, right, rightName) {
         pair?.free();
@@ -106,9 +116,10 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         matched = undefined;
         const { found, took } = await run(device, preset, range);
         [matched, made] = [found, { preset, range }];
-        const { width, height, min, max, iterations, device: by, note } = found;
+        const { width, height, min, max, iterations, note } = found;
         return {
-            ...{ width, height, range: { min, max }, iterations, device: by, note, warnings: found.warnings(), took },
+            ...{ width, height, range: { min, max }, iterations, device: await named(found.device), note, took },
+            warnings: found.warnings(),
             disparity: own(found.disparity()),
             confidence: own(found.confidence()),
             validity: own(found.validity()),
@@ -119,7 +130,8 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         const first = need(matched, 'map');
         const { preset, range } = need(made, 'map');
         const { found, took } = await run(device, preset, range);
-        return using(found, (other) => ({ device: other.device, note: other.note, differing: first.differing(other), took }));
+        const by = await named(found.device);
+        return using(found, (other) => ({ device: by, note: other.note, differing: first.differing(other), took }));
     },
     picture(map, colours) {
         const { width, height } = need(matched, 'map');

@@ -51,20 +51,16 @@ describe('inputs', () => {
             copyFileSync(LEFT, at(left));
             copyFileSync(RIGHT, at(right));
             for (const order of [[left, right], [right, left]]) {
-                await visit.choose('left', ...order.map(at));
-                await visit.says('#left .name', new RegExp(`^${left}$`));
-                await visit.says('#right .name', new RegExp(`^${right}$`));
-                await visit.state('ready');
+                assert.equal(await visit.changed(() => visit.choose('left', ...order.map(at))), 'ready');
+                assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], [left, right]);
             }
         }
     });
 
     it('swaps the views', async () => {
         await visit.pair(scene('thin'));
-        await visit.tab.click('#swap');
-        await visit.state('loading', 'ready');
-        await visit.says('#left .name', /im1/);
-        await visit.state('ready');
+        assert.equal(await visit.changed(() => visit.tab.click('#swap')), 'ready');
+        assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im1.png', 'im0.png']);
         await visit.match({ preset: 'fast', device: 'cpu', range: [-31, 0] });
         const swapped = native(RIGHT, LEFT, ['--method', 'fast', '--min-disparity', '-31', '--max-disparity', '0']);
         assert.equal(difference((await visit.save('pfm')).bytes, swapped.pfm), undefined);
@@ -76,7 +72,7 @@ describe('inputs', () => {
 
     it('takes dropped files', async () => {
         const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, content: readFileSync(path, 'base64') }));
-        await visit.tab.evaluate((files) => {
+        const drop = () => visit.tab.evaluate((files) => {
             const transfer = new DataTransfer();
             for (const { name, content } of files) {
                 transfer.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name));
@@ -85,14 +81,13 @@ describe('inputs', () => {
                 document.body.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
             }
         }, files);
-        await visit.says('#left .name', /^im0/);
-        await visit.state('ready');
+        assert.equal(await visit.changed(drop), 'ready');
+        assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im0.png', 'im1.png']);
         await works();
     });
 
     it('opens a rendered scene', async () => {
-        await visit.tab.click('[data-scene=thin]');
-        await visit.says('#left .name', /thin im0/);
+        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
         await visit.says('#range-found', /^0 to 31 px, by calib.txt$/);
         await visit.match({ preset: 'fast', device: 'cpu', range: 'automatic' });
         const map = await visit.save('pfm');

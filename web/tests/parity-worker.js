@@ -5,6 +5,15 @@ const ready = init({ module_or_path: new URL('/engine/mrfgs_web_bg.wasm', self.l
 const matchers = new Map();
 const get = async (path) => new Uint8Array(await (await fetch(path)).arrayBuffer());
 
+/** The device's name; where the browser hides it, its maker and architecture. */
+async function named(device) {
+    if (!device.trim().startsWith('(')) {
+        return device;
+    }
+    const info = (await navigator.gpu.requestAdapter())?.info;
+    return [info?.vendor, info?.architecture, device.trim()].filter(Boolean).join(' ');
+}
+
 async function match({ path, preset, pair: number, range: { min, max } }) {
     await ready;
     const files = await Promise.all(['im0.png', 'im1.png'].map((file) => get(`/pairs/${number}/${file}`)));
@@ -23,7 +32,7 @@ async function match({ path, preset, pair: number, range: { min, max } }) {
     for (const object of [found, range, pair]) {
         object.free();
     }
-    return { width, height, device, note, seconds };
+    return { width, height, device: await named(device), note, seconds };
 }
 
 self.onmessage = async ({ data }) => {

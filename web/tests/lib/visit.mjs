@@ -8,7 +8,7 @@ import { SITE } from './paths.mjs';
 import { serve } from './server.mjs';
 
 /** Longer than any match on a software driver takes. */
-const PATIENCE = 300_000;
+const PATIENCE = 120_000;
 
 export const BROWSER = process.env.MRFGS_BROWSER ?? 'chromium';
 
@@ -91,11 +91,19 @@ export class Visit {
         await (await this.tab.$(`#${side}-file`)).uploadFile(...paths);
     }
 
-    /** Chooses a scene's views in the slots, or a folder's, and waits for the engine to have read them. */
+    /** Does what changes the pair, and waits until the page has taken it up; answers with the state. */
+    async changed(action) {
+        const before = await this.tab.$eval('#app', (app) => Number(app.dataset.turn ?? 0));
+        await action();
+        const later = (before) => Number(document.getElementById('app').dataset.turn ?? 0) > before;
+        await this.tab.waitForFunction(later, { timeout: PATIENCE }, before);
+        return this.settled();
+    }
+
+    /** Chooses the views of a folder, and what else is named. */
     async pair(folder, ...also) {
-        await this.choose('left', join(folder, 'im0.png'), join(folder, 'im1.png'), ...also);
-        await this.state('loading');
-        await this.state('ready');
+        const state = await this.changed(() => this.choose('left', join(folder, 'im0.png'), join(folder, 'im1.png'), ...also));
+        assert.equal(state, 'ready', await this.text('#pair-problem'));
     }
 
     async set({ preset, device, range }) {
