@@ -68,10 +68,10 @@ async function start(): Promise<void> {
     }
     try {
         say('engine', `GPU: ${await client.call('open', 'gpu')}`);
-    } catch (error) {
+    } catch {
         gpu = false;
-        settings.withoutGpu(withoutWebGpu(words(error)));
-        say('engine', `${await client.call('open', 'cpu')}`);
+        settings.withoutGpu(withoutWebGpu());
+        say('engine', 'No WebGPU: the CPU path');
     }
     document.documentElement.dataset['gpu'] = gpu ? 'yes' : 'no';
     if (app.dataset['state'] === 'starting') {

@@ -102,11 +102,13 @@ describe('inputs', () => {
         await other.click('#match');
         await other.waitForFunction(() => /Choose the left view/.test(document.getElementById('left-problem').textContent));
         await (await other.$('#left-file')).uploadFile(LEFT);
-        await other.waitForSelector('#left.filled');
+        await other.waitForFunction(() => document.getElementById('left-problem').textContent === '');
         await other.click('#match');
         await other.waitForFunction(() => /Choose the right view/.test(document.getElementById('right-problem').textContent));
         assert.equal(await other.$eval('#left-problem', (p) => p.textContent), '');
         await other.close();
+        // Pages in the background draw no frames.
+        await visit.tab.bringToFront();
     });
 
     it('says that a file is no image, at its slot', async () => {
