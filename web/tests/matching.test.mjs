@@ -43,14 +43,14 @@ describe('a match', () => {
             };
         });
         // On a software driver this takes longer than the page waits.
-        await visit.set({ device: 'gpu' });
+        await visit.set({ device: 'gpu', preset: 'paper' });
         await visit.tab.click('#match');
         await visit.state('matching');
         await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
         await visit.tab.click('#cancel');
         await visit.state('ready');
         await visit.says('#problem', /^Stopped\.$/);
-        await visit.match({ device: 'cpu' });
+        await visit.match({ device: 'cpu', preset: 'default' });
         assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
     });
 
