@@ -7,6 +7,8 @@ export interface Calibration {
     /** Labels 0 to ndisp - 1, as the program takes them. */
     range: Range | undefined;
     size: { width: number; height: number } | undefined;
+    /** Whether it tells of the cameras; some files have the range alone. */
+    cameras: boolean;
 }
 
 export function calibration(text: string): Calibration {
@@ -19,5 +21,6 @@ export function calibration(text: string): Calibration {
         text,
         range: labels ? { min: 0, max: labels - 1 } : undefined,
         size: width && height ? { width, height } : undefined,
+        cameras: /^\s*cam0\s*=/m.test(text) || !labels,
     };
 }

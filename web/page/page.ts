@@ -161,8 +161,8 @@ async function calibrate({ width, height }: Picture): Promise<void> {
             if (file.size && (file.size.width !== width || file.size.height !== height)) {
                 throw new Error(`calib.txt is for images of ${file.size.width} × ${file.size.height}, and these are ${width} × ${height}: it is not used.`);
             }
-            cameras = await client.call('cameras', file.text);
             found = file.range && { range: file.range, by: 'calib.txt' };
+            cameras = file.cameras ? await client.call('cameras', file.text) : undefined;
         } catch (error) {
             say('pair-problem', words(error));
         }

@@ -27,7 +27,8 @@ async function named(device: string): Promise<string> {
     }
     const gpu = (navigator as unknown as { gpu: { requestAdapter(): Promise<{ info?: Record<string, string> } | null> } }).gpu;
     const info = (await gpu.requestAdapter())?.info;
-    return [info?.['vendor'], info?.['architecture'], device.trim()].filter(Boolean).join(' ');
+    const known = [info?.['vendor'], info?.['architecture']].filter(Boolean);
+    return known.length > 0 ? `${known.join(' ')} (WebGPU)` : 'WebGPU';
 }
 
 function need<T>(value: T | undefined, what: string): T {

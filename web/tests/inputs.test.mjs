@@ -150,6 +150,15 @@ describe('inputs', () => {
         await works();
     });
 
+    it('takes the range of a calib.txt that tells of no cameras', async () => {
+        writeFileSync(at('calib.txt'), 'width=240\nheight=180\nndisp=24\n');
+        await visit.pair(scene('thin'), at('calib.txt'));
+        await visit.says('#range-found', /^0 to 23 px, by calib.txt$/);
+        assert.equal(await visit.text('#pair-problem'), '');
+        assert.match(await visit.tab.$eval('#cameras-note', (note) => note.textContent), /guess.*not to scale/);
+        await works();
+    });
+
     it('says that a calib.txt is for other images, or makes no sense', async () => {
         await visit.pair(scene('thin'), join(scene('mixed'), 'calib.txt'));
         await visit.says('#pair-problem', /320 × 240.*240 × 180/);

@@ -11,7 +11,8 @@ async function named(device) {
         return device;
     }
     const info = (await navigator.gpu.requestAdapter())?.info;
-    return [info?.vendor, info?.architecture, device.trim()].filter(Boolean).join(' ');
+    const known = [info?.vendor, info?.architecture].filter(Boolean);
+    return known.length > 0 ? `${known.join(' ')} (WebGPU)` : 'WebGPU';
 }
 
 async function match({ path, preset, pair: number, range: { min, max } }) {
