@@ -1,6 +1,6 @@
 // What to do where there is no WebGPU.
 
-const SAME = 'The CPU path is used: the same maps, bit for bit, but slower.';
+const SAME = 'The CPU path is used: the same maps, bit for bit.';
 
 /** Why this browser cannot use the GPU, with the remedy. */
 export function withoutWebGpu(): string {
