@@ -1,0 +1,119 @@
+// The page's side of the worker: calls as promises, and a new worker in place of one that broke or does not stop.
+
+import type { Calls, Facts, Name, Reply, Request } from './protocol';
+
+/** The user stopped what ran. */
+export class Interrupted extends Error {}
+
+/** The worker is gone, and with it the pair and the maps that it held. There is a new one. */
+export class Broken extends Error {}
+
+/** The longest that a worker may take to stop, in milliseconds. */
+const PATIENCE = 1000;
+
+interface Waiting {
+    resolve(value: never): void;
+    reject(error: Error): void;
+}
+
+export class Client {
+    /** Called with the stage that runs and how much of the match is done, 0 to 1. */
+    onProgress: (stage: string, done: number) => void = () => {};
+    /** How many workers there were before this one: what an earlier one held is lost. */
+    generation = 0;
+    /** What the engine says of itself once it is there. */
+    facts: Promise<Facts>;
+    private worker!: Worker;
+    private started = false;
+    private waiting = new Map<number, Waiting>();
+    private last = 0;
+    private settled: () => void = () => {};
+
+    constructor(private readonly script: URL) {
+        this.facts = this.hire();
+    }
+
+    /** Asks the worker, once it has started. */
+    async call<N extends Name>(name: N, ...args: Parameters<Calls[N]>): Promise<ReturnType<Calls[N]>> {
+        await this.facts;
+        return this.send(name, ...args);
+    }
+
+    /** Ends all calls: by asking, and after a while by ending the worker. */
+    async cancel(): Promise<void> {
+        const calls = [...this.waiting.keys()];
+        if (!this.started || calls.length === 0) {
+            return;
+        }
+        this.worker.postMessage({ cancel: true } satisfies Request);
+        const patience = setTimeout(() => this.replace(new Interrupted('interrupted')), PATIENCE);
+        while (calls.some((id) => this.waiting.has(id))) {
+            await new Promise<void>((resolve) => (this.settled = resolve));
+        }
+        clearTimeout(patience);
+    }
+
+    private send<N extends Name>(name: N, ...args: Parameters<Calls[N]>): Promise<ReturnType<Calls[N]>> {
+        const id = ++this.last;
+        return new Promise((resolve, reject) => {
+            this.waiting.set(id, { resolve, reject });
+            this.worker.postMessage({ id, call: name, args } as Request);
+        });
+    }
+
+    private hire(): Promise<Facts> {
+        const worker = new Worker(this.script, { type: 'module', name: 'mrfgs' });
+        this.worker = worker;
+        this.started = false;
+        worker.addEventListener('message', ({ data }: MessageEvent<Reply>) => {
+            // What an ended worker still says counts no more.
+            if (worker === this.worker) {
+                this.take(data);
+            }
+        });
+        worker.addEventListener('error', (event) => {
+            event.preventDefault();
+            if (worker === this.worker) {
+                this.replace(new Broken(event.message || 'its worker did not start'));
+            }
+        });
+        const facts = this.send('start');
+        facts.then(
+            () => (this.started = true),
+            () => {},
+        );
+        return facts;
+    }
+
+    private take(reply: Reply): void {
+        if ('broken' in reply) {
+            this.replace(new Broken(reply.broken));
+        } else if ('stage' in reply) {
+            this.onProgress(reply.stage, reply.done);
+        } else {
+            const waiting = this.waiting.get(reply.id);
+            this.waiting.delete(reply.id);
+            if ('value' in reply) {
+                waiting?.resolve(reply.value as never);
+            } else {
+                waiting?.reject(reply.why === 'interrupted' ? new Interrupted(reply.error) : new Error(reply.error));
+            }
+            this.settled();
+        }
+    }
+
+    private replace(reason: Error): void {
+        this.worker.terminate();
+        const waiting = [...this.waiting.values()];
+        this.waiting.clear();
+        // One that could not start would not start a second time.
+        if (this.started) {
+            this.generation += 1;
+            this.facts = this.hire();
+        }
+        for (const { reject } of waiting) {
+            reject(reason);
+        }
+        this.settled();
+    }
+}

@@ -1,0 +1,195 @@
+// Points in 3-D. A chunk of its own: it brings three.js and is loaded when it is first looked at.
+
+import {
+    BufferAttribute,
+    BufferGeometry,
+    PerspectiveCamera,
+    Points,
+    Scene,
+    ShaderMaterial,
+    Spherical,
+    Vector3,
+    WebGLRenderer,
+} from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { step } from './dom';
+import type { Cameras, Cloud } from './protocol';
+
+// A point is as large as its pixel is at its depth, so that a surface seen from the front has no holes.
+const VERTEX = `
+    attribute float confidence;
+    uniform float least, footprint, projection;
+    varying vec3 tint;
+    void main() {
+        tint = color;
+        vec4 seen = modelViewMatrix * vec4(position, 1.0);
+        gl_Position = projectionMatrix * seen;
+        gl_PointSize = clamp(footprint * position.z * projection / -seen.z, 1.0, 64.0);
+        if (confidence < least) {
+            gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
+        }
+    }`;
+const FRAGMENT = `
+    varying vec3 tint;
+    void main() {
+        gl_FragColor = vec4(tint, 1.0);
+    }`;
+
+/** Degrees that an arrow key turns. */
+const TURN = 5;
+
+export class CloudView {
+    private readonly renderer: WebGLRenderer;
+    private readonly scene = new Scene();
+    private readonly camera = new PerspectiveCamera();
+    private readonly controls: OrbitControls;
+    private readonly material = new ShaderMaterial({
+        vertexShader: VERTEX,
+        fragmentShader: FRAGMENT,
+        vertexColors: true,
+        uniforms: { least: { value: 0 }, footprint: { value: 0 }, projection: { value: 0 } },
+    });
+    private points: Points | undefined;
+    private rig: { cameras: Cameras; width: number; height: number } | undefined;
+    private due = 0;
+
+    /** Throws where the browser has no WebGL. */
+    constructor(private readonly canvas: HTMLCanvasElement) {
+        const context = canvas.getContext('webgl2', { antialias: false, powerPreference: 'high-performance' });
+        if (!context) {
+            throw new Error('this browser offers no WebGL 2 here. Is hardware acceleration switched off in its settings?');
+        }
+        this.renderer = new WebGLRenderer({ canvas, context });
+        this.renderer.setClearColor(0x14161a);
+        this.controls = new OrbitControls(this.camera, canvas);
+        this.controls.addEventListener('change', () => this.ask());
+        canvas.addEventListener('keydown', (event) => this.press(event));
+        new ResizeObserver(() => this.resize()).observe(canvas);
+    }
+
+    /** Shows other points. The view stays as it is if they are of the same size and cameras. */
+    show(cloud: Cloud, cameras: Cameras, width: number, height: number): void {
+        this.clear();
+        const geometry = new BufferGeometry();
+        geometry.setAttribute('position', new BufferAttribute(cloud.positions, 3));
+        geometry.setAttribute('color', new BufferAttribute(cloud.colours, 3, true));
+        geometry.setAttribute('confidence', new BufferAttribute(cloud.confidences, 1));
+        this.points = new Points(geometry, this.material);
+        // The camera moves inside the cloud: no sphere around it is worth a test.
+        this.points.frustumCulled = false;
+        // From x right, y down, z forward to y up and z towards the viewer.
+        this.points.rotation.x = Math.PI;
+        this.scene.add(this.points);
+        this.rig = { cameras, width, height };
+        this.uniform('footprint', 1.2 / cameras.focalLength);
+        this.reset();
+    }
+
+    /** Gives the memory of the points back. */
+    clear(): void {
+        if (this.points) {
+            this.scene.remove(this.points);
+            this.points.geometry.dispose();
+            this.points = undefined;
+            this.renderer.renderLists.dispose();
+            this.ask();
+        }
+    }
+
+    /** Hides the points of less confidence. */
+    atLeast(confidence: number): void {
+        this.uniform('least', confidence);
+        this.ask();
+    }
+
+    /** The view of the left camera, a little from the side. */
+    reset(): void {
+        if (!this.points || !this.rig) {
+            return;
+        }
+        const { cameras, width, height } = this.rig;
+        const [, median, far] = depths(this.points.geometry.getAttribute('position') as BufferAttribute);
+        const across = (pixel: number, centre: number) => ((pixel - centre) * median) / cameras.focalLength;
+        this.controls.target.set(across((width - 1) / 2, cameras.cx), -across((height - 1) / 2, cameras.cy), -median);
+        [this.camera.near, this.camera.far] = [median / 500, 20 * far];
+        const offset = new Spherical(1.06 * median, Math.PI / 2 - 0.12, 0.26);
+        this.camera.position.setFromSpherical(offset).add(this.controls.target);
+        this.controls.update();
+        this.resize();
+    }
+
+    private uniform(name: 'least' | 'footprint' | 'projection', value: number): void {
+        const uniform = this.material.uniforms[name];
+        if (uniform) {
+            uniform.value = value;
+        }
+    }
+
+    private resize(): void {
+        const { clientWidth, clientHeight } = this.canvas;
+        if (clientWidth === 0 || clientHeight === 0) {
+            return;
+        }
+        this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+        this.renderer.setSize(clientWidth, clientHeight, false);
+        this.camera.aspect = clientWidth / clientHeight;
+        if (this.rig) {
+            // All that the left camera sees fits in, with a margin for the turned view.
+            const { cameras, width, height } = this.rig;
+            const half = (1.12 * Math.max(height, width / this.camera.aspect)) / 2 / cameras.focalLength;
+            this.camera.fov = (360 / Math.PI) * Math.atan(half);
+            this.uniform('projection', this.renderer.domElement.height / 2 / half);
+        }
+        this.camera.updateProjectionMatrix();
+        this.ask();
+    }
+
+    /** Draws once before the next frame, however often it is asked. */
+    private ask(): void {
+        this.due ||= requestAnimationFrame(() => {
+            this.due = 0;
+            this.renderer.render(this.scene, this.camera);
+            this.canvas.dataset['drawn'] = String(Number(this.canvas.dataset['drawn'] ?? 0) + 1);
+        });
+    }
+
+    private press(event: KeyboardEvent): void {
+        const { target } = this.controls;
+        const offset = this.camera.position.clone().sub(target);
+        const keys = step(event);
+        if (keys && event.shiftKey) {
+            // Along the screen, by a part of the distance.
+            const move = new Vector3(Math.sign(keys[0]), -Math.sign(keys[1]), 0).multiplyScalar(0.04 * offset.length());
+            target.add(move.applyQuaternion(this.camera.quaternion));
+        } else if (keys) {
+            const angles = new Spherical().setFromVector3(offset);
+            angles.theta -= (keys[0] * TURN * Math.PI) / 180;
+            angles.phi -= (keys[1] * TURN * Math.PI) / 180;
+            offset.setFromSpherical(angles.makeSafe());
+        } else if (event.key === '+' || event.key === '=' || event.key === '-') {
+            offset.multiplyScalar(event.key === '-' ? 1.15 : 1 / 1.15);
+        } else if (event.key === 'Home') {
+            event.preventDefault();
+            this.reset();
+            return;
+        } else {
+            return;
+        }
+        event.preventDefault();
+        this.camera.position.copy(target).add(offset);
+        this.controls.update();
+        this.ask();
+    }
+}
+
+/** The depths below which 5, 50 and 95 percent of the points lie. */
+function depths(positions: BufferAttribute): [number, number, number] {
+    const every = Math.max(1, Math.floor(positions.count / 10_000));
+    const some: number[] = [];
+    for (let i = 0; i < positions.count; i += every) {
+        some.push(positions.getZ(i));
+    }
+    some.sort((a, b) => a - b);
+    const at = (part: number) => some[Math.floor(part * (some.length - 1))] ?? 1;
+    return [at(0.05), at(0.5), at(0.95)];
+}

@@ -1,0 +1,75 @@
+// What the first bytes of an image file say of it, so that a slot can refuse a file before the engine decodes it.
+
+export interface Header {
+    format: 'PNG' | 'JPEG' | 'PNM' | 'PFM' | 'TIFF';
+    /** Where the first bytes tell it. */
+    size: { width: number; height: number } | undefined;
+}
+
+/** How far into a JPEG file its size is looked for, behind what a camera tells of itself. */
+const REACH = 1 << 20;
+
+/** What kind of image a file is; undefined where it is none that the engine reads. */
+export async function header(file: Blob): Promise<Header | undefined> {
+    const view = new DataView(await file.slice(0, REACH).arrayBuffer());
+    const starts = (...bytes: number[]) =>
+        view.byteLength >= bytes.length && bytes.every((byte, i) => view.getUint8(i) === byte);
+    if (starts(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a)) {
+        const size = view.byteLength >= 24 ? { width: view.getUint32(16), height: view.getUint32(20) } : undefined;
+        return { format: 'PNG', size };
+    }
+    if (starts(0xff, 0xd8, 0xff)) {
+        return { format: 'JPEG', size: jpeg(view) };
+    }
+    if (starts(0x49, 0x49, 0x2a, 0) || starts(0x4d, 0x4d, 0, 0x2a)) {
+        return { format: 'TIFF', size: await tiff(file, view) };
+    }
+    if (starts(0x49, 0x49, 0x2b, 0) || starts(0x4d, 0x4d, 0, 0x2b)) {
+        return { format: 'TIFF', size: undefined };
+    }
+    const text = new TextDecoder('latin1').decode(new Uint8Array(view.buffer, 0, Math.min(1024, view.byteLength)));
+    const numbers = text.replace(/#[^\n]*/g, '').match(/^P([1-6Ff])\s+(\d+)\s+(\d+)\s/);
+    if (numbers) {
+        const size = { width: Number(numbers[2]), height: Number(numbers[3]) };
+        return { format: /f/i.test(numbers[1] ?? '') ? 'PFM' : 'PNM', size };
+    }
+    const pam = [/^P7\s[^]*?^WIDTH\s+(\d+)/m, /^P7\s[^]*?^HEIGHT\s+(\d+)/m].map((field) => Number(text.match(field)?.[1]));
+    if (/^P7\s/.test(text)) {
+        return { format: 'PNM', size: pam[0] && pam[1] ? { width: pam[0], height: pam[1] } : undefined };
+    }
+    return undefined;
+}
+
+/** The size in the first frame header. */
+function jpeg(view: DataView): Header['size'] {
+    let at = 2;
+    while (at + 9 < view.byteLength && view.getUint8(at) === 0xff) {
+        const marker = view.getUint8(at + 1);
+        // Frames are C0 to CF, but for three tables among them.
+        if (marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker)) {
+            return { width: view.getUint16(at + 7), height: view.getUint16(at + 5) };
+        }
+        at += 2 + view.getUint16(at + 2);
+    }
+    return undefined;
+}
+
+/** The size in the first directory, which may lie behind the pixels. */
+async function tiff(file: Blob, start: DataView): Promise<Header['size']> {
+    const little = start.getUint8(0) === 0x49;
+    if (start.byteLength < 8) {
+        return undefined;
+    }
+    const at = start.getUint32(4, little);
+    const directory = new DataView(await file.slice(at, at + 2 + 12 * 64).arrayBuffer());
+    const sides = new Map<number, number>();
+    for (let entry = 2; entry + 12 <= directory.byteLength; entry += 12) {
+        const [tag, type] = [directory.getUint16(entry, little), directory.getUint16(entry + 2, little)];
+        if (tag === 256 || tag === 257) {
+            const value = type === 3 ? directory.getUint16(entry + 8, little) : directory.getUint32(entry + 8, little);
+            sides.set(tag, value);
+        }
+    }
+    const [width, height] = [sides.get(256), sides.get(257)];
+    return width && height ? { width, height } : undefined;
+}

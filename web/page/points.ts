@@ -1,0 +1,155 @@
+// The tab with the points: the cameras that they take, and which of them are shown.
+
+import type { CloudView } from './cloud';
+import { by, count, say, words } from './dom';
+import type { Cameras, Cloud } from './protocol';
+
+const FIELDS = { focalLength: 'focal-length', cx: 'cx', cy: 'cy', doffs: 'doffs', baseline: 'baseline' } as const;
+const field = (key: keyof Cameras) => by<HTMLInputElement>(FIELDS[key]);
+
+/** Where the cameras come from. */
+type Source = 'calib.txt' | 'given' | 'guess';
+
+const NOTES: Record<Source, string> = {
+    'calib.txt': 'From calib.txt. Depths have the unit of its baseline.',
+    given: 'As given here. Depths have the unit of the baseline.',
+    guess: 'A guess, so not to scale: the focal length is the width of the image, the baseline is 1. Give your own, or drop a calib.txt.',
+};
+
+export class PointsTab {
+    private view: CloudView | undefined;
+    private source: Source = 'guess';
+    private size = { width: 0, height: 0 };
+    /** Whether the points that are shown are of this result and these cameras. */
+    private fresh = false;
+    /** How many points have at least this confidence. */
+    private atLeast = new Uint32Array(257);
+    private open = false;
+
+    /** `points` asks the engine; `changed` is called when the cameras change. */
+    constructor(
+        private readonly points: (cameras: Cameras) => Promise<Cloud>,
+        private readonly changed: () => void,
+    ) {
+        for (const key of Object.keys(FIELDS) as (keyof Cameras)[]) {
+            field(key).addEventListener('change', () => {
+                this.source = 'given';
+                this.renew();
+            });
+        }
+        by('least').addEventListener('input', () => this.filter());
+        by('reset-view').addEventListener('click', () => this.view?.reset());
+    }
+
+    /** The cameras of the form; undefined where a number is missing or makes no sense. */
+    get cameras(): Cameras | undefined {
+        const of = (key: keyof Cameras) => field(key).valueAsNumber;
+        const cameras = { focalLength: of('focalLength'), cx: of('cx'), cy: of('cy'), doffs: of('doffs'), baseline: of('baseline') };
+        const sound = Object.values(cameras).every(Number.isFinite) && cameras.focalLength > 0 && cameras.baseline > 0;
+        return sound ? cameras : undefined;
+    }
+
+    /** The cameras, where they are more than a guess. */
+    get known(): Cameras | undefined {
+        return this.source === 'guess' ? undefined : this.cameras;
+    }
+
+    get leastConfidence(): number {
+        return by<HTMLInputElement>('least').valueAsNumber;
+    }
+
+    /** A new pair, whose cameras its calib.txt may tell. */
+    pair(width: number, height: number, read: Cameras | undefined): void {
+        // What was typed in holds for the next pair of this size.
+        const same = this.size.width === width && this.size.height === height;
+        this.size = { width, height };
+        if (read || this.source !== 'given' || !same) {
+            this.source = read ? 'calib.txt' : 'guess';
+            const guess = { focalLength: width, cx: (width - 1) / 2, cy: (height - 1) / 2, doffs: 0, baseline: 1 };
+            for (const [key, value] of Object.entries(read ?? guess)) {
+                field(key as keyof Cameras).value = String(value);
+            }
+        }
+        this.note();
+    }
+
+    /** There is a result, or none any more. The points of an earlier one go. */
+    result(there: boolean): void {
+        this.view?.clear();
+        this.fresh = false;
+        by('points').dataset['points'] = '';
+        say('cloud-note', there ? undefined : 'The points of the next result appear here.');
+        if (there && this.open) {
+            void this.show();
+        }
+    }
+
+    /** The tab is opened, or another one is. */
+    select(open: boolean, there: boolean): void {
+        this.open = open;
+        if (open && there && !this.fresh) {
+            void this.show();
+        } else if (open && !there) {
+            say('cloud-note', 'The points of the next result appear here.');
+        }
+    }
+
+    private renew(): void {
+        this.fresh = false;
+        this.note();
+        this.changed();
+        if (this.open) {
+            void this.show();
+        }
+    }
+
+    private note(): void {
+        say('cameras-note', NOTES[this.source]);
+        const sound = this.cameras !== undefined;
+        say('cameras-problem', sound ? undefined : 'All five take a number; focal length and baseline one above 0.');
+    }
+
+    private async show(): Promise<void> {
+        const cameras = this.cameras;
+        if (!cameras || this.size.width === 0) {
+            return;
+        }
+        this.fresh = true;
+        try {
+            if (!this.view) {
+                say('cloud-note', 'Loading the viewer …');
+                const { CloudView } = await import('./cloud');
+                this.view ??= new CloudView(by<HTMLCanvasElement>('cloud'));
+            }
+            const cloud = await this.points(cameras);
+            this.view.show(cloud, cameras, this.size.width, this.size.height);
+            this.tally(cloud.confidences);
+            this.filter();
+        } catch (error) {
+            this.fresh = false;
+            say('cloud-note', `The points cannot be shown: ${words(error)}`);
+        }
+    }
+
+    private tally(confidences: Uint8Array): void {
+        this.atLeast.fill(0);
+        for (const confidence of confidences) {
+            this.atLeast[confidence] = (this.atLeast[confidence] ?? 0) + 1;
+        }
+        for (let i = 254; i >= 0; i -= 1) {
+            this.atLeast[i] = (this.atLeast[i] ?? 0) + (this.atLeast[i + 1] ?? 0);
+        }
+    }
+
+    private filter(): void {
+        const least = this.leastConfidence;
+        by('least-value').textContent = String(least);
+        this.view?.atLeast(least);
+        if (this.fresh) {
+            const [shown, all] = [this.atLeast[least] ?? 0, this.atLeast[0] ?? 0];
+            by('points').dataset['points'] = String(shown);
+            const filled = 'Pixels that are filled or not trusted give none.';
+            say('cloud-note', `${least > 0 ? `${count(shown)} of ${count(all)}` : count(all)} points. ${filled}`);
+        }
+    }
+}

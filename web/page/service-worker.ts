@@ -1,0 +1,66 @@
+// Serves the page from a cache, so that it opens without a network. Each build has a cache of its own, named by the content of its
+// files; what did not change is copied from the one before. A new build waits until the pages of the old one are closed, because they
+// may still load chunks.
+
+export {};
+
+declare const self: ServiceWorkerGlobalScope;
+
+/** All files of the page but the scenes, and the digest of their content; the build fills them in. */
+declare const FILES: string[];
+declare const DIGEST: string;
+
+// Pages in other folders of the same host have caches too.
+const PREFIX = `mrfgs ${self.registration.scope} `;
+const NAME = PREFIX + DIGEST;
+
+/** Names that hold a hash of the content never change it. */
+const hashed = (url: string) => /-[0-9A-Z]{8}\.\w+$/.test(url);
+
+async function install(): Promise<void> {
+    const cache = await caches.open(NAME);
+    await Promise.all(
+        FILES.map(async (file) => {
+            const url = new URL(file, self.registration.scope).href;
+            const known = hashed(url) ? await caches.match(url) : undefined;
+            // Past the browser's own cache, which may hold an older page.
+            const answer = known ?? (await fetch(url, { cache: hashed(url) ? 'default' : 'reload' }));
+            if (!answer.ok) {
+                throw new Error(`${url}: ${answer.status}`);
+            }
+            await cache.put(url, answer);
+        }),
+    );
+}
+
+async function activate(): Promise<void> {
+    const old = (await caches.keys()).filter((name) => name.startsWith(PREFIX) && name !== NAME);
+    await Promise.all(old.map((name) => caches.delete(name)));
+    await self.clients.claim();
+}
+
+async function answer(request: Request): Promise<Response> {
+    const cache = await caches.open(NAME);
+    const url = new URL(request.url);
+    url.search = url.hash = '';
+    url.pathname = url.pathname.replace(/index\.html$/, '');
+    const known = await cache.match(url.href);
+    if (known) {
+        return known;
+    }
+    const fetched = await fetch(request);
+    // Scenes stay once they were opened.
+    if (fetched.ok && url.pathname.includes('/scenes/')) {
+        await cache.put(url.href, fetched.clone());
+    }
+    return fetched;
+}
+
+self.addEventListener('install', (event) => event.waitUntil(install()));
+self.addEventListener('activate', (event) => event.waitUntil(activate()));
+self.addEventListener('fetch', (event) => {
+    const own = event.request.method === 'GET' && event.request.url.startsWith(self.registration.scope);
+    if (own) {
+        event.respondWith(answer(event.request));
+    }
+});

@@ -1,0 +1,68 @@
+// Preset, range and device, as the form has them.
+
+import { by, make, say } from './dom';
+import type { Device, Preset, Range } from './protocol';
+
+const radio = (name: string) => document.querySelector<HTMLInputElement>(`input[name="${name}"]:checked`)?.value;
+
+export class Settings {
+    private presets: Preset[] = [];
+
+    /** `ranged` is called when the range changes. */
+    constructor(ranged: () => void) {
+        by('preset').addEventListener('change', () => this.about());
+        for (const input of document.querySelectorAll('input[name="range"]')) {
+            input.addEventListener('change', () => {
+                by('ends').hidden = this.automatic;
+                ranged();
+            });
+        }
+        for (const id of ['min', 'max']) {
+            by(id).addEventListener('change', ranged);
+        }
+    }
+
+    get preset(): string {
+        return by<HTMLSelectElement>('preset').value;
+    }
+
+    get device(): Device {
+        return radio('device') as Device;
+    }
+
+    get automatic(): boolean {
+        return radio('range') === 'automatic';
+    }
+
+    /** The range that was typed in; undefined where it makes none. */
+    get given(): Range | undefined {
+        const [min, max] = ['min', 'max'].map((id) => by<HTMLInputElement>(id).valueAsNumber) as [number, number];
+        return Number.isInteger(min) && Number.isInteger(max) && min <= max ? { min, max } : undefined;
+    }
+
+    offer(presets: Preset[]): void {
+        this.presets = presets;
+        by('preset').append(...presets.map(({ name }) => make('option', { textContent: name })));
+        this.about();
+    }
+
+    /** Takes the GPU from the choice, and says why. */
+    withoutGpu(reason: string): void {
+        const [gpu, cpu] = ['gpu', 'cpu'].map((value) => document.querySelector<HTMLInputElement>(`input[value="${value}"]`));
+        if (gpu && cpu) {
+            gpu.disabled = true;
+            cpu.checked = true;
+        }
+        say('device-note', reason);
+    }
+
+    /** A range that was found is a good start for one that is given. */
+    suggest({ min, max }: Range): void {
+        by<HTMLInputElement>('min').value = String(min);
+        by<HTMLInputElement>('max').value = String(max);
+    }
+
+    private about(): void {
+        say('preset-about', this.presets.find(({ name }) => name === this.preset)?.about);
+    }
+}

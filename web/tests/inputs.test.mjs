@@ -1,0 +1,195 @@
+// How views come in, and what the page says of what it cannot use. It works on after each.
+import assert from 'node:assert/strict';
+import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { difference, native } from './lib/native.mjs';
+import { scene } from './lib/paths.mjs';
+import { Visit } from './lib/visit.mjs';
+
+const [LEFT, RIGHT] = ['im0.png', 'im1.png'].map((file) => join(scene('thin'), file));
+
+describe('inputs', () => {
+    let visit;
+    let folder;
+    const at = (name) => join(folder, name);
+    const expected = native(LEFT, RIGHT, ['--method', 'fast']);
+    before(async () => {
+        visit = await Visit.open();
+        folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
+    });
+    after(async () => {
+        rmSync(folder, { recursive: true, force: true });
+        await visit.close();
+    });
+
+    /** A good pair matches as ever, and nothing of the trouble is left. */
+    async function works() {
+        await visit.set({ range: 'automatic' });
+        await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
+        for (const problem of ['#left-problem', '#right-problem', '#pair-problem', '#problem', '#range-problem']) {
+            assert.equal(await visit.text(problem), '', problem);
+        }
+        await visit.match({ preset: 'fast', device: 'cpu' });
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+    }
+
+    it('tells left from right by the names', async () => {
+        const names = [
+            ['left.png', 'right.png'],
+            ['im0.png', 'im1.png'],
+            ['im2.png', 'im6.png'],
+            ['view9.png', 'view10.png'],
+            ['scene_L.png', 'scene_R.png'],
+            ['rightmost-l.png', 'rightmost-r.png'],
+            ['imgL.png', 'imgR.png'],
+            ['leftImage.png', 'rightImage.png'],
+            ['000010_0.png', '000010_1.png'],
+        ];
+        for (const [left, right] of names) {
+            copyFileSync(LEFT, at(left));
+            copyFileSync(RIGHT, at(right));
+            for (const order of [[left, right], [right, left]]) {
+                assert.equal(await visit.changed(() => visit.choose('left', ...order.map(at))), 'ready');
+                assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], [left, right]);
+            }
+        }
+    });
+
+    it('swaps the views', async () => {
+        await visit.pair(scene('thin'));
+        assert.equal(await visit.changed(() => visit.tab.click('#swap')), 'ready');
+        assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im1.png', 'im0.png']);
+        await visit.match({ preset: 'fast', device: 'cpu', range: [-31, 0] });
+        const swapped = native(RIGHT, LEFT, ['--method', 'fast', '--min-disparity', '-31', '--max-disparity', '0']);
+        assert.equal(difference((await visit.save('pfm')).bytes, swapped.pfm), undefined);
+        // What is below 0 does not fit into PNG.
+        await visit.tab.click('#downloads [data-output=png]');
+        await visit.says('#save-problem', /\w/);
+        await works();
+    });
+
+    it('takes dropped files', async () => {
+        const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, content: readFileSync(path, 'base64') }));
+        const drop = () => visit.tab.evaluate((files) => {
+            const transfer = new DataTransfer();
+            for (const { name, content } of files) {
+                transfer.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name));
+            }
+            for (const type of ['dragover', 'drop']) {
+                document.body.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+            }
+        }, files);
+        assert.equal(await visit.changed(drop), 'ready');
+        assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im0.png', 'im1.png']);
+        await works();
+    });
+
+    it('opens a rendered scene', async () => {
+        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
+        await visit.says('#range-found', /^0 to 31 px, by calib.txt$/);
+        await visit.match({ preset: 'fast', device: 'cpu', range: 'automatic' });
+        const map = await visit.save('pfm');
+        assert.equal(map.name, 'thin-disparity.pfm');
+        assert.equal(difference(map.bytes, expected.pfm), undefined);
+    });
+
+    it('asks for the view that is missing', async () => {
+        const other = await visit.browser.newPage();
+        await other.goto(visit.url);
+        await other.waitForSelector('#app[data-state=empty]');
+        await other.click('#match');
+        await other.waitForFunction(() => /Choose the left view/.test(document.getElementById('left-problem').textContent));
+        await (await other.$('#left-file')).uploadFile(LEFT);
+        await other.waitForFunction(() => document.getElementById('left-problem').textContent === '');
+        await other.click('#match');
+        await other.waitForFunction(() => /Choose the right view/.test(document.getElementById('right-problem').textContent));
+        assert.equal(await other.$eval('#left-problem', (p) => p.textContent), '');
+        await other.close();
+        // Pages in the background draw no frames.
+        await visit.tab.bringToFront();
+    });
+
+    it('says that a file is no image, at its slot', async () => {
+        writeFileSync(at('notes.png'), 'These are no pixels.');
+        await visit.choose('right', at('notes.png'));
+        await visit.says('#right-problem', /notes\.png is not an image/);
+        assert.equal(await visit.text('#left-problem'), '');
+        await works();
+    });
+
+    it('says that a file is cut off, at its slot', async () => {
+        writeFileSync(at('half.png'), readFileSync(LEFT).subarray(0, 20_000));
+        await visit.choose('left', at('half.png'));
+        await visit.says('#left-problem', /half\.png/);
+        await works();
+    });
+
+    it('says that the sizes differ', async () => {
+        await visit.choose('right', join(scene('mixed'), 'im1.png'));
+        await visit.says('#pair-problem', /240 × 180.*320 × 240/);
+        await works();
+    });
+
+    it('refuses what the memory of a page cannot hold', async () => {
+        const huge = Buffer.from(readFileSync(LEFT));
+        huge.writeUInt32BE(30_000, 16);
+        huge.writeUInt32BE(20_000, 20);
+        for (const name of ['huge0.png', 'huge1.png']) {
+            writeFileSync(at(name), huge);
+        }
+        await visit.choose('left', at('huge0.png'), at('huge1.png'));
+        await visit.says('#pair-problem', /30,000 × 20,000.*GiB/);
+        await works();
+    });
+
+    it('refuses a crowd', async () => {
+        await visit.choose('left', LEFT, RIGHT, join(scene('thin'), 'mask0nocc.png'));
+        await visit.says('#pair-problem', /3 files/);
+        await works();
+    });
+
+    it('takes the range of a calib.txt that tells of no cameras', async () => {
+        writeFileSync(at('calib.txt'), 'width=240\nheight=180\nndisp=24\n');
+        await visit.pair(scene('thin'), at('calib.txt'));
+        await visit.says('#range-found', /^0 to 23 px, by calib.txt$/);
+        assert.equal(await visit.text('#pair-problem'), '');
+        assert.match(await visit.tab.$eval('#cameras-note', (note) => note.textContent), /guess.*not to scale/);
+        await works();
+    });
+
+    it('says that a calib.txt is for other images, or makes no sense', async () => {
+        await visit.pair(scene('thin'), join(scene('mixed'), 'calib.txt'));
+        await visit.says('#pair-problem', /320 × 240.*240 × 180/);
+        writeFileSync(at('calib.txt'), 'cam0=[1 2 3]\n');
+        await visit.pair(scene('thin'), at('calib.txt'));
+        await visit.says('#pair-problem', /calib\.txt/);
+        await works();
+    });
+
+    it('says that a range makes no sense', async () => {
+        await visit.set({ range: [20, 10] });
+        await visit.says('#range-problem', /whole numbers/);
+        await visit.tab.click('#match');
+        assert.notEqual(await visit.settled(), 'matching');
+        await visit.set({ range: [0, 1_000_000] });
+        await visit.says('#range-problem', /range|labels/);
+        await works();
+    });
+
+    it('goes on with another worker where one has ended', async () => {
+        await visit.set({ range: 'automatic', device: 'cpu', preset: 'default' });
+        // The worker does not understand this, and ends with an error that nothing catches.
+        await visit.tab.evaluate(() => {
+            const post = Worker.prototype.postMessage;
+            Worker.prototype.postMessage = function (message) {
+                Worker.prototype.postMessage = post;
+                post.call(this, message.call === 'match' ? null : message);
+            };
+        });
+        await visit.tab.click('#match');
+        await visit.says('#problem', /The engine ended .* started again/);
+        await works();
+    });
+});

@@ -1,0 +1,36 @@
+// What the program writes for a pair: what every browser must give too.
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { ROOT } from './paths.mjs';
+
+/** Runs `mrfgs match` on the CPU; answers with the bytes of the map and of all that `also` names. */
+export function native(left, right, flags = [], also = ['raw', 'confidence', 'validity']) {
+    const folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
+    try {
+        const json = join(folder, 'run.json');
+        const output = ['--also', also.join(','), '--json', json, '--device', 'cpu', '--quiet'];
+        execFileSync(join(ROOT, 'target/release/mrfgs'), ['match', left, right, join(folder, 'd.pfm'), ...output, ...flags]);
+        const ends = { raw: 'raw.pfm', confidence: 'confidence.png', validity: 'validity.png', points: 'points.ply' };
+        const files = also.map((word) => [word, readFileSync(join(folder, `d.${ends[word]}`))]);
+        const { range } = JSON.parse(readFileSync(json, 'utf8'));
+        return { pfm: readFileSync(join(folder, 'd.pfm')), range, ...Object.fromEntries(files) };
+    } finally {
+        rmSync(folder, { recursive: true, force: true });
+    }
+}
+
+/** The first byte in which two files differ; undefined where they are the same. */
+export function difference(a, b) {
+    if (Buffer.compare(a, b) === 0) {
+        return undefined;
+    }
+    const length = Math.min(a.length, b.length);
+    for (let i = 0; i < length; i += 1) {
+        if (a[i] !== b[i]) {
+            return i;
+        }
+    }
+    return length;
+}

@@ -1,0 +1,56 @@
+// A static host of the built page, in a sub-folder as GitHub Pages has it. It can be stopped while a page is open.
+import { createReadStream, statSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const TYPES = {
+    '.css': 'text/css; charset=utf-8',
+    '.html': 'text/html; charset=utf-8',
+    '.js': 'text/javascript; charset=utf-8',
+    '.mjs': 'text/javascript; charset=utf-8',
+    '.png': 'image/png',
+    '.svg': 'image/svg+xml',
+    '.txt': 'text/plain; charset=utf-8',
+    '.wasm': 'application/wasm',
+};
+
+/**
+ * Serves folders below these prefixes: `{ '/mrfgs/': 'target/web/site' }`. A function takes requests itself.
+ * @returns {Promise<{ url: string, asked: string[], stop(): Promise<void> }>}
+ */
+export async function serve(mounts, port = 0) {
+    const asked = [];
+    const server = createServer((request, response) => {
+        const { pathname } = new URL(request.url, 'http://localhost');
+        asked.push(pathname);
+        const prefix = Object.keys(mounts).find((mount) => pathname.startsWith(mount));
+        const mount = prefix && mounts[prefix];
+        if (typeof mount === 'function') {
+            mount(request, response, pathname.slice(prefix.length));
+            return;
+        }
+        const inside = mount && normalize(decodeURIComponent(pathname.slice(prefix.length)) || 'index.html');
+        const file = inside && !inside.startsWith('..') && join(mount, inside.endsWith('/') ? `${inside}index.html` : inside);
+        if (!file || !statSync(file, { throwIfNoEntry: false })?.isFile()) {
+            response.writeHead(404).end();
+            return;
+        }
+        response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream' });
+        createReadStream(file).pipe(response);
+    });
+    await new Promise((resolve) => server.listen(port, '127.0.0.1', resolve));
+    return {
+        url: `http://127.0.0.1:${server.address().port}`,
+        asked,
+        stop: () => {
+            server.closeAllConnections();
+            return new Promise((resolve) => server.close(resolve));
+        },
+    };
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+    const { url } = await serve({ '/': process.argv[2] }, Number(process.argv[3] ?? 8000));
+    console.log(`${url}/`);
+}

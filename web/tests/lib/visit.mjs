@@ -1,0 +1,160 @@
+// A visitor of the built page: a browser, a host, and what one does there with mouse and keyboard.
+import assert from 'node:assert/strict';
+import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { launch } from './browser.mjs';
+import { SITE } from './paths.mjs';
+import { serve } from './server.mjs';
+
+/** Longer than any match on a software driver takes. */
+const PATIENCE = 120_000;
+
+export const BROWSER = process.env.MRFGS_BROWSER ?? 'chromium';
+
+export class Visit {
+    /** Opens the page and waits until the engine is there. */
+    static async open(options = {}) {
+        const visit = new Visit();
+        visit.downloads = mkdtempSync(join(tmpdir(), 'mrfgs-downloads-'));
+        visit.host = await serve({ '/some/folder/': SITE });
+        visit.browser = await launch(BROWSER, { ...options, downloads: visit.downloads });
+        await visit.page(options);
+        return visit;
+    }
+
+    async page({ width = 1280, height = 800, before } = {}) {
+        this.tab = await this.browser.newPage();
+        await this.tab.setViewport({ width, height });
+        /** What must not happen: errors, refusals by the Content-Security-Policy, requests that leave the host. */
+        this.faults = [];
+        this.tab.on('pageerror', (error) => this.faults.push(error.message));
+        this.tab.on('console', (message) => {
+            if (message.type() === 'error') {
+                this.faults.push(message.text());
+            }
+        });
+        this.tab.on('request', (request) => {
+            if (!/^(blob|data):/.test(request.url()) && !request.url().startsWith(this.host.url)) {
+                this.faults.push(`a request to ${request.url()}`);
+            }
+        });
+        if (before) {
+            await before(this);
+        }
+        await this.tab.goto(this.url);
+        await this.settled();
+    }
+
+    get url() {
+        return `${this.host.url}/some/folder/`;
+    }
+
+    async close() {
+        await this.browser.close();
+        await this.host.stop();
+        rmSync(this.downloads, { recursive: true, force: true });
+        assert.deepEqual(this.faults, []);
+    }
+
+    /** Waits until the page is at one of these. */
+    async state(...states) {
+        await this.tab.waitForFunction((states) => states.includes(document.getElementById('app').dataset.state), { timeout: PATIENCE }, states);
+        return this.tab.$eval('#app', (app) => app.dataset.state);
+    }
+
+    /** Waits until nothing runs. */
+    settled() {
+        return this.state('empty', 'ready', 'done', 'failed');
+    }
+
+    text(selector) {
+        return this.tab.$eval(selector, (element) => element.textContent);
+    }
+
+    /** Waits for a text that matches; answers with it. */
+    async says(selector, pattern) {
+        const [source, flags] = [pattern.source, pattern.flags];
+        const found = (selector, source, flags) => {
+            const element = document.querySelector(selector);
+            return element?.checkVisibility() && new RegExp(source, flags).test(element.textContent);
+        };
+        try {
+            await this.tab.waitForFunction(found, { timeout: 60_000 }, selector, source, flags);
+        } catch {
+            assert.fail(`${selector} says ${JSON.stringify(await this.text(selector))}, not ${pattern}`);
+        }
+        return this.text(selector);
+    }
+
+    async choose(side, ...paths) {
+        await (await this.tab.$(`#${side}-file`)).uploadFile(...paths);
+    }
+
+    /** Does what changes the pair, and waits until the page has taken it up; answers with the state. */
+    async changed(action) {
+        const before = await this.tab.$eval('#app', (app) => Number(app.dataset.turn ?? 0));
+        await action();
+        const later = (before) => Number(document.getElementById('app').dataset.turn ?? 0) > before;
+        await this.tab.waitForFunction(later, { timeout: PATIENCE }, before);
+        return this.settled();
+    }
+
+    /** Chooses the views of a folder, and what else is named. */
+    async pair(folder, ...also) {
+        const state = await this.changed(() => this.choose('left', join(folder, 'im0.png'), join(folder, 'im1.png'), ...also));
+        assert.equal(state, 'ready', await this.text('#pair-problem'));
+    }
+
+    async set({ preset, device, range }) {
+        if (preset) {
+            await this.tab.select('#preset', preset);
+        }
+        if (device) {
+            await this.tab.click(`input[name=device][value=${device}]`);
+        }
+        if (range === 'automatic') {
+            await this.tab.click('input[value=automatic]');
+        } else if (range) {
+            await this.tab.click('input[value=given]');
+            await this.tab.$eval('#ends', (_, [min, max]) => {
+                for (const [id, value] of [['min', min], ['max', max]]) {
+                    const input = document.getElementById(id);
+                    input.value = value;
+                    input.dispatchEvent(new Event('change'));
+                }
+            }, range);
+        }
+    }
+
+    /** Matches and waits for the result. */
+    async match(settings = {}) {
+        await this.set(settings);
+        await this.tab.click('#match');
+        await this.state('matching', 'done');
+        await this.state('done', 'ready');
+        assert.equal(await this.state('done', 'ready'), 'done', await this.text('#problem'));
+    }
+
+    /** Clicks a download and waits for its file; answers with its name and bytes. */
+    async save(output) {
+        for (const file of readdirSync(this.downloads)) {
+            rmSync(join(this.downloads, file));
+        }
+        await this.tab.click(`#downloads [data-output=${output}]`);
+        for (;;) {
+            const [name] = readdirSync(this.downloads).filter((file) => !/\.(part|crdownload|tmp)$|^\./.test(file));
+            // Firefox makes an empty file first, and fills another.
+            const partial = readdirSync(this.downloads).length > 1;
+            if (name && !partial && existsSync(join(this.downloads, name))) {
+                const bytes = readFileSync(join(this.downloads, name));
+                if (bytes.length > 0) {
+                    return { name, bytes };
+                }
+            }
+            assert.equal(await this.text('#save-problem'), '');
+            // One frame of the page.
+            await this.tab.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
+        }
+    }
+}

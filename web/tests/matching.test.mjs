@@ -1,0 +1,122 @@
+// A match that is stopped, a browser without WebGPU, and a page without a network.
+import assert from 'node:assert/strict';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { difference, native } from './lib/native.mjs';
+import { scene } from './lib/paths.mjs';
+import { Visit } from './lib/visit.mjs';
+
+const views = (name) => ['im0.png', 'im1.png'].map((file) => join(scene(name), file));
+const CALIBRATION = join(scene('mixed'), 'calib.txt');
+
+describe('a match', () => {
+    let visit;
+    const expected = native(...views('mixed'));
+    before(async () => (visit = await Visit.open()));
+    after(() => visit.close());
+
+    for (const device of ['gpu', 'cpu']) {
+        it(`stops when it is told to, on the ${device}`, async () => {
+            await visit.pair(scene('mixed'), CALIBRATION);
+            // One that takes a while on either path.
+            await visit.set({ device, preset: device === 'cpu' ? 'paper' : 'default', range: 'automatic' });
+            await visit.tab.click('#match');
+            await visit.state('matching');
+            // In the middle of it.
+            await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+            await visit.tab.click('#cancel');
+            await visit.state('ready');
+            await visit.says('#problem', /^Stopped\.$/);
+            await visit.match({ preset: 'default' });
+            assert.equal(await visit.text('#problem'), '');
+            assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+        });
+    }
+
+    it('stops even where the worker does not hear', async () => {
+        await visit.tab.evaluate(() => {
+            const post = Worker.prototype.postMessage;
+            Worker.prototype.postMessage = function (message) {
+                if (!message.cancel) {
+                    post.call(this, message);
+                }
+            };
+        });
+        // On a software driver this takes longer than the page waits.
+        await visit.set({ device: 'gpu', preset: 'paper' });
+        await visit.tab.click('#match');
+        await visit.state('matching');
+        await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+        await visit.tab.click('#cancel');
+        await visit.state('ready');
+        await visit.says('#problem', /^Stopped\.$/);
+        await visit.match({ device: 'cpu', preset: 'default' });
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+    });
+
+    it('gives way to another pair', async () => {
+        await visit.set({ device: 'gpu' });
+        await visit.tab.click('#match');
+        await visit.state('matching');
+        await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
+        await visit.match({ device: 'cpu' });
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...views('thin')).pfm), undefined);
+    });
+});
+
+describe('without WebGPU', () => {
+    let visit;
+    before(async () => (visit = await Visit.open({ gpu: false })));
+    after(() => visit.close());
+
+    it('the CPU path matches, and the page says why', async () => {
+        await visit.says('#device-note', /WebGPU.*CPU path is used/);
+        assert.equal(await visit.tab.$eval('input[value=gpu]', (input) => input.disabled), true);
+        assert.equal(await visit.tab.$eval('input[value=cpu]', (input) => input.checked), true);
+        await visit.pair(scene('slanted'), join(scene('slanted'), 'calib.txt'));
+        await visit.match();
+        assert.match(await visit.text('#facts'), /CPU path/);
+        assert.equal(await visit.tab.$eval('#compare', (button) => button.disabled), true);
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...views('slanted')).pfm), undefined);
+    });
+});
+
+describe('without a network', () => {
+    let visit;
+    const caches = (tab) => tab.evaluate(async () => (await window.caches.keys()).sort());
+    before(async () => {
+        visit = await Visit.open({
+            // What an earlier build has left, and a page in another folder of the host.
+            before: async ({ tab, url }) => {
+                await tab.goto(`${url}icon.svg`);
+                const names = [`mrfgs ${url} 0123456789abcdef`, `mrfgs ${url}other/ 0123456789abcdef`];
+                await tab.evaluate((names) => Promise.all(names.map((name) => window.caches.open(name))), names);
+            },
+        });
+    });
+    after(() => visit.close());
+
+    it('the page opens again, with what was opened before', async () => {
+        await visit.tab.waitForSelector('html[data-offline=ready]');
+        await visit.tab.waitForFunction(() => navigator.serviceWorker.controller?.state === 'activated');
+        const kept = await caches(visit.tab);
+        assert.equal(kept.length, 2, kept);
+        assert.ok(kept.includes(`mrfgs ${visit.url}other/ 0123456789abcdef`), kept);
+        assert.ok(!kept.includes(`mrfgs ${visit.url} 0123456789abcdef`), kept);
+        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
+
+        await visit.host.stop();
+        await visit.tab.reload();
+        await visit.settled();
+        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
+        await visit.match({ device: 'cpu' });
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...views('thin')).pfm), undefined);
+        await visit.tab.click('#tab-points');
+        // The chunk is there, and says so itself where the browser has no WebGL.
+        await visit.says('#cloud-note', /[\d,]+ points|no WebGL 2/);
+        await visit.tab.click('[data-scene=steep]');
+        await visit.says('#pair-problem', /could not be loaded/);
+        // The browser tells of the scene that it could not fetch.
+        visit.faults = visit.faults.filter((fault) => !/steep|ERR_|Failed to (load|fetch)|NetworkError/.test(fault));
+    });
+});

@@ -1,0 +1,240 @@
+// What is shown of a result, with mouse and keyboard, on wide and narrow screens.
+import assert from 'node:assert/strict';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { decode } from '../png.mjs';
+import { native } from './lib/native.mjs';
+import { scene } from './lib/paths.mjs';
+import { Visit } from './lib/visit.mjs';
+
+const VIEWS = ['disparity', 'confidence', 'validity', 'left'];
+const views = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
+
+/** Disparities of a PFM file, from the top row down. */
+function disparities(file) {
+    const [, width, height] = file.toString('latin1', 0, 40).match(/^Pf\n(\d+) (\d+)\n-1(?:\.0)?\n/).map(Number);
+    const start = file.length - 4 * width * height;
+    return { width, at: (x, y) => file.readFloatLE(start + 4 * ((height - 1 - y) * width + x)) };
+}
+
+describe('views', () => {
+    let visit;
+    const expected = native(...views, [], ['confidence', 'validity', 'points']);
+    const focused = () => visit.tab.evaluate(() => document.activeElement.id || document.activeElement.dataset.scene || document.activeElement.name);
+    const shown = (view) => visit.tab.waitForSelector(`#map[data-shown=${view}]`);
+    before(async () => {
+        visit = await Visit.open();
+        await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
+        await visit.match({ device: 'cpu' });
+    });
+    after(() => visit.close());
+
+    it('reads out the pixel under the pointer', async () => {
+        const map = disparities(expected.pfm);
+        const [confidence, validity] = [decode(expected.confidence), decode(expected.validity)];
+        await visit.tab.click('#zoom-one');
+        for (const [x, y] of [[0, 0], [319, 239], [100, 150], [3, 120]]) {
+            const box = await visit.tab.$eval('#sheet', (sheet) => ({ x: sheet.getBoundingClientRect().x, y: sheet.getBoundingClientRect().y }));
+            // Whole numbers, which every browser takes as they are.
+            await visit.tab.mouse.move(Math.ceil(box.x + x), Math.ceil(box.y + y));
+            const said = await visit.says('#readout', new RegExp(`^x ${x}, y ${y} `));
+            assert.match(said, new RegExp(`disparity ${map.at(x, y).toFixed(2)} px · confidence ${confidence.pixels[y * 320 + x]} `));
+            assert.equal(/measured/.test(said), validity.pixels[y * 320 + x] === 0, said);
+            // Z = baseline * f / d, by the calib.txt.
+            const depth = Number(said.match(/depth ([\d.]+)/)[1]);
+            assert.ok(Math.abs(depth / ((0.18604166666666666 * 240) / map.at(x, y)) - 1) < 1e-4, said);
+        }
+        await visit.tab.click('#zoom-fit');
+    });
+
+    it('zooms', async () => {
+        const size = () => visit.tab.$eval('#sheet', (sheet) => sheet.getBoundingClientRect().width);
+        await visit.tab.click('#zoom-one');
+        assert.equal(await size(), 320);
+        await visit.tab.click('#zoom-in');
+        assert.equal(await size(), 640);
+        assert.equal(await visit.tab.$eval('#view', (view) => getComputedStyle(view).imageRendering), 'pixelated');
+        await visit.tab.click('#zoom-out');
+        await visit.tab.click('#zoom-out');
+        assert.equal(await size(), 160);
+        await visit.tab.click('#zoom-fit');
+        const box = await visit.tab.$eval('#stage-box', (box) => [box.scrollWidth - box.clientWidth, box.scrollHeight - box.clientHeight]);
+        assert.deepEqual(box, [0, 0]);
+    });
+
+    it('draws the left view up to the divider', async () => {
+        const colours = () => visit.tab.evaluate(() => {
+            const read = (id, x) => [...document.getElementById(id).getContext('2d').getImageData(x, 120, 1, 1).data];
+            return { clip: getComputedStyle(document.getElementById('under')).clipPath, left: read('under', 10), map: read('view', 10) };
+        });
+        assert.notDeepEqual((await colours()).left, (await colours()).map);
+        await visit.tab.focus('#wipe');
+        await visit.tab.keyboard.press('End');
+        assert.match((await colours()).clip, /inset\(0(px|%)? (calc\()?0/);
+        const divider = await (await visit.tab.$('#divider span')).boundingBox();
+        const sheet = await (await visit.tab.$('#sheet')).boundingBox();
+        const y = divider.y + divider.height / 2;
+        await visit.tab.mouse.move(divider.x + divider.width / 2, y);
+        await visit.tab.mouse.down();
+        await visit.tab.mouse.move(sheet.x + sheet.width / 4, y, { steps: 5 });
+        await visit.tab.mouse.up();
+        assert.equal(await visit.tab.$eval('#wipe', (wipe) => wipe.value), '25');
+        await visit.tab.$eval('#wipe', (wipe) => {
+            wipe.value = 0;
+            wipe.dispatchEvent(new Event('input'));
+        });
+    });
+
+    it('shows every view with its legend', async () => {
+        for (const view of VIEWS) {
+            await visit.tab.click(`#tab-${view}`);
+            await shown(view);
+            const seen = await visit.tab.evaluate(() => ['scale', 'legend'].map((id) => document.getElementById(id).checkVisibility()));
+            assert.deepEqual(seen, [['disparity', 'confidence'].includes(view), view === 'validity'], view);
+        }
+        await visit.tab.click('#tab-validity');
+        await shown('validity');
+        const none = decode(expected.validity).pixels.filter((value) => value === 0).length;
+        const share = `${((100 * none) / (320 * 240)).toFixed(1)} %`;
+        assert.ok((await visit.text('#legend')).includes(share), `${share}: ${await visit.text('#legend')}`);
+        await visit.tab.click('#tab-disparity');
+        await shown('disparity');
+        assert.equal(await visit.text('#scale-max'), '47');
+    });
+
+    it('turns the points, and hides those of less confidence', async (test) => {
+        await visit.tab.click('#tab-points');
+        if (!(await visit.tab.evaluate(() => Boolean(document.createElement('canvas').getContext('webgl2'))))) {
+            await visit.says('#cloud-note', /cannot be shown: this browser offers no WebGL 2/);
+            console.error('SKIPPED points in 3-D: this browser has no WebGL without a display');
+            test.skip('no WebGL');
+            await visit.tab.click('#tab-disparity');
+            return;
+        }
+        await visit.tab.waitForFunction(() => Number(document.getElementById('points').dataset.points) > 0);
+        const points = () => visit.tab.$eval('#points', (panel) => Number(panel.dataset.points));
+        const count = Number(expected.points.toString('latin1', 0, 400).match(/element vertex (\d+)/)[1]);
+        assert.equal(await points(), count);
+        const picture = async () => {
+            // Without the ring of the focus. What was asked for is drawn in the next frame.
+            await visit.tab.evaluate(() => {
+                document.activeElement.blur();
+                return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+            });
+            return Buffer.from(await (await visit.tab.$('#cloud')).screenshot());
+        };
+        const before = await picture();
+        await visit.tab.focus('#cloud');
+        await visit.tab.keyboard.press('ArrowLeft');
+        const turned = await picture();
+        assert.ok(!before.equals(turned));
+        await visit.tab.focus('#cloud');
+        await visit.tab.keyboard.press('Home');
+        assert.ok(before.equals(await picture()));
+        const box = await (await visit.tab.$('#cloud')).boundingBox();
+        await visit.tab.mouse.move(box.x + 200, box.y + 200);
+        await visit.tab.mouse.down();
+        await visit.tab.mouse.move(box.x + 260, box.y + 220, { steps: 3 });
+        await visit.tab.mouse.up();
+        assert.ok(!before.equals(await picture()));
+        await visit.tab.click('#reset-view');
+        assert.ok(before.equals(await picture()));
+        await visit.tab.focus('#least');
+        await visit.tab.keyboard.press('End');
+        const sure = await points();
+        assert.ok(sure < count / 2, `${sure} of ${count}`);
+        assert.ok(!before.equals(await picture()));
+        const ply = await visit.save('ply');
+        assert.match(ply.bytes.toString('latin1', 0, 400), new RegExp(`element vertex ${sure}\n`));
+        await visit.tab.focus('#least');
+        await visit.tab.keyboard.press('Home');
+        await visit.tab.click('#tab-disparity');
+    });
+
+    it('takes other cameras', async () => {
+        await visit.tab.click('#tab-points');
+        const baseline = await visit.tab.$eval('#baseline', (input) => input.value);
+        const set = (value) => visit.tab.$eval('#baseline', (input, value) => {
+            input.value = value;
+            input.dispatchEvent(new Event('change'));
+        }, value);
+        await set('-1');
+        await visit.says('#cameras-problem', /above 0/);
+        await set(baseline);
+        assert.equal(await visit.text('#cameras-problem'), '');
+        await visit.tab.click('#tab-disparity');
+    });
+
+    it('works by keyboard alone', async () => {
+        await visit.tab.focus('#left-file');
+        // The focus is shown to those who use the keyboard.
+        await visit.tab.keyboard.press('Tab');
+        await visit.tab.keyboard.down('Shift');
+        await visit.tab.keyboard.press('Tab');
+        await visit.tab.keyboard.up('Shift');
+        const order = [];
+        for (let i = 0; i < 20; i += 1) {
+            order.push(await focused());
+            // Where the focus is, is seen.
+            const outlined = await visit.tab.evaluate(() => {
+                const element = document.activeElement;
+                const outlined = element.type === 'file' ? element.nextElementSibling.querySelector('.thumb') : element;
+                return getComputedStyle(outlined).outlineStyle !== 'none';
+            });
+            assert.ok(outlined, order.at(-1));
+            if (order.at(-1) === 'match') {
+                break;
+            }
+            await visit.tab.keyboard.press('Tab');
+        }
+        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'range', 'device', 'match']);
+        await visit.tab.focus('[data-scene=slanted]');
+        assert.equal(await visit.changed(() => visit.tab.keyboard.press('Enter')), 'ready');
+        await visit.tab.focus('#match');
+        await visit.tab.keyboard.press('Enter');
+        await visit.state('done');
+        await visit.tab.focus('#tab-disparity');
+        for (const view of ['confidence', 'validity', 'left']) {
+            await visit.tab.keyboard.press('ArrowRight');
+            await shown(view);
+            assert.equal(await focused(), `tab-${view}`);
+        }
+        await visit.tab.keyboard.press('Home');
+        await shown('disparity');
+        await visit.tab.focus('#stage-box');
+        await visit.tab.keyboard.press('ArrowRight');
+        await visit.says('#readout', /^x 121, y 90 · disparity \d/);
+        await visit.tab.keyboard.press('ArrowDown');
+        await visit.says('#readout', /^x 121, y 91 /);
+        await visit.tab.keyboard.press('+');
+        assert.notEqual(await visit.tab.$eval('#stage-box', (box) => box.dataset.zoom), 'fit');
+        await visit.tab.keyboard.press('0');
+        assert.equal(await visit.tab.$eval('#stage-box', (box) => box.dataset.zoom), 'fit');
+    });
+
+    it('has a name for every control', async () => {
+        const nameless = await visit.tab.evaluate(() =>
+            [...document.querySelectorAll('button, input, select, [role=application], progress')]
+                .filter((e) => !(e.labels?.length || e.textContent.trim() || e.getAttribute('aria-label') || e.getAttribute('aria-labelledby')))
+                .map((e) => e.outerHTML),
+        );
+        assert.deepEqual(nameless, []);
+    });
+
+    it('fits on a phone', async () => {
+        await visit.tab.setViewport({ width: 360, height: 740 });
+        for (const view of [...VIEWS, 'points']) {
+            await visit.tab.click(`#tab-${view}`);
+            const wide = await visit.tab.evaluate(() => document.documentElement.scrollWidth);
+            assert.ok(wide <= 360, `${view}: ${wide}`);
+            const hidden = await visit.tab.evaluate(() =>
+                [...document.querySelectorAll('button, select, input:not([type=file])')]
+                    .filter((e) => e.checkVisibility() && e.getBoundingClientRect().width > 0)
+                    .filter((e) => e.getBoundingClientRect().right > 361 || e.getBoundingClientRect().left < -1)
+                    .map((e) => e.id || e.textContent),
+            );
+            assert.deepEqual(hidden, [], view);
+        }
+        await visit.tab.setViewport({ width: 1280, height: 800 });
+    });
+});
