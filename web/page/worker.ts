@@ -20,15 +20,18 @@ async function matcher(device: Device): Promise<engine.Matcher> {
     return open;
 }
 
+/** What the engine calls a device whose name the browser hides. */
+const UNNAMED = 'WebGPU';
+
 /** The device's name for people. Browsers hide it, or tell of its maker and architecture alone, which the engine does not see. */
 async function named(device: string): Promise<string> {
-    if (!device.trim().startsWith('(')) {
+    if (device !== UNNAMED) {
         return device;
     }
     const gpu = (navigator as unknown as { gpu: { requestAdapter(): Promise<{ info?: Record<string, string> } | null> } }).gpu;
     const info = (await gpu.requestAdapter())?.info;
     const known = [info?.['vendor'], info?.['architecture']].filter(Boolean);
-    return known.length > 0 ? `${known.join(' ')} (WebGPU)` : 'WebGPU';
+    return known.length > 0 ? `${known.join(' ')} (${UNNAMED})` : UNNAMED;
 }
 
 function need<T>(value: T | undefined, what: string): T {

@@ -7,7 +7,7 @@ const get = async (path) => new Uint8Array(await (await fetch(path)).arrayBuffer
 
 /** The device's name; where the browser hides it, its maker and architecture. */
 async function named(device) {
-    if (!device.trim().startsWith('(')) {
+    if (device !== 'WebGPU') {
         return device;
     }
     const info = (await navigator.gpu.requestAdapter())?.info;

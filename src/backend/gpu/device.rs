@@ -290,7 +290,9 @@ impl Device {
                 }
             }
         };
-        let name = format!("{} ({})", info.name, api(info.backend));
+        // A browser may not tell the name.
+        let api = api(info.backend);
+        let name = if info.name.is_empty() { api.into() } else { format!("{} ({api})", info.name) };
         let (uncaptured, device_name) = (note(&failure), name.clone());
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
             uncaptured(match e {
