@@ -5,7 +5,7 @@ import { basename, dirname, join, relative } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 import { build } from 'esbuild';
-import { decode, encode, shrink } from './png.mjs';
+import { shrunk } from './png.mjs';
 
 const root = dirname(dirname(fileURLToPath(import.meta.url)));
 const engine = join(root, 'target/web/engine');
@@ -73,7 +73,7 @@ for (const { name } of SCENES) {
     for (const file of ['im0.png', 'im1.png', 'calib.txt']) {
         copyFileSync(join(from, file), join(to, file));
     }
-    writeFileSync(join(to, 'small.png'), encode(shrink(decode(readFileSync(join(from, 'im0.png'))), 120, 90)));
+    writeFileSync(join(to, 'small.png'), shrunk(readFileSync(join(from, 'im0.png')), 120, 90));
 }
 
 /** All files below a folder, by their paths from it. */

@@ -70,21 +70,26 @@ describe('inputs', () => {
         await works();
     });
 
-    it('takes dropped files', async () => {
-        const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, content: readFileSync(path, 'base64') }));
-        const drop = () => visit.tab.evaluate((files) => {
-            const transfer = new DataTransfer();
-            for (const { name, content } of files) {
-                transfer.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name));
-            }
-            for (const type of ['dragover', 'drop']) {
-                document.body.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
-            }
-        }, files);
-        assert.equal(await visit.changed(drop), 'ready');
-        assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im0.png', 'im1.png']);
-        await works();
-    });
+    for (const way of ['dropped', 'pasted']) {
+        it(`takes ${way} files`, async () => {
+            const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, content: readFileSync(path, 'base64') }));
+            const give = () => visit.tab.evaluate((files, way) => {
+                const transfer = new DataTransfer();
+                for (const { name, content } of files) {
+                    transfer.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name, { type: 'image/png' }));
+                }
+                const properties = { bubbles: true, cancelable: true };
+                const events = way === 'dropped'
+                    ? ['dragover', 'drop'].map((type) => new DragEvent(type, { dataTransfer: transfer, ...properties }))
+                    // Firefox lets no script make an event with files in it.
+                    : [Object.defineProperty(new Event('paste', properties), 'clipboardData', { value: transfer })];
+                events.forEach((event) => document.body.dispatchEvent(event));
+            }, files, way);
+            assert.equal(await visit.changed(give), 'ready');
+            assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im0.png', 'im1.png']);
+            await works();
+        });
+    }
 
     it('opens a rendered scene', async () => {
         assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');

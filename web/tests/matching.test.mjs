@@ -4,7 +4,7 @@ import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { difference, native } from './lib/native.mjs';
 import { scene } from './lib/paths.mjs';
-import { Visit } from './lib/visit.mjs';
+import { BROWSER, Visit } from './lib/visit.mjs';
 
 const views = (name) => ['im0.png', 'im1.png'].map((file) => join(scene(name), file));
 const CALIBRATION = join(scene('mixed'), 'calib.txt');
@@ -43,14 +43,14 @@ describe('a match', () => {
             };
         });
         // On a software driver this takes longer than the page waits.
-        await visit.set({ device: 'gpu', preset: 'paper' });
+        await visit.set({ device: 'gpu', preset: 'paper', range: [0, 255] });
         await visit.tab.click('#match');
         await visit.state('matching');
         await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
         await visit.tab.click('#cancel');
         await visit.state('ready');
         await visit.says('#problem', /^Stopped\.$/);
-        await visit.match({ device: 'cpu', preset: 'default' });
+        await visit.match({ device: 'cpu', preset: 'default', range: 'automatic' });
         assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
     });
 
@@ -61,6 +61,31 @@ describe('a match', () => {
         await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
         await visit.match({ device: 'cpu' });
         assert.equal(difference((await visit.save('pfm')).bytes, native(...views('thin')).pfm), undefined);
+    });
+});
+
+describe('a device that is lost', { skip: BROWSER !== 'chromium' && 'only Chromium can be told to end its GPU process' }, () => {
+    let visit;
+    before(async () => (visit = await Visit.open()));
+    after(() => visit.close());
+
+    it('gives way to the CPU path, and is opened anew', async () => {
+        const expected = native(...views('mixed'));
+        await visit.pair(scene('mixed'), CALIBRATION);
+        await visit.set({ device: 'gpu', preset: 'default', range: 'automatic' });
+        await visit.tab.click('#match');
+        await visit.state('matching');
+        await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+        const session = await visit.browser.target().createCDPSession();
+        await session.send('Browser.crashGpuProcess');
+        assert.equal(await visit.state('done', 'ready'), 'done', await visit.text('#problem'));
+        await visit.says('#warnings', /failed|lost/);
+        assert.match(await visit.text('#facts'), /CPU path/);
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+
+        await visit.match();
+        assert.match(await visit.text('#facts'), /WebGPU/);
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
     });
 });
 

@@ -9,7 +9,7 @@
 import { basename, dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { decode } from '../png.mjs';
+import { levels } from '../png.mjs';
 import { installed, launch } from './lib/browser.mjs';
 import { native } from './lib/native.mjs';
 import { ENGINE } from './lib/paths.mjs';
@@ -38,8 +38,8 @@ const OUTPUTS = ['pfm', 'raw', 'confidence', 'validity'];
 /** The bytes of each pixel of a map, however the file stores it. */
 function pixels(output, file) {
     if (output === 'confidence' || output === 'validity') {
-        const { width, height, pixels } = decode(file);
-        return { width, height, bytes: 1, data: pixels };
+        const { width, height, levels: data } = levels(file);
+        return { width, height, bytes: 1, data };
     }
     const [head, width, height] = file.toString('latin1', 0, 64).match(/^Pf\n(\d+) (\d+)\n[^\n]*\n/);
     return { width: Number(width), height: Number(height), bytes: 4, data: file.subarray(head.length) };

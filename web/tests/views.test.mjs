@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { decode } from '../png.mjs';
+import { levels } from '../png.mjs';
 import { native } from './lib/native.mjs';
 import { scene } from './lib/paths.mjs';
 import { Visit } from './lib/visit.mjs';
@@ -31,15 +31,15 @@ describe('views', () => {
 
     it('reads out the pixel under the pointer', async () => {
         const map = disparities(expected.pfm);
-        const [confidence, validity] = [decode(expected.confidence), decode(expected.validity)];
+        const [confidence, validity] = [levels(expected.confidence).levels, levels(expected.validity).levels];
         await visit.tab.click('#zoom-one');
         for (const [x, y] of [[0, 0], [319, 239], [100, 150], [3, 120]]) {
             const box = await visit.tab.$eval('#sheet', (sheet) => ({ x: sheet.getBoundingClientRect().x, y: sheet.getBoundingClientRect().y }));
             // Whole numbers, which every browser takes as they are.
             await visit.tab.mouse.move(Math.ceil(box.x + x), Math.ceil(box.y + y));
             const said = await visit.says('#readout', new RegExp(`^x ${x}, y ${y} `));
-            assert.match(said, new RegExp(`disparity ${map.at(x, y).toFixed(2)} px · confidence ${confidence.pixels[y * 320 + x]} `));
-            assert.equal(/measured/.test(said), validity.pixels[y * 320 + x] === 0, said);
+            assert.match(said, new RegExp(`disparity ${map.at(x, y).toFixed(2)} px · confidence ${confidence[y * 320 + x]} `));
+            assert.equal(/measured/.test(said), validity[y * 320 + x] === 0, said);
             // Z = baseline * f / d, by the calib.txt.
             const depth = Number(said.match(/depth ([\d.]+)/)[1]);
             assert.ok(Math.abs(depth / ((0.18604166666666666 * 240) / map.at(x, y)) - 1) < 1e-4, said);
@@ -94,7 +94,7 @@ describe('views', () => {
         }
         await visit.tab.click('#tab-validity');
         await shown('validity');
-        const none = decode(expected.validity).pixels.filter((value) => value === 0).length;
+        const none = levels(expected.validity).levels.filter((value) => value === 0).length;
         const share = `${((100 * none) / (320 * 240)).toFixed(1)} %`;
         assert.ok((await visit.text('#legend')).includes(share), `${share}: ${await visit.text('#legend')}`);
         await visit.tab.click('#tab-disparity');
