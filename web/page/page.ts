@@ -310,6 +310,7 @@ async function present(): Promise<void> {
     say('facts', facts.join(' · '));
     by('compare').title = gpu ? 'Matches by the other path too and counts the pixels that differ' : 'There is no GPU to compare with';
     points.result(true);
+    readOut(undefined);
     await showView();
     // On a narrow page the result is below the form.
     const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -396,7 +397,8 @@ function select(to: View): void {
 /** Says what is known of a pixel. */
 function readOut(pixel: Pixel | undefined): void {
     if (!result || !facts || !pixel) {
-        say('readout', pair && !result ? 'The left view. Match the pair to see its maps.' : undefined);
+        const hint = result ? 'Point at a pixel to read its disparity.' : 'The left view. Match the pair to see its maps.';
+        say('readout', pair && hint);
         return;
     }
     const at = pixel.y * result.width + pixel.x;
