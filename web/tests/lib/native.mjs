@@ -5,13 +5,16 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { ROOT } from './paths.mjs';
 
+/** The program; the variable MRFGS names another build of it. */
+const PROGRAM = process.env.MRFGS ?? join(ROOT, 'target/release/mrfgs');
+
 /** Runs `mrfgs match` on the CPU; answers with the bytes of the map and of all that `also` names. */
 export function native(left, right, flags = [], also = ['raw', 'confidence', 'validity']) {
     const folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
     try {
         const json = join(folder, 'run.json');
         const output = ['--also', also.join(','), '--json', json, '--device', 'cpu', '--quiet'];
-        execFileSync(join(ROOT, 'target/release/mrfgs'), ['match', left, right, join(folder, 'd.pfm'), ...output, ...flags]);
+        execFileSync(PROGRAM, ['match', left, right, join(folder, 'd.pfm'), ...output, ...flags]);
         const ends = { raw: 'raw.pfm', confidence: 'confidence.png', validity: 'validity.png', points: 'points.ply' };
         const files = also.map((word) => [word, readFileSync(join(folder, `d.${ends[word]}`))]);
         const { range } = JSON.parse(readFileSync(json, 'utf8'));
