@@ -2,7 +2,7 @@
 
 use super::search::Search;
 use super::{Matched, Matcher};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
 use crate::solver::Inspection;
@@ -123,12 +123,20 @@ impl<'a> Job<'a> {
     /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` has not as many elements as the images have pixels.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_into(self, out: &mut [f32]) -> Result<Matched> {
+        pollster::block_on(self.run_into_async(out))
+    }
+
+    /// As `run_into`, for a browser.
+    ///
+    /// # Errors
+    /// Those of `run_into`.
+    pub async fn run_into_async(self, out: &mut [f32]) -> Result<Matched> {
         let (width, height) = self.pair.size();
         if out.len() != width * height {
             let reason = format!("{} values for a map of {width} x {height} pixels", out.len());
-            return Err(crate::Error::Mismatch(reason));
+            return Err(Error::Mismatch(reason));
         }
-        let matched = self.run()?;
+        let matched = self.run_async().await?;
         out.copy_from_slice(matched.disparity().data());
         Ok(matched)
     }
