@@ -52,9 +52,9 @@ impl std::ops::AddAssign for Traffic {
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ticket(u64);
 
-/// What a backend is going to answer. In a native program it is there as soon as it is asked for: who asks waits meanwhile. In a
-/// browser, where nobody may wait, the thread does other work until then.
-pub type Answer<'a, T> = Pin<Box<dyn Future<Output = Result<T>> + 'a>>;
+/// What a backend is asked for, to be awaited. A native program waits for the device there. In a browser, where nobody may wait, the
+/// thread does other work until the answer comes.
+pub type Promise<'a, T> = Pin<Box<dyn Future<Output = Result<T>> + 'a>>;
 
 /// What runs the stages. Every method fails with [`crate::Error::Device`] when the device does.
 #[allow(clippy::missing_errors_doc, reason = "said once, above")]
@@ -84,7 +84,7 @@ pub trait Backend {
 
     /// To be awaited between stages: until a device is no more than a few submissions behind, and in a browser until the other work
     /// of the thread has had its turn.
-    fn keep_up(&mut self) -> Answer<'_, ()>;
+    fn keep_up(&mut self) -> Promise<'_, ()>;
 
     /// Runs the stages of a wavefront, the first that follow on the windows of level 0. What they leave of level 0 beside maps
     /// may be gone afterwards. `before` hears of each stage that is about to run, with the share of it that is.
@@ -95,20 +95,20 @@ pub trait Backend {
         &'a mut self,
         wavefront: &'a Wavefront,
         before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Answer<'a, ()>;
+    ) -> Promise<'a, ()>;
 
     /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
     /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.
-    fn settled(&mut self, wait: bool) -> Answer<'_, bool>;
+    fn settled(&mut self, wait: bool) -> Promise<'_, bool>;
 
     /// How many iterations found the map settled already.
-    fn idle_iterations(&mut self) -> Answer<'_, u32>;
+    fn idle_iterations(&mut self) -> Promise<'_, u32>;
 
     /// Waits until every stage has run.
-    fn wait(&mut self) -> Answer<'_, ()>;
+    fn wait(&mut self) -> Promise<'_, ()>;
 
     /// The values of `map`, as they are once all stages before have run.
-    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>>;
+    fn map(&mut self, map: Map) -> Promise<'_, Plane<i32>>;
 
     /// Asks for the maps as they are once all stages before have run. The next pair may be prepared before they arrive.
     fn request_maps(&mut self) -> Result<Ticket>;
@@ -118,14 +118,14 @@ pub trait Backend {
     ///
     /// # Panics
     /// When the ticket is of another backend.
-    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)>;
+    fn maps(&mut self, ticket: Ticket) -> Promise<'_, (Maps, u32)>;
 
     /// Starts to take the time of every stage, or stops.
     fn keep_time(&mut self, on: bool) -> Result<()>;
 
     /// The time of every run of a stage since [`Backend::keep_time`] was last called, in order: a device's own where it has
     /// a clock.
-    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>>;
+    fn times(&mut self) -> Promise<'_, Vec<(Stage, Duration)>>;
 
     /// Cells of a volume of each level, as they are stored: the labels of all pixels, with padding.
     fn cells(&self) -> Vec<u64>;

@@ -6,7 +6,7 @@ use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::low_level::backend::probe::Probe;
 use mrfgs::low_level::backend::wavefront::Wavefront;
-use mrfgs::low_level::backend::{Answer, Backend, Map, Stage, Ticket, Traffic};
+use mrfgs::low_level::backend::{Backend, Map, Promise, Stage, Ticket, Traffic};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::Maps;
@@ -81,7 +81,7 @@ impl Backend for Pooled {
         self.gpu().run(stage)
     }
 
-    fn keep_up(&mut self) -> Answer<'_, ()> {
+    fn keep_up(&mut self) -> Promise<'_, ()> {
         self.gpu().keep_up()
     }
 
@@ -89,23 +89,23 @@ impl Backend for Pooled {
         &'a mut self,
         wavefront: &'a Wavefront,
         before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Answer<'a, ()> {
+    ) -> Promise<'a, ()> {
         self.gpu().run_wavefront(wavefront, before)
     }
 
-    fn settled(&mut self, wait: bool) -> Answer<'_, bool> {
+    fn settled(&mut self, wait: bool) -> Promise<'_, bool> {
         self.gpu().settled(wait)
     }
 
-    fn idle_iterations(&mut self) -> Answer<'_, u32> {
+    fn idle_iterations(&mut self) -> Promise<'_, u32> {
         self.gpu().idle_iterations()
     }
 
-    fn wait(&mut self) -> Answer<'_, ()> {
+    fn wait(&mut self) -> Promise<'_, ()> {
         self.gpu().wait()
     }
 
-    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>> {
+    fn map(&mut self, map: Map) -> Promise<'_, Plane<i32>> {
         self.gpu().map(map)
     }
 
@@ -113,7 +113,7 @@ impl Backend for Pooled {
         self.gpu().request_maps()
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)> {
+    fn maps(&mut self, ticket: Ticket) -> Promise<'_, (Maps, u32)> {
         self.gpu().maps(ticket)
     }
 
@@ -121,7 +121,7 @@ impl Backend for Pooled {
         self.gpu().keep_time(on)
     }
 
-    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>> {
+    fn times(&mut self) -> Promise<'_, Vec<(Stage, Duration)>> {
         self.gpu().times()
     }
 

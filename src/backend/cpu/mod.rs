@@ -12,7 +12,7 @@ mod windows;
 
 use super::probe::Probe;
 use super::wavefront::Wavefront;
-use super::{Answer, Backend, Map, Requests, Stage, Ticket, Traffic};
+use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
 use crate::image::{Image, Plane};
@@ -143,7 +143,7 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn keep_up(&mut self) -> Answer<'_, ()> {
+    fn keep_up(&mut self) -> Promise<'_, ()> {
         Box::pin(async {
             self.pause.now_and_then().await;
             Ok(())
@@ -154,7 +154,7 @@ impl Backend for Cpu {
         &'a mut self,
         wavefront: &'a Wavefront,
         before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Answer<'a, ()> {
+    ) -> Promise<'a, ()> {
         Box::pin(async {
             let sent = on_volumes!(self, v => wavefront.stages().iter().map(|&stage| v.begin(stage)).collect::<Vec<_>>());
             let mut times = vec![Duration::ZERO; sent.len()];
@@ -174,19 +174,19 @@ impl Backend for Cpu {
         })
     }
 
-    fn settled(&mut self, _: bool) -> Answer<'_, bool> {
+    fn settled(&mut self, _: bool) -> Promise<'_, bool> {
         Box::pin(ready(Ok(on_volumes!(self, v => v.settled))))
     }
 
-    fn idle_iterations(&mut self) -> Answer<'_, u32> {
+    fn idle_iterations(&mut self) -> Promise<'_, u32> {
         Box::pin(ready(Ok(0)))
     }
 
-    fn wait(&mut self) -> Answer<'_, ()> {
+    fn wait(&mut self) -> Promise<'_, ()> {
         Box::pin(ready(Ok(())))
     }
 
-    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>> {
+    fn map(&mut self, map: Map) -> Promise<'_, Plane<i32>> {
         Box::pin(ready(Ok(on_volumes!(self, v => v.maps.read(map)))))
     }
 
@@ -202,7 +202,7 @@ impl Backend for Cpu {
         Ok(self.requests.add(maps))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)> {
+    fn maps(&mut self, ticket: Ticket) -> Promise<'_, (Maps, u32)> {
         Box::pin(ready(Ok((self.requests.take(&ticket), 0))))
     }
 
@@ -211,7 +211,7 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>> {
+    fn times(&mut self) -> Promise<'_, Vec<(Stage, Duration)>> {
         Box::pin(ready(Ok(self.times.clone().unwrap_or_default())))
     }
 

@@ -8,6 +8,7 @@
 //! Where message passing stops by itself, [`Stage::Change`] decides that there: from then on, it makes the dispatches of the
 //! messages empty.
 
+mod adapters;
 mod buffers;
 mod convergence;
 mod device;
@@ -26,20 +27,20 @@ mod words;
 
 use super::probe::Probe;
 use super::wavefront::{Wavefront, needs_level_0};
-use super::{Answer, Backend, Map, Requests, Stage, Ticket, Traffic};
+use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
 use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
+pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
+#[cfg(not(target_arch = "wasm32"))]
+pub use adapters::{devices, has_automatic};
 use buffers::{Buffers, LevelBuffers};
-
 use convergence::Convergence;
 use device::Device;
-pub use device::{DeviceInfo, FaultInjection, devices_async, has_automatic_async, may_have_gpu};
-#[cfg(not(target_arch = "wasm32"))]
-pub use device::{devices, has_automatic};
+pub use device::FaultInjection;
 use levels::{can_share, next_level, record_levels};
 use rows::Rows;
 pub use shader::{Constant, Kernel};
@@ -383,7 +384,7 @@ impl Backend for Gpu {
         self.perform(stage, &steps)
     }
 
-    fn keep_up(&mut self) -> Answer<'_, ()> {
+    fn keep_up(&mut self) -> Promise<'_, ()> {
         Box::pin(async {
             if self.timer.as_ref().is_some_and(Timer::waits) {
                 self.wait().await?;
@@ -397,7 +398,7 @@ impl Backend for Gpu {
         &'a mut self,
         wavefront: &'a Wavefront,
         before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Answer<'a, ()> {
+    ) -> Promise<'a, ()> {
         Box::pin(async {
             if !self.state().plan.holds_all_rows() {
                 return self.run_parts(wavefront, before).await;
@@ -411,25 +412,25 @@ impl Backend for Gpu {
         })
     }
 
-    fn settled(&mut self, wait: bool) -> Answer<'_, bool> {
+    fn settled(&mut self, wait: bool) -> Promise<'_, bool> {
         // Where times are kept, idle iterations are not to be among them.
         let asked = wait || self.timer.is_some();
         Box::pin(async move { Ok(asked && self.convergence().await?.settled()) })
     }
 
-    fn idle_iterations(&mut self) -> Answer<'_, u32> {
+    fn idle_iterations(&mut self) -> Promise<'_, u32> {
         let may_settle = self.state().plan.settled_change().is_some();
         Box::pin(async move { if may_settle { Ok(self.convergence().await?.idle()) } else { Ok(0) } })
     }
 
-    fn wait(&mut self) -> Answer<'_, ()> {
+    fn wait(&mut self) -> Promise<'_, ()> {
         Box::pin(async {
             self.submit()?;
             self.device.wait().await
         })
     }
 
-    fn map(&mut self, map: Map) -> Answer<'_, Plane<i32>> {
+    fn map(&mut self, map: Map) -> Promise<'_, Plane<i32>> {
         Box::pin(self.map_values(map))
     }
 
@@ -443,7 +444,7 @@ impl Backend for Gpu {
         Ok(self.requests.add(RequestedMaps { parts, shape }))
     }
 
-    fn maps(&mut self, ticket: Ticket) -> Answer<'_, (Maps, u32)> {
+    fn maps(&mut self, ticket: Ticket) -> Promise<'_, (Maps, u32)> {
         let RequestedMaps { parts, shape } = self.requests.take(&ticket);
         Box::pin(self.device.read(parts, move |words| {
             let maps = Maps {
@@ -462,7 +463,7 @@ impl Backend for Gpu {
         Ok(())
     }
 
-    fn times(&mut self) -> Answer<'_, Vec<(Stage, Duration)>> {
+    fn times(&mut self) -> Promise<'_, Vec<(Stage, Duration)>> {
         Box::pin(async {
             self.wait().await?;
             match &mut self.timer {

@@ -1,0 +1,180 @@
+//! Adapters: listing them, and choosing one.
+
+use crate::error::{DeviceError, ExecutionError, Result};
+
+/// An adapter, as `mrfgs devices` lists it.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct DeviceInfo {
+    /// Position in the list, which `--device` accepts besides a part of the name.
+    pub index: usize,
+    /// Name given by its driver.
+    pub name: String,
+    /// Discrete GPU, integrated GPU, virtual GPU, software, or other.
+    pub kind: &'static str,
+    /// Vulkan, Metal or WebGPU.
+    pub api: &'static str,
+    /// Driver and its version, as far as the adapter reports them.
+    pub driver: String,
+    /// Largest buffer, in bytes.
+    pub max_buffer: u64,
+    /// Largest range of a buffer that a shader can see at once, in bytes.
+    pub max_binding: u64,
+    /// Whether it is a software driver, which `auto` does not choose.
+    pub software: bool,
+    /// Whether `auto` chooses this one.
+    pub automatic: bool,
+}
+
+async fn adapters() -> Vec<wgpu::Adapter> {
+    adapters_of(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::BROWSER_WEBGPU).await
+}
+
+pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor {
+        backends,
+        flags: wgpu::InstanceFlags::empty(),
+        // Above this share of the memory that the driver reports, allocations are refused instead of evicting
+        // others' buffers.
+        memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
+            for_resource_creation: Some(95),
+            for_device_loss: None,
+        },
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    };
+    descriptor.backend_options.noop.enable = backends.contains(wgpu::Backends::NOOP);
+    let instance = wgpu::Instance::new(descriptor);
+    if !cfg!(target_arch = "wasm32") {
+        return instance.enumerate_adapters(backends).await;
+    }
+    // A browser shows one of its adapters, the one that is asked for.
+    let wanted = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..Default::default()
+    };
+    instance.request_adapter(&wanted).await.into_iter().collect()
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+fn kind(device_type: wgpu::DeviceType) -> &'static str {
+    match device_type {
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::VirtualGpu => "virtual GPU",
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::Other => "other",
+    }
+}
+
+pub(super) fn api(backend: wgpu::Backend) -> &'static str {
+    match backend {
+        wgpu::Backend::Vulkan => "Vulkan",
+        wgpu::Backend::Metal => "Metal",
+        wgpu::Backend::BrowserWebGpu => "WebGPU",
+        _ => "other",
+    }
+}
+
+/// Driver and version, as far as the adapter reports them.
+pub(super) fn driver(info: &wgpu::AdapterInfo) -> String {
+    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
+}
+
+/// Rank of a kind of device; the smallest is preferred.
+fn preference(device_type: wgpu::DeviceType) -> u8 {
+    match device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+/// Position of the preferred adapter, the first one on a tie.
+fn preferred(adapters: &[wgpu::Adapter]) -> Option<usize> {
+    (0..adapters.len()).min_by_key(|&i| preference(adapters[i].get_info().device_type))
+}
+
+/// Whether `auto` would take this adapter. A browser does not say of what kind a GPU is.
+fn is_automatic(info: &wgpu::AdapterInfo) -> bool {
+    let in_browser = info.backend == wgpu::Backend::BrowserWebGpu;
+    preference(info.device_type) <= if in_browser { 3 } else { 1 }
+}
+
+/// Every adapter of this machine, in the order of their indices. Empty where there is no driver.
+#[cfg(not(target_arch = "wasm32"))]
+#[must_use]
+pub fn devices() -> Vec<DeviceInfo> {
+    let adapters = pollster::block_on(adapters());
+    let preferred = preferred(&adapters);
+    adapters
+        .iter()
+        .enumerate()
+        .map(|(index, adapter)| {
+            let (info, limits) = (adapter.get_info(), adapter.limits());
+            DeviceInfo {
+                index,
+                kind: kind(info.device_type),
+                api: api(info.backend),
+                driver: driver(&info),
+                max_buffer: limits.max_buffer_size,
+                max_binding: limits.max_storage_buffer_binding_size,
+                software: info.device_type == wgpu::DeviceType::Cpu,
+                automatic: preferred == Some(index) && is_automatic(&info),
+                name: info.name,
+            }
+        })
+        .collect()
+}
+
+/// The adapter that `wanted` names by its index or a part of its name, or the preferred one.
+pub(super) async fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
+    let mut adapters = adapters().await;
+    if adapters.is_empty() {
+        return Err(DeviceError::NoDriver.into());
+    }
+    let place = match wanted {
+        None => preferred(&adapters),
+        Some(wanted) => {
+            let named = || {
+                adapters.iter().position(|a| {
+                    a.get_info().name.to_lowercase().contains(&wanted.to_lowercase()) && !wanted.is_empty()
+                })
+            };
+            wanted.parse::<usize>().ok().filter(|&i| i < adapters.len()).or_else(named)
+        }
+    };
+    if let Some(place) = place {
+        return Ok(adapters.swap_remove(place));
+    }
+    let present = adapters.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect();
+    Err(ExecutionError::NoSuchDevice { wanted: wanted.unwrap_or_default().into(), present }.into())
+}
+
+/// Whether there may be a GPU. On Linux every GPU driver has a node in `/dev`; elsewhere only the driver
+/// knows.
+#[must_use]
+pub fn may_have_gpu() -> bool {
+    // The kernel's graphics, NVIDIA, WSL, Arm, Qualcomm, Imagination.
+    const NODES: [&str; 9] = ["dri", "nvidia", "nvhost", "nvgpu", "nvmap", "dxg", "mali", "kgsl", "pvr"];
+    if !cfg!(target_os = "linux") {
+        return true;
+    }
+    let Ok(entries) = std::fs::read_dir("/dev") else { return true };
+    let mut names = entries.flatten().map(|entry| entry.file_name());
+    names.any(|name| NODES.iter().any(|node| name.to_string_lossy().starts_with(node)))
+}
+
+/// Whether `auto` finds a suitable device. Where there is no GPU the driver is not asked, because a loader
+/// that finds no display may print to standard error.
+#[cfg(not(target_arch = "wasm32"))]
+#[must_use]
+pub fn has_automatic() -> bool {
+    pollster::block_on(has_automatic_async())
+}
+
+/// As `has_automatic`, for a browser.
+pub async fn has_automatic_async() -> bool {
+    may_have_gpu() && adapters().await.iter().any(|a| is_automatic(&a.get_info()))
+}
