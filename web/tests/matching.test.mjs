@@ -20,10 +20,7 @@ describe('a match', () => {
             await visit.pair(scene('mixed'), CALIBRATION);
             // One that takes a while on either path.
             await visit.set({ device, preset: device === 'cpu' ? 'paper' : 'default', range: 'automatic' });
-            await visit.tab.click('#match');
-            await visit.state('matching');
-            // In the middle of it.
-            await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+            await visit.begin();
             await visit.tab.click('#cancel');
             await visit.state('ready');
             await visit.says('#problem', /^Stopped\.$/);
@@ -44,9 +41,7 @@ describe('a match', () => {
         });
         // On a software driver this takes longer than the page waits.
         await visit.set({ device: 'gpu', preset: 'paper', range: [0, 255] });
-        await visit.tab.click('#match');
-        await visit.state('matching');
-        await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+        await visit.begin();
         await visit.tab.click('#cancel');
         await visit.state('ready');
         await visit.says('#problem', /^Stopped\.$/);
@@ -73,9 +68,7 @@ describe('a device that is lost', { skip: BROWSER !== 'chromium' && 'only Chromi
         const expected = native(...views('mixed'));
         await visit.pair(scene('mixed'), CALIBRATION);
         await visit.set({ device: 'gpu', preset: 'default', range: 'automatic' });
-        await visit.tab.click('#match');
-        await visit.state('matching');
-        await visit.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+        await visit.begin();
         const session = await visit.browser.target().createCDPSession();
         await session.send('Browser.crashGpuProcess');
         assert.equal(await visit.state('done', 'ready'), 'done', await visit.text('#problem'));

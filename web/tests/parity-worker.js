@@ -5,16 +5,6 @@ const ready = init({ module_or_path: new URL('/engine/mrfgs_web_bg.wasm', self.l
 const matchers = new Map();
 const get = async (path) => new Uint8Array(await (await fetch(path)).arrayBuffer());
 
-/** The device's name; where the browser hides it, its maker and architecture. */
-async function named(device) {
-    if (device !== 'WebGPU') {
-        return device;
-    }
-    const info = (await navigator.gpu.requestAdapter())?.info;
-    const known = [info?.vendor, info?.architecture].filter(Boolean);
-    return known.length > 0 ? `${known.join(' ')} (WebGPU)` : 'WebGPU';
-}
-
 async function match({ path, preset, pair: number, range: { min, max } }) {
     await ready;
     const files = await Promise.all(['im0.png', 'im1.png'].map((file) => get(`/pairs/${number}/${file}`)));
@@ -33,7 +23,7 @@ async function match({ path, preset, pair: number, range: { min, max } }) {
     for (const object of [found, range, pair]) {
         object.free();
     }
-    return { width, height, device: await named(device), note, seconds };
+    return { width, height, device, note, seconds };
 }
 
 self.onmessage = async ({ data }) => {

@@ -57,6 +57,13 @@ export class Visit {
         assert.deepEqual(this.faults, []);
     }
 
+    /** Starts a match, and waits until it is in the middle. */
+    async begin() {
+        await this.tab.click('#match');
+        await this.state('matching');
+        await this.tab.waitForFunction(() => document.getElementById('progress').value > 0.02);
+    }
+
     /** Waits until the page is at one of these. */
     async state(...states) {
         await this.tab.waitForFunction((states) => states.includes(document.getElementById('app').dataset.state), { timeout: PATIENCE }, states);
