@@ -42,8 +42,10 @@ impl Claim {
     /// Claims `bytes` for what is done to an image.
     ///
     /// # Errors
-    /// Those of [`check`], of all claims together.
+    /// Those of [`check`], of this claim and of all claims together.
     pub(crate) fn new(bytes: u64) -> Result<Self, MemoryError> {
+        // Alone first: what is too much in any case is told in the same way whatever others claim at this moment.
+        check(bytes, Purpose::Image)?;
         let claim = Self(bytes);
         let others = CLAIMED.fetch_add(bytes, Ordering::Relaxed);
         // Where it fails the claim is dropped.

@@ -1,6 +1,7 @@
 //! `calib.txt`, the calibration file of the Middlebury benchmark.
 
 use std::path::Path;
+use std::str::FromStr;
 
 use crate::error::{Error, Result};
 use crate::text;
@@ -29,6 +30,53 @@ pub struct Calibration {
     pub vmin: Option<f64>,
     /// Tight upper bound of the disparities, in pixels.
     pub vmax: Option<f64>,
+    /// The unit of the baseline, which Middlebury's files do not state: millimetres unless the file has `unit`.
+    pub unit: Unit,
+}
+
+/// The unit of a baseline, and thereby of depths and points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unit {
+    /// Middlebury's.
+    #[default]
+    Millimetre,
+    /// Hundredths of a metre.
+    Centimetre,
+    /// That of ROS and Kalibr.
+    Metre,
+    /// The calibration does not say, as OpenCV's: that of the squares of the chessboard.
+    Unknown,
+}
+
+impl Unit {
+    const ALL: [(&'static str, Self); 4] =
+        [("mm", Self::Millimetre), ("cm", Self::Centimetre), ("m", Self::Metre), ("unknown", Self::Unknown)];
+
+    /// Its sign: mm, cm or m, or `unknown`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
+    }
+
+    /// How many millimetres it has, where that is known.
+    #[must_use]
+    pub fn millimetres(self) -> Option<f64> {
+        match self {
+            Self::Millimetre => Some(1.0),
+            Self::Centimetre => Some(10.0),
+            Self::Metre => Some(1000.0),
+            Self::Unknown => None,
+        }
+    }
+}
+
+impl FromStr for Unit {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> std::result::Result<Self, &'static str> {
+        let known = Self::ALL.iter().find(|(name, _)| *name == text);
+        known.map(|(_, unit)| *unit).ok_or("mm, cm, m or unknown")
+    }
 }
 
 /// The matrix `[fx 0 cx; 0 fy cy; 0 0 1]` of a rectified camera, in pixels.
@@ -94,6 +142,12 @@ impl Calibration {
                 "vmax" => number(value).map(|v| calibration.vmax = Some(v)),
                 "cam0" => camera(value).map(|v| calibration.camera = Some(v)),
                 "cam1" => camera(value).map(|_| ()),
+                "unit" => {
+                    let unit = value
+                        .parse()
+                        .map_err(|expected| format!("expected {expected}, found {}", quoted(value)));
+                    unit.map(|unit| calibration.unit = unit)
+                }
                 _ => Ok(()),
             };
             put.map_err(|reason| at(key, reason))?;
@@ -156,6 +210,7 @@ mod tests {
             height: Some(2000),
             vmin: Some(31.0),
             vmax: Some(257.0),
+            unit: Unit::Millimetre,
         }
     }
 
@@ -192,6 +247,7 @@ mod tests {
             ("cam0=[1 0 2; 0 0 2; 0 0 1]", ["line 1", "cam0"]),
             ("cam0=[1 9 2; 0 1 2; 0 0 1]", ["line 1", "cam0"]),
             ("cam1=[-1 0 2; 0 1 2; 0 0 1]", ["line 1", "cam1"]),
+            ("baseline=1\nunit=feet", ["line 2", "mm, cm, m or unknown"]),
         ] {
             let reason = Calibration::parse(text).unwrap_err();
             assert!(words.iter().all(|w| reason.contains(w)), "{text:?}: {reason}");

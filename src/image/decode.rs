@@ -113,7 +113,14 @@ fn decode_pfm(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadErro
         pfm::Pfm::Grey(p) => (p.width(), p.height(), 1, p.into_data()),
         pfm::Pfm::Colour(p) => (p.width(), p.height(), 3, p.into_data().into_flattened()),
     };
-    Ok(Raster { width, height, channels, samples: Samples::Float(samples.into()), no_data: None })
+    Ok(Raster {
+        width,
+        height,
+        channels,
+        samples: Samples::Float(samples.into()),
+        no_data: None,
+        georeference: None,
+    })
 }
 
 /// The error of the general decoder.
@@ -173,7 +180,14 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
             );
         }
     };
-    Ok(Raster { width: width as usize, height: height as usize, channels, samples, no_data: None })
+    Ok(Raster {
+        width: width as usize,
+        height: height as usize,
+        channels,
+        samples,
+        no_data: None,
+        georeference: None,
+    })
 }
 
 /// (width, height) that a PNG file claims, from the header that must come first.

@@ -40,7 +40,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
     let samples = Samples::Byte(samples.into());
-    Ok(Raster { width: size.0, height: size.1, channels, samples, no_data: None })
+    Ok(Raster { width: size.0, height: size.1, channels, samples, no_data: None, georeference: None })
 }
 
 /// The error of the decoder, which prints some values in Rust's debug format.

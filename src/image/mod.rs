@@ -1,16 +1,22 @@
 //! Planes of pixels, and the stereo pair.
 
 pub mod calib;
+pub(crate) mod cubic;
 mod decode;
+mod downsampled;
 mod file;
+mod georeference;
 mod jpeg;
 pub mod pfm;
+pub mod picture;
 pub mod ply;
 pub mod raster;
 pub mod read;
 mod save;
 mod tiff;
 pub mod write;
+
+pub use georeference::Georeference;
 
 use crate::error::{Error, Result};
 use std::fmt;
@@ -279,6 +285,7 @@ impl Image {
 pub struct Pair {
     left: Arc<Image>,
     right: Arc<Image>,
+    georeferences: [Option<Georeference>; 2],
 }
 
 impl Pair {
@@ -297,7 +304,18 @@ impl Pair {
         if l.0 == 0 || l.1 == 0 {
             return Err(Error::Mismatch("the images hold no pixel".into()));
         }
-        Ok(Self { left: Arc::new(left), right: Arc::new(right) })
+        Ok(Self::without_georeference(left, right))
+    }
+
+    fn without_georeference(left: Image, right: Image) -> Self {
+        Self { left: Arc::new(left), right: Arc::new(right), georeferences: [None, None] }
+    }
+
+    /// The georeferences of the left and the right image, where they are from TIFF files that have one; maps have the pixels
+    /// of the image, and so its georeference. Parts and mirror images of a pair have none.
+    #[must_use]
+    pub fn georeferences(&self) -> [Option<Georeference>; 2] {
+        self.georeferences.clone()
     }
 
     /// The reference view.
@@ -326,13 +344,28 @@ impl Pair {
     /// stay the same.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        Self { left: Arc::new(self.right.mirrored()), right: Arc::new(self.left.mirrored()) }
+        Self::without_georeference(self.right.mirrored(), self.left.mirrored())
+    }
+
+    /// A pair of what `f` makes of each view, of one size.
+    pub(crate) fn map(&self, f: impl Fn(&Image) -> Image) -> Self {
+        Self { left: Arc::new(f(&self.left)), right: Arc::new(f(&self.right)), georeferences: [None, None] }
+    }
+
+    /// The same pair with another left view of the same size.
+    pub(crate) fn with_left(&self, left: Image) -> Self {
+        Self { left: Arc::new(left), ..self.clone() }
+    }
+
+    /// The same pair with another right view of the same size.
+    pub(crate) fn with_right(&self, right: Image) -> Self {
+        Self { right: Arc::new(right), ..self.clone() }
     }
 
     /// Both views inside `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
-        Self { left: Arc::new(self.left.crop(part)), right: Arc::new(self.right.crop(part)) }
+        Self::without_georeference(self.left.crop(part), self.right.crop(part))
     }
 
     /// (width, height) of both views.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::georeference::Georeference;
 use super::{Image, Pair, Pixel, Plane, grey};
 use crate::error::{Error, MemoryError, Purpose, Result};
 use crate::memory;
@@ -38,6 +39,8 @@ pub struct Raster<'a> {
     pub(super) samples: Samples<'a>,
     /// `true` where a pixel holds no data, row by row; as large as the image.
     pub(super) no_data: Option<Vec<bool>>,
+    /// Where its file says that it lies.
+    pub(super) georeference: Option<Georeference>,
 }
 
 /// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
@@ -122,7 +125,7 @@ impl<'a> Raster<'a> {
                 "{count} samples for {width} x {height} pixels of {channels} channels: an image has pixels of 1 to 4 channels"
             )));
         }
-        Ok(Self { width, height, channels, samples, no_data: None })
+        Ok(Self { width, height, channels, samples, no_data: None, georeference: None })
     }
 
     /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.
@@ -295,9 +298,10 @@ pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Resul
     }
     let scale = Scale::of(images, &masks);
     let [in_left, in_right] = masks;
+    let georeferences = [&left, &right].map(|raster| raster.georeference.clone());
     let l = scale.apply(&left, in_left);
     drop(left);
-    Pair::new(l, scale.apply(&right, in_right))
+    Ok(Pair { georeferences, ..Pair::new(l, scale.apply(&right, in_right))? })
 }
 
 /// The conversion from samples to levels, the same for both images of a pair.

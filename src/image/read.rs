@@ -52,7 +52,8 @@ impl Reader {
     /// (JPEG, TIFF) become RGB, images whose white is 0 are inverted, and colours premultiplied by alpha are
     /// divided by it. Rows, planes and tiles are put in order. A TIFF file with several images is read from
     /// the first one that is no reduced copy and no mask. Pixels are taken as they are stored: an orientation
-    /// tag is ignored, because a pair is rectified as it is stored.
+    /// tag is ignored, because a pair is rectified as it is stored. The tags of GeoTIFF come along
+    /// ([`Pair::georeferences`]), unless one of them is damaged.
     ///
     /// A pixel is masked where its alpha is 0 (which includes a transparent palette entry), where one of its
     /// values is not finite, and where all of its samples stand for no data ([`Reader::no_data`]). Any other

@@ -1,17 +1,13 @@
 //! Writing maps and pictures: a file is written completely or not at all.
 
 use std::fs;
-use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
-use tiff::TiffResult;
-use tiff::encoder::{TiffEncoder, TiffKind, colortype::Gray32Float};
-use tiff::tags::Tag;
 
 use super::save::Target;
-use super::{Plane, pfm};
+use super::{Georeference, Plane, pfm, tiff};
 use crate::error::{Error, Result};
 
 pub use super::save::{publish, remove, save};
@@ -27,36 +23,77 @@ enum Format {
     Tiff,
 }
 
-/// Writes a disparity map (in pixels; not finite = invalid) in the format of the extension:
-///
-/// - `.pfm`: float; invalid is +infinity;
-/// - `.tif`, `.tiff`: float; invalid is NaN, which GDAL's no-data tag declares;
-/// - `.png`: 16 bits, disparity times 256; invalid is 0, as in the KITTI benchmark. Only disparities from 0
-///   to below 256; a valid one that would round to 0 becomes 1.
-///
-/// An existing path that is not a regular file (`/dev/null`, a pipe) is written to directly, as PFM when its
-/// name has no known extension.
-///
-/// # Errors
-/// [`Error::Write`] for an unknown extension, a disparity that PNG cannot hold, or a file that cannot be
-/// written.
-pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
-    save(path, &encode_disparity(path, map)?)
+/// How maps are written. The functions of this module use the default.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Writer {
+    /// Where the pixels of a map lie on the ground: those of [`Pair::georeferences`](super::Pair::georeferences). TIFF alone
+    /// holds it.
+    pub georeference: Option<Georeference>,
 }
 
-/// The bytes of the file that [`disparity`] would write to `path`.
+impl Writer {
+    /// Writes a disparity map (in pixels; not finite = invalid) in the format of the extension:
+    ///
+    /// - `.pfm`: float; invalid is +infinity;
+    /// - `.tif`, `.tiff`: float; invalid is NaN, which GDAL's no-data tag declares. More than 4 Mi pixels are in tiles, packed by
+    ///   Deflate with the predictor of floats. A file of more than 4 GiB is BigTIFF;
+    /// - `.png`: 16 bits, disparity times 256; invalid is 0, as in the KITTI benchmark. Only disparities from 0
+    ///   to below 256; a valid one that would round to 0 becomes 1.
+    ///
+    /// An existing path that is not a regular file (`/dev/null`, a pipe) is written to directly, as PFM when its
+    /// name has no known extension.
+    ///
+    /// # Errors
+    /// [`Error::Write`] for an unknown extension, a disparity that PNG cannot hold, or a file that cannot be
+    /// written.
+    pub fn disparity(&self, path: &Path, map: &Plane<f32>) -> Result<()> {
+        save(path, &self.encode_disparity(path, map)?)
+    }
+
+    /// The bytes of the file that [`Writer::disparity`] would write to `path`.
+    ///
+    /// # Errors
+    /// [`Error::Write`] for an unknown extension, and a disparity that PNG cannot hold.
+    pub fn encode_disparity(&self, path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
+        match format(path)? {
+            Format::Pfm => Ok(pfm::encode(&map.map(|&d| if d.is_finite() { d } else { f32::INFINITY }))),
+            Format::Png => {
+                let levels = png_levels(map).map_err(|reason| Error::write(path, reason))?;
+                png(path, bytemuck::cast_slice(&levels), map.size(), ExtendedColorType::L16)
+            }
+            Format::Tiff => {
+                let size = png_or_tiff_size(path, map.size())?;
+                let map = map.map(|&d| if d.is_finite() { d } else { f32::NAN });
+                tiff::encode(&map, size, self.georeference.as_ref()).map_err(|e| Error::write(path, e))
+            }
+        }
+    }
+
+    /// Writes a depth map (not finite = invalid) as [`Writer::disparity`] writes disparities, but not as PNG, which has
+    /// no unit.
+    ///
+    /// # Errors
+    /// [`Error::Write`] for an extension other than `.pfm`, `.tif` and `.tiff`, or a file that cannot be written.
+    pub fn depth(&self, path: &Path, map: &Plane<f32>) -> Result<()> {
+        check_float(path)?;
+        self.disparity(path, map)
+    }
+}
+
+/// [`Writer::disparity`] with the default settings.
 ///
 /// # Errors
-/// [`Error::Write`] for an unknown extension, and a disparity that PNG cannot hold.
+/// Those of [`Writer::disparity`].
+pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
+    Writer::default().disparity(path, map)
+}
+
+/// [`Writer::encode_disparity`] with the default settings.
+///
+/// # Errors
+/// Those of [`Writer::encode_disparity`].
 pub fn encode_disparity(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
-    match format(path)? {
-        Format::Pfm => Ok(pfm::encode(&map.map(|&d| if d.is_finite() { d } else { f32::INFINITY }))),
-        Format::Png => {
-            let levels = png_levels(map).map_err(|reason| Error::write(path, reason))?;
-            png(path, bytemuck::cast_slice(&levels), map.size(), ExtendedColorType::L16)
-        }
-        Format::Tiff => tiff(path, &map.map(|&d| if d.is_finite() { d } else { f32::NAN })),
-    }
+    Writer::default().encode_disparity(path, map)
 }
 
 impl Plane<f32> {
@@ -69,14 +106,12 @@ impl Plane<f32> {
     }
 }
 
-/// Writes a depth map (not finite = invalid) as [`disparity`] writes disparities, but not as PNG, which has
-/// no unit.
+/// [`Writer::depth`] with the default settings.
 ///
 /// # Errors
-/// [`Error::Write`] for an extension other than `.pfm`, `.tif` and `.tiff`, or a file that cannot be written.
+/// Those of [`Writer::depth`].
 pub fn depth(path: &Path, map: &Plane<f32>) -> Result<()> {
-    check_float(path)?;
-    disparity(path, map)
+    Writer::default().depth(path, map)
 }
 
 /// Checks before any computation that [`disparity`] will be able to write a map with disparities from
@@ -147,6 +182,15 @@ pub fn grey8(path: &Path, plane: &Plane<u8>) -> Result<()> {
 /// [`Error::Write`] when PNG cannot hold a picture of this size.
 pub fn encode_grey8(path: &Path, plane: &Plane<u8>) -> Result<Vec<u8>> {
     png(path, plane.data(), plane.size(), ExtendedColorType::L8)
+}
+
+/// Writes 16-bit levels, such as depths in millimetres, as PNG.
+///
+/// # Errors
+/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
+pub fn grey16(path: &Path, plane: &Plane<u16>) -> Result<()> {
+    png_extension(path)?;
+    save(path, &png(path, bytemuck::cast_slice(plane.data()), plane.size(), ExtendedColorType::L16)?)
 }
 
 /// Writes 8-bit colours (red, green, blue) as PNG.
@@ -225,35 +269,16 @@ fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
 }
 
 /// A PNG file; 16-bit samples are in the byte order of the machine.
-fn png(path: &Path, samples: &[u8], size: (usize, usize), kind: ExtendedColorType) -> Result<Vec<u8>> {
+pub(super) fn png(
+    path: &Path,
+    samples: &[u8],
+    size: (usize, usize),
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>> {
     let (w, h) = png_or_tiff_size(path, size)?;
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes).write_image(samples, w, h, kind).map_err(|e| Error::write(path, e))?;
     Ok(bytes)
-}
-
-fn tiff(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
-    let (w, h) = png_or_tiff_size(path, map.size())?;
-    let mut bytes = Cursor::new(Vec::new());
-    // Offsets in plain TIFF end at 4 GiB. Few programs read BigTIFF, so it is used only where it is needed.
-    let written = if map.data().len() < 1_000_000_000 {
-        TiffEncoder::new(&mut bytes).and_then(|e| tiff_image(e, (w, h), map.data()))
-    } else {
-        TiffEncoder::new_big(&mut bytes).and_then(|e| tiff_image(e, (w, h), map.data()))
-    };
-    written.map_err(|e| Error::write(path, e))?;
-    Ok(bytes.into_inner())
-}
-
-fn tiff_image<W: Write + Seek, K: TiffKind>(
-    mut encoder: TiffEncoder<W, K>,
-    (width, height): (u32, u32),
-    values: &[f32],
-) -> TiffResult<()> {
-    let mut image = encoder.new_image::<Gray32Float>(width, height)?;
-    // GDAL's tag, which the programs based on GDAL read too.
-    image.encoder().write_tag(Tag::GdalNodata, "nan")?;
-    image.write_data(values)
 }
 
 fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
@@ -269,6 +294,8 @@ fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
 mod tests {
     use super::super::read::read_disparity;
     use super::*;
+    use ::tiff::tags::Tag;
+    use std::io::Cursor;
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<_> =
@@ -321,9 +348,9 @@ mod tests {
         let path = folder.path().join("a.tif");
         disparity(&path, &map).unwrap();
         let bytes = fs::read(&path).unwrap();
-        let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).unwrap();
+        let mut decoder = ::tiff::decoder::Decoder::new(Cursor::new(bytes)).unwrap();
         assert_eq!(decoder.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
-        let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
+        let ::tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else {
             panic!("float")
         };
         assert_eq!(values.iter().map(|v| v.is_nan()).collect::<Vec<_>>(), [true, true, true, false]);

@@ -4,6 +4,7 @@
 
 #[path = "../common/files.rs"]
 mod files;
+mod geotiffs;
 mod tiffs;
 
 use files::{Png, exif_orientation, jpeg};

@@ -17,6 +17,9 @@ pub(super) enum Order {
 }
 
 impl Order {
+    /// That of the machine.
+    pub(super) const NATIVE: Self = if cfg!(target_endian = "big") { Self::Big } else { Self::Little };
+
     /// The number in `bytes`, which are at most eight.
     pub(super) fn number(self, bytes: &[u8]) -> u64 {
         let append = |n: u64, byte: &u8| n << 8 | u64::from(*byte);
@@ -116,7 +119,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The values of a tag as stored, with their type.
-    fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, ReadError> {
+    pub(super) fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, ReadError> {
         let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };
         let bytes = entry.count.checked_mul(size_of_kind(entry.kind) as u64);
         let range = bytes.and_then(|bytes| Some(entry.place..entry.place.checked_add(bytes)?));
@@ -194,7 +197,7 @@ fn number(file: &[u8], order: Order, place: u64, size: usize) -> Option<u64> {
 }
 
 /// Bytes per value of a field type.
-fn size_of_kind(kind: u16) -> usize {
+pub(super) fn size_of_kind(kind: u16) -> usize {
     match kind {
         3 | 8 => 2,
         4 | 9 | 11 | 13 => 4,

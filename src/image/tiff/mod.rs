@@ -1,4 +1,4 @@
-//! TIFF files: selects one image of a file, and converts its samples to levels.
+//! TIFF files: selects one image of a file, and converts its samples to levels; writes maps.
 //!
 //! Tags are those of TIFF 6.0 and its technical notes, and GDAL's tag for no data. A tag that changes the
 //! meaning of the samples is either supported or rejected. Orientation, resolution, colour profiles and
@@ -7,7 +7,11 @@
 mod chunks;
 mod colours;
 mod directory;
+mod encode;
+mod geo;
 mod tag;
+
+pub(super) use encode::encode;
 
 use std::borrow::Cow;
 
@@ -66,7 +70,8 @@ pub(super) fn decode(
     let samples = layout.samples(file, no_data.unwrap_or(0.0))?;
     let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
     let (channels, samples) = colours.levels(samples)?;
-    Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data })
+    let georeference = geo::georeference(&directory);
+    Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data, georeference })
 }
 
 /// The no-data value that GDAL's tag declares.

@@ -27,5 +27,12 @@ pub(super) const JPEG_TABLES: u16 = 347;
 pub(super) const YCBCR_COEFFICIENTS: u16 = 529;
 pub(super) const YCBCR_SUBSAMPLING: u16 = 530;
 pub(super) const REFERENCE_BLACK_WHITE: u16 = 532;
+// GeoTIFF's.
+pub(super) const MODEL_PIXEL_SCALE: u16 = 33_550;
+pub(super) const MODEL_TIEPOINT: u16 = 33_922;
+pub(super) const MODEL_TRANSFORMATION: u16 = 34_264;
+pub(super) const GEO_KEY_DIRECTORY: u16 = 34_735;
+pub(super) const GEO_DOUBLE_PARAMS: u16 = 34_736;
+pub(super) const GEO_ASCII_PARAMS: u16 = 34_737;
 /// GDAL's, as text.
 pub(super) const NO_DATA: u16 = 42_113;

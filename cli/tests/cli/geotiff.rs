@@ -1,0 +1,72 @@
+//! GeoTIFF: every map that is TIFF lies where its view lies.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use tiff::decoder::Decoder;
+use tiff::tags::Tag;
+
+use super::files::{Tiff, Values};
+use super::{run, scene_file};
+use Values::{Double, Long, Short};
+
+const KEYS: [u16; 8] = [1, 1, 0, 1, 3072, 0, 1, 32_631];
+
+/// Writes a view of a scene as GeoTIFF whose first pixel is this far east.
+fn write_view(path: &Path, from: &str, east: f64) {
+    let grey = image::open(scene_file("slanted", from)).unwrap().to_luma8();
+    let tags = [
+        (256, Long(&[grey.width()])),
+        (257, Long(&[grey.height()])),
+        (258, Short(&[8])),
+        (262, Short(&[1])),
+        (33_550, Double(&[0.5, 0.5, 0.0])),
+        (33_922, Double(&[0.0, 0.0, 0.0, east, 5e6, 0.0])),
+        (34_735, Short(&KEYS)),
+    ];
+    fs::write(path, Tiff { big_endian: true, tiled: false, tags: &tags, chunks: &[grey.as_raw()] }.bytes())
+        .unwrap();
+}
+
+/// How far east a map begins, and that it has all tags.
+fn east(path: &Path) -> f64 {
+    let mut map = Decoder::new(Cursor::new(fs::read(path).unwrap())).unwrap();
+    assert_eq!(map.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap(), [0.5, 0.5, 0.0]);
+    assert_eq!(map.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap(), KEYS);
+    assert_eq!(map.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
+    map.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap()[3]
+}
+
+#[test]
+fn maps_lie_where_their_views_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write_view(&at("left.tif"), "im0.png", 4e5);
+    write_view(&at("right.tif"), "im1.png", 7e5);
+    fs::copy(scene_file("slanted", "calib.txt"), at("calib.txt")).unwrap();
+    fs::write(at("list.csv"), "left,right,name\nleft.tif,right.tif,d\n").unwrap();
+    let more = ["--device", "cpu", "--quiet", "--method", "fast", "--also", "raw,right,depth"];
+    run(folder.path(), &[&["match", "left.tif", "right.tif", "d.tif"], &more[..]].concat()).succeeded();
+    run(folder.path(), &[&["batch", "list.csv", "maps", "--format", "tif"], &more[..]].concat()).succeeded();
+    for (name, expected) in [("d.tif", 4e5), ("d.raw.tif", 4e5), ("d.right.tif", 7e5), ("d.depth.tif", 4e5)] {
+        for path in [at(name), at("maps").join(name)] {
+            assert!((east(&path) - expected).abs() < 1e-9, "{}", path.display());
+        }
+    }
+    // The same in tiles.
+    let tiled = [
+        "match",
+        "left.tif",
+        "right.tif",
+        "tiled.tif",
+        "--device",
+        "cpu",
+        "--method",
+        "fast",
+        "--memory",
+        "12MiB",
+    ];
+    assert!(run(folder.path(), &tiled).succeeded().stderr.contains(" tiles, "));
+    assert!((east(&at("tiled.tif")) - 4e5).abs() < 1e-9);
+}

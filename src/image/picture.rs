@@ -1,0 +1,89 @@
+//! Writing the images that the matcher sees.
+
+use std::path::Path;
+
+use image::ExtendedColorType;
+
+use super::Image;
+use super::write::{check_png_path, png, save};
+use crate::error::Result;
+
+/// Writes an image as PNG, so that reading it gives the same pixels: grey where all colours are, with 8 bits where all levels
+/// have them, else with 16; with alpha where a pixel is masked.
+///
+/// # Errors
+/// [`Error::Write`](crate::Error::Write) when the extension is not `.png` or the file cannot be written.
+pub fn write(path: &Path, image: &Image) -> Result<()> {
+    check_png_path(path)?;
+    save(path, &encode(path, image)?)
+}
+
+/// The bytes of the file that [`write()`] would write to `path`.
+///
+/// # Errors
+/// [`Error::Write`](crate::Error::Write) when PNG cannot hold an image of this size.
+pub fn encode(path: &Path, image: &Image) -> Result<Vec<u8>> {
+    let pixels = image.pixels.data();
+    let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
+    let is_bytes = pixels.iter().all(|pixel| pixel[..3].iter().all(|v| v % 256 == 0));
+    let has_alpha = image.masked.data().contains(&true);
+    let mut samples: Vec<u16> = Vec::with_capacity(pixels.len() * 4);
+    for (pixel, masked) in pixels.iter().zip(image.masked.data()) {
+        samples.extend(&pixel[..if is_grey { 1 } else { 3 }]);
+        samples.extend(has_alpha.then_some(if *masked { 0 } else { u16::MAX }));
+    }
+    let kind = match (is_grey, has_alpha, is_bytes) {
+        (true, false, true) => ExtendedColorType::L8,
+        (true, true, true) => ExtendedColorType::La8,
+        (false, false, true) => ExtendedColorType::Rgb8,
+        (false, true, true) => ExtendedColorType::Rgba8,
+        (true, false, false) => ExtendedColorType::L16,
+        (true, true, false) => ExtendedColorType::La16,
+        (false, false, false) => ExtendedColorType::Rgb16,
+        (false, true, false) => ExtendedColorType::Rgba16,
+    };
+    if is_bytes {
+        let bytes: Vec<u8> = samples.iter().map(|v| (v >> 8) as u8).collect();
+        png(path, &bytes, image.pixels.size(), kind)
+    } else {
+        png(path, bytemuck::cast_slice(&samples), image.pixels.size(), kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Pair, Plane, grey};
+    use super::*;
+
+    #[test]
+    fn images_come_back_as_they_went() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        for (colours, masked, step) in [
+            (false, false, 256),
+            (true, false, 256),
+            (false, true, 256),
+            (true, true, 256),
+            (true, true, 1),
+            (false, true, 1),
+        ] {
+            let mut image = Image {
+                pixels: Plane::from_fn(19, 14, |x, y| {
+                    let v = ((x * 2713 + y * 911 + 40_003) % 65_281 / step * step) as u16;
+                    let [r, g, b] = if colours { [v, v / 512 * 256, 256] } else { [v; 3] };
+                    [r, g, b, grey(r, g, b)]
+                }),
+                masked: Plane::filled(19, 14, false),
+            };
+            if masked {
+                (image.pixels[(3, 2)], image.masked[(3, 2)]) = ([0; 4], true);
+            }
+            write(&path, &image).unwrap();
+            let again = Pair::open(&path, &path).unwrap();
+            assert_eq!(*again.left(), image, "{colours} {masked} {step}");
+        }
+        assert!(
+            write(&folder.path().join("a.jpg"), &Image::from_rgb8(&Plane::filled(1, 1, [0; 3]))).is_err()
+        );
+    }
+}

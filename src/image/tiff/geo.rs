@@ -1,0 +1,39 @@
+//! The georeference of a TIFF file.
+
+use tiff::tags::Type;
+
+use super::directory::{Directory, Order, size_of_kind};
+use super::tag;
+use crate::image::georeference::{Field, Georeference};
+
+/// The tags of GeoTIFF and their types.
+const TAGS: [(u16, Type); 6] = [
+    (tag::MODEL_PIXEL_SCALE, Type::DOUBLE),
+    (tag::MODEL_TIEPOINT, Type::DOUBLE),
+    (tag::MODEL_TRANSFORMATION, Type::DOUBLE),
+    (tag::GEO_KEY_DIRECTORY, Type::SHORT),
+    (tag::GEO_DOUBLE_PARAMS, Type::DOUBLE),
+    (tag::GEO_ASCII_PARAMS, Type::ASCII),
+];
+/// Most bytes of a tag: room for twenty thousand tie points.
+const MOST: usize = 1 << 20;
+
+/// The georeference that the directory declares. One with a tag of another type, of no value, beyond the end of the file, or of
+/// more than [`MOST`] bytes is none: the rest of it would place the image elsewhere.
+pub(super) fn georeference(directory: &Directory) -> Option<Georeference> {
+    let there = TAGS.iter().filter(|(tag, _)| directory.has(*tag));
+    let fields: Vec<Field> = there.map(|&(tag, kind)| field(directory, tag, kind)).collect::<Option<_>>()?;
+    (!fields.is_empty()).then(|| Georeference { fields: fields.into() })
+}
+
+fn field(directory: &Directory, tag: u16, kind: Type) -> Option<Field> {
+    let (stored, values) = directory.values(tag).ok()??;
+    if stored != kind.to_u16() || values.is_empty() || values.len() > MOST {
+        return None;
+    }
+    let mut bytes = values.to_vec();
+    if directory.order != Order::NATIVE {
+        bytes.chunks_exact_mut(size_of_kind(stored)).for_each(<[u8]>::reverse);
+    }
+    Some(Field { tag, kind, bytes })
+}
