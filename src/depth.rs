@@ -5,7 +5,7 @@
 //! (cx1 - cx0). Depth has the unit of the baseline.
 
 use crate::error::{Error, Result};
-use crate::image::calib::{Calibration, Camera};
+use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::ply::Point;
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps};
@@ -16,6 +16,7 @@ pub struct Rig {
     camera: Camera,
     doffs: f64,
     baseline: f64,
+    unit: Unit,
 }
 
 impl Rig {
@@ -26,7 +27,7 @@ impl Rig {
     /// the baseline is not above 0.
     pub fn new(calibration: &Calibration) -> Result<Self> {
         let error = |reason: String| Err(Error::Calibration(reason));
-        let &Calibration { camera, doffs, baseline, .. } = calibration;
+        let &Calibration { camera, doffs, baseline, unit, .. } = calibration;
         let (Some(camera), Some(doffs), Some(baseline)) = (camera, doffs, baseline) else {
             let known =
                 [("cam0", camera.is_some()), ("doffs", doffs.is_some()), ("baseline", baseline.is_some())];
@@ -39,7 +40,7 @@ impl Rig {
         if baseline <= 0.0 {
             return error(format!("baseline={baseline} is not above 0; give the distance of the cameras"));
         }
-        Ok(Self { camera, doffs, baseline })
+        Ok(Self { camera, doffs, baseline, unit })
     }
 
     /// The depth at disparity `d` (pixels), along the optical axis and in the unit of the baseline. `None`
@@ -63,6 +64,23 @@ impl Rig {
     #[must_use]
     pub fn depths(&self, disparities: &Plane<f32>) -> Plane<f32> {
         disparities.map(|&d| self.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32))
+    }
+
+    /// The unit of the baseline.
+    #[must_use]
+    pub fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    /// The depths of a map of disparities in whole millimetres, as ROS and TUM have them: 0 where there is no depth, and
+    /// where it rounds to 0 or to more than 65535. `None` where the unit of the baseline is not known.
+    #[must_use]
+    pub fn millimetres(&self, disparities: &Plane<f32>) -> Option<Plane<u16>> {
+        let unit = self.unit.millimetres()?;
+        Some(disparities.map(|&d| {
+            let depth = self.depth(f64::from(d)).map_or(0.0, |depth| (depth * unit).round());
+            if depth <= f64::from(u16::MAX) { depth as u16 } else { 0 }
+        }))
     }
 
     /// The points that were measured and are trusted (validity 0), row by row, with the colours of the `left`
@@ -119,6 +137,20 @@ mod tests {
         }
         let map = Plane::new(3, 1, vec![60.0, -20.0, f32::INFINITY]);
         assert_eq!(rig.depths(&map).data(), [2000.0, f32::INFINITY, f32::INFINITY]);
+    }
+
+    #[test]
+    fn millimetres_take_a_known_unit() {
+        let millimetres = |unit, map: &[f32]| {
+            let rig = Rig::new(&Calibration { unit, ..calibration() }).unwrap();
+            rig.millimetres(&Plane::new(map.len(), 1, map.to_vec())).map(Plane::into_data)
+        };
+        // 160,000 over 80, 100,000 (1.6, rounded), 4, 2, and what has no depth.
+        let map = [60.0, 99_980.0, -16.0, -18.0, -20.0, f32::INFINITY];
+        assert_eq!(millimetres(Unit::Millimetre, &map), Some(vec![2000, 2, 40_000, 0, 0, 0]));
+        assert_eq!(millimetres(Unit::Centimetre, &map[..2]), Some(vec![20_000, 16]));
+        assert_eq!(millimetres(Unit::Metre, &map[..2]), Some(vec![0, 1600]));
+        assert_eq!(millimetres(Unit::Unknown, &map), None);
     }
 
     #[test]

@@ -3,10 +3,12 @@
 //!
 //! A file is read or refused: a refusal is one line that fits a screen, and what is read keeps its promises.
 
+use mrfgs::calibration;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::pfm::{self, Pfm};
 use mrfgs::image::read::Reader;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
+use mrfgs::rectification::{Options, Rectification};
 use mrfgs::{Error, Result};
 use mrfgs_cli::list::{self, Largest};
 use std::collections::HashSet;
@@ -47,6 +49,26 @@ pub fn calib(bytes: &[u8]) {
                 && camera.principal_point.iter().all(|c| c.is_finite())
         }));
     });
+}
+
+/// A calibration of two cameras: read alone, and as both of two files.
+pub fn cameras(bytes: &[u8]) {
+    let (name, text) = (Path::new("cameras"), String::from_utf8_lossy(bytes).into_owned());
+    let one = [(name, text)];
+    for files in [&one[..], &[one[0].clone(), one[0].clone()]] {
+        let Some(cameras) = told(calibration::of_texts(files)) else { continue };
+        told(cameras.of_rectified_images());
+        let size = cameras.size.unwrap_or((32, 24));
+        for alpha in [None, Some(0.0), Some(1.0)] {
+            let options = Options { alpha, ..Options::default() };
+            let Some(by) = told(Rectification::new(&cameras, size, &options)) else { continue };
+            let known = by.calibration().expect("a rectification has one");
+            assert!(known.baseline.is_some_and(|baseline| baseline > 0.0));
+            for place in [by.left(3.0, 4.0), by.right(31.0, 0.0)].into_iter().flatten() {
+                assert!(place.iter().all(|v| v.is_finite()));
+            }
+        }
+    }
 }
 
 /// An image of any kind: as both views and the mask of a pair, as levels, and as a map of disparities.

@@ -37,5 +37,13 @@ pub(crate) fn rig(
         ))
         .into());
     }
-    Ok(Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?)
+    let rig = Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?;
+    if word.takes_unit() && rig.unit().millimetres().is_none() {
+        let reason = format!(
+            "{} does not say the unit of the baseline; add an entry `unit` to it: mm, cm or m",
+            path.display()
+        );
+        return Err(Failure::Usage(format!("{}: {reason}", word.flag())));
+    }
+    Ok(rig)
 }

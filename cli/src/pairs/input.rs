@@ -2,18 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
+use mrfgs::Error;
+use mrfgs::calibration;
 use mrfgs::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::DisparityRange;
+use mrfgs::rectification::Options;
 
 use crate::args::reading::ReadingArgs;
+use crate::args::rectification;
 use crate::args::search::{Found, Search};
 use crate::args::sign::Sign;
 use crate::console;
-use crate::failure::Result;
+use crate::failure::{self, Result};
 use crate::outputs::record::Files;
 use crate::pairs::folder::CALIBRATION;
+use crate::pairs::raw;
 use crate::remedy;
 
 /// The files of a pair, and how they are read.
@@ -26,9 +31,10 @@ pub(crate) struct PairArgs {
 
     #[command(flatten)]
     pub(crate) search: Search,
-    /// Calibration file: the range (ndisp), and the cameras for depth and points [default: a calib.txt beside LEFT]
+    /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; of OpenCV, ROS (two files, each
+    /// with --calib), Kalibr or Middlebury [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
-    pub(crate) calib: Option<PathBuf>,
+    pub(crate) calib: Vec<PathBuf>,
     /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
     #[arg(long, value_name = "FILE")]
     pub(crate) mask: Option<PathBuf>,
@@ -42,21 +48,42 @@ pub(crate) struct Input {
     pub(crate) range: DisparityRange,
     /// Whether sparse matches gave the range.
     by_matches: bool,
-    /// The calibration file and what it holds.
-    calibration: Option<(PathBuf, Calibration)>,
+    /// The calibration of the rectified pair.
+    calibration: Option<Known>,
+}
+
+/// A calibration of a rectified pair, and where it comes from.
+struct Known {
+    files: Vec<PathBuf>,
+    calibration: Calibration,
+}
+
+impl Known {
+    /// With the file that messages name.
+    fn named(&self) -> (&Path, &Calibration) {
+        (&self.files[0], &self.calibration)
+    }
 }
 
 impl PairArgs {
     /// Reads the images and what the range takes, and the cameras where `cameras` asks for them. The user counts disparities
-    /// by `sign`.
-    pub(crate) fn read(&self, sign: Sign, cameras: bool) -> Result<Input> {
-        let pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
-        let calibration = match &self.calib {
-            Some(path) => Some((path.clone(), Calibration::read(path)?)),
-            None if self.search.max_disparity.is_some() && !cameras => None,
-            None => Calibration::beside(&self.left)?.map(|c| (self.left.with_file_name(CALIBRATION), c)),
+    /// by `sign`. With `rectify`, the images are as the cameras took them, and are rectified.
+    pub(crate) fn read(&self, sign: Sign, cameras: bool, rectify: Option<&Options>) -> Result<Input> {
+        let mut pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
+        let files = self.calib.clone();
+        let calibration = if let Some(options) = rectify {
+            let rectification;
+            (rectification, pair) = raw::rectify(&calibration::read(&files)?, &files, &pair, options)?;
+            Some(Known { files, calibration: rectification.calibration()? })
+        } else if !files.is_empty() {
+            Some(Known { calibration: of_rectified_images(&files)?, files })
+        } else if self.search.max_disparity.is_some() && !cameras {
+            None
+        } else {
+            let files = vec![self.left.with_file_name(CALIBRATION)];
+            Calibration::beside(&self.left)?.map(|calibration| Known { files, calibration })
         };
-        let known = calibration.as_ref().map(|(path, calibration)| (path.as_path(), calibration));
+        let known = calibration.as_ref().map(Known::named);
         let Found { range, by_matches } = self.search.range(&pair, known, sign)?;
         Ok(Input { pair, range, by_matches, calibration })
     }
@@ -68,7 +95,7 @@ impl PairArgs {
             left: path(&self.left),
             right: path(&self.right),
             mask: self.mask.as_deref().map(path),
-            calibration: input.calibration().map(|(file, _)| path(file)),
+            calibration: input.calibration.as_ref().map(|known| rectification::shown(&known.files)),
             output: output.map(path),
         }
     }
@@ -77,7 +104,8 @@ impl PairArgs {
     pub(crate) fn inputs<'a>(&'a self, input: &'a Input) -> Vec<(&'static str, &'a Path)> {
         let mut inputs = vec![("LEFT", self.left.as_path()), ("RIGHT", self.right.as_path())];
         inputs.extend(self.mask.as_deref().map(|path| ("the mask", path)));
-        inputs.extend(input.calibration().map(|(path, _)| ("the calibration file", path)));
+        let files = input.calibration.iter().flat_map(|known| &known.files);
+        inputs.extend(files.map(|path| ("the calibration file", path.as_path())));
         inputs
     }
 }
@@ -85,7 +113,7 @@ impl PairArgs {
 impl Input {
     /// The calibration file and what it holds.
     pub(crate) fn calibration(&self) -> Option<(&Path, &Calibration)> {
-        self.calibration.as_ref().map(|(path, calibration)| (path.as_path(), calibration))
+        self.calibration.as_ref().map(Known::named)
     }
 
     /// Says which range was found, if the user gave none.
@@ -103,6 +131,18 @@ impl Input {
         // A range that was found does not show what the user knows.
         warn(check::warnings(&self.pair, (!self.by_matches).then_some(self.range)));
     }
+}
+
+/// What the calibration in `files` says of images that are rectified.
+fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
+    let named = |reason: &str| Error::read(rectification::shown(files), reason);
+    let known = calibration::read(files)?;
+    let calibration = known
+        .of_rectified_images()
+        .map_err(|e| failure::in_file(e, rectification::shown(files).as_ref(), ""))?;
+    Ok(calibration.ok_or_else(|| {
+        named("is of images that are not rectified; add --rectify, or give the calibration of the rectified pair")
+    })?)
 }
 
 /// Says on standard error what is probably wrong.

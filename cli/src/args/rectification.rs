@@ -1,0 +1,30 @@
+//! How images are rectified.
+
+use std::path::PathBuf;
+
+use mrfgs::rectification::Options;
+
+/// The calibration that rectifies, and how.
+#[derive(clap::Args)]
+pub(crate) struct RectificationArgs {
+    /// From 0, where no rectified pixel lacks a source, to 1, where no pixel of the images is lost. Without it the
+    /// rectification is that of the calibration where it has one, else one that keeps the focal length (fisheyes: 0)
+    #[arg(long, value_name = "0..1", allow_negative_numbers = true, value_parser = alpha)]
+    pub(crate) alpha: Option<f64>,
+}
+
+impl RectificationArgs {
+    pub(crate) fn options(&self) -> Options {
+        Options { alpha: self.alpha, ..Options::default() }
+    }
+}
+
+fn alpha(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.0..=1.0).contains(number));
+    number.ok_or_else(|| "give a number from 0 to 1".into())
+}
+
+/// The files of a calibration, as messages name them.
+pub(crate) fn shown(files: &[PathBuf]) -> String {
+    files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,113 @@
+//! `mrfgs rectify`.
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::calibration;
+use mrfgs::image::{Image, pfm, picture, write};
+use mrfgs::rectification::Rectification;
+
+use crate::args::reading::ReadingArgs;
+use crate::args::rectification::RectificationArgs;
+use crate::failure::Result;
+use crate::outputs::staged::StagedFolder;
+use crate::pairs::raw;
+use crate::{console, stop};
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs rectify left.png right.png rectified --calib stereo.yml
+  mrfgs match rectified/im0.png rectified/im1.png d.pfm --also depth
+  # ROS has a file for each camera:
+  mrfgs rectify l.png r.png rectified --calib left.yaml --calib right.yaml
+  # All that the cameras have seen:
+  mrfgs rectify l.png r.png rectified --calib camchain.yaml --alpha 1";
+
+/// Rectify a pair of images as the cameras took them
+///
+/// Rectified images have no lens distortion, and matches are on the same row. DIR gets im0.png and im1.png (transparent
+/// where there is no source), mask0.png and mask1.png (white where there is none), and the calibration of the
+/// rectified pair twice: calib.txt in Middlebury's form and cameras.yml in OpenCV's.
+///
+/// CALIB is OpenCV's YAML or XML (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's
+/// camera chain (cam0 is the left camera), or Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes
+/// with radial and tangential distortion, or fisheyes (equidistant); OpenCV's files say `fisheye: 1`.
+///
+/// The method is that of OpenCV's `stereoRectify`; what is infinitely far has a disparity of 0. Where one camera is above the other, both
+/// images are turned by a quarter, so that the upper camera, turned counter-clockwise, or the lower one, turned clockwise, is
+/// the left one.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    /// Image of the left camera: the first one of the calibration
+    left: PathBuf,
+    /// Image of the right camera, of the same size
+    right: PathBuf,
+    /// Folder for the rectified pair, new or empty
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+
+    /// Calibration of the cameras; give the files of ROS, or the two of OpenCV's example program, one after the other
+    #[arg(long, value_name = "CALIB", required = true)]
+    calib: Vec<PathBuf>,
+    #[command(flatten)]
+    rectification: RectificationArgs,
+    /// Writes also where each rectified pixel comes from: map0x.pfm, map0y.pfm, map1x.pfm and map1y.pfm
+    #[arg(long)]
+    maps: bool,
+    /// Image of the size of LEFT: where it is not black, LEFT is ignored
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    /// Prints nothing but failures
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    stop::listen();
+    let folder = StagedFolder::new_or_empty(&args.folder)?;
+    let calibration = calibration::read(&args.calib)?;
+    let raw = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
+    let options = args.rectification.options();
+    let (rectification, pair) = raw::rectify(&calibration, &args.calib, &raw, &options)?;
+    drop(raw);
+    write_all(&folder.path(), &rectification, [pair.left(), pair.right()], args.maps)
+        .map_err(|e| folder.named(e))?;
+    folder.publish()?;
+    if !args.quiet {
+        let (width, height) = rectification.size();
+        let known = |image: &Image| {
+            let known = image.masked.data().iter().filter(|masked| !**masked).count();
+            100.0 * known as f64 / (width * height) as f64
+        };
+        console::say(&format!(
+            "{width} x {height}, {:.1} % of the left and {:.1} % of the right view have a source",
+            known(pair.left()),
+            known(pair.right())
+        ));
+    }
+    Ok(())
+}
+
+fn write_all(folder: &Path, by: &Rectification, images: [&Image; 2], maps: bool) -> mrfgs::Result<()> {
+    let at = |name: &str| folder.join(name);
+    for (i, image) in images.into_iter().enumerate() {
+        picture::write(&at(&format!("im{i}.png")), image)?;
+        let mask = image.masked.map(|&masked| if masked { 255 } else { 0 });
+        write::grey8(&at(&format!("mask{i}.png")), &mask)?;
+    }
+    if maps {
+        for (i, map) in by.maps().iter().enumerate() {
+            for (axis, map) in ["x", "y"].into_iter().zip(map) {
+                write::save(&at(&format!("map{i}{axis}.pfm")), &pfm::encode(map))?;
+            }
+        }
+    }
+    let calibration = by.calibration()?;
+    let texts = [
+        ("calib.txt", calibration::write::middlebury(&calibration)),
+        ("cameras.yml", calibration::write::opencv(&calibration, by.rotations())),
+    ];
+    texts.into_iter().try_for_each(|(name, text)| write::save(&at(name), text.unwrap_or_default().as_bytes()))
+}

@@ -1,0 +1,337 @@
+//! Calibrations that people have: each format gives the same pair and the same depths, and what is wrong in a file is told in
+//! one line.
+
+use super::*;
+
+fn raw(file: &str) -> String {
+    scene_file("raw", file)
+}
+
+/// That of `testdata/raw`, as OpenCV has it in YAML.
+fn opencv() -> String {
+    fs::read_to_string(raw("cameras.yml")).unwrap()
+}
+
+/// The numbers of an entry of it.
+fn numbers(name: &str) -> Vec<String> {
+    let text = opencv();
+    let entry = text.split(&format!("\n{name}: ")).nth(1).unwrap();
+    let data = entry.split("data: [ ").nth(1).unwrap().split(" ]").next().unwrap();
+    data.split(", ").map(str::to_owned).collect()
+}
+
+/// The same in XML.
+fn xml() -> String {
+    let mut text =
+        "<?xml version=\"1.0\"?>\n<opencv_storage>\n<imageSize>\n  240 180</imageSize>\n<unit>m</unit>\n"
+            .to_owned();
+    for (name, rows) in [("K1", 3), ("D1", 1), ("K2", 3), ("D2", 1), ("R", 3), ("T", 3)] {
+        let numbers = numbers(name);
+        let (columns, numbers) = (numbers.len() / rows, numbers.join(" "));
+        let head =
+            format!("<{name} type_id=\"opencv-matrix\">\n  <rows>{rows}</rows>\n  <cols>{columns}</cols>");
+        text += &[&head, "\n  <dt>d</dt>\n  <data>\n    ", &numbers, "</data></", name, ">\n"].concat();
+    }
+    text + "</opencv_storage>\n"
+}
+
+/// The same of Kalibr.
+fn kalibr() -> String {
+    let camera = |n: usize| {
+        let (k, d) = (numbers(&format!("K{n}")), numbers(&format!("D{n}")));
+        format!(
+            "cam{}:\n  camera_model: pinhole\n  distortion_coeffs: [{}]\n  distortion_model: radtan\n  intrinsics: [{}, {}, {}, {}]\n  resolution: [240, 180]\n  rostopic: /cam{}/image_raw\n",
+            n - 1,
+            d[..4].join(", "),
+            k[0],
+            k[4],
+            k[2],
+            k[5],
+            n - 1
+        )
+    };
+    let (r, t) = (numbers("R"), numbers("T"));
+    let row = |y: usize| format!("  - [{}, {}]\n", r[3 * y..3 * y + 3].join(", "), t[y]);
+    let pose = format!("  T_cn_cnm1:\n{}{}{}  - [0.0, 0.0, 0.0, 1.0]\n", row(0), row(1), row(2));
+    camera(1) + &camera(2) + &pose
+}
+
+/// One of ROS's two, for images that are rectified already.
+fn ros(tx: &str) -> String {
+    format!(
+        "image_width: 240\nimage_height: 180\ncamera_name: some\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [215.5, 0, 118.5, 0, 215.5, 89.5, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0, 0, 0, 0, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nprojection_matrix:\n  rows: 3\n  cols: 4\n  data: [215.5, 0, 118.5, {tx}, 0, 215.5, 89.5, 0, 0, 0, 1, 0]\n"
+    )
+}
+
+fn rectify(folder: &Path, calibrations: &[&str]) -> Run {
+    let (left, right) = (raw("left.png"), raw("right.png"));
+    let mut args = vec!["rectify", &left, &right, "out"];
+    args.extend(calibrations.iter().flat_map(|file| ["--calib", file]));
+    run(folder, &args)
+}
+
+#[test]
+fn every_format_rectifies_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (lenses, pose) = opencv().split_once("R: ").map(|(a, b)| (a.to_owned(), format!("R: {b}"))).unwrap();
+    let renamed =
+        opencv().replace("K1:", "cameraMatrix1:").replace("D2:", "dist_coeffs_2:").replace("T:", "T :");
+    for (name, text) in [
+        ("a.yml", opencv()),
+        ("b.txt", xml()),
+        ("c", kalibr()),
+        ("lenses", lenses),
+        ("pose", pose),
+        ("renamed", renamed.replace("%YAML:1.0", "%YAML 1.2")),
+    ] {
+        fs::write(at(name), text).unwrap();
+    }
+    let mut first = None;
+    for files in [&["a.yml"][..], &["b.txt"], &["c"], &["lenses", "pose"], &["renamed"]] {
+        let told = rectify(folder.path(), files).succeeded();
+        assert!(told.stderr.contains("240 x 180, 98.7 % of the left"), "{told:?}");
+        let found: BTreeMap<_, _> = listing(&at("out"));
+        assert_eq!(found.len(), 6, "{files:?}");
+        assert!(first.get_or_insert_with(|| found.clone()) == &found, "{files:?}");
+        fs::remove_dir_all(at("out")).unwrap();
+    }
+}
+
+#[test]
+fn rectified_first_or_on_the_way_gives_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let (left, right, calib) = (raw("left.png"), raw("right.png"), raw("cameras.yml"));
+    rectify(folder.path(), &[&calib]).succeeded();
+    let end = ["--max-disparity", "40", "--device", "cpu", "--also", "validity,depth-mm,points"];
+    let args =
+        [&["match", &left, &right, "a.pfm", "--rectify", "--calib", &calib], &end[..], &["--json", "a.json"]]
+            .concat();
+    run(folder.path(), &args).succeeded();
+    run(folder.path(), &[&["match", "out/im0.png", "out/im1.png", "b.pfm"], &end[..]].concat()).succeeded();
+    // OpenCV's form of the calibration says the same.
+    let args = ["match", "out/im0.png", "out/im1.png", "c.pfm", "--calib", "out/cameras.yml"];
+    run(folder.path(), &[&args, &end[..]].concat()).succeeded();
+    let read = |name: String| fs::read(folder.path().join(name)).unwrap();
+    for end in ["pfm", "validity.png", "depth-mm.png"] {
+        for other in ["b", "c"] {
+            assert!(read(format!("a.{end}")) == read(format!("{other}.{end}")), "{other} {end}");
+        }
+    }
+    assert!(read("a.points.ply".into()) == read("c.points.ply".into()), "points in the unit of the file");
+    let record: Value = serde_json::from_slice(&read("a.json".into())).unwrap();
+    assert_eq!(
+        (&record["rectified"], &record["files"]["calibration"]),
+        (&true.into(), &calib.as_str().into())
+    );
+    // Depths are in metres, and 16-bit ones in millimetres.
+    let pixels = image::open(folder.path().join("a.depth-mm.png")).unwrap().into_luma16();
+    let (least, most) = pixels
+        .pixels()
+        .map(|p| p.0[0])
+        .filter(|mm| *mm > 0)
+        .fold((u16::MAX, 0), |(l, m), mm| (l.min(mm), m.max(mm)));
+    assert!((1000..2000).contains(&least) && (2500..6000).contains(&most), "{least} to {most}");
+}
+
+#[test]
+fn every_format_gives_the_same_depths() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("left", &ros("0"));
+    write("right", &ros("-34.48"));
+    write("txt", "cam0=[215.5 0 118.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\n");
+    let p = "!!opencv-matrix\n   rows: 3\n   cols: 4\n   dt: d\n   data: [ 215.5, 0., 118.5, ";
+    let rest = ", 0., 215.5, 89.5, 0., 0., 0., 1., 0. ]\n";
+    write("cv", &format!("%YAML:1.0\n---\nP1: {p}0.{rest}P2: {p}-34.48{rest}unit: m\n"));
+    let left = scene_file("slanted", "im0.png");
+    let right = scene_file("slanted", "im1.png");
+    let depths = |files: &[&str]| {
+        let mut args = vec!["match", &left, &right, "d.pfm", "--max-disparity", "31", "--also", "depth-mm"];
+        args.extend(files.iter().flat_map(|file| ["--calib", file]));
+        run(folder.path(), &args).succeeded();
+        fs::read(folder.path().join("d.depth-mm.png")).unwrap()
+    };
+    let first = depths(&["txt"]);
+    for files in [&["left", "right"][..], &["right", "left"], &["cv"]] {
+        assert!(depths(files) == first, "{files:?}");
+    }
+}
+
+/// What is changed in which file, and what the line must say beside the name of the file.
+type Row = (&'static str, &'static str, &'static str, &'static [&'static str]);
+
+const WRONG: &[Row] = &[
+    ("cv", "K1:", "X1:", &["K1 is missing: expected the matrix [f 0 cx; 0 f cy; 0 0 1]"]),
+    ("cv", "D2:", "X2:", &["D2 is missing", "0 0 0 0 for none"]),
+    ("cv", "R:", "X:", &["R is missing", "3 x 3 or a rotation vector"]),
+    ("cv", "T:", "X:", &["T is missing", "3 numbers"]),
+    ("cv", "214.0, 0.0, 121.4", "214.0, 0.0", &["K1: expected 9 numbers", "a damaged matrix"]),
+    ("cv", "214.0, 0.0, 121.4", "214.0, 0.5, 121.4", &["K1: expected a camera matrix", "no skew"]),
+    ("cv", "214.0, 0.0, 121.4", "-214.0, 0.0, 121.4", &["K1: expected a camera matrix", "f above 0"]),
+    ("cv", "214.0, 0.0, 121.4", "1e999, 0.0, 121.4", &["K1: expected 9 numbers"]),
+    ("cv", "-0.0005, 0.0 ]", "-0.0005, 0.0, 1.0 ]", &["D1: expected the coefficients", "a damaged matrix"]),
+    (
+        "cv",
+        "5\n   dt: d\n   data: [ -0.16,",
+        "6\n   dt: d\n   data: [ 0, -0.16,",
+        &["D1: expected 4, 5 or 8", "6 numbers"],
+    ),
+    (
+        "cv",
+        "5\n   dt: d\n   data: [ -0.16,",
+        "12\n   dt: d\n   data: [ 1, 2, 3, 4, 5, 6, 7, -0.16,",
+        &["D1: expected no thin prism"],
+    ),
+    ("cv", "[ 0.998908116030631", "[ 0.798908116030631", &["R: expected a rotation"]),
+    ("cv", "[ -0.16356857928250576,", "[ .Nan,", &["T: expected 3 numbers"]),
+    (
+        "cv",
+        "[ -0.16356857928250576,",
+        "[ 0.16356857928250576,",
+        &["right camera on the left of the left one", "exchange"],
+    ),
+    ("cv", "[ -0.16356857928250576,", "[ 0.001, 0.001,", &["T: expected 3 numbers"]),
+    (
+        "cv",
+        "[ -0.16356857928250576, 0.0029582522634575997,",
+        "[ 0.0001, 0.0,",
+        &["one camera in front of the other"],
+    ),
+    ("cv", "[ 240, 180 ]", "[ 240 ]", &["imageSize: expected width and height", "found 1 number"]),
+    ("cv", "[ 240, 180 ]", "[ 240, 180.5 ]", &["imageSize: expected width and height"]),
+    ("cv", "[ 240, 180 ]", "[ 320, 240 ]", &["is for images of 320 x 240", "240 x 180"]),
+    ("cv", "unit: m", "unit: feet", &["unit: expected mm, cm, m or unknown, found `feet`"]),
+    ("cv", "unit: m", "fisheye: perhaps", &["fisheye: expected 0 or 1", "`perhaps`"]),
+    ("cv", "unit: m", "fisheye: 1", &["D1: expected the 4 coefficients of a fisheye", "5 numbers"]),
+    ("cv", "unit: m", "K1: 5", &["`K1` is there twice"]),
+    ("cv", "unit: m", "unit: [ m", &["is no YAML"]),
+    ("cv", "unit: m", "a: &a [ 1 ]\nb: *a", &["line", "found a reference"]),
+    ("cv", "unit: m", "P1: 1", &["P1: expected 12 numbers, a matrix of 3 x 4, found `1`"]),
+    ("xml", "</D1>", "</D2>", &["is no XML"]),
+    ("xml", "<D1 ", "<K1 ", &["is no XML"]),
+    ("xml", "<unit>m</unit>", "<K1>3</K1>", &["`K1` is there twice"]),
+    ("xml", "<opencv_storage>", "<!DOCTYPE a [<!ENTITY b \"c\">]><opencv_storage>", &["is no XML"]),
+    ("xml", "<rows>3</rows>", "<rows>4</rows>", &["K1: expected 9 numbers", "a damaged matrix"]),
+    ("chain", "cam1:", "cam2:", &["cam1 is missing"]),
+    ("chain", "pinhole", "omni", &["cam0.camera_model: expected pinhole, found `omni`"]),
+    ("chain", "radtan", "fov", &["cam0.distortion_model: expected radtan, equidistant or none, found `fov`"]),
+    ("chain", "T_cn_cnm1", "T_other", &["cam1.T_cn_cnm1 is missing", "4 x 4"]),
+    ("chain", "[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 0.0, 2.0]", &["cam1.T_cn_cnm1: expected a rotation"]),
+    ("chain", "[240, 180]", "[320, 240]", &["cam1.resolution: expected 320 x 240", "240 x 180"]),
+    ("chain", "intrinsics: [214.0, ", "intrinsics: [", &["cam0.intrinsics: expected 4 numbers", "3 numbers"]),
+    (
+        "chain",
+        "intrinsics: [214.0, ",
+        "intrinsics: [0, ",
+        &["cam0.intrinsics: expected 4 numbers", "above 0"],
+    ),
+    ("ros", "plumb_bob", "thin_prism", &["distortion_model: expected plumb_bob", "`thin_prism`"]),
+    ("ros", "projection_matrix", "projection", &["projection_matrix is missing"]),
+    (
+        "ros",
+        "image_width: 240",
+        "image_width: 200",
+        &["image_width, image_height: expected 240 x 180", "200 x 180"],
+    ),
+    ("ros", "-34.48", "0", &["projection_matrix: expected focal length times baseline"]),
+    (
+        "ros",
+        "215.5, 0, 118.5, -34",
+        "100.5, 0, 118.5, -34",
+        &["projection_matrix: expected the focal length"],
+    ),
+    ("ros", "data: [1, 0, 0, 0, 1", "data: [1, 0, 0, 0, -1", &["rectification_matrix: expected a rotation"]),
+    ("ros", "camera_matrix:", "camera:", &["does not belong to the other file"]),
+];
+
+#[test]
+fn what_is_wrong_in_a_calibration_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("left"), ros("0")).unwrap();
+    for (kind, from, to, words) in WRONG {
+        let text = match *kind {
+            "cv" => opencv(),
+            "xml" => xml(),
+            "chain" => kalibr(),
+            _ => ros("-34.48"),
+        };
+        let what = format!("{kind}: {from} -> {to}");
+        assert!(text.contains(from), "{what}");
+        fs::write(folder.path().join("a file"), text.replacen(from, to, 1)).unwrap();
+        let files: &[&str] = if *kind == "ros" { &["left", "a file"] } else { &["a file"] };
+        let told = rectify(folder.path(), files);
+        told.failed(1, &[&["a file"], *words].concat(), &what);
+        assert_eq!(listing(folder.path()).len(), 2, "{what}: nothing is left");
+    }
+}
+
+#[test]
+fn files_that_are_no_calibration_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    write("empty", b"");
+    write("words", b"some words\n");
+    write("list", b"- 1\n- 2\n");
+    write("lists", "[".repeat(100_000).as_bytes());
+    write("list of lists", format!("{}1{}", "[".repeat(40), "]".repeat(40)).as_bytes());
+    write("groups", format!("<a>{}", "<b>".repeat(20_000)).as_bytes());
+    write("deep", format!("<a>{}{}</a>", "<b>".repeat(2000), "</b>".repeat(2000)).as_bytes());
+    let keys = (0..2000).map(|n| format!("k{n}: 1\n")).collect::<Vec<_>>();
+    write("keys", keys.concat().as_bytes());
+    let elements = (0..2000).map(|n| format!("<k{n}/>")).collect::<Vec<_>>();
+    write("elements", format!("<a>{}</a>", elements.concat()).as_bytes());
+    write("bytes", &[0, 159, 146, 150, 10]);
+    write("large", &vec![b' '; (1 << 20) + 1]);
+    write("half", b"cam0=[100 0 30; 0 100 20; 0 0 1]\n");
+    write("left", ros("0").as_bytes());
+    write("opencv", opencv().as_bytes());
+    let before = listing(folder.path());
+    for (files, words) in [
+        (&["none"][..], &["none", "no such file"][..]),
+        (&["empty"], &["empty", "is no YAML with entries"]),
+        (&["words"], &["words", "expected the entries of OpenCV"]),
+        (&["list"], &["list", "expected the entries of OpenCV"]),
+        (&["lists"], &["lists", "is no YAML"]),
+        (&["list of lists"], &["list of lists", "too many levels"]),
+        (&["groups"], &["groups", "is no XML"]),
+        (&["deep"], &["deep", "too many levels"]),
+        (&["keys"], &["keys", "too many entries"]),
+        (&["elements"], &["elements", "too many entries"]),
+        (&["bytes"], &["bytes"]),
+        (&["large"], &["large", "larger than any calibration file"]),
+        (&["half"], &["half", "K1, D1, K2 and D2"]),
+        (&["left"], &["left", "of one camera", "the other one too"]),
+        (&["left", "left"], &["left", "expected focal length times baseline"]),
+        (&["left", "words"], &["words", "does not belong"]),
+        (&["opencv", "opencv", "opencv"], &["opencv", "one too many"]),
+    ] {
+        rectify(folder.path(), files).failed(1, words, &files.join(" "));
+        assert!(listing(folder.path()) == before, "{files:?}");
+    }
+    let (left, right, calib) = (raw("left.png"), raw("right.png"), raw("cameras.yml"));
+    let no_unit = opencv().replace("unit: m\n", "");
+    write("no unit", no_unit.as_bytes());
+    let before = listing(folder.path());
+    let flags = |args: &[&str], code: i32, words: &[&str]| {
+        run(folder.path(), args).failed(code, words, &args.join(" "));
+        assert!(listing(folder.path()) == before, "{args:?}");
+    };
+    let m = ["match", &left, &right, "d.pfm"];
+    flags(&[&m[..], &["--rectify"]].concat(), 2, &["--calib"]);
+    flags(&[&m[..], &["--calib", &calib, "--alpha", "1"]].concat(), 2, &["--alpha", "--rectify"]);
+    flags(
+        &[&m[..], &["--rectify", "--calib", &calib, "--alpha", "2"]].concat(),
+        2,
+        &["--alpha", "from 0 to 1"],
+    );
+    flags(&[&m[..], &["--calib", &calib, "--also", "depth"]].concat(), 1, &["not rectified", "--rectify"]);
+    flags(
+        &[&m[..], &["--rectify", "--calib", "no unit", "--max-disparity", "40", "--also", "depth-mm"]]
+            .concat(),
+        2,
+        &["--also depth-mm", "no unit", "mm, cm or m"],
+    );
+    flags(&["rectify", &left, &right, "out"], 2, &["--calib"]);
+    flags(&["rectify", &left, &right, &left, "--calib", &calib], 1, &["is a file"]);
+}

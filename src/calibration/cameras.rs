@@ -1,0 +1,104 @@
+//! What a calibration says of a pair of cameras.
+
+use super::lens::Lens;
+use super::matrix::{Matrix, product, rotated, transposed};
+use crate::error::{Error, Result};
+use crate::image::calib::{Calibration, Camera, Unit};
+
+/// A pair of cameras as a calibration program found it. The left camera is the first one.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct StereoCalibration {
+    /// The cameras as they took their images, left and right.
+    pub lenses: Option<[Lens; 2]>,
+    /// How the right camera stands to the left one.
+    pub pose: Option<Pose>,
+    /// A rectification that is part of the calibration.
+    pub views: Option<Views>,
+    /// Width and height of the images, in pixels.
+    pub size: Option<(usize, usize)>,
+    /// The unit of the baseline.
+    pub unit: Unit,
+    /// What `calib.txt` says, where it is one.
+    pub benchmark: Option<Calibration>,
+}
+
+/// How the right camera stands to the left one: a point X in the frame of the left camera is R X + T in that of the right
+/// one. Frames are x to the right, y down, z forward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// R.
+    pub rotation: Matrix,
+    /// T, in the unit of the calibration.
+    pub translation: [f64; 3],
+}
+
+/// A rectification: two pinhole cameras that look in the same direction from where the real ones stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Views {
+    /// From the frame of each real camera to that of its rectified view (R1 and R2).
+    pub rotations: [Matrix; 2],
+    /// The rectified cameras.
+    pub cameras: [Camera; 2],
+    /// Where the left camera is in the frame of the right view: x and y, in the unit of the calibration. One of them is 0.
+    pub translation: [f64; 2],
+}
+
+impl Views {
+    /// Whether columns, not rows, are epipolar lines: one camera is above the other.
+    #[must_use]
+    pub fn is_vertical(&self) -> bool {
+        self.translation[1].abs() > self.translation[0].abs()
+    }
+
+    /// The calibration of the rectified images, of the given size.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] where the right camera is not to the right of the left one.
+    pub fn calibration(&self, size: Option<(usize, usize)>, unit: Unit) -> Result<Calibration> {
+        let error = |reason: &str| Err(Error::Calibration(reason.into()));
+        if self.is_vertical() {
+            return error("has one camera above the other, and only rows are matched");
+        }
+        if self.translation[0] >= 0.0 {
+            return error(
+                "puts the right camera on the left of the left one; exchange the two in it, or the images",
+            );
+        }
+        let [left, right] = self.cameras;
+        let count = |count: usize| u32::try_from(count).ok();
+        Ok(Calibration {
+            camera: Some(left),
+            doffs: Some(right.principal_point[0] - left.principal_point[0]),
+            baseline: Some(-self.translation[0]),
+            width: size.and_then(|(width, _)| count(width)),
+            height: size.and_then(|(_, height)| count(height)),
+            unit,
+            ..Calibration::default()
+        })
+    }
+}
+
+impl StereoCalibration {
+    /// The calibration of images that are rectified already; `None` where it does not say how they were rectified.
+    ///
+    /// # Errors
+    /// Those of [`Views::calibration`].
+    pub fn of_rectified_images(&self) -> Result<Option<Calibration>> {
+        if let Some(benchmark) = &self.benchmark {
+            return Ok(Some(benchmark.clone()));
+        }
+        self.views.map(|views| views.calibration(self.size, self.unit)).transpose()
+    }
+
+    /// With the pose that the rectification implies, where a file gives that alone.
+    pub(super) fn with_pose_of_views(mut self) -> Self {
+        self.pose = self.pose.or_else(|| {
+            let Views { rotations: [left, right], translation: [x, y], .. } = self.views?;
+            // A point goes to the left view, along to the right one, and back to the right camera.
+            let back = transposed(&right);
+            Some(Pose { rotation: product(&back, &left), translation: rotated(&back, [x, y, 0.0]) })
+        });
+        self
+    }
+}

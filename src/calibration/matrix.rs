@@ -1,0 +1,124 @@
+//! Matrices of rotations, with the same bits on every platform.
+
+/// A matrix of three rows.
+pub type Matrix = [[f64; 3]; 3];
+
+/// The rotation that changes nothing.
+pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// `a` times `b`.
+#[must_use]
+pub fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let column = |x: usize| rotated(a, [b[0][x], b[1][x], b[2][x]]);
+    transposed(&[column(0), column(1), column(2)])
+}
+
+/// `matrix` times the column `v`.
+#[must_use]
+pub fn rotated(matrix: &Matrix, v: [f64; 3]) -> [f64; 3] {
+    matrix.map(|row| dot(row, v))
+}
+
+/// Rows and columns exchanged; the inverse of a rotation.
+#[must_use]
+pub fn transposed(m: &Matrix) -> Matrix {
+    std::array::from_fn(|y| std::array::from_fn(|x| m[x][y]))
+}
+
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn length(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
+
+pub(crate) fn scaled(v: [f64; 3], by: f64) -> [f64; 3] {
+    v.map(|x| x * by)
+}
+
+/// The rotation about `v` by its length in radians (Rodrigues).
+#[must_use]
+pub fn rotation(v: [f64; 3]) -> Matrix {
+    let angle = length(v);
+    if angle == 0.0 {
+        return IDENTITY;
+    }
+    let axis = scaled(v, 1.0 / angle);
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let [x, y, z] = axis;
+    let turn = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| cos * IDENTITY[r][c] + (1.0 - cos) * axis[r] * axis[c] + sin * turn[r][c])
+    })
+}
+
+/// The axis of a rotation by less than half a turn, as long as its angle in radians: the inverse of [`rotation`].
+#[must_use]
+pub fn rotation_vector(m: &Matrix) -> [f64; 3] {
+    // Twice the axis, as long as the sine.
+    let v = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]];
+    let sin = length(v) / 2.0;
+    if sin == 0.0 {
+        return [0.0; 3];
+    }
+    let cos = (m[0][0] + m[1][1] + m[2][2] - 1.0) / 2.0;
+    scaled(v, libm::atan2(sin, cos) / (2.0 * sin))
+}
+
+/// The rotation nearest to `m`, or `None` where `m` is none up to the digits of a file.
+pub(crate) fn nearest_rotation(m: &Matrix) -> Option<Matrix> {
+    const DIGITS: f64 = 1e-2;
+    // By Newton's iteration for the orthogonal factor; it converges quadratically from so near.
+    let mut near = *m;
+    for _ in 0..8 {
+        let [a, b, c] = near;
+        let determinant = dot(a, cross(b, c));
+        if determinant <= 0.5 {
+            return None;
+        }
+        let inverse = [cross(b, c), cross(c, a), cross(a, b)].map(|row| scaled(row, 1.0 / determinant));
+        near = std::array::from_fn(|y| std::array::from_fn(|x| f64::midpoint(near[y][x], inverse[y][x])));
+    }
+    let close = m.iter().flatten().zip(near.iter().flatten()).all(|(a, b)| (a - b).abs() <= DIGITS);
+    close.then_some(near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: &Matrix, b: &Matrix) -> bool {
+        a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-14)
+    }
+
+    #[test]
+    fn a_vector_is_its_rotation() {
+        for v in [[0.0; 3], [0.1, -0.2, 0.3], [1e-9, 0.0, 0.0], [0.0, 2.9, 0.0]] {
+            let matrix = rotation(v);
+            assert!(close(&product(&matrix, &transposed(&matrix)), &IDENTITY), "{v:?}");
+            let back = rotation_vector(&matrix);
+            assert!(v.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-14), "{v:?}: {back:?}");
+        }
+        // A quarter turn about z takes x to y.
+        let turned = rotated(&rotation([0.0, 0.0, std::f64::consts::FRAC_PI_2]), [1.0, 0.0, 0.0]);
+        assert!((turned[1] - 1.0).abs() < 1e-15 && turned[0].abs() < 1e-15, "{turned:?}");
+    }
+
+    #[test]
+    fn digits_that_a_file_lacks_are_found_again() {
+        let exact = rotation([0.02, -0.1, 0.05]);
+        let rounded = exact.map(|row| row.map(|v| (v * 1e4).round() / 1e4));
+        let near = nearest_rotation(&rounded).unwrap();
+        assert!(close(&product(&near, &transposed(&near)), &IDENTITY));
+        assert!(near.iter().flatten().zip(exact.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-4));
+        let mirror = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for wrong in [mirror, [[0.0; 3]; 3], [[1.0; 3]; 3], IDENTITY.map(|row| row.map(|v| 1.1 * v))] {
+            assert_eq!(nearest_rotation(&wrong), None, "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Middlebury's `calib.txt` as a calibration of two cameras.
+
+use std::path::Path;
+
+use super::cameras::{Pose, StereoCalibration, Views};
+use super::lens::{Distortion, Lens};
+use super::matrix::IDENTITY;
+use crate::error::Result;
+use crate::image::calib::{Calibration, Camera};
+
+/// Whether a text has lines `key=value`, and none that begin like YAML or XML.
+pub(super) fn is(text: &str) -> bool {
+    let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|line| !line.trim().is_empty());
+    let first = lines.clone().next().unwrap_or_default();
+    let entry = |line: &str| {
+        line.split_once('=')
+            .is_some_and(|(key, _)| key.trim().chars().all(|c| c.is_alphanumeric() || c == '_'))
+    };
+    !first.starts_with(['<', '%']) && lines.any(entry)
+}
+
+pub(super) fn of_text(path: &Path, text: &str) -> Result<StereoCalibration> {
+    let benchmark = Calibration::of_text(path, text)?;
+    let mut calibration = StereoCalibration { unit: benchmark.unit, ..StereoCalibration::default() };
+    if let (Some(width), Some(height)) = (benchmark.width, benchmark.height) {
+        calibration.size = Some((width as usize, height as usize));
+    }
+    if let (Some(left), Some(doffs), Some(baseline)) = (benchmark.camera, benchmark.doffs, benchmark.baseline)
+        && baseline > 0.0
+    {
+        let [cx, cy] = left.principal_point;
+        let right = Camera { principal_point: [cx + doffs, cy], ..left };
+        let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
+        calibration.lenses = Some([lens(left)?, lens(right)?]);
+        calibration.pose = Some(Pose { rotation: IDENTITY, translation: [-baseline, 0.0, 0.0] });
+        calibration.views =
+            Some(Views { rotations: [IDENTITY; 2], cameras: [left, right], translation: [-baseline, 0.0] });
+    }
+    calibration.benchmark = Some(benchmark);
+    Ok(calibration)
+}

@@ -1,0 +1,184 @@
+//! The entries of a calibration file, whatever its syntax.
+
+use std::path::Path;
+
+use crate::calibration::matrix::Matrix;
+use crate::error::{Error, Result};
+use crate::text::quoted;
+
+/// Entries may lie this deep in each other; calibrations need four levels.
+pub(super) const MAX_DEPTH: usize = 16;
+
+/// A group holds at most this many entries; calibrations have dozens.
+pub(super) const MAX_ENTRIES: usize = 1000;
+
+/// A value.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Node {
+    /// A word, a number, or numbers with blanks between them.
+    Scalar(String),
+    List(Vec<Node>),
+    Map(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// The value of `key`, spelt like this.
+    pub(super) fn get(&self, key: &str) -> Option<&Self> {
+        let Self::Map(entries) = self else { return None };
+        entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
+    }
+
+    /// All numbers of a scalar, a list, a list of lists or an `opencv-matrix`; `None` where there is anything else.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::Scalar(text) => {
+                let number = |word: &str| word.parse().ok().filter(|v: &f64| v.is_finite());
+                text.split_whitespace().map(number).collect()
+            }
+            Self::List(nodes) => {
+                nodes.iter().map(Self::numbers).collect::<Option<Vec<_>>>().map(|all| all.concat())
+            }
+            Self::Map(_) => {
+                let data = self.get("data")?.numbers()?;
+                let count = |key: &str| self.get(key).map(Self::numbers);
+                let (rows, columns) = (count("rows"), count("cols"));
+                match (rows, columns) {
+                    (None, None) => Some(data),
+                    (Some(rows), Some(columns)) => {
+                        let wanted = rows?.first()? * columns?.first()?;
+                        (data.len() == wanted as usize).then_some(data)
+                    }
+                    _ => None,
+                }
+            }
+        }
+    }
+
+    fn described(&self) -> String {
+        match (self, self.numbers()) {
+            (Self::Scalar(text), _) if text.is_empty() => "nothing".into(),
+            (Self::Scalar(text), _) => quoted(text),
+            (_, Some(numbers)) => match numbers.len() {
+                1 => "1 number".into(),
+                count => format!("{count} numbers"),
+            },
+            (Self::List(_), None) => "a list that holds more than numbers".into(),
+            (Self::Map(_), None) if self.get("data").is_some() => "a damaged matrix".into(),
+            (Self::Map(_), None) => "a group of entries".into(),
+        }
+    }
+}
+
+/// The entries of one or two files that belong together.
+pub(super) struct Entries<'a> {
+    files: Vec<(&'a Path, &'a Node)>,
+    /// The name of the group they are in, with a dot: `cam0.`.
+    group: String,
+}
+
+/// A value with its name.
+pub(super) struct Entry<'a> {
+    path: &'a Path,
+    name: String,
+    node: &'a Node,
+}
+
+impl<'a> Entries<'a> {
+    pub(super) fn new(files: Vec<(&'a Path, &'a Node)>) -> Self {
+        Self { files, group: String::new() }
+    }
+
+    /// The first entry that has one of `names`, which are in lower case and without `_`, `-` and blanks.
+    pub(super) fn find(&self, names: &[&str]) -> Option<Entry<'a>> {
+        let plain = |name: &str| {
+            name.chars().filter(|c| !['_', '-', ' '].contains(c)).collect::<String>().to_lowercase()
+        };
+        self.files.iter().find_map(|(path, node)| {
+            let Node::Map(entries) = node else { return None };
+            let (name, node) = entries.iter().find(|(name, _)| names.contains(&plain(name).as_str()))?;
+            Some(Entry { path, name: format!("{}{name}", self.group), node })
+        })
+    }
+
+    /// As [`Entries::find`]; the error says that it is missing and what was `expected`, calling it `called`.
+    pub(super) fn require(&self, names: &[&str], called: &str, expected: &str) -> Result<Entry<'a>> {
+        self.find(names).ok_or_else(|| {
+            Error::read(self.path(), format!("{}{called} is missing: expected {expected}", self.group))
+        })
+    }
+
+    /// The file that errors of all entries together name.
+    pub(super) fn path(&self) -> &'a Path {
+        self.files[0].0
+    }
+}
+
+impl<'a> Entry<'a> {
+    pub(super) fn wrong(&self, expected: &str) -> Error {
+        let found = self.node.described();
+        Error::read(self.path, format!("{}: expected {expected}, found {found}", self.name))
+    }
+
+    /// The entries in it.
+    pub(super) fn group(&self) -> Result<Entries<'a>> {
+        match self.node {
+            Node::Map(_) => {
+                Ok(Entries { files: vec![(self.path, self.node)], group: format!("{}.", self.name) })
+            }
+            _ => Err(self.wrong("a group of entries")),
+        }
+    }
+
+    /// So many numbers; `expected` says which.
+    pub(super) fn numbers<const N: usize>(&self, expected: &str) -> Result<[f64; N]> {
+        let numbers = self.node.numbers().and_then(|numbers| numbers.try_into().ok());
+        numbers.ok_or_else(|| self.wrong(expected))
+    }
+
+    /// Any number of numbers.
+    pub(super) fn list(&self, expected: &str) -> Result<Vec<f64>> {
+        self.node.numbers().ok_or_else(|| self.wrong(expected))
+    }
+
+    /// A matrix of `R` rows and `C` columns, row by row.
+    pub(super) fn matrix<const R: usize, const C: usize>(&self) -> Result<[[f64; C]; R]> {
+        let expected = format!("{} numbers, a matrix of {R} x {C}", R * C);
+        let numbers = self.list(&expected)?;
+        if numbers.len() != R * C {
+            return Err(self.wrong(&expected));
+        }
+        Ok(std::array::from_fn(|y| std::array::from_fn(|x| numbers[y * C + x])))
+    }
+
+    /// A rotation.
+    pub(super) fn rotation(&self, matrix: &Matrix) -> Result<Matrix> {
+        let wrong = || self.wrong("a rotation, whose rows are at right angles and of length 1");
+        super::matrix::nearest_rotation(matrix).ok_or_else(wrong)
+    }
+
+    /// A number of pixels.
+    pub(super) fn count(&self) -> Result<usize> {
+        const EXPECTED: &str = "a whole number of pixels above 0";
+        let [number] = self.numbers(EXPECTED)?;
+        pixels(number).ok_or_else(|| self.wrong(EXPECTED))
+    }
+
+    /// Width and height.
+    pub(super) fn size(&self) -> Result<(usize, usize)> {
+        const EXPECTED: &str = "width and height, two whole numbers above 0";
+        let [width, height] = self.numbers(EXPECTED)?;
+        pixels(width).zip(pixels(height)).ok_or_else(|| self.wrong(EXPECTED))
+    }
+
+    /// A word.
+    pub(super) fn word(&self) -> Result<&'a str> {
+        match self.node {
+            Node::Scalar(text) => Ok(text.trim_matches(|c: char| c == '"' || c.is_whitespace())),
+            _ => Err(self.wrong("a word")),
+        }
+    }
+}
+
+fn pixels(number: f64) -> Option<usize> {
+    (number.fract() == 0.0 && (1.0..=f64::from(1 << 24)).contains(&number)).then_some(number as usize)
+}

@@ -1,0 +1,203 @@
+//! OpenCV's stereo calibrations, in YAML or XML, by the names that its programs and most others give to entries.
+
+use super::cameras::{Pose, StereoCalibration, Views};
+use super::lens::{Distortion, Lens};
+use super::matrix::{IDENTITY, Matrix, length, rotation};
+use super::node::{Entries, Entry};
+use crate::error::Result;
+use crate::image::calib::Camera;
+
+// In lower case and without `_`, as `Entries::find` takes them.
+const CAMERA: [&[&str]; 2] = [
+    &["k1", "m1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "kl", "leftk", "mleft"],
+    &[
+        "k2",
+        "m2",
+        "cameramatrix2",
+        "cameramatrixright",
+        "rightcameramatrix",
+        "kright",
+        "kr",
+        "rightk",
+        "mright",
+    ],
+];
+const DISTORTION: [&[&str]; 2] = [
+    &[
+        "d1",
+        "distcoeffs1",
+        "distortioncoefficients1",
+        "dist1",
+        "distcoeffsleft",
+        "leftdistcoeffs",
+        "dleft",
+        "dl",
+    ],
+    &[
+        "d2",
+        "distcoeffs2",
+        "distortioncoefficients2",
+        "dist2",
+        "distcoeffsright",
+        "rightdistcoeffs",
+        "dright",
+        "dr",
+    ],
+];
+const ROTATION: &[&str] = &["r", "rotation", "rotationmatrix", "stereor"];
+const TRANSLATION: &[&str] = &["t", "translation", "translationvector", "trans", "stereot"];
+const RECTIFICATION: [&[&str]; 2] =
+    [&["r1", "rectification1", "rleft", "rl"], &["r2", "rectification2", "rright", "rr"]];
+const PROJECTION: [&[&str]; 2] =
+    [&["p1", "projection1", "pleft", "pl"], &["p2", "projection2", "pright", "pr"]];
+const SIZE: &[&str] = &["imagesize", "size", "imgsize", "resolution"];
+const WIDTH: &[&str] = &["imagewidth", "width"];
+const HEIGHT: &[&str] = &["imageheight", "height"];
+const FISHEYE: &[&str] = &["fisheye", "fisheyemodel", "usefisheye"];
+const UNIT: &[&str] = &["unit", "units"];
+
+/// Whether these entries are OpenCV's: whether there is any camera.
+pub(super) fn is(entries: &Entries) -> bool {
+    CAMERA.iter().chain(&PROJECTION).chain(&DISTORTION).any(|names| entries.find(names).is_some())
+}
+
+pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
+    let mut calibration = StereoCalibration { size: size(entries)?, ..StereoCalibration::default() };
+    if let Some(unit) = entries.find(UNIT) {
+        let word = unit.word()?;
+        calibration.unit = word.parse().map_err(|expected: &str| unit.wrong(expected))?;
+    } else {
+        calibration.unit = crate::image::calib::Unit::Unknown;
+    }
+    let has = |names: &[&str]| entries.find(names).is_some();
+    let stored = PROJECTION.iter().any(|names| has(names));
+    if CAMERA.iter().any(|names| has(names)) || !stored {
+        calibration.lenses = Some([lens(entries, 0)?, lens(entries, 1)?]);
+    }
+    if stored {
+        calibration.views = Some(views(entries)?);
+    }
+    if has(ROTATION) || has(TRANSLATION) || !stored {
+        calibration.pose = Some(pose(entries)?);
+    }
+    Ok(calibration)
+}
+
+fn size(entries: &Entries) -> Result<Option<(usize, usize)>> {
+    match (entries.find(SIZE), entries.find(WIDTH), entries.find(HEIGHT)) {
+        (Some(size), ..) => size.size().map(Some),
+        (None, Some(width), Some(height)) => Ok(Some((width.count()?, height.count()?))),
+        _ => Ok(None),
+    }
+}
+
+fn lens(entries: &Entries, view: usize) -> Result<Lens> {
+    let called = ["K1", "K2"][view];
+    let matrix = entries.require(CAMERA[view], called, "the matrix [f 0 cx; 0 f cy; 0 0 1] of the camera")?;
+    let (focal_length, principal_point) = camera(&matrix)?;
+    let called = ["D1", "D2"][view];
+    let expected = "the distortion of the lens, 0 0 0 0 for none";
+    let entry = entries.require(DISTORTION[view], called, expected)?;
+    let coefficients = entry.list("the coefficients of the distortion")?;
+    let distortion = if is_fisheye(entries)? {
+        equidistant(&entry, &coefficients)?
+    } else {
+        Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))?
+    };
+    Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
+}
+
+/// Files of OpenCV do not say so by themselves; see the guide.
+fn is_fisheye(entries: &Entries) -> Result<bool> {
+    let Some(entry) = entries.find(FISHEYE) else { return Ok(false) };
+    match entry.word()? {
+        "1" | "true" => Ok(true),
+        "0" | "false" => Ok(false),
+        _ => Err(entry.wrong("0 or 1, whether the lenses are fisheyes")),
+    }
+}
+
+pub(super) fn equidistant(entry: &Entry, coefficients: &[f64]) -> Result<Distortion> {
+    let four = coefficients.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
+    Ok(Distortion::Equidistant(four))
+}
+
+/// Focal length and principal point of a camera matrix.
+pub(super) fn camera(entry: &Entry) -> Result<([f64; 2], [f64; 2])> {
+    match entry.matrix::<3, 3>()? {
+        [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]] if fx > 0.0 && fy > 0.0 => Ok(([fx, fy], [cx, cy])),
+        _ => Err(entry.wrong("a camera matrix like [f 0 cx; 0 f cy; 0 0 1] with f above 0 and no skew")),
+    }
+}
+
+fn pose(entries: &Entries) -> Result<Pose> {
+    let expected = "the rotation from the left camera to the right one, 3 x 3 or a rotation vector";
+    let entry = entries.require(ROTATION, "R", expected)?;
+    let rotation = match entry.numbers::<3>(expected) {
+        Ok(vector) => rotation(vector),
+        Err(_) => entry.rotation(&entry.matrix()?)?,
+    };
+    let expected = "3 numbers, the left camera in the frame of the right one";
+    let entry = entries.require(TRANSLATION, "T", expected)?;
+    let translation: [f64; 3] = entry.numbers(expected)?;
+    if length(translation) == 0.0 {
+        return Err(entry.wrong("the two cameras apart"));
+    }
+    Ok(Pose { rotation, translation })
+}
+
+fn views(entries: &Entries) -> Result<Views> {
+    let mut rotations = [IDENTITY; 2];
+    let mut projections = Vec::new();
+    for (view, rotation) in rotations.iter_mut().enumerate() {
+        // Images that are rectified already have none.
+        if let Some(entry) = entries.find(RECTIFICATION[view]) {
+            *rotation = entry.rotation(&entry.matrix()?)?;
+        }
+        let called = ["P1", "P2"][view];
+        let expected = "the projection of the rectified camera, a matrix of 3 x 4";
+        projections.push(projection(&entries.require(PROJECTION[view], called, expected)?)?);
+    }
+    let entry = entries.require(PROJECTION[1], "P2", "")?;
+    rectified(&entry, rotations, [projections[0], projections[1]])
+}
+
+/// A rectified camera, and the fourth column of its matrix.
+#[derive(Clone, Copy)]
+pub(super) struct Projection {
+    pub(super) camera: Camera,
+    pub(super) column: [f64; 2],
+}
+
+pub(super) fn projection(entry: &Entry) -> Result<Projection> {
+    match entry.matrix::<3, 4>()? {
+        [[fx, 0.0, cx, tx], [0.0, fy, cy, ty], [0.0, 0.0, 1.0, 0.0]] if fx > 0.0 && fy > 0.0 => {
+            let camera = Camera { focal_length: [fx, fy], principal_point: [cx, cy] };
+            Ok(Projection { camera, column: [tx, ty] })
+        }
+        _ => Err(entry.wrong("a projection like [f 0 cx tx; 0 f cy ty; 0 0 1 0] with f above 0")),
+    }
+}
+
+/// The rectification of two projections; `entry` is the second one.
+pub(super) fn rectified(
+    entry: &Entry,
+    rotations: [Matrix; 2],
+    [left, right]: [Projection; 2],
+) -> Result<Views> {
+    let [a, b] = [left.camera, right.camera];
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
+    let translation: [f64; 2] =
+        std::array::from_fn(|i| (right.column[i] - left.column[i]) / b.focal_length[i]);
+    // The direction in which both views must agree.
+    let across = usize::from(translation[0].abs() >= translation[1].abs());
+    let agree = (0..2).all(|i| close(a.focal_length[i], b.focal_length[i]))
+        && close(a.principal_point[across], b.principal_point[across]);
+    if !agree {
+        return Err(entry.wrong("the focal length and the rows of the left projection"));
+    }
+    if translation.iter().all(|v| *v == 0.0) {
+        return Err(entry.wrong("focal length times baseline in its fourth column"));
+    }
+    Ok(Views { rotations, cameras: [a, b], translation })
+}

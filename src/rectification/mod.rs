@@ -1,0 +1,176 @@
+//! Rectified pairs from images as the cameras took them.
+//!
+//! The rectified views are those of Bouguet's method, as OpenCV's `stereoRectify` chooses them. The place in the image that each
+//! of their pixels shows is computed in double precision, with the same bits on every platform, and rounded to 1/256 px;
+//! values are interpolated by cubics in integers.
+//!
+//! ```
+//! use mrfgs::rectification::{Options, Rectification};
+//! use mrfgs::{Matcher, Pair, calibration, depth::Rig};
+//!
+//! # fn main() -> mrfgs::Result<()> {
+//! let cameras = calibration::read(&["testdata/raw/cameras.yml".into()])?;
+//! let raw = Pair::open("testdata/raw/left.png", "testdata/raw/right.png")?;
+//! let rectification = Rectification::new(&cameras, raw.size(), &Options::default())?;
+//! let pair = rectification.apply(&raw)?;
+//! # let pair = pair.crop(&mrfgs::image::Rect { x: 60..124, y: 60..108 });
+//! let found = Matcher::new()?.run(&pair, 0..=31)?;
+//! let depths = Rig::new(&rectification.calibration()?)?.depths(&found.disparity());
+//! # assert_eq!(depths.size(), (64, 48));
+//! # Ok(())
+//! # }
+//! ```
+
+mod options;
+mod sampling;
+mod views;
+
+pub use options::Options;
+
+use crate::calibration::cameras::{StereoCalibration, Views};
+use crate::calibration::lens::Lens;
+use crate::calibration::matrix::{Matrix, product, rotated, transposed};
+use crate::error::{Error, Result};
+use crate::image::calib::{Calibration, Camera, Unit};
+use crate::image::{Pair, Plane};
+
+/// How a pair of images becomes a rectified pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rectification {
+    lenses: [Lens; 2],
+    /// Their epipolar lines are rows.
+    views: Views,
+    /// Of the images, and of the rectified ones.
+    sizes: [(usize, usize); 2],
+    unit: Unit,
+}
+
+impl Rectification {
+    /// The rectification of images of `size` by a calibration: that which the calibration holds, unless the options ask for
+    /// another one, or else Bouguet's.
+    ///
+    /// Where one camera is above the other, the views are turned by a quarter, so that rows are epipolar lines and the right
+    /// view is to the right: the upper camera is the left one after a quarter turn counter-clockwise, the lower one after a
+    /// quarter turn clockwise.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] when the calibration lacks the lenses or how they stand, when the right camera is on the left of
+    /// the left one, or no rectified views exist; [`Error::Mismatch`] when it is for images of another size.
+    pub fn new(calibration: &StereoCalibration, size: (usize, usize), options: &Options) -> Result<Self> {
+        options.check()?;
+        let error = |reason: &str| Error::Calibration(reason.into());
+        if let Some((width, height)) = calibration.size.filter(|known| *known != size) {
+            return Err(Error::Mismatch(format!(
+                "the calibration is for images of {width} x {height} and these are {} x {}",
+                size.0, size.1
+            )));
+        }
+        let lenses = calibration
+            .lenses
+            .ok_or_else(|| error("does not say the lenses, K1, D1, K2 and D2, which rectification takes"))?;
+        let views = match (calibration.views, &calibration.pose) {
+            (Some(views), _) if options.alpha.is_none() => views,
+            (_, Some(pose)) => views::choose(&lenses, pose, size, options)?,
+            _ => return Err(error("does not say how the cameras stand to each other, R and T")),
+        };
+        let (views, rectified) = turned(views, size);
+        // Says where the right camera is on the left.
+        views.calibration(None, calibration.unit)?;
+        Ok(Self { lenses, views, sizes: [size, rectified], unit: calibration.unit })
+    }
+
+    /// (width, height) of the rectified images.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        self.sizes[1]
+    }
+
+    /// Where the left image shows what the rectified left view has at (x, y), in pixels. `None` where it cannot show it; what
+    /// is found may still be outside of the image.
+    #[must_use]
+    pub fn left(&self, x: f64, y: f64) -> Option<[f64; 2]> {
+        self.source(0, x, y)
+    }
+
+    /// The same for the right views.
+    #[must_use]
+    pub fn right(&self, x: f64, y: f64) -> Option<[f64; 2]> {
+        self.source(1, x, y)
+    }
+
+    /// [`Rectification::left`] and [`Rectification::right`] of every pixel: x, then y; +infinity where there is nothing.
+    #[must_use]
+    pub fn maps(&self) -> [[Plane<f32>; 2]; 2] {
+        let (width, height) = self.size();
+        [0, 1].map(|view| {
+            [0, 1].map(|i| {
+                Plane::from_fn(width, height, |x, y| {
+                    self.source(view, x as f64, y as f64).map_or(f32::INFINITY, |at| at[i] as f32)
+                })
+            })
+        })
+    }
+
+    fn source(&self, view: usize, x: f64, y: f64) -> Option<[f64; 2]> {
+        let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.views.cameras[view];
+        let back = transposed(&self.views.rotations[view]);
+        self.lenses[view].project(rotated(&back, [(x - cx) / fx, (y - cy) / fy, 1.0]))
+    }
+
+    /// The rectified pair. A pixel is masked where its source is not in the image, or masked, or where one of the sixteen pixels
+    /// is that its value takes. A pair of 8-bit levels stays one.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] when the pair is of another size; [`Error::Memory`] when the system has not enough memory.
+    pub fn apply(&self, pair: &Pair) -> Result<Pair> {
+        let [(width, height), rectified] = self.sizes;
+        if pair.size() != (width, height) {
+            let (w, h) = pair.size();
+            return Err(Error::Mismatch(format!(
+                "the rectification is of images of {width} x {height} and these are {w} x {h}"
+            )));
+        }
+        let images = [pair.left(), pair.right()];
+        let bytes = sampling::hold_bytes(images);
+        let view = |view: usize| {
+            sampling::resample(images[view], rectified, bytes, |x, y| self.source(view, x as f64, y as f64))
+        };
+        Pair::new(view(0)?, view(1)?)
+    }
+
+    /// The calibration of the rectified pair.
+    ///
+    /// # Errors
+    /// None: where [`Views::calibration`] has one, [`Rectification::new`] had it before.
+    pub fn calibration(&self) -> Result<Calibration> {
+        self.views.calibration(Some(self.size()), self.unit)
+    }
+
+    /// The rotations from the frame of each camera to that of its rectified view.
+    #[must_use]
+    pub fn rotations(&self) -> &[Matrix; 2] {
+        &self.views.rotations
+    }
+}
+
+/// Views whose epipolar lines are columns, turned so that they are rows and the right view is to the right; and their size.
+fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usize)) {
+    if !views.is_vertical() {
+        return (views, (width, height));
+    }
+    let (right, bottom) = (width as f64 - 1.0, height as f64 - 1.0);
+    let Views { rotations, cameras, translation: [_, down] } = views;
+    // The left camera is above the right one where it is up in the frame of the right view.
+    let above = down < 0.0;
+    let turn: Matrix = if above {
+        [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    } else {
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    };
+    let cameras = cameras.map(|Camera { focal_length: [fx, fy], principal_point: [cx, cy] }| Camera {
+        focal_length: [fy, fx],
+        principal_point: if above { [cy, right - cx] } else { [bottom - cy, cx] },
+    });
+    let rotations = rotations.map(|rotation| product(&turn, &rotation));
+    (Views { rotations, cameras, translation: [-down.abs(), 0.0] }, (height, width))
+}

@@ -1,0 +1,30 @@
+//! What a user may choose of a rectification.
+
+use crate::error::{Error, Result};
+
+/// What a user may choose of a rectification. The default is that of OpenCV's `stereoRectify`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// From 0, where every pixel of the rectified views has a source, to 1, where no pixel of the images is lost. `None` keeps
+    /// the focal length; for fisheyes it is 0. With a number, a rectification that the calibration holds is not used.
+    pub alpha: Option<f64>,
+    /// Whether both views have the same principal point, so that what is infinitely far has a disparity of 0.
+    pub zero_disparity: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { alpha: None, zero_disparity: true }
+    }
+}
+
+impl Options {
+    pub(super) fn check(&self) -> Result<()> {
+        match self.alpha {
+            Some(alpha) if !(0.0..=1.0).contains(&alpha) => Err(Error::Calibration(format!(
+                "is rectified with an alpha of 0 to 1, and {alpha} is outside"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}

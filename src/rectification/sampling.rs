@@ -1,0 +1,135 @@
+//! Images at other places: cubic interpolation in integers.
+
+use rayon::prelude::*;
+
+use crate::error::Result;
+use crate::image::cubic::{BITS, STEPS, WEIGHTS};
+use crate::image::{Image, Pixel, Plane, grey};
+use crate::memory;
+
+/// `image` at the places that `source` says for each pixel of an image of `size`. A pixel is masked where there is no place,
+/// and where its value takes one that is masked or outside. With `bytes`, values are whole 8-bit levels.
+///
+/// # Errors
+/// [`Error::Memory`](crate::Error::Memory) when the system has not enough memory.
+pub(super) fn resample(
+    image: &Image,
+    (width, height): (usize, usize),
+    bytes: bool,
+    source: impl Fn(usize, usize) -> Option<[f64; 2]> + Sync,
+) -> Result<Image> {
+    let mut pixels: Vec<Pixel> = memory::filled(width * height, [0; 4])?;
+    let mut masked = memory::filled(width * height, true)?;
+    let rows = pixels.par_chunks_mut(width).zip(masked.par_chunks_mut(width));
+    rows.enumerate().for_each(|(y, (pixels, masked))| {
+        for x in 0..width {
+            if let Some(value) = source(x, y).and_then(|at| sample(image, at)) {
+                pixels[x] = pixel(value, bytes);
+                masked[x] = false;
+            }
+        }
+    });
+    Ok(Image { pixels: Plane::new(width, height, pixels), masked: Plane::new(width, height, masked) })
+}
+
+/// Whether both images hold 8-bit levels.
+pub(super) fn hold_bytes(images: [&Image; 2]) -> bool {
+    images.iter().all(|image| image.pixels.data().iter().all(|pixel| pixel[..3].iter().all(|v| v % 256 == 0)))
+}
+
+fn pixel(value: [i64; 3], bytes: bool) -> Pixel {
+    let [r, g, b] = value.map(|v| {
+        let half = 1 << (2 * BITS - 1);
+        let level = ((v + half) >> (2 * BITS)).clamp(0, i64::from(u16::MAX));
+        if bytes { (((level + 128) >> 8).min(255) << 8) as u16 } else { level as u16 }
+    });
+    [r, g, b, grey(r, g, b)]
+}
+
+/// The colour at `at`, times 2^28.
+fn sample(image: &Image, at: [f64; 2]) -> Option<[i64; 3]> {
+    let (width, height) = image.pixels.size();
+    let [(x, across), (y, down)] = at.map(|v| {
+        // What is not finite or far away ends up outside, too.
+        let steps = (v * STEPS as f64 + 0.5).floor() as i64;
+        (steps.div_euclid(STEPS), &WEIGHTS[steps.rem_euclid(STEPS) as usize])
+    });
+    let mut sum = [0; 3];
+    for (y, down) in (y.saturating_sub(1)..).zip(down).filter(|(_, weight)| **weight != 0) {
+        let y = usize::try_from(y).ok().filter(|y| *y < height)?;
+        let (pixels, masked) = (image.pixels.row(y), image.masked.row(y));
+        let mut row = [0; 3];
+        for (x, across) in (x.saturating_sub(1)..).zip(across).filter(|(_, weight)| **weight != 0) {
+            let x = usize::try_from(x).ok().filter(|x| *x < width && !masked[*x])?;
+            for (sum, value) in row.iter_mut().zip(pixels[x]) {
+                *sum += across * i64::from(value);
+            }
+        }
+        for (sum, row) in sum.iter_mut().zip(row) {
+            *sum += down * row;
+        }
+    }
+    Some(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(width: usize, height: usize) -> Image {
+        let value = |x: usize, y: usize| {
+            let noise = (x as u32 * 7919 + y as u32 * 104_729).wrapping_mul(0x9e37_79b9) >> 16;
+            [noise as u16, (noise / 2) as u16, 9, grey(noise as u16, (noise / 2) as u16, 9)]
+        };
+        Image { pixels: Plane::from_fn(width, height, value), masked: Plane::filled(width, height, false) }
+    }
+
+    #[test]
+    fn whole_pixels_stay_as_they_are() {
+        let image = noise(20, 11);
+        let same = resample(&image, (20, 11), false, |x, y| Some([x as f64, y as f64])).unwrap();
+        assert_eq!(same, image);
+        let moved = resample(&image, (20, 11), false, |x, y| Some([x as f64 + 3.0, y as f64])).unwrap();
+        assert_eq!(moved.pixels[(4, 5)], image.pixels[(7, 5)]);
+        assert!(moved.masked[(17, 5)] && !moved.masked[(16, 5)]);
+    }
+
+    #[test]
+    fn a_ramp_stays_a_ramp() {
+        let value = |x: usize, y: usize| (600 * x + 100 * y) as u16;
+        let pixels = Plane::from_fn(30, 30, |x, y| [value(x, y); 4]);
+        let image = Image { pixels, masked: Plane::filled(30, 30, false) };
+        let moved =
+            resample(&image, (30, 30), false, |x, y| Some([x as f64 + 0.25, y as f64 - 0.5])).unwrap();
+        assert_eq!(moved.pixels[(10, 10)], [value(10, 10) + 150 - 50; 4]);
+        // What takes a pixel outside is masked: three columns and rows are read beyond whole pixels.
+        assert!(moved.masked[(28, 10)] && !moved.masked[(27, 10)] && moved.masked[(0, 10)]);
+        assert!(moved.masked[(10, 1)] && !moved.masked[(10, 2)]);
+    }
+
+    #[test]
+    fn what_takes_a_masked_pixel_is_masked() {
+        let mut image = noise(12, 12);
+        image.masked[(6, 6)] = true;
+        let masked = |dx: f64| {
+            let moved = resample(&image, (12, 12), false, |x, y| Some([x as f64 + dx, y as f64])).unwrap();
+            (0..12).filter(|&x| moved.masked[(x, 6)]).collect::<Vec<_>>()
+        };
+        assert_eq!(masked(0.0), [6]);
+        assert_eq!(masked(0.5), [0, 4, 5, 6, 7, 10, 11]);
+        for nowhere in [[f64::NAN, 3.0], [f64::INFINITY, 3.0], [3.0, -1e300], [1e18, 1e18]] {
+            // NaN becomes 0, which is a place; the lens never gives it.
+            let at = sample(&image, nowhere);
+            assert!(nowhere[0].is_nan() || at.is_none(), "{nowhere:?}");
+        }
+    }
+
+    #[test]
+    fn bytes_stay_bytes() {
+        let image = noise(16, 16);
+        let image = Image { pixels: image.pixels.map(|p| p.map(|v| v & 0xff00)), ..image };
+        assert!(hold_bytes([&image, &image]) && !hold_bytes([&image, &noise(4, 4)]));
+        let moved = resample(&image, (16, 16), true, |x, y| Some([x as f64 + 0.3, y as f64 + 0.3])).unwrap();
+        assert!(hold_bytes([&moved, &moved]));
+    }
+}
