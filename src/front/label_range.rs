@@ -35,12 +35,12 @@ pub struct LabelRanges {
 /// # Panics
 /// When a match lies outside the map of zones.
 #[must_use]
-pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match], k: f64) -> LabelRanges {
+pub fn zonal(range: DisparityRange, zones: (&Plane<u32>, usize), matches: &[Match], k: f64) -> LabelRanges {
     let (map, count) = zones;
     // Number, sum and sum of squares: integers, so that their order does not matter.
     let mut sums = vec![(0_i64, 0_i64, 0_i64); count];
     for m in matches {
-        if let Some((n, sum, squares)) = sums.get_mut(usize::from(map[(m.x, m.y)])) {
+        if let Some((n, sum, squares)) = sums.get_mut(map[(m.x, m.y)] as usize) {
             let d = i64::from(m.disparity);
             *n += 1;
             *sum += d;
@@ -63,7 +63,7 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u8>, usize), matches: &[Match
             if low <= high { (low, high) } else { full }
         })
         .collect();
-    let interval = |zone: &u8| intervals.get(usize::from(*zone)).copied().unwrap_or((range.min, range.max));
+    let interval = |zone: &u32| intervals.get(*zone as usize).copied().unwrap_or((range.min, range.max));
     LabelRanges { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
 }
 

@@ -3,7 +3,8 @@
 //! The recipe is that of Jain and Farrokhnia, *Unsupervised texture segmentation using Gabor filters* (1991).
 //! The features are the magnitudes of a bank of Gabor filters, each smoothed in proportion to its wavelength,
 //! and the pixel's coordinates. They are standardised and clustered. The paper gives orientations,
-//! wavelengths, and K-means with K = 15 in 5 replicates of up to 500 iterations.
+//! wavelengths, and K-means with K = 15 in 5 replicates of up to 500 iterations. A zone is a connected region of a
+//! cluster, or a whole cluster.
 //!
 //! The filters run in single precision (see `gabor`). Their smoothed magnitudes are then rounded to integers,
 //! and everything after that is exact: interpolation, clustering, assignment.
@@ -11,14 +12,16 @@
 mod gabor;
 mod kmeans;
 mod lanes;
+pub mod regions;
 
 use rayon::prelude::*;
 
 use crate::image::{Image, Plane};
+use crate::options::ZoneExtent;
 use gabor::{ORIENTATIONS, Response};
 
 /// The zone of masked pixels. It is not counted.
-pub const MASKED: u8 = 255;
+pub const MASKED: u32 = u32::MAX;
 
 /// Features are integers, in 1 / `UNITS` of their standard deviation.
 const UNITS: f64 = 64.0;
@@ -33,8 +36,10 @@ const LEAST_DEVIATION: f64 = 1.0 / 64.0;
 /// smoothed features, and K-means needs only their distribution. All other pixels are assigned to the nearest
 /// centroid.
 const SAMPLES: usize = 4096;
-/// Smallest number of samples per zone. Smaller images get fewer zones: a zone of a few pixels is useless.
-const SAMPLES_PER_ZONE: usize = 16;
+/// Smallest number of samples per cluster. Smaller images get fewer clusters: one of a few pixels is useless.
+const SAMPLES_PER_CLUSTER: usize = 16;
+/// Largest number of clusters.
+const MAX_CLUSTERS: usize = 255;
 /// Values of a pixel are padded to a multiple of this.
 const VECTOR: usize = 16;
 /// Bits of the interpolation weights, across and down.
@@ -43,8 +48,10 @@ const WEIGHT_BITS: u32 = 8;
 /// The parameters of the segmentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Largest number of zones, 1 ..= 255: the K of K-means.
-    pub zones: usize,
+    /// Largest number of clusters, up to 255: the K of K-means.
+    pub clusters: usize,
+    /// Whether a zone is a cluster, or a connected region of one.
+    pub extent: ZoneExtent,
     /// Number of clusterings from different starts; the tightest is taken.
     pub replicates: usize,
     /// Largest number of iterations of each clustering; it ends when no sample changes its zone.
@@ -54,9 +61,9 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// The paper's numbers.
+    /// The preset `paper`.
     fn default() -> Self {
-        Self { zones: 15, replicates: 5, iterations: 500, seed: 0 }
+        Self { clusters: 15, extent: ZoneExtent::Region, replicates: 5, iterations: 500, seed: 0 }
     }
 }
 
@@ -64,7 +71,7 @@ impl Default for Options {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Zones {
     /// Zone of each pixel, 0 .. `count` in the order of their first pixels, or [`MASKED`].
-    pub map: Plane<u8>,
+    pub map: Plane<u32>,
     /// Number of zones.
     pub count: usize,
 }
@@ -72,8 +79,8 @@ pub struct Zones {
 /// Segments an image by its texture.
 ///
 /// Only the grey value counts. Masked pixels are filled with the mean, take no part in the clustering and get
-/// the zone [`MASKED`]. Zones need not be connected. Images too small for `options.zones` get fewer: one for
-/// every 16 samples (all pixels, up to about 4096).
+/// the zone [`MASKED`]. Images too small for `options.clusters` get fewer clusters: one for every 16 samples (all
+/// pixels, up to about 4096).
 ///
 /// The result is the same on every machine and for any number of threads.
 #[must_use]
@@ -93,36 +100,38 @@ pub fn segment(image: &Image, options: &Options) -> Zones {
             row.iter().flat_map(point)
         })
         .collect();
-    let zones = options.zones.min(usize::from(MASKED)).min(samples.len() / SAMPLES_PER_ZONE).max(1);
-    let centroids = kmeans::cluster(&points, dimensions, zones, options);
+    let clusters = options.clusters.min(MAX_CLUSTERS).min(samples.len() / SAMPLES_PER_CLUSTER).max(1);
+    let centroids = kmeans::cluster(&points, dimensions, clusters, options);
 
     let mut map = Plane::filled(width, height, MASKED);
     map.data_mut().par_chunks_exact_mut(width).enumerate().for_each_init(
         || vec![0; width],
-        |nearest, (y, zones)| {
+        |nearest, (y, clusters)| {
             kmeans::assign(&centroids, &features.row(y), nearest);
-            for ((zone, nearest), masked) in zones.iter_mut().zip(nearest).zip(image.masked.row(y)) {
-                *zone = if *masked { MASKED } else { *nearest as u8 };
+            for ((cluster, nearest), masked) in clusters.iter_mut().zip(nearest).zip(image.masked.row(y)) {
+                *cluster = if *masked { MASKED } else { *nearest as u32 };
             }
         },
     );
-    let count = renumber(&mut map);
-    Zones { map, count }
+    match options.extent {
+        ZoneExtent::Cluster => renumbered(map),
+        ZoneExtent::Region => regions::connected(&map),
+    }
 }
 
-/// Renumbers zones in the order of their first pixels, and counts them.
-fn renumber(map: &mut Plane<u8>) -> usize {
-    let mut numbers = [MASKED; 256];
+/// Renumbers clusters in the order of their first pixels, and counts them.
+fn renumbered(mut map: Plane<u32>) -> Zones {
+    let mut numbers = [MASKED; MAX_CLUSTERS];
     let mut count = 0;
-    for zone in map.data_mut() {
-        let number = &mut numbers[usize::from(*zone)];
-        if *zone != MASKED && *number == MASKED {
-            *number = count as u8;
+    for cluster in map.data_mut().iter_mut().filter(|cluster| **cluster != MASKED) {
+        let number = &mut numbers[*cluster as usize];
+        if *number == MASKED {
+            *number = count;
             count += 1;
         }
-        *zone = *number;
+        *cluster = *number;
     }
-    count
+    Zones { map, count: count as usize }
 }
 
 /// The unmasked pixels (x, y) of a grid with about [`SAMPLES`] of them, row by row. Where all pixels of the

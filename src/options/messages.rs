@@ -42,7 +42,7 @@ options! {
         dependency_truncation: f64 = 2.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";
         /// Which labels of two levels agree.
         agreement: Agreement = Agreement::Interpolating, takes one_of(Agreement::WORDS),
-            source "section 2.2: strict";
+            source "section 2.2; open for odd labels";
         /// Cost of disagreement in a resolution factor; hard potentials do not use it.
         resolution_truncation: f64 = 3.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";
     }

@@ -26,8 +26,10 @@ Examples:
 /// Print the two tables of the paper, with its figures beside those of the presets fgs, paper and default
 ///
 /// Pairs are recognised by the names of their folders (Teddy, Cones, Dolls, Rocks1, Motorcycle); others have dashes in the
-/// paper's columns. --json holds `source`, `ran_on`, `methods` (by preset: its keys) and `tables`, one for the raw and one
-/// for the final maps: `number`, `map`, `pairs` (each: `name`, `published`, `ours`) and `mean` (`published`, `ours`).
+/// paper's columns. A third table shows by how much the preset paper is ahead of fgs, and says in how many figures it is, here
+/// and as printed. --json holds `source`, `ran_on`, `methods` (by preset: its keys), `tables`, one for the raw and one
+/// for the final maps: `number`, `map`, `pairs` (each: `name`, `published`, `ours`) and `mean` (`published`, `ours`), and
+/// `ahead`: the number of `figures`, and of those in which MR-FGS is ahead of FGS, `published` and `ours`.
 /// `published` holds `fgs` and `mr-fgs` or is null, `ours` has one entry for each preset; an entry is `avg`, `psnr` and
 /// `bad2.0`, over all pixels with known truth.
 #[derive(clap::Args)]
@@ -71,6 +73,16 @@ struct Comparison {
     #[serde(serialize_with = "object")]
     methods: Named<Option<Method>>,
     tables: [Table; 2],
+    ahead: Ahead,
+}
+
+/// In how many of some figures MR-FGS is ahead of FGS.
+#[derive(Serialize)]
+struct Ahead {
+    figures: usize,
+    /// None if the paper lacks one of the pairs.
+    published: Option<usize>,
+    ours: usize,
 }
 
 /// One table of the paper.
@@ -127,8 +139,25 @@ impl Comparison {
             source: SOURCE,
             ran_on: found.last().and_then(|(_, findings)| findings.ran_on.clone()),
             methods: found.iter().map(|(preset, findings)| (*preset, findings.method.clone())).collect(),
+            ahead: Ahead::new(&tables),
             tables,
         }
+    }
+
+    /// By how much the preset paper is ahead of fgs.
+    fn leads(&self) -> table::Table {
+        let mut table = table::Table::new("l|rrr|rrr");
+        table.text("What the preset paper gains over fgs: positive where it is ahead\n");
+        table.titles(["", "raw", "final"]);
+        table.row(["pair", "avg", "PSNR", "bad2.0", "avg", "PSNR", "bad2.0"]);
+        table.rule();
+        let [raw, finished] = &self.tables;
+        for (pair, same) in raw.pairs.iter().zip(&finished.pairs) {
+            let leads = [&pair.line, &same.line].into_iter().flat_map(|line| lead(line.ours()));
+            let cells = leads.map(|lead| lead.map_or_else(|| "-".into(), |lead| format!("{lead:+.3}")));
+            table.row(std::iter::once(metrics::cut(&pair.name)).chain(cells));
+        }
+        table
     }
 
     /// Both tables for a terminal, at most 120 characters wide.
@@ -156,12 +185,47 @@ impl Comparison {
             }
             let _ = writeln!(out, "{table}");
         }
-        let _ = writeln!(out, "{SOURCE}.");
+        let Ahead { figures, published, ours } = self.ahead;
+        let _ = writeln!(out, "{}", self.leads());
+        let _ = write!(out, "MR-FGS is ahead of FGS in {ours} of {figures} figures");
+        let _ = match published {
+            Some(published) => writeln!(out, "; the paper prints it ahead in {published}."),
+            None => writeln!(out, "."),
+        };
+        let _ = writeln!(out, "\n{SOURCE}.");
         out
     }
 }
 
+impl Ahead {
+    fn new(tables: &[Table]) -> Self {
+        let lines: Vec<&Line> = tables.iter().flat_map(|table| &table.pairs).map(|pair| &pair.line).collect();
+        let ahead =
+            |figures: [Option<Figures>; 2]| lead(figures).into_iter().flatten().filter(|l| *l > 0.0).count();
+        Self {
+            figures: 3 * lines.len(),
+            published: lines
+                .iter()
+                .map(|line| line.published.map(|p| ahead([p.fgs, p.mr_fgs].map(Some))))
+                .sum(),
+            ours: lines.iter().map(|line| ahead(line.ours())).sum(),
+        }
+    }
+}
+
+/// By how much the second of two methods is ahead of the first in average error, PSNR and share of bad pixels.
+fn lead([fgs, mr_fgs]: [Option<Figures>; 2]) -> [Option<f64>; 3] {
+    let (Some(fgs), Some(mr_fgs)) = (fgs, mr_fgs) else { return [None; 3] };
+    let gain = |more: Option<f64>, less: Option<f64>| Some(more? - less?);
+    [gain(fgs.avg, mr_fgs.avg), gain(mr_fgs.psnr, fgs.psnr), Some(fgs.bad2 - mr_fgs.bad2)]
+}
+
 impl Line {
+    /// Our FGS and MR-FGS.
+    fn ours(&self) -> [Option<Figures>; 2] {
+        ["fgs", "paper"].map(|wanted| self.ours.iter().find(|(preset, _)| *preset == wanted)?.1)
+    }
+
     /// The cells of its row.
     fn cells(&self, name: &str) -> Vec<String> {
         let paper = [self.published.map(|p| p.fgs), self.published.map(|p| p.mr_fgs)];
