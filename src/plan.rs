@@ -11,6 +11,8 @@
 
 mod arithmetic;
 mod memory;
+pub mod planes;
+pub mod votes;
 
 use crate::error::Result;
 use crate::options::{

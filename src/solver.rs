@@ -225,10 +225,10 @@ pub fn post_processing(method: &Method) -> Vec<Stage> {
     match method.refinement.fill {
         Fill::None => {}
         Fill::Row => stages.push(Stage::Fill),
-        Fill::Median => stages.extend([Stage::Fill, Stage::FillMedian]),
+        Fill::Votes => stages.extend([Stage::Fill, Stage::VoteFill, Stage::FillMedian]),
     }
     if method.refinement.median != Median::Off {
-        stages.push(Stage::Median);
+        stages.push(if method.refinement.plane { Stage::Plane } else { Stage::Median });
     }
     stages
 }

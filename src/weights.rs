@@ -1,10 +1,10 @@
-//! The weights of the median's window, as tables of integers.
+//! Weights as tables of integers: those of the median's window, and those of votes.
 
 use crate::options::Method;
 
 /// Weight of the centre of the median's window, the largest there is.
 pub const MEDIAN_WEIGHT: u8 = 127;
-/// The largest part of it that distance alone subtracts.
+/// The largest part of the centre's weight that distance alone subtracts.
 const MEDIAN_SPACE: f64 = 96.0;
 /// Distance between the rows of the window, as a power of two: every second row is used, with all of its
 /// columns.
@@ -13,6 +13,24 @@ const SPARSE_ROW_BITS: u32 = 1;
 const STRETCH_BITS: u32 = 2;
 /// The range sigma of the stretched window is smaller by this factor.
 const STRETCH_SIGMA: f64 = 4.0;
+
+/// Number of differences in colour: the sum over three channels of 8 bits.
+pub const COLOUR_DIFFERENCES: usize = 3 * 255 + 1;
+/// Weight of a vote after a step along a row and along a column, between half-size pixels of the same colour: about
+/// exp(-sqrt(2) / 134) and exp(-sqrt(2) / 6.7). Disparities change from row to row on the ground, and stay along rows.
+const VOTE_STEP: [f64; 2] = [0.9895, 0.81];
+/// What a difference of one level takes off the logarithm of that weight.
+const VOTE_EDGE: f64 = 0.0345;
+
+/// Weights of votes after a step along a row, and along a column, in 1/65536, by the difference d in colour between the two
+/// half-size pixels: round(65536 a exp(-0.0345 d)), with a = 0.9895 along rows and 0.81 along columns.
+#[must_use]
+pub fn vote_weights() -> [Vec<u32>; 2] {
+    let weight = |step: f64, difference: usize| {
+        (65536.0 * step * libm::exp(-VOTE_EDGE * difference as f64) + 0.5).floor() as u32
+    };
+    VOTE_STEP.map(|step| (0..COLOUR_DIFFERENCES).map(|difference| weight(step, difference)).collect())
+}
 
 /// Bilateral weights of the median's window, as 8-bit integers: max(0, [`MEDIAN_WEIGHT`] - colour - space).
 ///
@@ -119,5 +137,28 @@ impl MedianWeights {
     pub fn space_row(&self, dy: usize) -> &[u8] {
         let side = 2 * self.radius + 1;
         &self.space[dy * side..][..side]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::votes::{VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_SHIFT};
+
+    /// In an image of one colour, however large, with the largest own votes everywhere.
+    #[test]
+    fn sums_of_votes_fit_in_32_bits() {
+        let vote = (VOTE_MOST as u64 >> VOTE_BITS).max(VOTE_HIDING.into());
+        let own = (4 * vote) << VOTE_FRACTION_BITS;
+        let [row, column] = vote_weights().map(|weights| u64::from(weights[0]));
+        // What comes from one side, once it no longer grows.
+        let from_side = |own: u64, weight: u64| own * weight / (65536 - weight);
+        let along_row = own + 2 * from_side(own, row);
+        assert!(along_row <= u32::MAX.into(), "{along_row}");
+        let summed = along_row >> VOTE_SHIFT;
+        let in_all = summed + 2 * from_side(summed, column);
+        assert!(in_all <= u32::MAX.into(), "{in_all}");
+        // Each bit that votes have is needed, and each that sums lose.
+        assert!(2 * along_row > u32::MAX.into() && 2 * in_all > u32::MAX.into());
     }
 }

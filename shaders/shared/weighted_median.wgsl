@@ -47,35 +47,55 @@ fn places(a: vec2<u32>, b: vec2<u32>, step_bits: u32) -> vec2<u32> {
     return (max(a, b) - min(a, b)) >> vec2(step_bits);
 }
 
-// The median around the pixel in column id.x and row id.y of the band.
-fn median(id: vec2<u32>) {
+// The window of a pixel.
+struct Window {
+    // The pixel, where it is bound, and its guide.
+    middle: vec2<u32>,
+    here: u32,
+    centre: vec3<u32>,
+    // The first place, and the end of all places, in steps of `step`.
+    first: vec2<u32>,
+    last: vec2<u32>,
+    step: vec2<u32>,
+    // First row that is bound.
+    top: u32,
+}
+
+// The window of the pixel in column id.x and row id.y of the band.
+fn window(id: vec2<u32>) -> Window {
+    let bits = params.step_bits;
+    // The first place lies in the image and on the raster of places.
+    let raster = vec2(bits, bits + params.row_bits);
+    let reach = vec2(params.radius << bits, (params.radius >> params.row_bits) << raster.y);
+    let top = halo_start(params.radius << bits);
+    let middle = vec2(id.x, params.band.first_row + id.y);
+    let here = (middle.y - top) * params.level.pixel_pitch + middle.x;
+    let first = middle - min(reach, (middle >> raster) << raster);
+    let last = min(middle + reach + vec2(1u), vec2(params.level.width, params.level.height));
+    return Window(middle, here, guide(here), first, last, vec2(1u) << raster, top);
+}
+
+// Whether the median changes a pixel with such flags.
+fn touched(flags: u32) -> bool {
+    return has_disparity(flags) && (params.all == 1u || (flags & FILLED) != 0u);
+}
+
+// The median in window `w`; where it changes nothing, the disparity as it is.
+fn median(w: Window) -> i32 {
     let pitch = params.level.pixel_pitch;
     let bits = params.step_bits;
-    let row_bits = bits + params.row_bits;
-    let step = vec2(1u << bits, 1u << row_bits);
-    let reach = vec2(params.radius << bits, (params.radius >> params.row_bits) << row_bits);
-    let top = halo_start(params.radius << bits);
-    let y = params.band.first_row + id.y;
-    let here = (y - top) * pitch + id.x;
-    let centre = guide(here);
-    let flags_here = flags[here];
-    var low = disparity[here];
-    if has_disparity(flags_here) && (params.all == 1u || (flags_here & FILLED) != 0u) {
-        let middle = vec2(id.x, y);
-        // The first sample lies in the image and on the grid of samples.
-        let raster = vec2(bits, row_bits);
-        let first = middle - min(reach, (middle >> raster) << raster);
-        let last = min(middle + reach + vec2(1u), vec2(params.level.width, params.level.height));
+    var low = disparity[w.here];
+    if touched(flags[w.here]) {
         var high = low;
         var total = 0u;
-        for (var v = first.y; v < last.y; v += step.y) {
-            for (var u = first.x; u < last.x; u += step.x) {
-                let at = (v - top) * pitch + u;
+        for (var v = w.first.y; v < w.last.y; v += w.step.y) {
+            for (var u = w.first.x; u < w.last.x; u += w.step.x) {
+                let at = (v - w.top) * pitch + u;
                 if has_disparity(flags[at]) {
                     let value = disparity[at];
                     low = min(low, value);
                     high = max(high, value);
-                    total += weight(centre, at, places(vec2(u, v), middle, bits));
+                    total += weight(w.centre, at, places(vec2(u, v), w.middle, bits));
                 }
             }
         }
@@ -85,15 +105,15 @@ fn median(id: vec2<u32>) {
             // Weight of the values below low + k share, k = 1 to 8.
             var below_first = vec4<u32>();
             var below_second = vec4<u32>();
-            for (var v = first.y; v < last.y; v += step.y) {
-                for (var u = first.x; u < last.x; u += step.x) {
-                    let at = (v - top) * pitch + u;
+            for (var v = w.first.y; v < w.last.y; v += w.step.y) {
+                for (var u = w.first.x; u < w.last.x; u += w.step.x) {
+                    let at = (v - w.top) * pitch + u;
                     let value = disparity[at];
                     if has_disparity(flags[at]) && value < low + i32(8u * share) {
-                        let w = vec4(weight(centre, at, places(vec2(u, v), middle, bits)));
+                        let own = vec4(weight(w.centre, at, places(vec2(u, v), w.middle, bits)));
                         let offset = vec4(value - low);
-                        below_first += select(vec4(0u), w, offset < vec4<i32>(FIRST * share));
-                        below_second += select(vec4(0u), w, offset < vec4<i32>(SECOND * share));
+                        below_first += select(vec4(0u), own, offset < vec4<i32>(FIRST * share));
+                        below_second += select(vec4(0u), own, offset < vec4<i32>(SECOND * share));
                     }
                 }
             }
@@ -106,5 +126,5 @@ fn median(id: vec2<u32>) {
             width = share;
         }
     }
-    smoothed[id.y * pitch + id.x] = low;
+    return low;
 }

@@ -14,7 +14,7 @@ macro_rules! for_every_stage {
         $then! {
             levels {
                 /// The members of the dependency factors of a level, chosen as `graph` says from the level's guide. The guide
-                /// of level 0 is the left image, that of a coarser level `graph::downsample` of the next finer one.
+                /// of level 0 is the left image, that of a coarser level [`Image::downsampled`](crate::image::Image::downsampled) of the next finer one.
                 Graph graph;
                 /// Cost of a level (1 or coarser) from that of the next finer one, in 1/256 cost units (costs of level 0 count
                 /// 256 times).
@@ -147,6 +147,30 @@ macro_rules! for_every_stage {
                 /// farther surface. The smaller of two is farther, or the larger where [`crate::options::RefinementOptions::nearer`] says so. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
                 /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
                 Fill fill;
+                /// A disparity by votes on every filled pixel that gets one, where [`crate::options::RefinementOptions::fill`] asks for
+                /// votes; constants are those of [`crate::plan::votes`].
+                ///
+                /// Half-size pixel (X, Y) stands for the pixels (2 X, 2 Y) to (2 X + 1, 2 Y + 1), as far as they are inside. Its colour is, channel by
+                /// channel, floor((2 s + n) / (2 n)), with s the sum of c >> 8 over the n of them that are not masked, and 0 without any. Differences
+                /// are sums over the channels. Labels are the even label indices k.
+                ///
+                /// 1. Own votes v(k), of its pixels: of a valid pixel with disparity D, min(|D - 256 l|, [`VOTE_MOST`](crate::plan::votes::VOTE_MOST)) >>
+                ///    [`VOTE_BITS`](crate::plan::votes::VOTE_BITS) with l the disparity of label k in pixels; of a pixel (x, y) that is neither valid nor masked,
+                ///    [`VOTE_HIDING`](crate::plan::votes::VOTE_HIDING) where k hides what the right view sees. It sees at (x', y) the nearest label j of those of the valid
+                ///    pixels (x' + j, y) (j as a disparity); k hides it if x' = x - k is inside and k is nearer by [`HIDING_LABELS`](crate::plan::votes::HIDING_LABELS) or more. Nearer
+                ///    is as [`crate::options::RefinementOptions::nearer`] says. Their sum counts 2 ^ [`VOTE_FRACTION_BITS`](crate::plan::votes::VOTE_FRACTION_BITS) times.
+                /// 2. Along the row, with w(X) / 65536 the weight ([`vote_weights`](crate::weights::vote_weights)) of the difference between X - 1 and X: f(X) = v(X) + w(X) f(X - 1), and
+                ///    b(X) = w(X + 1) (v(X + 1) + b(X + 1)), each product rounded down; r = (f + b) >> [`VOTE_SHIFT`](crate::plan::votes::VOTE_SHIFT).
+                /// 3. Along the column, over at most [`VOTE_REACH`](crate::plan::votes::VOTE_REACH) rows Y' on either side: what comes from there starts as 0 at the farthest, and
+                ///    at each step towards Y becomes w (r + itself), rounded down, with r of the row that the step leaves and w the weight of the step.
+                ///    The sum s is r of Y plus both.
+                /// 4. The vote is for the label with the smallest s, the lowest on ties; there is none where s is the same for all labels. With p and q what
+                ///    the s of the labels two below and two above have more, both halved as often as it takes to bring them below 65536 and
+                ///    rounded down, and t the larger one, its offset is floor((512 (p - q) + t) / (2 t)), in 1/256 px; 0 where t = 0 or at either end.
+                /// 5. A filled pixel (x, y) takes the vote of that half-size pixel with a vote, among the 3 x 3 around (x >> 1, y >> 1) that are inside, whose colour
+                ///    differs least from its own (c >> 8), [`VOTE_AWAY`](crate::plan::votes::VOTE_AWAY) added for each column and row away, the first in reading order on ties. Without any it
+                ///    keeps what it has.
+                VoteFill vote_fill;
                 /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
                 /// apart, distance counts in places, and the range parameter is a quarter.
                 FillMedian fill_median;
@@ -154,6 +178,26 @@ macro_rules! for_every_stage {
                 /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
                 /// smallest value at which half of the weight is reached. Weights are [`crate::weights::MedianWeights`] of the left image.
                 Median median;
+                /// [`Stage::Median`], and then planes: each pixel that it changes takes the value at its place of a plane
+                /// through the disparities of its window, found in two rounds of weighted least squares.
+                ///
+                /// The plane at (x, y), counted from the pixel, is c + a x + b y above the median, in 1/256 px; a, b and c start at 0. In a
+                /// round, each place with x + y / 2 even that has a weight w in the median has e = (its disparity - the plane there) >> k,
+                /// m = w (256 - |e|) >> 8, at least 0, and g = m e >> 3. With k = 2 in the first round and 0 in the second
+                /// ([`PLANE_BITS`](crate::plan::planes::PLANE_BITS)), a disparity counts up to 4 px and then up to 1 px from the plane. With
+                /// \[f\] the sum of f over these places, s = max(\[m\], 1), and all divisions rounded towards 0:
+                ///
+                /// - The centre is at u = 16 \[m x\] / s and v = 16 \[m y\] / s, with a mean of t = 32 \[g\] / s.
+                /// - About it, xx = 16 (\[m x x\] - (\[m x\] u >> 4)) / s + 16, yy = 16 (\[m y y\] - (\[m y\] v >> 4)) / s + 16,
+                ///   xy = 16 (\[m x y\] - (\[m x\] v >> 4)) / s, xe = (8 \[g x\] - (\[m x\] t >> 2)) / s and
+                ///   ye = (8 \[g y\] - (\[m y\] t >> 2)) / s. (The 16 stand for 1 px^2, which holds slopes that little supports.)
+                /// - With n = max(xx yy - xy xy, 1), a grows by (xe yy - ye xy) 2^(k + 4) / n and b by (ye xx - xe xy) 2^(k + 4) / n, but
+                ///   not beyond +-[`PLANE_STEEPEST`](crate::plan::planes::PLANE_STEEPEST).
+                /// - With da and db by how much they did grow, c grows by (2^(k + 2) t - da u - db v + 8) >> 4, but not beyond
+                ///   +-[`PLANE_FARTHEST`](crate::plan::planes::PLANE_FARTHEST).
+                ///
+                /// The result is clamped to the range of the disparities.
+                Plane plane;
             }
         }
     };

@@ -21,9 +21,10 @@ words! {
         None = "none",
         /// They take the farther of the nearest valid disparities to the left and to the right on the row.
         Row = "row",
-        /// As row, then a weighted median over a window four times as wide and high, so that filled pixels follow the colours
-        /// around them and not their row alone.
-        Median = "median",
+        /// Valid pixels vote for their own disparities, above all along rows. A vote loses weight with distance and at edges.
+        /// Disparities that would hide what the right view sees get votes against them. A weighted median over a wide window
+        /// follows.
+        Votes = "votes",
     }
 }
 
@@ -61,7 +62,7 @@ options! {
         /// Place the disparity between the labels, by the matching cost around the optimum.
         sub_pixel: bool = true, takes Takes::Switch, source "open";
         /// What happens to invalid pixels.
-        fill: Fill = Fill::Median, takes one_of(Fill::WORDS), source "row in the paper";
+        fill: Fill = Fill::Votes, takes one_of(Fill::WORDS), source "row in the paper";
         /// Which disparities belong to nearer surfaces; the fill takes the farther ones.
         nearer: Nearer = Nearer::Larger, takes one_of(Nearer::WORDS), source "not in the paper";
         /// Which pixels the weighted median changes.
@@ -72,6 +73,8 @@ options! {
         median_sigma_space: f64 = 5.0, takes real(0.1..=100.0), unit "pixels", source "open";
         /// Range parameter of the median's weights, for intensities from 0 to 1.
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
+        /// After the median, fit a plane around each pixel that it changes, and take its value there.
+        plane: bool = true, takes Takes::Switch, source "not in the paper";
         /// Also make the disparity map of the right view, refined like that of the left one.
         right_map: bool = false, takes Takes::Switch, source "not in the paper";
         /// Pixels with less confidence than this get the validity flag for low confidence.

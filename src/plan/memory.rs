@@ -1,7 +1,8 @@
 //! What a match takes of the memory, at most.
 
-use super::{GRAPH_WINDOW, Plan, RING_PART, ROW_ALIGN};
-use crate::options::Illumination;
+use super::votes::Votes;
+use super::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
+use crate::options::{Fill, Illumination};
 
 impl Plan {
     /// Parts of a ring, of `part` rows each and with a halo on either side, that hold all rows of level 0 that are needed at the
@@ -57,7 +58,20 @@ impl Plan {
         let right = if self.method.refinement.right_map { 10 + 2 * 9 } else { 0 };
         let (width, height) = self.size();
         // Beside them, what a device keeps of each row, and its tables.
-        ((100 + right) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14)) as u64
+        let maps = (100 + right) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14);
+        maps as u64 + self.vote_bytes()
+    }
+
+    /// Largest number of bytes taken by the votes on invalid pixels.
+    fn vote_bytes(&self) -> u64 {
+        if self.method.refinement.fill != Fill::Votes {
+            return 0;
+        }
+        let votes = Votes::of(self);
+        let padded = votes.labels.next_multiple_of(LABEL_BLOCK / 2);
+        let sums = aligned(4 * votes.width * padded) * (votes.band + votes.summed());
+        // The half-size image and the votes, and a device's table of weights.
+        (sums + 2 * aligned(4 * votes.width) * votes.height + (1 << 13)) as u64
     }
 
     /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
@@ -68,6 +82,15 @@ impl Plan {
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 66 };
         let zones = if self.limits_labels() { 200 } else { 0 };
         (corrected + zones) * self.levels[0].pixels() as u64
+    }
+
+    /// Bytes of what the conditioning of the pair leaves, another pair. While it works it takes up to three times as many, before a
+    /// match holds anything else.
+    #[must_use]
+    pub fn conditioning_bytes(&self) -> u64 {
+        let front = &self.method.front;
+        let any = front.level_rows || front.equal_sharpness || front.denoise;
+        if any { self.pair_bytes() } else { 0 }
     }
 
     /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks.
@@ -85,7 +108,7 @@ impl Plan {
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
         // Disparities of the right view, its image and its maps.
         let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
-        (20 + 12 + corrected + right) * self.levels[0].pixels() as u64
+        (20 + 12 + corrected + right) * self.levels[0].pixels() as u64 + self.vote_bytes()
     }
 
     /// Bytes taken by all volumes, graphs and maps together.

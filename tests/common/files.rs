@@ -80,6 +80,7 @@ pub enum Values<'a> {
     Short(&'a [u16]),
     Long(&'a [u32]),
     Fraction(&'a [(u32, u32)]),
+    Double(&'a [f64]),
 }
 
 /// A TIFF file of one image whose strips or tiles are `chunks`.
@@ -96,6 +97,7 @@ impl Tiff<'_> {
     pub fn bytes(&self) -> Vec<u8> {
         let short = |v: u16| if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() };
         let long = |v: u32| if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() };
+        let double = |v: f64| if self.big_endian { v.to_be_bytes() } else { v.to_le_bytes() };
         let mut out = if self.big_endian { b"MM\0*".to_vec() } else { b"II*\0".to_vec() };
         out.extend(long(0));
         // Data that entries point to comes first.
@@ -120,6 +122,7 @@ impl Tiff<'_> {
                     v.len(),
                     v.iter().flat_map(|(a, b)| [long(*a), long(*b)].concat()).collect::<Vec<_>>(),
                 ),
+                Values::Double(v) => (12, v.len(), v.iter().flat_map(|v| double(*v)).collect()),
             };
             entries.extend([&short(tag)[..], &short(kind), &long(count as u32)].concat());
             if values.len() <= 4 {

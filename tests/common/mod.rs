@@ -25,7 +25,7 @@ pub fn graphs(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
     let mut guide = image.clone();
     let mut graphs = vec![graph::of_level(&guide, plan)];
     for _ in 1..plan.levels.len() {
-        guide = graph::downsample(&guide);
+        guide = guide.downsampled();
         graphs.push(graph::of_level(&guide, plan));
     }
     graphs

@@ -8,8 +8,8 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::{
-    Agreement, DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Nearer, Order, Potential,
-    Pyramid,
+    Agreement, DisparityRange, Fill, FrontOptions, LeftRightCheck, MatchingCost, Median, Method, Nearer,
+    Order, Potential, Pyramid,
 };
 use std::ops::Range;
 
@@ -126,10 +126,18 @@ pub fn pair(random: &mut Random, width: usize, height: usize) -> Pair {
     Pair::new(left, right).unwrap()
 }
 
+/// Options by which a pair is matched as it is: nothing stands between the images and the stages.
+pub fn as_it_is() -> FrontOptions {
+    let mut front = FrontOptions::default();
+    (front.level_rows, front.equal_sharpness, front.denoise) = (false, false, false);
+    front
+}
+
 /// A method with random values for all parameters that the stages read, and `neighbours` neighbours per
 /// factor.
 pub fn method(random: &mut Random, neighbours: usize) -> Method {
     let mut m = Method::default();
+    m.front = as_it_is();
     m.cost.matching = random.pick(&[
         MatchingCost::Sad,
         MatchingCost::Census,
@@ -168,12 +176,13 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     ]);
     m.refinement.speckle_size = random.pick(&[0, 3, 20]);
     m.refinement.sub_pixel = random.pick(&[false, true]);
-    m.refinement.fill = random.pick(&[Fill::None, Fill::Row, Fill::Median, Fill::Median]);
+    m.refinement.fill = random.pick(&[Fill::None, Fill::Row, Fill::Votes, Fill::Votes]);
     m.refinement.nearer = random.pick(&[Nearer::Larger, Nearer::Smaller]);
     m.refinement.median = random.pick(&[Median::Off, Median::Filled, Median::All]);
     m.refinement.median_window = random.pick(&[3, 5, 15]);
     m.refinement.median_sigma_space = random.log_within(0.3, 30.0);
     m.refinement.median_sigma_range = random.log_within(0.01, 3.0);
+    m.refinement.plane = random.pick(&[false, true]);
     m.refinement.confidence_floor = random.pick(&[0, 16, 255]);
     m.refinement.right_map = random.one_in(3);
     m

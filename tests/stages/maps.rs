@@ -75,9 +75,15 @@ fn nothing_valid() {
             for (name, mut backend) in backends() {
                 backend.prepare(&plan, Prepared::new(&pair)).unwrap();
                 maps.write(backend.as_mut());
-                for stage in
-                    [Stage::SpeckleFilter, Stage::Fill, Stage::FillMedian, Stage::Median, Stage::Confidence]
-                {
+                for stage in [
+                    Stage::SpeckleFilter,
+                    Stage::Fill,
+                    Stage::VoteFill,
+                    Stage::FillMedian,
+                    Stage::Median,
+                    Stage::Plane,
+                    Stage::Confidence,
+                ] {
                     backend.run(stage).unwrap();
                 }
                 if let Err(e) = compare_finest(backend.as_mut(), &expected) {
@@ -120,6 +126,10 @@ fn control_changes_are_found() {
         (Stage::SpeckleFilter, true, region, |p| p.method.refinement.speckle_size += 1),
         (Stage::Fill, false, fill, |p| p.method.refinement.nearer = Nearer::Smaller),
         (Stage::Confidence, false, confidence, |p| p.method.refinement.confidence_floor += 4),
+        (Stage::VoteFill, false, twin::vote_fill::vote_fill, |p| {
+            p.method.refinement.nearer = Nearer::Smaller;
+        }),
+        (Stage::VoteFill, false, twin::vote_fill::vote_fill, |p| p.range.min += 1),
         (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.refinement.median_window = 7),
         (Stage::FillMedian, false, twin::fill_median::fill_median, |p| {
             p.method.refinement.median_sigma_range = 0.02;
@@ -128,6 +138,11 @@ fn control_changes_are_found() {
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_window = 7),
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_space = 1.0),
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_range = 0.02),
+        (Stage::Plane, false, twin::median::median, |_| ()),
+        (Stage::Plane, false, twin::plane::plane, |p| p.method.refinement.median = Median::Filled),
+        (Stage::Plane, false, twin::plane::plane, |p| p.method.refinement.median_window = 7),
+        (Stage::Plane, false, twin::plane::plane, |p| p.method.refinement.median_sigma_range = 0.02),
+        (Stage::Plane, false, twin::plane::plane, |p| p.range.max -= 1),
     ];
     let mut plan = plan;
     plan.method.refinement.speckle_size = 3;

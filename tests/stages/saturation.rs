@@ -69,6 +69,7 @@ fn wide_beliefs_stay_below_their_largest() {
     for (resolution, levels) in [(Agreement::Strict, 3), (Agreement::Interpolating, 2)] {
         let mut method = Method::preset("paper").unwrap();
         (method.graph.percentile, method.messages.agreement, method.graph.levels) = (0.0, resolution, levels);
+        (method.messages.temperature, method.messages.evidence_cap) = (0.5, 63.75);
         method.schedule.iterations = 6;
         let plan = random::plan((15, 13), 0, 5, &method);
         assert_eq!(plan.levels[0].evidence.cap, 255);

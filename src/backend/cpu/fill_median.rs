@@ -8,5 +8,5 @@ use crate::plan::Plan;
 use crate::weights::MedianWeights;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
-    smooth(&MedianWeights::stretched(&plan.method), |f| f & flag::FILLED != 0, guide, maps);
+    smooth(&MedianWeights::stretched(&plan.method), |f| f & flag::FILLED != 0, None, guide, maps);
 }

@@ -2,12 +2,12 @@
 
 use super::units::Units;
 use super::volumes::Volumes;
-use crate::graph::{downsample, of_level};
+use crate::graph::of_level;
 
 pub(super) fn run<U: Units>(volumes: &mut Volumes<U>, z: usize) {
     let (finer, rest) = volumes.levels.split_at_mut(z);
     let level = &mut rest[0];
     level.guide =
-        finer.last().map(|finer| downsample(finer.guide.as_ref().unwrap_or_else(|| volumes.pair.left())));
+        finer.last().map(|finer| finer.guide.as_ref().unwrap_or_else(|| volumes.pair.left()).downsampled());
     level.graph = of_level(level.guide.as_ref().unwrap_or_else(|| volumes.pair.left()), &volumes.plan);
 }

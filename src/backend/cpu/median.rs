@@ -5,7 +5,9 @@
 //! weight. Every step sums the weights of the values below the middle. This needs no sort.
 
 use super::finest::Finest;
-use super::units::{block, each_lane};
+use super::least_squares::Planes;
+use super::places::{LANES, Place, Weighed};
+use super::units::{block, block_mut, each_lane};
 use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
@@ -14,18 +16,25 @@ use crate::weights::{MEDIAN_WEIGHT, MedianWeights};
 use rayon::prelude::*;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
-    let touched = |f: u8| match plan.method.refinement.median {
+    smooth(&MedianWeights::of(&plan.method), touched(plan), None, guide, maps);
+}
+
+/// Whether the median changes a pixel with such flags.
+pub(super) fn touched(plan: &Plan) -> impl Fn(u8) -> bool + Sync {
+    let median = plan.method.refinement.median;
+    move |f: u8| match median {
         Median::Off => false,
         Median::Filled => f & flag::FILLED != 0,
         Median::All => has_disparity(f),
-    };
-    smooth(&MedianWeights::of(&plan.method), touched, guide, maps);
+    }
 }
 
-/// Applies the median to every pixel whose flags are `touched`. Such a pixel has a disparity.
+/// Applies the median to every pixel whose flags are `touched`. Such a pixel has a disparity. Where there are `limits`, planes
+/// follow, whose values stay within.
 pub(super) fn smooth(
     weights: &MedianWeights,
     touched: impl Fn(u8) -> bool + Sync,
+    limits: Option<(i32, i32)>,
     guide: &Image,
     maps: &mut Finest,
 ) {
@@ -35,6 +44,7 @@ pub(super) fn smooth(
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
     disparity.for_each_init(Window::default, |window, (y, row)| {
         window.open(weights, &seen, y);
+        window.limits = limits;
         window.touched.clear();
         window.touched.extend(flags.row(y).iter().map(|&f| touched(f)));
         window.touched.resize(width + LANES, false);
@@ -42,7 +52,7 @@ pub(super) fn smooth(
     });
 }
 
-/// The medians of the touched pixels of the row that `window` is open at.
+/// The results of the touched pixels of the row that `window` is open at.
 #[pulp::with_simd(median_row = pulp::Arch::new())]
 #[inline(always)]
 fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen, row: &'a mut [i32]) {
@@ -50,18 +60,18 @@ fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen
     while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched) {
         x += skipped;
         let touched: [bool; LANES] = *block(&window.touched, x);
-        let medians = window.medians(seen, x, &touched);
-        for ((out, median), _) in row[x..].iter_mut().zip(medians).zip(touched).filter(|each| each.1) {
-            *out = median;
+        let results = window.results(seen, x, &touched);
+        for ((out, result), _) in row[x..].iter_mut().zip(results).zip(touched).filter(|each| each.1) {
+            *out = result;
         }
         x += LANES;
     }
 }
 
-/// Number of pixels whose windows are weighed together, in vectors of bytes.
-const LANES: usize = 32;
 /// Number of pixels whose medians are found together, in vectors of 16 bits.
 const HALF: usize = LANES / 2;
+/// A guess of a median is too far from it where it misses by this much: values at the ends of 16 bits may then be near it.
+const FAR: u16 = 1 << 14;
 /// Number of places whose weights are summed before they join the others.
 const GROUP: usize = 4;
 /// Sums of this many weights fit in 16 bits.
@@ -124,32 +134,20 @@ fn seen_row_on<'a, S: pulp::Simd>(
 struct Window {
     /// Where the row of the centres starts in the input.
     centre: usize,
-    /// By place: where it lies in the input for the pixel in column 0, and the weight of what has the colour of the centre there.
-    offsets: Vec<(usize, u8)>,
+    radius: usize,
+    /// By place: where it lies in the input for the pixel in column 0, how many steps from the centre, and the weight of what has
+    /// the colour of the centre there.
+    offsets: Vec<(usize, [i16; 2], u8)>,
     doublings: u32,
+    /// What the values of planes stay within, where planes follow the median.
+    limits: Option<(i32, i32)>,
+    planes: Planes,
     /// Whether each pixel of the row takes its median.
     touched: Vec<bool>,
     /// The first `count` places have weight.
     weighed: Vec<Weighed>,
     places: Vec<Place>,
     count: usize,
-}
-
-/// Where a place of the first lane's window lies in the input, and the weights of all lanes: 0 without disparity.
-#[derive(Clone, Copy, Default)]
-struct Weighed {
-    at: usize,
-    weights: [u8; LANES],
-}
-
-/// What a place of the window holds, for all lanes.
-#[repr(align(64))]
-#[derive(Clone, Copy, Default)]
-struct Place {
-    /// Relative to a guess of each lane.
-    values: [i16; LANES],
-    /// 0 without disparity.
-    weights: [u16; LANES],
 }
 
 /// What is known of the medians before the search, for all lanes.
@@ -172,36 +170,41 @@ impl Window {
         self.offsets.clear();
         for ny in (first..(y + reach * apart + 1).min(seen.height)).step_by(apart) {
             for (column, &taken) in weights.space_row(ny.abs_diff(y) / step).iter().enumerate() {
-                self.offsets.push((ny * seen.pitch + column * step, MEDIAN_WEIGHT.saturating_sub(taken)));
+                let steps = [
+                    column as i16 - weights.radius() as i16,
+                    (ny as i32 - y as i32) as i16 >> weights.step_bits(),
+                ];
+                let near = MEDIAN_WEIGHT.saturating_sub(taken);
+                self.offsets.push((ny * seen.pitch + column * step, steps, near));
             }
         }
+        self.radius = weights.radius();
         (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings());
         self.weighed.resize(self.offsets.len(), Weighed::default());
         self.places.resize(self.offsets.len().next_multiple_of(GROUP), Place::default());
     }
 
-    /// The medians of the pixels from column `x` on, as far as they are `touched`.
+    /// The medians, or what planes make of them, of the pixels from column `x` on, as far as they are `touched`.
     #[inline(always)]
-    fn medians(&mut self, seen: &Seen, x: usize, touched: &[bool; LANES]) -> [i32; LANES] {
+    fn results(&mut self, seen: &Seen, x: usize, touched: &[bool; LANES]) -> [i32; LANES] {
         let mut medians: [i32; LANES] = *block(&seen.values, self.centre + x);
         self.weigh(seen, x, touched);
+        let mut found = [0i16; LANES];
         loop {
             let bounds = self.load(seen, &medians);
-            let mut far = false;
             for first in [0, HALF] {
-                let found = self.search(&bounds, first, block(touched, first));
-                for ((median, found), touched) in
-                    medians[first..].iter_mut().zip(found).zip(&touched[first..])
-                {
-                    *median += i32::from(found);
-                    far |= *touched && (found == i16::MIN || found == i16::MAX);
-                }
+                *block_mut(&mut found, first) = self.search(&bounds, first, block(touched, first));
             }
+            medians = each_lane(|i| medians[i] + i32::from(found[i]));
             // A median out of the reach of its guess is searched for again, from there.
-            if !far {
-                return medians;
+            if found.iter().zip(touched).all(|(found, &touched)| !touched || found.unsigned_abs() < FAR) {
+                break;
             }
         }
+        let Some((low, high)) = self.limits else { return medians };
+        self.planes.choose(&self.weighed[..self.count]);
+        let above = self.planes.above_medians(self.radius, &self.places, &found);
+        each_lane(|i| (medians[i] + above[i]).clamp(low, high))
     }
 
     /// Finds the places that have weight for any of the pixels `touched`.
@@ -216,7 +219,7 @@ impl Window {
         let most = (MEDIAN_WEIGHT + 1) >> doublings;
         let touched: [u8; LANES] = each_lane(|i| u8::from(touched[i]).wrapping_neg());
         let mut count = 0;
-        for &(offset, near) in &self.offsets {
+        for &(offset, step, near) in &self.offsets {
             let at = offset + x;
             let r = apart(block(red, at), &centres[0]);
             let g = apart(block(green, at), &centres[1]);
@@ -225,7 +228,7 @@ impl Window {
             let colour: [u8; LANES] = each_lane(|i| apart[i].min(most) << doublings);
             let known: &[u8; LANES] = block(known, at);
             let weights: [u8; LANES] = each_lane(|i| near.saturating_sub(colour[i]) & known[i] & touched[i]);
-            self.weighed[count] = Weighed { at, weights };
+            self.weighed[count] = Weighed { at, step, weights };
             count += usize::from(weights != [0; LANES]);
         }
         self.count = count;
@@ -239,7 +242,7 @@ impl Window {
         let weighed = &self.weighed[..self.count];
         for (places, weighed) in self.places.chunks_mut(PART).zip(weighed.chunks(PART)) {
             let mut part = [0u16; LANES];
-            for (place, Weighed { at, weights }) in places.iter_mut().zip(weighed) {
+            for (place, Weighed { at, weights, .. }) in places.iter_mut().zip(weighed) {
                 let weights: [u16; LANES] = each_lane(|i| weights[i].into());
                 let values: &[i32; LANES] = block(&seen.values, *at);
                 let values: [i16; LANES] =

@@ -2,8 +2,10 @@
 
 mod features;
 mod finest;
+mod least_squares;
 #[cfg_attr(target_arch = "wasm32", path = "pages_in_browser.rs")]
 mod pages;
+mod places;
 mod probe;
 mod sad;
 mod units;

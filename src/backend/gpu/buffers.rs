@@ -2,20 +2,19 @@
 //!
 //! Where they fit, levels share buffers, so that one dispatch can go over several of them.
 
+use super::allocator::{Allocator, USAGE};
 use super::convergence::Convergence;
 use super::device::Device;
 use super::rows::{HALO, Pool, Rows};
 use super::uniform::{ALIGN_WORDS, LevelParams};
+use super::vote_buffers::VoteBuffers;
 use super::words::window_words;
 use crate::error::{MemoryError, Result};
 use crate::image::Plane;
+use crate::options::Fill;
 use crate::plan::{LevelPlan, Plan, RING_PART};
 use crate::weights::MedianWeights;
 use std::array;
-
-/// What stages and copies do with buffers.
-const USAGE: wgpu::BufferUsages =
-    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);
 
 /// The buffers that the coarser levels share.
 pub(super) struct Shared {
@@ -73,6 +72,8 @@ pub(super) struct Buffers {
     /// Whether each row holds a valid pixel, and the row that it takes its values from.
     pub(super) filled_rows: wgpu::Buffer,
     pub(super) source_rows: wgpu::Buffer,
+    /// `None` where the method fills without votes.
+    pub(super) votes: Option<VoteBuffers>,
     written: Vec<wgpu::Buffer>,
     constant: Vec<wgpu::Buffer>,
 }
@@ -123,60 +124,6 @@ impl LevelBuffers {
     /// The message volumes, which start at 0.
     pub(super) fn messages(&self) -> [&Rows; 3] {
         [&self.dependency, &self.down, &self.up]
-    }
-}
-
-/// Allocates buffers, and keeps track of them.
-struct Allocator<'a> {
-    device: &'a mut Device,
-    written: Vec<wgpu::Buffer>,
-    constant: Vec<wgpu::Buffer>,
-}
-
-impl Allocator<'_> {
-    /// A buffer that matches write.
-    fn buffer(&mut self, label: &str, words: u64) -> Result<wgpu::Buffer> {
-        let buffer = self.allocate(label, words, USAGE)?;
-        self.written.push(buffer.clone());
-        Ok(buffer)
-    }
-
-    /// A buffer that keeps these words from match to match.
-    fn constant(&mut self, label: &str, words: &[u32]) -> Result<wgpu::Buffer> {
-        let buffer = self.allocate(label, words.len() as u64, USAGE)?;
-        self.device.write(&buffer, bytemuck::cast_slice(words))?;
-        self.constant.push(buffer.clone());
-        Ok(buffer)
-    }
-
-    fn allocate(&self, label: &str, words: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
-        let size = (4 * words).max(4 * ALIGN_WORDS as u64);
-        let (name, largest) = (&self.device.name, self.device.max_buffer);
-        if size > largest {
-            let (name, what) = (name.clone(), format!("the {label}"));
-            return Err(MemoryError::Buffer { name, what, needed: size, allowed: largest }.into());
-        }
-        let buffer = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        });
-        self.device.check()?;
-        Ok(buffer)
-    }
-
-    /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height.
-    fn rows(&mut self, label: &str, words: u32, starts: &[u32]) -> Result<Rows> {
-        Rows::in_parts(words, starts, |_, rows| self.buffer(label, u64::from(words) * rows))
-    }
-
-    /// The same, where the rows of `count` parts are needed at a time.
-    fn ring(&mut self, label: &str, words: u32, starts: &[u32], count: usize) -> Result<Rows> {
-        let rows = u64::from(starts[1] - starts[0] + 2 * HALO);
-        let buffers = starts[1..].iter().take(count).map(|_| self.buffer(label, u64::from(words) * rows));
-        let buffers: Vec<_> = buffers.collect::<Result<_>>()?;
-        Rows::in_parts(words, starts, |i, _| Ok(buffers[i % count].clone()))
     }
 }
 
@@ -269,7 +216,7 @@ impl Buffers {
             let (name, needed) = (device.name.clone(), plan.bytes());
             return Err(MemoryError::Device { name, needed, available }.into());
         }
-        let mut allocator = Allocator { device, written: Vec::new(), constant: Vec::new() };
+        let mut allocator = Allocator::new(device);
         let a = &mut allocator;
         let last = plan.levels.len() - 1;
         let (finest, mut shared) = Self::shared(a, plan)?;
@@ -337,11 +284,14 @@ impl Buffers {
         let (raw, disparity, flags) = (map("raw", 1)?, map("disparity", 1)?, map("flags", 1)?);
         let (spare_disparity, spare_flags) = (map("spare disparity", 1)?, map("spare flags", 1)?);
         let (speckle_parents, speckle_sizes) = (map("speckle parents", 1)?, map("speckle sizes", 1)?);
+        let has_votes = plan.method.refinement.fill == Fill::Votes;
+        let votes = has_votes.then(|| VoteBuffers::new(a, plan, &fine)).transpose()?;
         let rows = u64::from(fine.height);
         Ok(Self {
             median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
             stretched_weights: a
                 .constant("stretched weights", &MedianWeights::stretched(&plan.method).words())?,
+            votes,
             change_sums: a.buffer("change", 2 * rows)?,
             convergence: a.buffer("convergence", size_of::<Convergence>() as u64 / 4)?,
             groups: a.buffer("groups", 0)?,
@@ -414,7 +364,7 @@ impl Buffers {
     pub(super) fn end_when_settled(&mut self, device: &mut Device, groups: &[[u32; 3]]) -> Result<()> {
         let usage = wgpu::BufferUsages::INDIRECT | USAGE;
         let words = groups.as_flattened();
-        let mut allocator = Allocator { device, written: Vec::new(), constant: Vec::new() };
+        let mut allocator = Allocator::new(device);
         self.all_groups = allocator.constant("groups", words)?;
         self.groups = allocator.allocate("groups", words.len() as u64, usage)?;
         self.written.push(self.groups.clone());

@@ -10,7 +10,7 @@ use crate::weights::MedianWeights;
 const SHADER: &str = include_str!("../../../shaders/fill_median.wgsl");
 
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    vec![median::job(plan, Kernel::new("fill_median", "main", SHADER))]
+    vec![median::job(plan, Kernel::new("fill_median", "main", SHADER), 0)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {

@@ -15,24 +15,31 @@ const SHADER: &str = include_str!("../../../shaders/median.wgsl");
 
 uniform! { radius: u32, step_bits: u32, row_bits: u32, scale: u32, doublings: u32, all: u32 }
 
-/// A job for `kernel`, which imports the weighted median.
-pub(super) fn job(plan: &Plan, kernel: Kernel) -> Job {
+/// A job for `kernel`, which imports the weighted median and goes over the window so many times `more`.
+pub(super) fn job(plan: &Plan, kernel: Kernel, more: usize) -> Job {
     // One pass, and one for every three bits of what the disparities of a window may span.
+    let passes = 1 + 8 + more;
     let window = plan.method.refinement.median_window as usize;
-    Job::new::<Uniform>(kernel, (1 + 8) * (window + 1) * window + 8)
+    Job::new::<Uniform>(kernel, passes * (window + 1) * window + 8 + more)
 }
 
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    vec![job(plan, Kernel::new("median", "main", SHADER))]
+    vec![job(plan, Kernel::new("median", "main", SHADER), 0)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
+    let job = &jobs(r.plan, 0)[0];
+    record_as(r, job)
+}
+
+/// Records `job` on the pixels that the median changes.
+pub(super) fn record_as(r: &mut Recorder, job: &Job) -> Result<()> {
     let median = r.plan.method.refinement.median;
     if median == Median::Off {
         return Ok(());
     }
     let (weights, table) = (MedianWeights::of(&r.plan.method), &r.buffers.median_weights);
-    smooth(r, &jobs(r.plan, 0)[0], &weights, table, median == Median::All)
+    smooth(r, job, &weights, table, median == Median::All)
 }
 
 /// The median with `weights`, which `table` holds, of `all` pixels or of the filled ones.

@@ -9,6 +9,7 @@
 //! messages empty.
 
 mod adapters;
+mod allocator;
 mod buffers;
 mod convergence;
 mod device;
@@ -23,6 +24,7 @@ mod streaming;
 mod timer;
 mod uniform;
 mod upload;
+mod vote_buffers;
 mod words;
 
 use super::probe::Probe;

@@ -24,11 +24,16 @@ pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let sigma_range = plan.method.refinement.median_sigma_range;
-    smooth(plan, pair, maps, (1, 2), sigma_range, |validity| match plan.method.refinement.median {
+    smooth(plan, pair, maps, (1, 2), sigma_range, |validity| changes(plan, validity));
+}
+
+/// Whether the median changes a pixel.
+pub fn changes(plan: &Plan, validity: i32) -> bool {
+    match plan.method.refinement.median {
         Median::Off => false,
         Median::Filled => filled(validity),
         Median::All => known(validity),
-    });
+    }
 }
 
 /// Whether a pixel was filled.
@@ -40,46 +45,69 @@ fn known(validity: i32) -> bool {
     !invalid(validity) || filled(validity)
 }
 
+/// A place of a window that has a disparity.
+pub struct Place {
+    /// Where it is, in samples from the middle.
+    pub step: (i64, i64),
+    pub disparity: i32,
+    pub weight: i64,
+}
+
+/// The places of the window of pixel (x, y), in samples `step` apart and every `every`-th row of them.
+pub fn places(
+    plan: &Plan,
+    pair: &Pair,
+    maps: &Finest,
+    (step, every): (i64, i64),
+    sigma_range: f64,
+    (x, y): (usize, usize),
+) -> Vec<Place> {
+    let (width, height) = plan.size();
+    let method = &plan.method;
+    let sigma_space = method.refinement.median_sigma_space;
+    let radius = i64::from(method.refinement.median_window / 2);
+    let guide = &pair.left().pixels;
+    let mut places = Vec::new();
+    for j in (-radius..=radius).filter(|j| j % every == 0) {
+        for i in -radius..=radius {
+            let (nx, ny) = (x as i64 + step * i, y as i64 + step * j);
+            if nx < 0 || ny < 0 || nx >= width as i64 || ny >= height as i64 {
+                continue;
+            }
+            let at = (nx as usize, ny as usize);
+            if known(maps.validity[at]) {
+                let colour = colour(guide[(x, y)], guide[at], sigma_range);
+                let weight = (127 - colour - space(i, j, sigma_space)).max(0);
+                places.push(Place { step: (i, j), disparity: maps.disparity[at], weight });
+            }
+        }
+    }
+    places
+}
+
 /// The median over samples `step` apart, in every `every`-th row of them.
 pub fn smooth(
     plan: &Plan,
     pair: &Pair,
     maps: &mut Finest,
-    (step, every): (i64, i64),
+    raster: (i64, i64),
     sigma_range: f64,
     touched: impl Fn(i32) -> bool,
 ) {
     let (width, height) = plan.size();
-    let method = &plan.method;
-    let sigma_space = method.refinement.median_sigma_space;
-    let radius = i64::from(method.refinement.median_window / 2);
-    let guide = pair.left();
-    let Finest { disparity, validity, .. } = &*maps;
+    let before = maps.clone();
     maps.disparity = Plane::from_fn(width, height, |x, y| {
-        if !touched(validity[(x, y)]) {
-            return disparity[(x, y)];
+        if !touched(before.validity[(x, y)]) {
+            return before.disparity[(x, y)];
         }
-        let mut values = Vec::new();
-        for j in (-radius..=radius).filter(|j| j % every == 0) {
-            for i in -radius..=radius {
-                let (nx, ny) = (x as i64 + step * i, y as i64 + step * j);
-                if nx < 0 || ny < 0 || nx >= width as i64 || ny >= height as i64 {
-                    continue;
-                }
-                let at = (nx as usize, ny as usize);
-                if known(validity[at]) {
-                    let colour = colour(guide.pixels[(x, y)], guide.pixels[at], sigma_range);
-                    values.push((disparity[at], (127 - colour - space(i, j, sigma_space)).max(0)));
-                }
-            }
-        }
-        values.sort_unstable();
-        let total: i64 = values.iter().map(|v| v.1).sum();
+        let mut places = places(plan, pair, &before, raster, sigma_range, (x, y));
+        places.sort_unstable_by_key(|place| place.disparity);
+        let total: i64 = places.iter().map(|place| place.weight).sum();
         let mut cumulated = 0;
-        for (value, weight) in values {
-            cumulated += weight;
+        for place in places {
+            cumulated += place.weight;
             if cumulated * 2 >= total {
-                return value;
+                return place.disparity;
             }
         }
         unreachable!("the centre has weight")

@@ -1,0 +1,73 @@
+//! How the buffers of a match are allocated.
+
+use super::device::Device;
+use super::rows::{HALO, Rows};
+use super::uniform::ALIGN_WORDS;
+use crate::error::{MemoryError, Result};
+
+/// What stages and copies do with buffers.
+pub(super) const USAGE: wgpu::BufferUsages =
+    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);
+
+/// Allocates buffers, and keeps track of them.
+pub(super) struct Allocator<'a> {
+    pub(super) device: &'a mut Device,
+    pub(super) written: Vec<wgpu::Buffer>,
+    pub(super) constant: Vec<wgpu::Buffer>,
+}
+
+impl<'a> Allocator<'a> {
+    pub(super) fn new(device: &'a mut Device) -> Self {
+        Self { device, written: Vec::new(), constant: Vec::new() }
+    }
+
+    /// A buffer that matches write.
+    pub(super) fn buffer(&mut self, label: &str, words: u64) -> Result<wgpu::Buffer> {
+        let buffer = self.allocate(label, words, USAGE)?;
+        self.written.push(buffer.clone());
+        Ok(buffer)
+    }
+
+    /// A buffer that keeps these words from match to match.
+    pub(super) fn constant(&mut self, label: &str, words: &[u32]) -> Result<wgpu::Buffer> {
+        let buffer = self.allocate(label, words.len() as u64, USAGE)?;
+        self.device.write(&buffer, bytemuck::cast_slice(words))?;
+        self.constant.push(buffer.clone());
+        Ok(buffer)
+    }
+
+    pub(super) fn allocate(
+        &self,
+        label: &str,
+        words: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        let size = (4 * words).max(4 * ALIGN_WORDS as u64);
+        let (name, largest) = (&self.device.name, self.device.max_buffer);
+        if size > largest {
+            let (name, what) = (name.clone(), format!("the {label}"));
+            return Err(MemoryError::Buffer { name, what, needed: size, allowed: largest }.into());
+        }
+        let buffer = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
+        self.device.check()?;
+        Ok(buffer)
+    }
+
+    /// Rows of `words` words each, in parts that start at `starts`, whose last element is the height.
+    pub(super) fn rows(&mut self, label: &str, words: u32, starts: &[u32]) -> Result<Rows> {
+        Rows::in_parts(words, starts, |_, rows| self.buffer(label, u64::from(words) * rows))
+    }
+
+    /// The same, where the rows of `count` parts are needed at a time.
+    pub(super) fn ring(&mut self, label: &str, words: u32, starts: &[u32], count: usize) -> Result<Rows> {
+        let rows = u64::from(starts[1] - starts[0] + 2 * HALO);
+        let buffers = starts[1..].iter().take(count).map(|_| self.buffer(label, u64::from(words) * rows));
+        let buffers: Vec<_> = buffers.collect::<Result<_>>()?;
+        Rows::in_parts(words, starts, |i, _| Ok(buffers[i % count].clone()))
+    }
+}
