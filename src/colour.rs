@@ -138,8 +138,8 @@ pub fn grey(levels: &Plane<u8>) -> Plane<[u8; 3]> {
 
 /// A colour for texture zone `zone`, far from the colours of the next zones.
 #[must_use]
-pub fn zone(zone: u8) -> [u8; 3] {
-    let hash = (u32::from(zone) + 1).wrapping_mul(0x9e37_79b9);
+pub fn zone(zone: u32) -> [u8; 3] {
+    let hash = zone.wrapping_add(1).wrapping_mul(0x9e37_79b9);
     [hash >> 24, hash >> 16 & 0xff, hash >> 8 & 0xff].map(|v| v as u8)
 }
 

@@ -2,6 +2,7 @@
 
 use crate::backend::{Backend, Stage, Ticket, Traffic};
 use crate::error::{Error, Purpose, Result};
+use crate::front::conditioning::Conditioning;
 use crate::front::{self, Prepared};
 use crate::image::Pair;
 use crate::maps::{Maps, RightMap, flag};
@@ -22,6 +23,8 @@ pub struct Solution {
     pub maps: Maps,
     /// Iterations done, of all phases together; the most of any tile.
     pub iterations: u32,
+    /// What was corrected in the pair.
+    pub conditioning: Conditioning,
     /// What the host did around the stages, and how long it took.
     pub host_times: Vec<(&'static str, Duration)>,
     /// The time of every stage that ran on the maps of all tiles.
@@ -58,18 +61,20 @@ pub async fn inspect(
     inspector: Option<Inspector<'_>>,
 ) -> Result<Solution> {
     let mut run = Run::new(watch(plan, observer), inspector);
+    let (pair, conditioning) = front::condition(pair, plan, &mut run.watch)?;
     let (iterations, tickets) = whole(backend, plan, pair, &mut run).await?;
     backend.wait().await?;
     let (maps, idle) = run.watch.host_async("download", tickets.collect(backend)).await?;
     let iterations = iterations - idle;
     let (traffic, cells, host_times) = (backend.traffic(), backend.cells(), run.watch.into_times());
-    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
+    Ok(Solution { maps, iterations, conditioning, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
 
 /// A match whose stages may still run, or whose maps are on their way.
 pub struct Started {
     tickets: Tickets,
     iterations: u32,
+    conditioning: Conditioning,
     host_times: Vec<(&'static str, Duration)>,
     traffic: Traffic,
     cells: Vec<u64>,
@@ -86,9 +91,10 @@ pub async fn start(
     observer: Observer<'_>,
 ) -> Result<Started> {
     let mut run = Run::new(watch(plan, observer), None);
+    let (pair, conditioning) = front::condition(pair, plan, &mut run.watch)?;
     let (iterations, tickets) = whole(backend, plan, pair, &mut run).await?;
     let (traffic, cells) = (backend.traffic(), backend.cells());
-    Ok(Started { tickets, iterations, host_times: run.watch.into_times(), traffic, cells })
+    Ok(Started { tickets, iterations, conditioning, host_times: run.watch.into_times(), traffic, cells })
 }
 
 /// Ends a match that was started on `backend`.
@@ -96,10 +102,10 @@ pub async fn start(
 /// # Errors
 /// Whatever the backend reports.
 pub async fn finish(backend: &mut dyn Backend, started: Started) -> Result<Solution> {
-    let Started { tickets, iterations, host_times, traffic, cells } = started;
+    let Started { tickets, iterations, conditioning, host_times, traffic, cells } = started;
     let (maps, idle) = tickets.collect(backend).await?;
     let iterations = iterations - idle;
-    Ok(Solution { maps, iterations, host_times, mosaic_times: Vec::new(), traffic, cells })
+    Ok(Solution { maps, iterations, conditioning, host_times, mosaic_times: Vec::new(), traffic, cells })
 }
 
 /// How often a pair is matched: once more, mirrored, where that is how its right view is found.
@@ -154,7 +160,7 @@ fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: Pair, run: &mut Run) ->
 async fn whole(
     backend: &mut dyn Backend,
     plan: &Plan,
-    pair: &Pair,
+    pair: Pair,
     run: &mut Run<'_, '_>,
 ) -> Result<(u32, Tickets)> {
     let plan = &if run.inspector.is_some() { plan.clone() } else { solver::streamed(plan) };
@@ -167,7 +173,7 @@ async fn whole(
         run.stage(backend, plan, Stage::MirrorLabels).await?;
         run.inspector = inspector;
     }
-    let prepared = prepare(backend, plan, pair.clone(), run)?;
+    let prepared = prepare(backend, plan, pair, run)?;
     let iterations = solver::estimate(backend, plan, prepared, run).await?;
     for stage in solver::post_processing(&plan.method) {
         run.stage(backend, plan, stage).await?;
@@ -195,9 +201,10 @@ pub async fn solve_tiles(
 ) -> Result<Solution> {
     let whole = tiles.whole();
     let all: f64 = tiles.list().iter().map(|tile| solver::work(&tile.plan)).sum();
-    let watch = Watch::new(observer, matchings(whole) as f64 * all);
+    let mut watch = Watch::new(observer, matchings(whole) as f64 * all);
+    let (pair, conditioning) = front::condition(pair, whole, &mut watch)?;
     let mut run = Run::new(watch.in_tiles(matchings(whole) * tiles.count()), None);
-    let mut mosaic = Mosaic::new(whole, pair)?;
+    let mut mosaic = Mosaic::new(whole, &pair)?;
     let (mut iterations, mut traffic) = (0, Traffic::default());
     let mut cells = vec![0; whole.levels.len()];
     let right_map_wanted = whole.method.refinement.right_map;
@@ -252,5 +259,5 @@ pub async fn solve_tiles(
         maps.right = Some(right_map(finish(&mut mosaic)?));
     }
     let host_times = run.watch.into_times();
-    Ok(Solution { maps, iterations, host_times, mosaic_times, traffic, cells })
+    Ok(Solution { maps, iterations, conditioning, host_times, mosaic_times, traffic, cells })
 }

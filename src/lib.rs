@@ -76,6 +76,7 @@
 //! - [`Matched`] is what a match gives: maps of disparity, confidence and validity, and what made them.
 //! - [`colour`] shows maps as pictures.
 //! - [`check`] warns of what is probably wrong with a pair, and finds its range.
+//! - [`calibration`] reads what is known of the cameras, and [`rectification`] makes rectified pairs of their images.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
@@ -87,6 +88,7 @@
 #![forbid(unsafe_code)]
 
 mod backend;
+pub mod calibration;
 pub mod colour;
 pub mod depth;
 mod engine;
@@ -102,6 +104,7 @@ pub mod options;
 #[cfg_attr(target_arch = "wasm32", path = "pause_in_browser.rs")]
 mod pause;
 mod plan;
+pub mod rectification;
 mod roofline;
 mod solver;
 mod text;
@@ -111,6 +114,7 @@ mod weights;
 
 pub use error::{Error, Result};
 pub use front::check;
+pub use front::conditioning::Conditioning;
 pub use image::Pair;
 pub use matcher::{Answer, Builder, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;

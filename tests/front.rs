@@ -1,10 +1,16 @@
 //! The front end on whole images: invariances, expected results, and small and empty images.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
-use mrfgs::image::{Image, Plane, grey, read};
+use mrfgs::image::{Image, Pair, Plane, grey, read};
 use mrfgs::low_level::front::illumination::homomorphic;
+use mrfgs::low_level::front::zones::regions::connected;
 use mrfgs::low_level::front::zones::{MASKED, Options, Zones, segment};
+use mrfgs::low_level::front::{label_range, matches, prepare};
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::watch::Watch;
+use mrfgs::options::{DisparityRange, Illumination, Method, ZoneExtent};
 
 const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"];
 
@@ -13,6 +19,11 @@ fn scene(name: &str) -> Image {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name);
     let pair = read::pair(&folder.join("im0.png"), &folder.join("im1.png"), None);
     pair.expect("the scenes are there").left().clone()
+}
+
+/// The paper's clusters, each a zone.
+fn clusters() -> Options {
+    Options { extent: ZoneExtent::Cluster, ..Options::default() }
 }
 
 /// An image of `colour(x, y)`, in 1/256 of an 8-bit level, without masked pixels.
@@ -60,8 +71,8 @@ fn assert_well_formed(zones: &Zones, image: &Image) {
     for (zone, masked) in zones.map.data().iter().zip(image.masked.data()) {
         assert_eq!(*zone == MASKED, *masked);
         if !masked {
-            assert!(usize::from(*zone) <= seen, "zone {zone} before zone {seen}");
-            seen = seen.max(usize::from(*zone) + 1);
+            assert!(*zone as usize <= seen, "zone {zone} before zone {seen}");
+            seen = seen.max(*zone as usize + 1);
         }
     }
     assert_eq!(seen, zones.count);
@@ -139,16 +150,13 @@ fn what_is_masked_stays_and_has_no_influence() {
 /// it.
 fn parts_at(zones: &Zones, border: usize) -> bool {
     let (width, height) = zones.map.size();
-    let right = |x, y| {
-        let zone = usize::from(zones.map[(x, y)]);
-        x.abs_diff(border) <= 12 || zone == usize::from(x > border)
-    };
+    let right = |x: usize, y: usize| x.abs_diff(border) <= 12 || zones.map[(x, y)] == u32::from(x > border);
     zones.count == 2 && (0..height).all(|y| (0..width).all(|x| right(x, y)))
 }
 
 #[test]
 fn two_textures_are_two_zones() {
-    let options = Options { zones: 2, ..Options::default() };
+    let options = Options { clusters: 2, ..clusters() };
     let stripe = |number: usize| if number.is_multiple_of(2) { [40000; 3] } else { [20000; 3] };
     // Same mean and contrast; only the direction, or only the wavelength, differs.
     let upright = |x: usize, _: usize| stripe(x / 3);
@@ -179,12 +187,12 @@ fn every_run_and_every_number_of_threads_agree() {
 }
 
 #[test]
-fn there_are_as_many_zones_as_asked_for() {
+fn there_are_as_many_clusters_as_asked_for() {
     let image = scene("slanted");
-    for zones in [1, 2, 5, 15] {
-        let found = segment(&image, &Options { zones, ..Options::default() });
+    for clusters in [1, 2, 5, 15] {
+        let found = segment(&image, &Options { clusters, ..self::clusters() });
         assert_well_formed(&found, &image);
-        assert_eq!(found.count, zones);
+        assert_eq!(found.count, clusters);
     }
 }
 
@@ -200,22 +208,22 @@ fn the_scenes_keep_their_checksums() {
     ];
     let actual = SCENES.map(|name| {
         let image = scene(name);
-        let zones = segment(&image, &Options::default());
+        let zones = segment(&image, &clusters());
         assert_well_formed(&zones, &image);
         let even = homomorphic(&image);
         let values = even.pixels.data().as_flattened().iter().flat_map(|v| v.to_le_bytes());
-        (fnv(zones.map.data().iter().copied()), fnv(values))
+        (fnv(zones.map.data().iter().map(|zone| *zone as u8)), fnv(values))
     });
     assert!(actual == expected, "(zones, evened out) of {SCENES:?}:\n{actual:#018x?}");
 }
 
 #[test]
-fn small_images_have_few_zones() {
+fn small_images_have_few_clusters() {
     for (width, height) in
         (1..40).flat_map(|n| [(1, n), (n, 1), (n, n)]).chain([(1, 3000), (3000, 1), (700, 2)])
     {
         let image = image(width, height, speckle);
-        let zones = segment(&image, &Options::default());
+        let zones = segment(&image, &clusters());
         assert_well_formed(&zones, &image);
         let pixels = width * height;
         assert!(
@@ -223,7 +231,7 @@ fn small_images_have_few_zones() {
             "{width} x {height}: {}",
             zones.count
         );
-        assert!(pixels < 1000 || zones.count == 15, "{width} x {height}: {} zones", zones.count);
+        assert!(pixels < 1000 || zones.count == 15, "{width} x {height}: {} clusters", zones.count);
         assert_eq!(homomorphic(&image).pixels.size(), (width, height));
     }
 }
@@ -232,10 +240,10 @@ fn small_images_have_few_zones() {
 fn images_without_texture_have_zones_of_place() {
     for level in [0, 1, 30000, 65535] {
         let image = image(64, 48, |_, _| [level; 3]);
-        let zones = segment(&image, &Options::default());
+        let zones = segment(&image, &clusters());
         assert_well_formed(&zones, &image);
         assert_eq!(zones.count, 15);
-        assert_eq!(zones, segment(&self::image(64, 48, |_, _| [7; 3]), &Options::default()));
+        assert_eq!(zones, segment(&self::image(64, 48, |_, _| [7; 3]), &clusters()));
     }
     // Where there is texture, coordinates alone do not decide.
     let plain = image(64, 48, |_, _| [7; 3]);
@@ -263,4 +271,110 @@ fn images_without_light_or_pixels_come_back() {
     let zones = segment(&almost, &Options::default());
     assert_well_formed(&zones, &almost);
     assert_eq!((zones.count, zones.map[(299, 1)]), (1, 0));
+}
+
+/// The connected regions by their definition: regions that touch within a cluster become one, until none do. Regions are numbered
+/// in the order of their first pixels.
+fn regions(clusters: &Plane<u32>, steps: &[(i32, i32)]) -> Zones {
+    let (width, height) = clusters.size();
+    let inside = |(x, y): (i32, i32)| x >= 0 && y >= 0 && x < width as i32 && y < height as i32;
+    // The index of the first pixel of each region.
+    let mut first = Plane::from_fn(width, height, |x, y| y * width + x);
+    loop {
+        let before = first.data().to_vec();
+        for y in 0..height {
+            for x in 0..width {
+                let around =
+                    steps.iter().map(|(dx, dy)| (x as i32 + dx, y as i32 + dy)).filter(|at| inside(*at));
+                for (u, v) in around.map(|(u, v)| (u as usize, v as usize)) {
+                    if clusters[(u, v)] == clusters[(x, y)] {
+                        first[(x, y)] = first[(x, y)].min(first[(u, v)]);
+                    }
+                }
+            }
+        }
+        if before == first.data() {
+            break;
+        }
+    }
+    let is_first = |i: usize| first.data()[i] == i && clusters.data()[i] != MASKED;
+    let firsts: Vec<usize> = (0..width * height).filter(|&i| is_first(i)).collect();
+    let map = Plane::from_fn(width, height, |x, y| {
+        firsts.binary_search(&first[(x, y)]).map_or(MASKED, |zone| zone as u32)
+    });
+    Zones { map, count: firsts.len() }
+}
+
+#[test]
+fn regions_are_connected_parts_of_clusters() {
+    let beside = [(-1, 0), (1, 0), (0, -1), (0, 1)];
+    let diagonal = [(-1, -1), (1, -1), (-1, 1), (1, 1)];
+    let corners_too = [beside, diagonal].concat();
+    let mut told_apart = 0;
+    for (width, height) in [(1, 1), (1, 9), (9, 1), (2, 2), (7, 5), (40, 33)] {
+        for kinds in [1, 2, 3, 6] {
+            let cluster = |x: usize, y: usize| match u32::from(noise(x + 100 * kinds as usize, y, kinds)) {
+                5 => MASKED,
+                cluster => cluster,
+            };
+            let clusters = Plane::from_fn(width, height, cluster);
+            let found = connected(&clusters);
+            assert_eq!(found, regions(&clusters, &beside), "{width} x {height}, {kinds} kinds");
+            // Control: another meaning of connected.
+            told_apart += u32::from(found != regions(&clusters, &corners_too));
+        }
+    }
+    assert!(told_apart > 5, "{told_apart}");
+
+    // A spiral is one region, and what it winds around is another.
+    let wall = ["#######", "......#", "#####.#", "#...#.#", "#.###.#", "#.....#", "#######"];
+    let spiral = Plane::from_fn(7, 7, |x, y| u32::from(wall[y].as_bytes()[x] == b'#'));
+    assert_eq!(connected(&spiral).count, 2);
+    assert_eq!(connected(&Plane::filled(0, 0, 0)).count, 0);
+}
+
+#[test]
+fn zones_are_regions_of_clusters() {
+    let mut split = 0;
+    for name in SCENES {
+        let image = scene(name);
+        let (zones, clusters) = (segment(&image, &Options::default()), segment(&image, &clusters()));
+        assert_well_formed(&zones, &image);
+        assert_eq!(zones, connected(&clusters.map));
+        split += usize::from(zones.count > clusters.count);
+    }
+    assert!(split >= 3, "{split} scenes have clusters of several regions");
+}
+
+#[test]
+fn the_method_says_what_is_corrected_and_what_a_zone_is() {
+    let folder = Path::new("testdata/exposure");
+    let pair = read::pair(&folder.join("im0.png"), &folder.join("im1.png"), None).unwrap();
+    let range = DisparityRange::new(0, 31).unwrap();
+    let corrected = Pair::new(homomorphic(pair.left()), homomorphic(pair.right())).unwrap();
+    let mut seen = Vec::new();
+    for illumination in [Illumination::None, Illumination::Homomorphic, Illumination::HomomorphicFirst] {
+        for extent in [ZoneExtent::Region, ZoneExtent::Cluster] {
+            let mut method = Method::paper();
+            (method.front.illumination, method.front.zone_extent) = (illumination, extent);
+            let plan = Plan::new(pair.size().0, pair.size().1, range, &method).unwrap();
+            let mut go_on = |_| ControlFlow::Continue(());
+            let found = prepare(pair.clone(), &plan, &mut Watch::new(&mut go_on, 1.0)).unwrap();
+            let matched = if illumination == Illumination::None { &pair } else { &corrected };
+            assert!(found.pair.left() == matched.left() && found.pair.right() == matched.right());
+            let source = if illumination == Illumination::HomomorphicFirst { &corrected } else { &pair };
+            let (zones, matches) = found.zones.unwrap();
+            assert_eq!(zones, segment(source.left(), &Options { extent, ..Default::default() }));
+            let split = Some((&zones.map, zones.count));
+            assert_eq!(matches, matches::find(source, split, Some(range)));
+            let ranges = label_range::zonal(range, (&zones.map, zones.count), &matches, 1.0);
+            let index = |label: i32| (label - range.min) as u16;
+            let at = |i: usize| [ranges.low.data()[i], ranges.high.data()[i]].map(index);
+            assert!((0..ranges.low.data().len()).all(|i| found.label_ranges[0].data()[i] == at(i)));
+            seen.push(found.label_ranges);
+        }
+    }
+    // Control: the sources and extents tell. Without correction the zones are those of `homomorphic`.
+    assert!(seen[0] == seen[2] && seen[1] == seen[3]);
+    assert!(seen[2] != seen[3] && seen[2] != seen[4] && seen[3] != seen[5] && seen[4] != seen[5]);
 }

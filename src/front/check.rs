@@ -225,9 +225,7 @@ pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
         out.extend(how.map(|(how, _)| Warning::Turned { how }));
         return out;
     }
-    let mut offsets: Vec<u32> = found.iter().map(|m| m.dy.unsigned_abs()).collect();
-    offsets.sort_unstable();
-    let offset = offsets[offsets.len() / 2];
+    let offset = matches::median(found.iter().map(|m| m.dy.abs())).unsigned_abs();
     if offset > MAX_OFFSET {
         out.push(Warning::NotRectified { offset });
     }

@@ -83,7 +83,7 @@ pub struct Match {
 /// # Panics
 /// When the map of zones differs in size from the images.
 #[must_use]
-pub fn find(pair: &Pair, zones: Option<(&Plane<u8>, usize)>, range: Option<DisparityRange>) -> Vec<Match> {
+pub fn find(pair: &Pair, zones: Option<(&Plane<u32>, usize)>, range: Option<DisparityRange>) -> Vec<Match> {
     let (width, height) = pair.size();
     let spacing = if range.is_some() { SPACING } else { width * height / OVERVIEW };
     search(pair, zones, range, spacing, 0)
@@ -106,7 +106,7 @@ pub(super) fn check_memory(pair: &Pair) -> Result<()> {
 /// its own.
 pub(super) fn search(
     pair: &Pair,
-    zones: Option<(&Plane<u8>, usize)>,
+    zones: Option<(&Plane<u32>, usize)>,
     range: Option<DisparityRange>,
     spacing: usize,
     rows: usize,
@@ -232,7 +232,7 @@ fn box_sums(
 
 /// Corners of `view` in raster order: the best of each zone in each cell of the image, one per `spacing`
 /// pixels.
-fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> Vec<(usize, usize)> {
+fn corners(view: &View, zones: Option<(&Plane<u32>, usize)>, spacing: usize) -> Vec<(usize, usize)> {
     let (width, height) = view.grey.size();
     if let Some((map, _)) = zones {
         assert_eq!(map.size(), (width, height), "the map of zones has the size of the images");
@@ -255,11 +255,11 @@ fn corners(view: &View, zones: Option<(&Plane<u8>, usize)>, spacing: usize) -> V
     let mut out: Vec<_> = cells
         .into_par_iter()
         .flat_map_iter(|(left, top)| {
-            let mut of_zone = BTreeMap::<u8, (usize, Vec<(usize, usize)>)>::new();
+            let mut of_zone = BTreeMap::<u32, (usize, Vec<(usize, usize)>)>::new();
             for y in top..(top + side).min(height) {
                 for x in left..(left + side).min(width) {
                     let zone = zones.map_or(0, |(map, _)| map[(x, y)]);
-                    if zones.is_none_or(|(_, count)| usize::from(zone) < count) {
+                    if zones.is_none_or(|(_, count)| (zone as usize) < count) {
                         let (pixels, optima) = of_zone.entry(zone).or_default();
                         *pixels += 1;
                         if is_peak(x, y) {
@@ -401,6 +401,13 @@ fn vertex(before: f64, peak: f64, after: f64) -> i32 {
     if bend < 0.0 { ((before - after) / (2.0 * bend) * f64::from(FRACTION) + 0.5).floor() as i32 } else { 0 }
 }
 
+/// The median; 0 of nothing.
+pub(super) fn median(values: impl Iterator<Item = i32>) -> i32 {
+    let mut values: Vec<i32> = values.collect();
+    values.sort_unstable();
+    values.get(values.len() / 2).copied().unwrap_or(0)
+}
+
 /// The matches that agree with others around them, in their own and the adjacent cells (of `side` pixels).
 fn consistent(matches: Vec<Match>, side: usize) -> Vec<Match> {
     let mut cells = BTreeMap::<(usize, usize), Vec<&Match>>::new();
@@ -441,7 +448,7 @@ mod tests {
             [if faint(y) { 112 + noise / 8 } else { noise }; 3]
         }));
         let view = View::new(&image);
-        let zones = Plane::from_fn(192, 128, |_, y| u8::from(faint(y)));
+        let zones = Plane::from_fn(192, 128, |_, y| u32::from(faint(y)));
         let found = |zones| {
             let all = corners(&view, zones, 256);
             assert!(all.len() <= 192 * 128 / 256);

@@ -2,6 +2,7 @@
 //! computed.
 
 pub mod check;
+pub mod conditioning;
 pub mod illumination;
 pub mod label_range;
 pub mod matches;
@@ -13,6 +14,7 @@ use crate::memory;
 use crate::options::Illumination;
 use crate::plan::Plan;
 use crate::watch::Watch;
+use conditioning::Conditioning;
 use illumination::homomorphic;
 use matches::Match;
 use zones::Zones;
@@ -42,6 +44,18 @@ impl Prepared {
     }
 }
 
+/// The pair that is matched by `plan` in the place of `pair`, and what was corrected in it.
+///
+/// # Errors
+/// [`Error::Memory`] when the machine cannot hold it, and [`Error::Interrupted`] when the observer breaks.
+pub fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, Conditioning)> {
+    if plan.conditioning_bytes() == 0 {
+        return Ok((pair.clone(), Conditioning::default()));
+    }
+    memory::check(3 * plan.conditioning_bytes(), Purpose::Match)?;
+    watch.host("conditioning", || Ok(conditioning::condition(pair, plan.range, &plan.method.front)))
+}
+
 /// Prepares a match of `pair` by `plan`.
 ///
 /// # Errors
@@ -54,20 +68,27 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     }
     memory::check(plan.front_bytes(), Purpose::Match)?;
     let method = &plan.method;
-    let pair = match method.front.illumination {
-        Illumination::None => pair,
-        Illumination::Homomorphic => {
+    let illumination = method.front.illumination;
+    let corrected = match illumination {
+        Illumination::None => None,
+        Illumination::Homomorphic | Illumination::HomomorphicFirst => {
             let both = || Pair::new(homomorphic(pair.left()), homomorphic(pair.right()));
-            watch.host("illumination", both)?
+            Some(watch.host("illumination", both)?)
         }
     };
-    let mut prepared = Prepared::new(&pair);
+    let matched = corrected.as_ref().unwrap_or(&pair);
+    let mut prepared = Prepared::new(matched);
     if plan.limits_labels() {
-        let options = zones::Options { zones: method.front.zones as usize, ..zones::Options::default() };
+        let pair = if illumination == Illumination::HomomorphicFirst { matched } else { &pair };
+        let options = zones::Options {
+            clusters: method.front.clusters as usize,
+            extent: method.front.zone_extent,
+            ..zones::Options::default()
+        };
         let zones = watch.host("zones", || Ok(zones::segment(pair.left(), &options)))?;
-        matches::check_memory(&pair)?;
+        matches::check_memory(pair)?;
         let split = Some((&zones.map, zones.count));
-        let matches = watch.host("matches", || Ok(matches::find(&pair, split, Some(plan.range))))?;
+        let matches = watch.host("matches", || Ok(matches::find(pair, split, Some(plan.range))))?;
         prepared.label_ranges =
             watch.host("label_range", || Ok(label_range::levels(plan, &zones, &matches)))?;
         prepared.zones = Some((zones, matches));

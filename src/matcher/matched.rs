@@ -4,6 +4,7 @@ use crate::backend::{Backend, Stage, Traffic};
 use crate::engine::Solution;
 use crate::error::Error;
 use crate::front::check::{self, Warning};
+use crate::front::conditioning::Conditioning;
 use crate::image::Plane;
 use crate::maps::Maps;
 use crate::options::DisparityRange;
@@ -19,6 +20,8 @@ pub struct Matched {
     pub maps: Maps,
     /// Iterations done, of all phases together; the most of any tile.
     pub iterations: u32,
+    /// What was corrected in the pair before it was matched.
+    pub conditioning: Conditioning,
     /// The plan that was followed, for the whole image.
     pub plan: Plan,
     /// How the image was cut for it: one tile where it was not.
@@ -63,6 +66,7 @@ impl Matched {
             cells: solution.cells,
             maps: solution.maps,
             iterations: solution.iterations,
+            conditioning: solution.conditioning,
             plan: tiles.whole().clone(),
             tiles: tiles.clone(),
             ran_on: backend.describe(),

@@ -26,7 +26,7 @@ mod tiles;
 
 pub use cost::{CostOptions, MatchingCost, Pyramid};
 pub use execution::{DeviceChoice, Execution};
-pub use front::{FrontOptions, Illumination};
+pub use front::{FrontOptions, Illumination, ZoneExtent};
 pub use graph::GraphOptions;
 pub use messages::{Agreement, MessageOptions, Potential};
 pub use method::{GROUPS, Method};

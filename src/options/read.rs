@@ -160,7 +160,7 @@ mod tests {
             assert_eq!((method.cost.matching, method.cost.outside_cost), (MatchingCost::AdCensus, 0.5));
         }
         let error = Method::paper().set("matching", "ad-census").unwrap_err().to_string();
-        assert_eq!(error, "outside-cost: 20 is outside 0 to 1.625");
+        assert_eq!(error, "outside-cost: 10 is outside 0 to 1.625");
     }
 
     #[test]

@@ -163,7 +163,7 @@ impl Tiles {
 
 /// Bytes that a match in tiles takes besides the current tile.
 fn beside(whole: &Plan) -> u64 {
-    whole.pair_bytes() + whole.mosaic_bytes()
+    whole.pair_bytes() + whole.conditioning_bytes() + whole.mosaic_bytes()
 }
 
 /// The smallest number in `range` for which `holds` is true; it must be true for all larger ones.

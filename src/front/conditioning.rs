@@ -1,0 +1,89 @@
+//! Conditioning of a pair: what rigs, lenses and noise made unlike in the two views is made alike before they are matched.
+//!
+//! Three faults are common in pairs that count as rectified, and each costs more than any part of a matcher gains: the views are a
+//! part of a row apart, one is blurred more than the other, or both are noisy. They are measured on the whole image, and corrected by
+//! filters. A pair without them stays as it is, bit for bit.
+
+mod filter;
+mod noise;
+mod rows;
+mod sharpness;
+
+use crate::image::{Image, Pair};
+use crate::maps::FRACTION;
+use crate::options::{DisparityRange, FrontOptions};
+use filter::{moved, smoothed};
+use std::fmt;
+
+/// What is corrected in a pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Conditioning {
+    /// How far the right view lies below the left one, in 1/256 px: it is moved up by this much.
+    pub offset: i32,
+    /// Standard deviations of the Gaussians that smooth the left and the right view, in pixels; 0 where a view stays as it is.
+    pub smoothing: [f64; 2],
+}
+
+/// `pair`, whose disparities are in `range`, without the faults that `options` ask to be corrected, and what was corrected. A view that
+/// stays as it is, is shared.
+#[must_use]
+pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> (Pair, Conditioning) {
+    let mut found = Conditioning::default();
+    let mut halves = pair.map(Image::downsampled);
+    if options.equal_sharpness {
+        found.smoothing = sharpness::smoothing(pair, &halves);
+        if found != Conditioning::default() {
+            halves = found.apply(pair).map(Image::downsampled);
+        }
+    }
+    let mut matches = Vec::new();
+    if options.level_rows || options.denoise {
+        matches = rows::matches(&halves, range);
+    }
+    if options.level_rows {
+        found.offset = rows::offset(&matches);
+        if found.offset != 0 {
+            // Offsets between whole rows are drawn to these. What is left is smaller, and so is its error.
+            matches = rows::matches(&found.apply(pair).map(Image::downsampled), range);
+            found.offset += rows::median_offset(&matches);
+        }
+    }
+    let level = found.apply(pair);
+    let sigma = if options.denoise { noise::smoothing(&level, &matches) } else { 0.0 };
+    if sigma == 0.0 {
+        return (level, found);
+    }
+    found.smoothing = found.smoothing.map(|of_view| (of_view * of_view + sigma * sigma).sqrt());
+    (found.apply(pair), found)
+}
+
+impl Conditioning {
+    /// The pair without what was found in it.
+    fn apply(&self, pair: &Pair) -> Pair {
+        let level =
+            if self.offset == 0 { pair.clone() } else { pair.with_right(moved(pair.right(), self.offset)) };
+        let [left, right] = self.smoothing;
+        let level = if left == 0.0 { level } else { level.with_left(smoothed(level.left(), left)) };
+        if right == 0.0 { level } else { level.with_right(smoothed(level.right(), right)) }
+    }
+}
+
+/// What was done to the views, in words; nothing where they stayed as they are.
+impl fmt::Display for Conditioning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = f64::from(self.offset.abs()) / f64::from(FRACTION);
+        let way = if self.offset > 0 { "up" } else { "down" };
+        let moved = (self.offset != 0).then(|| format!("the right view is moved {way} by {rows:.2} px"));
+        let [left, right] = self.smoothing;
+        let smoothed = |what: &str, sigma: f64| Some(format!("{what} smoothed by {sigma:.2} px"));
+        let smoothed = match (left > 0.0, right > 0.0) {
+            (false, false) => None,
+            (true, false) => smoothed("the left view is", left),
+            (false, true) => smoothed("the right view is", right),
+            (true, true) if left.total_cmp(&right).is_eq() => smoothed("both views are", left),
+            (true, true) => Some(format!("the views are smoothed by {left:.2} and {right:.2} px")),
+        };
+        f.write_str(&moved.into_iter().chain(smoothed).collect::<Vec<_>>().join(", "))
+    }
+}

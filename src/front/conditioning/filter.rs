@@ -1,0 +1,211 @@
+//! Filters in integers, along rows and columns.
+//!
+//! At its borders an image goes on as it ends. A masked pixel counts as the one before it in its row that is not masked, or as the
+//! first; a masked row counts as the one above that is not, or as the first.
+
+use bytemuck::{Pod, cast_slice, cast_slice_mut};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+use crate::front::illumination::gaussian;
+use crate::image::cubic::{BITS, WEIGHTS};
+use crate::image::{Image, Plane};
+use crate::maps::FRACTION;
+
+/// What filters work on: numbers of 16 bits, one or more a pixel.
+pub(super) trait Pixels: Pod + Send + Sync {}
+
+impl<T: Pod + Send + Sync> Pixels for T {}
+
+/// The weights of adjacent pixels; they sum to 2 to [`BITS`].
+struct Taps {
+    /// The place of the first, relative to the pixel that is computed.
+    first: isize,
+    weights: Vec<i32>,
+}
+
+impl Taps {
+    /// A Gaussian of `sigma` pixels; its centre takes up what is lost by rounding.
+    fn gaussian(sigma: f64) -> Self {
+        let radius = (3.0 * sigma).ceil() as usize;
+        let whole = f64::from(1 << BITS);
+        let mut weights: Vec<i32> =
+            gaussian(sigma, radius).iter().map(|w| (w * whole).round() as i32).collect();
+        weights[radius] += (1 << BITS) - weights.iter().sum::<i32>();
+        Self { first: -(radius as isize), weights }
+    }
+}
+
+/// The image moved up by `offset`, in 1/256 px. Rows that come from outside are masked, and so is what comes from a masked pixel.
+pub(super) fn moved(image: &Image, offset: i32) -> Image {
+    let (rows, part) = (offset.div_euclid(FRACTION) as isize, offset.rem_euclid(FRACTION));
+    let nearest = |y: usize| {
+        let y = y as isize + rows + isize::from(2 * part >= FRACTION);
+        usize::try_from(y).ok().filter(|&y| y < image.height())
+    };
+    let weights = WEIGHTS[part as usize].map(|weight| weight as i32).to_vec();
+    let pixels = down(&unmasked(&image.pixels, &image.masked), &Taps { first: rows - 1, weights });
+    let (width, height) = image.pixels.size();
+    let masked = Plane::from_fn(width, height, |x, y| nearest(y).is_none_or(|y| image.masked[(x, y)]));
+    Image { pixels, masked }
+}
+
+/// The image smoothed by a Gaussian of `sigma` pixels.
+pub(super) fn smoothed(image: &Image, sigma: f64) -> Image {
+    Image { pixels: smooth(&image.pixels, &image.masked, sigma), masked: image.masked.clone() }
+}
+
+/// The same, of anything that pixels hold.
+pub(super) fn smooth<T: Pixels>(pixels: &Plane<T>, masked: &Plane<bool>, sigma: f64) -> Plane<T> {
+    let taps = Taps::gaussian(sigma);
+    across(&down(&unmasked(pixels, masked), &taps), &taps)
+}
+
+/// The pixels of an image, with others in the place of masked ones.
+fn unmasked<'a, T: Pixels>(pixels: &'a Plane<T>, masked: &Plane<bool>) -> Cow<'a, Plane<T>> {
+    let mut pixels = Cow::Borrowed(pixels);
+    let all_masked = |y: usize| !masked.row(y).contains(&false);
+    let Some(first) = (0..masked.height()).find(|&y| !all_masked(y)) else { return pixels };
+    for y in (first..masked.height()).filter(|&y| masked.row(y).contains(&true)) {
+        let pixels = pixels.to_mut();
+        if all_masked(y) {
+            let (above, row) = pixels.rows_mut(y - 1..y + 1).split_at_mut(masked.width());
+            row.copy_from_slice(above);
+            continue;
+        }
+        let (row, masked) = (pixels.row_mut(y), masked.row(y));
+        let mut last =
+            masked.iter().zip(&*row).find(|(masked, _)| !**masked).map_or(T::zeroed(), |found| *found.1);
+        for (pixel, masked) in row.iter_mut().zip(masked) {
+            if *masked {
+                *pixel = last;
+            }
+            last = *pixel;
+        }
+    }
+    if first > 0 {
+        let row = pixels.row(first).to_vec();
+        (0..first).for_each(|y| pixels.to_mut().row_mut(y).copy_from_slice(&row));
+    }
+    pixels
+}
+
+/// Filters along columns.
+fn down<T: Pixels>(pixels: &Plane<T>, taps: &Taps) -> Plane<T> {
+    let (width, height) = pixels.size();
+    let mut out = Plane::filled(width, height, T::zeroed());
+    out.data_mut().par_chunks_mut(width).enumerate().for_each_init(Vec::new, |sums, (y, out)| {
+        let row = |place: isize| (y as isize + place).clamp(0, height as isize - 1) as usize;
+        let rows: Vec<&[u16]> =
+            (taps.first..).take(taps.weights.len()).map(|i| cast_slice(pixels.row(row(i)))).collect();
+        weigh(&taps.weights, &rows, sums, cast_slice_mut(out));
+    });
+    out
+}
+
+/// Filters along rows.
+fn across<T: Pixels>(pixels: &Plane<T>, taps: &Taps) -> Plane<T> {
+    let (width, height) = pixels.size();
+    let mut out = Plane::filled(width, height, T::zeroed());
+    out.data_mut().par_chunks_mut(width).enumerate().for_each_init(Vec::new, |sums, (y, out)| {
+        let row = pixels.row(y);
+        let column = |place: isize| place.clamp(0, width as isize - 1) as usize;
+        let longer: Vec<T> =
+            (taps.first..).take(width + taps.weights.len() - 1).map(|x| row[column(x)]).collect();
+        let places: Vec<&[u16]> = longer.windows(width).map(cast_slice).collect();
+        weigh(&taps.weights, &places, sums, cast_slice_mut(out));
+    });
+    out
+}
+
+/// Sums of `terms` by their weights; `sums` is room for them.
+#[pulp::with_simd(weigh = pulp::Arch::new())]
+#[inline(always)]
+fn weigh_on<'a, S: pulp::Simd>(
+    _: S,
+    weights: &'a [i32],
+    terms: &'a [&'a [u16]],
+    sums: &'a mut Vec<i32>,
+    out: &'a mut [u16],
+) {
+    sums.clear();
+    sums.resize(out.len(), 1 << (BITS - 1));
+    for (weight, term) in weights.iter().zip(terms) {
+        for (sum, v) in sums.iter_mut().zip(*term) {
+            *sum += weight * i32::from(*v);
+        }
+    }
+    for (out, sum) in out.iter_mut().zip(sums) {
+        *out = (*sum >> BITS).clamp(0, 0xffff) as u16;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: usize, height: usize, grey: impl Fn(usize, usize) -> u16) -> Image {
+        let pixels = Plane::from_fn(width, height, |x, y| [grey(x, y); 4]);
+        Image { pixels, masked: Plane::filled(width, height, false) }
+    }
+
+    #[test]
+    fn whole_rows_are_copied_and_others_lie_between() {
+        let slope = image(3, 20, |x, y| (1000 * x + 512 * y) as u16);
+        for rows in [-3, 0, 2] {
+            let there = moved(&slope, rows * FRACTION);
+            for y in 0..20 {
+                let from = y as i32 + rows;
+                assert_eq!(there.masked[(1, y)], !(0..20).contains(&from), "row {y}, moved by {rows}");
+                if !there.masked[(1, y)] {
+                    assert_eq!(there.pixels.row(y), slope.pixels.row(from as usize));
+                }
+            }
+        }
+        // Cubic convolution keeps a slope.
+        let there = moved(&slope, FRACTION / 4);
+        assert!((1..18).all(|y| there.pixels[(2, y)][0] == slope.pixels[(2, y)][0] + 128));
+        assert!(there.masked.data().iter().all(|masked| !masked));
+        let there = moved(&slope, FRACTION * 3 / 4);
+        assert_eq!(
+            there.masked.data().iter().filter(|masked| **masked).count(),
+            3,
+            "the last row is outside"
+        );
+    }
+
+    #[test]
+    fn a_gaussian_has_its_width_and_keeps_the_sum() {
+        for sigma in [0.7, 1.0, 2.8] {
+            let spot = smoothed(&image(41, 41, |x, y| if (x, y) == (20, 20) { 60_000 } else { 0 }), sigma);
+            let moment = |power: i32| -> f64 {
+                let columns = (0..41).map(|x| (x as f64 - 20.0, f64::from(spot.pixels[(x, 20)][0])));
+                columns.map(|(x, v)| x.powi(power) * v).sum()
+            };
+            let found = (moment(2) / moment(0)).sqrt();
+            assert!((found - sigma).abs() < 0.06 * sigma, "{found} for {sigma}");
+            let even = image(9, 7, |_, _| 43_210);
+            assert_eq!(smoothed(&even, sigma), even);
+        }
+    }
+
+    #[test]
+    fn what_is_masked_has_no_influence() {
+        let with = |hidden: u16| {
+            let mut image = image(12, 9, |x, y| (97 * x * y) as u16);
+            for (x, y) in [(5, 4), (0, 7), (11, 8)].into_iter().chain((0..12).flat_map(|x| [(x, 0), (x, 6)]))
+            {
+                image.masked[(x, y)] = true;
+                image.pixels[(x, y)] = [hidden; 4];
+            }
+            image
+        };
+        let seen = |image: Image| {
+            let pixels = image.pixels.data().iter().zip(image.masked.data());
+            pixels.map(|(pixel, masked)| (!masked).then_some(*pixel)).collect::<Vec<_>>()
+        };
+        for filter in [|image: &Image| moved(image, 100), |image: &Image| smoothed(image, 1.0)] {
+            assert!(seen(filter(&with(0))) == seen(filter(&with(65_535))));
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Noise: what the two views do not share of their finest detail, because of their sensors or of compression.
+
+use super::rows::FEWEST;
+use crate::front::matches::Match;
+use crate::image::{Image, Pair};
+use crate::maps::FRACTION;
+use std::array::from_fn;
+
+/// By how much both views are smoothed (a standard deviation in pixels), where they share less of their finest detail than this
+/// (open). Of 50 pairs that nobody disturbed, 39 share 0.70 or more; noise of 5, 10 and 20 levels leaves about 0.79, 0.65 and
+/// 0.40.
+const SMOOTHING: [(f64, f64); 3] = [(0.5, 1.0), (0.57, 0.7), (0.7, 0.5)];
+/// Radius of the patches that are compared, in pixels.
+const RADIUS: usize = 4;
+const SIDE: usize = 2 * RADIUS + 1;
+const PIXELS: usize = SIDE * SIDE;
+/// How far the patch of the right view is moved to either side of where it is expected, in pixels.
+const REACH: i32 = 3;
+/// Patches are compared where their disparity is this near to a whole number, in pixels: to interpolate is to smooth.
+const NEARLY_WHOLE: f64 = 0.2;
+/// Detail counts up to this many times its median, so that single wrong pixels do not matter: smoothing would spread them.
+const MOST_DETAIL: i32 = 2;
+
+/// The standard deviation of the Gaussian by which both views are to be smoothed, from matches at half their size; 0 for none.
+pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
+    let shared = shared_detail(pair, matches);
+
+    let smoothing = SMOOTHING.iter().find(|(least, _)| shared.is_some_and(|shared| shared < *least));
+    smoothing.map_or(0.0, |(_, sigma)| *sigma)
+}
+
+/// The correlation of the finest detail of all patches together; `None` where there are too few.
+fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
+    let patches: Vec<_> = matches.iter().filter_map(|m| details(pair, m)).collect();
+    if patches.len() < FEWEST {
+        return None;
+    }
+    let all = |side: usize| patches.iter().flat_map(move |details| &details[side]);
+    Some(correlation(all(0), all(1)))
+}
+
+/// The finest detail around a match in the left and the right view, where their patches are a whole number of pixels apart.
+fn details(pair: &Pair, m: &Match) -> Option<[[i32; PIXELS]; 2]> {
+    let (x, y) = (2 * m.x, 2 * m.y);
+    let left = Patch::new(pair.left(), x, y)?;
+    let expected = x as i32 - (2 * m.disparity + FRACTION / 2).div_euclid(FRACTION);
+    let there = |x: i32| Patch::new(pair.right(), usize::try_from(x).ok()?, y);
+    let places: Vec<Patch> = (expected - REACH..=expected + REACH).map(there).collect::<Option<_>>()?;
+    let scores: Vec<f64> = places.iter().map(|right| correlation(&left.coarse, &right.coarse)).collect();
+    let best = (1..scores.len() - 1).max_by(|a, b| scores[*a].total_cmp(&scores[*b]))?;
+    let (before, peak, after) = (scores[best - 1], scores[best], scores[best + 1]);
+    let bend = before - 2.0 * peak + after;
+    let whole = bend < 0.0 && (before - after).abs() <= -2.0 * bend * NEARLY_WHOLE;
+    let mut details = [left.fine, places[best].fine];
+    let mut sizes: Vec<i32> = details.iter().flatten().map(|v| v.abs()).collect();
+    let median = *sizes.select_nth_unstable(PIXELS).1;
+    details.iter_mut().flatten().for_each(|v| *v = (*v).clamp(-MOST_DETAIL * median, MOST_DETAIL * median));
+    whole.then_some(details)
+}
+
+/// The sum of products over the root of the product of the sums of squares; 1 where a sum is 0.
+fn correlation<'a>(a: impl IntoIterator<Item = &'a i32>, b: impl IntoIterator<Item = &'a i32>) -> f64 {
+    let (mut aa, mut ab, mut bb) = (0, 0, 0);
+    for (&a, &b) in a.into_iter().zip(b) {
+        let (a, b) = (i64::from(a), i64::from(b));
+        (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
+    }
+    if aa == 0 || bb == 0 { 1.0 } else { ab as f64 / (aa as f64).sqrt() / (bb as f64).sqrt() }
+}
+
+/// The grey around a pixel, in 1/16 of an 8-bit level.
+struct Patch {
+    /// Smoothed by a binomial filter of 3 x 3 pixels, less the mean.
+    coarse: [i32; PIXELS],
+    /// What that filter takes off.
+    fine: [i32; PIXELS],
+}
+
+impl Patch {
+    /// `None` where it leaves the image or holds a masked pixel.
+    fn new(image: &Image, x: usize, y: usize) -> Option<Self> {
+        const AROUND: usize = RADIUS + 1;
+        let (width, height) = image.pixels.size();
+        let (left, top) = (x.checked_sub(AROUND)?, y.checked_sub(AROUND)?);
+        if x + AROUND >= width || y + AROUND >= height {
+            return None;
+        }
+        let mut grey = [[0; SIDE + 2]; SIDE + 2];
+        for (j, row) in grey.iter_mut().enumerate() {
+            let columns = left..left + SIDE + 2;
+            if image.masked.row(top + j)[columns.clone()].contains(&true) {
+                return None;
+            }
+            let pixels = &image.pixels.row(top + j)[columns];
+            row.iter_mut().zip(pixels).for_each(|(grey, pixel)| *grey = i32::from(pixel[3] >> 4));
+        }
+        let sums: [i32; PIXELS] = from_fn(|at| {
+            let (x, y) = (at % SIDE, at / SIDE);
+            let across = |row: &[i32; SIDE + 2]| row[x] + 2 * row[x + 1] + row[x + 2];
+            across(&grey[y]) + 2 * across(&grey[y + 1]) + across(&grey[y + 2])
+        });
+        let fine = from_fn(|at| grey[at / SIDE + 1][at % SIDE + 1] - sums[at] / 16);
+        let mean = sums.iter().sum::<i32>() / PIXELS as i32;
+        Some(Self { coarse: sums.map(|sum| sum - mean), fine })
+    }
+}

@@ -1,0 +1,36 @@
+//! Views whose rows do not line up: a calibration that has aged, or a rig that was bumped.
+
+use crate::front::matches::{self, Match, median};
+use crate::image::Pair;
+use crate::options::DisparityRange;
+
+/// Approximate number of corners whose matches are looked at.
+const SAMPLE: usize = 400;
+/// Fewer matches than this tell nothing.
+pub(super) const FEWEST: usize = 30;
+/// Rows above and below its own on which a corner is looked for, at half the size.
+const ROWS: usize = 2;
+/// Smallest offset that is corrected, in 1/256 px (open): resampling costs a little sharpness.
+const LEAST: i32 = 16;
+
+/// Sparse matches of a pair at half its size, where noise and blur matter less, from a range at full size.
+pub(super) fn matches(halves: &Pair, range: DisparityRange) -> Vec<Match> {
+    let (width, height) = halves.size();
+    let range = DisparityRange { min: range.min.div_euclid(2), max: range.max.div_euclid(2) + 1 };
+    matches::search(halves, None, Some(range), width * height / SAMPLE, ROWS)
+}
+
+/// The offset of the rows in a pair with these matches at half its size, in 1/256 px; 0 where it is too small, or within what
+/// chance makes of it (three standard errors of the median).
+pub(super) fn offset(matches: &[Match]) -> i32 {
+    let offset = median_offset(matches);
+    let deviation = i64::from(median(matches.iter().map(|m| (2 * m.dy - offset).abs())));
+    let count = matches.len() as i64;
+    let sure = count * i64::from(offset).pow(2) >= 31 * deviation.pow(2);
+    if sure && offset.abs() >= LEAST { offset } else { 0 }
+}
+
+/// The same, however small. It is the median: moving objects and false matches do not count, and a rotation stays as it is.
+pub(super) fn median_offset(matches: &[Match]) -> i32 {
+    if matches.len() < FEWEST { 0 } else { median(matches.iter().map(|m| 2 * m.dy)) }
+}

@@ -1,0 +1,140 @@
+//! Conditioning: faults of a rig are found, corrected, and told from scenes without them.
+
+use std::path::Path;
+
+use mrfgs::image::{Image, Pair};
+use mrfgs::low_level::front::conditioning::condition;
+use mrfgs::maps::FRACTION;
+use mrfgs::options::DisparityRange;
+use mrfgs::{Conditioning, Matcher, Method};
+
+const RANGE: DisparityRange = DisparityRange { min: 0, max: 31 };
+
+fn scene(name: &str) -> mrfgs::Result<Pair> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name);
+    Pair::open(folder.join("im0.png"), folder.join("im1.png"))
+}
+
+fn found(pair: &Pair) -> Conditioning {
+    condition(pair, RANGE, &Method::default().front).1
+}
+
+#[test]
+fn sound_rigs_stay_as_they_are() {
+    for name in ["slanted", "thin", "wall", "repetitive", "exposure", "light", "steep", "mixed"] {
+        let pair = scene(name).unwrap();
+        let (same, found) = condition(&pair, RANGE, &Method::default().front);
+        assert_eq!(found, Conditioning::default(), "{name}");
+        assert!(same == pair, "{name}");
+        assert_eq!(found.to_string(), "", "{name}");
+    }
+}
+
+#[test]
+fn each_fault_is_found_in_its_scene() {
+    let rows = found(&scene("rows").unwrap());
+    let offset = f64::from(rows.offset) / f64::from(FRACTION);
+    assert!((offset - 0.6).abs() < 0.1, "{rows:?}");
+    // It says nothing of smoothing.
+    assert_eq!(rows.to_string(), format!("the right view is moved up by {offset:.2} px"));
+    // Light from 5 x 5 pixels is spread as by a Gaussian of 1.44 pixels, but only what noise leaves of the detail tells so.
+    let focus = found(&scene("focus").unwrap());
+    let [left, right] = focus.smoothing;
+    assert!((left * left - right * right).sqrt() > 0.6 && left < 2.0 && focus.offset == 0, "{focus:?}");
+    let grain = found(&scene("grain").unwrap());
+    assert_eq!(grain.offset, 0, "{grain:?}");
+    assert!(grain.to_string().starts_with("both views are smoothed by"), "{grain}");
+}
+
+/// With the views exchanged, the same faults have the other sign and the other side.
+#[test]
+fn exchanged_views_have_exchanged_faults() {
+    let exchanged = |name| found(&scene(name).unwrap().mirrored());
+    let (there, back) = (found(&scene("rows").unwrap()), exchanged("rows"));
+    assert!((there.offset + back.offset).abs() < FRACTION / 16, "{there:?} and {back:?}");
+    let (there, back) = (found(&scene("focus").unwrap()), exchanged("focus"));
+    let ratio = there.smoothing[0] / back.smoothing[1];
+    assert!((0.8..1.25).contains(&ratio), "{there:?} and {back:?}");
+}
+
+/// Each correction earns its place where its fault is.
+#[test]
+fn what_is_corrected_is_matched_better() {
+    let mut matcher = Matcher::builder().device("cpu").build().unwrap();
+    for (name, key) in [("rows", "level-rows"), ("focus", "equal-sharpness"), ("grain", "denoise")] {
+        let pair = scene(name).unwrap();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name);
+        let truth = mrfgs::image::read::read_disparity(&folder.join("disp0GT.pfm")).unwrap();
+        let mut bad = |value: &str| {
+            let mut method = Method::default();
+            method.set(key, value).unwrap();
+            let matched = matcher.job(&pair, RANGE).method(&method).run().unwrap();
+            let map = matched.disparity();
+            let errors = map.data().iter().zip(truth.data()).filter(|(d, t)| (*d - *t).abs() > 2.0).count();
+            (matched.conditioning, errors as f64 / map.data().len() as f64)
+        };
+        let ((none, before), (some, after)) = (bad("false"), bad("true"));
+        println!("{name}: bad2.0 {:.2} %, {:.2} % with {key}", 100.0 * before, 100.0 * after);
+        assert!(some != none && after < 0.9 * before, "{name}: {before} and {after}");
+    }
+}
+
+/// Off means off.
+#[test]
+fn the_paper_corrects_no_rig() {
+    for name in ["rows", "focus", "grain"] {
+        let pair = scene(name).unwrap();
+        assert!(condition(&pair, RANGE, &Method::paper().front) == (pair, Conditioning::default()), "{name}");
+    }
+}
+
+#[test]
+fn any_image_has_an_answer() {
+    let crop = |width: usize, height: usize| {
+        scene("grain").unwrap().crop(&mrfgs::image::Rect { x: 0..width, y: 0..height })
+    };
+    for (width, height) in [(1, 1), (2, 1), (1, 40), (17, 9), (40, 3), (31, 33)] {
+        let pair = crop(width, height);
+        assert_eq!(condition(&pair, RANGE, &Method::default().front).0.size(), (width, height));
+    }
+    let blind = |mut image: Image| {
+        image.masked.data_mut().fill(true);
+        image
+    };
+    let pair = scene("mixed").unwrap();
+    let pair = Pair::new(blind(pair.left().clone()), blind(pair.right().clone())).unwrap();
+    assert_eq!(found(&pair), Conditioning::default());
+}
+
+/// What is masked may hold anything.
+#[test]
+fn masked_pixels_say_nothing() {
+    for name in ["rows", "focus", "grain"] {
+        let pair = scene(name).unwrap();
+        let with = |hidden: u16| {
+            let cover = |image: &Image| {
+                let mut image = image.clone();
+                for y in 40..60 {
+                    image.masked.row_mut(y)[60..90].fill(true);
+                    image.pixels.row_mut(y)[60..90].fill([hidden; 4]);
+                }
+                image
+            };
+            found(&Pair::new(cover(pair.left()), cover(pair.right())).unwrap())
+        };
+        assert_eq!(with(0), with(65_535), "{name}");
+        assert_ne!(with(0), Conditioning::default(), "{name}");
+    }
+}
+
+/// Tiles are cut from the corrected pair: the faults are those of the whole.
+#[test]
+fn tiles_share_what_was_found() {
+    let pair = scene("rows").unwrap();
+    let mut method = Method::default();
+    method.set("memory", "15").unwrap();
+    let mut matcher = Matcher::builder().device("cpu").build().unwrap();
+    let matched = matcher.job(&pair, RANGE).method(&method).run().unwrap();
+    assert!(matched.tiles.count() > 1, "{} tile", matched.tiles.count());
+    assert_eq!(matched.conditioning, found(&pair));
+}
