@@ -1,0 +1,109 @@
+//! Maps in the memory of C.
+
+use mrfgs::Matched;
+use mrfgs::image::Plane;
+use mrfgs::maps::flag;
+
+use crate::frame::extent;
+use crate::status::Failure;
+
+/// Why a pixel is what it is: bits of the validity map. A pixel of 0 is measured and trusted.
+#[repr(u8)]
+pub enum Flag {
+    /// The match is outside the right image.
+    Outside = 1,
+    /// The right view disagrees: occluded, or mistaken.
+    Occluded = 2,
+    /// The pixel is in a region too small to be trusted.
+    Speckle = 4,
+    /// The confidence is low; the disparity stays.
+    LowConfidence = 8,
+    /// The disparity is filled in from other pixels.
+    Filled = 16,
+    /// The pixel is ignored, and has no disparity.
+    Masked = 32,
+}
+
+// The header takes numbers alone.
+const _: () = assert!(
+    Flag::Outside as u8 == flag::OUTSIDE
+        && Flag::Occluded as u8 == flag::OCCLUDED
+        && Flag::Speckle as u8 == flag::SPECKLE
+        && Flag::LowConfidence as u8 == flag::LOW_CONFIDENCE
+        && Flag::Filled as u8 == flag::FILLED
+        && Flag::Masked as u8 == flag::MASKED
+);
+
+/// Where maps are written; all of them have the size of the images. Null leaves a map out. Strides are in bytes, from a row to the next
+/// one.
+#[repr(C)]
+pub struct Maps {
+    /// sizeof(mrfgs_maps).
+    pub size: usize,
+    /// The disparity in pixels, +infinity where there is none. Left (x, y) with disparity d is seen at right (x - d, y).
+    pub disparity: *mut f32,
+    pub disparity_stride: usize,
+    /// How far the best runner-up is behind, in 1/8 nat; 0 where nothing was measured.
+    pub confidence: *mut u8,
+    pub confidence_stride: usize,
+    /// Why each pixel is what it is: the sum of mrfgs_flag.
+    pub validity: *mut u8,
+    pub validity_stride: usize,
+}
+
+impl Maps {
+    /// Whether maps of this size fit.
+    pub(crate) fn check(&self, size: (usize, usize)) -> Result<(), Failure> {
+        if self.size != size_of::<Self>() {
+            return Err(Failure::argument(format!(
+                "maps.size is {}, and sizeof(mrfgs_maps) is {} in the library: set it, and build with the library's own header",
+                self.size,
+                size_of::<Self>()
+            )));
+        }
+        for (name, is_null, stride, pixel) in [
+            ("disparity", self.disparity.is_null(), self.disparity_stride, size_of::<f32>()),
+            ("confidence", self.confidence.is_null(), self.confidence_stride, 1),
+            ("validity", self.validity.is_null(), self.validity_stride, 1),
+        ] {
+            if !is_null {
+                extent(stride, size, pixel)
+                    .map_err(|wrong| Failure::argument(format!("the map maps.{name} {wrong}")))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes every map that is wanted.
+    ///
+    /// # Safety
+    /// The maps were checked for the size of those that were found, and are as large as their fields say.
+    pub(crate) unsafe fn write(&self, matched: &Matched) {
+        if !self.disparity.is_null() {
+            // SAFETY: the caller promises it.
+            unsafe { put(&matched.disparity(), self.disparity, self.disparity_stride) };
+        }
+        if !self.confidence.is_null() {
+            // SAFETY: the caller promises it.
+            unsafe { put(matched.confidence(), self.confidence, self.confidence_stride) };
+        }
+        if !self.validity.is_null() {
+            // SAFETY: the caller promises it.
+            unsafe { put(matched.validity(), self.validity, self.validity_stride) };
+        }
+    }
+}
+
+/// Copies a map byte by byte: rows may begin at any address, and hold anything.
+///
+/// # Safety
+/// `to` is the first of as many rows as `map` has, `stride` bytes apart, each at least as long as its rows.
+unsafe fn put<T: Copy>(map: &Plane<T>, to: *mut T, stride: usize) {
+    for y in 0..map.height() {
+        let row = map.row(y);
+        // SAFETY: the row is in the memory of the map, as the caller promises.
+        let to = unsafe { to.cast::<u8>().add(y * stride) };
+        // SAFETY: both rows have these bytes, and one of them was made here.
+        unsafe { row.as_ptr().cast::<u8>().copy_to_nonoverlapping(to, size_of_val(row)) };
+    }
+}
