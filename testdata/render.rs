@@ -3,6 +3,8 @@
 //! With a scene's name and a size it renders that scene alone, as large as one likes:
 //! `cargo run --release --example render-scenes FOLDER mixed 3000 2000 256`.
 
+#[path = "raw.rs"]
+mod raw;
 #[path = "scenes.rs"]
 mod scenes;
 
@@ -19,7 +21,11 @@ fn main() -> Result<()> {
     let folder =
         args.first().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata"), PathBuf::from);
     match args.get(1..).unwrap_or_default() {
-        [] => scenes::ALL.iter().try_for_each(|recipe| save(&recipe.render(), &folder)),
+        [] => {
+            scenes::ALL.iter().try_for_each(|recipe| save(&recipe.render(), &folder))?;
+            save_raw(&folder.join("raw"))
+        }
+        [name] if name == "raw" => save_raw(&folder.join("raw")),
         [name, size @ ..] if size.len() == 3 => {
             let numbers: std::result::Result<Vec<u32>, _> = size.iter().map(|n| n.parse()).collect();
             let Ok(&[width, height, labels]) = numbers.as_deref() else { return Err(usage()) };
@@ -43,6 +49,22 @@ fn save(scene: &scenes::Scene, folder: &Path) -> Result<()> {
     write_png(&folder.join("mask0nocc.png"), size, scene.mask.data(), ExtendedColorType::L8)?;
     write_pfm(&folder.join("disp0GT.pfm"), &scene.truth)?;
     fs::write(folder.join("calib.txt"), scene.calibration())?;
+    println!("{}", folder.display());
+    Ok(())
+}
+
+/// Writes the raw pair and its calibration.
+fn save_raw(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)?;
+    let scene = raw::scene();
+    for (name, camera, view) in
+        [("left.png", &raw::CAMERAS[0], &scene.left), ("right.png", &raw::CAMERAS[1], &scene.right)]
+    {
+        let photograph = camera.photograph(raw::SIZE, view);
+        write_png(&folder.join(name), raw::SIZE, photograph.data().as_flattened(), ExtendedColorType::Rgb8)?;
+    }
+    let text = raw::calibration(&raw::CAMERAS, raw::SIZE, raw::baseline(&scene));
+    fs::write(folder.join("cameras.yml"), text)?;
     println!("{}", folder.display());
     Ok(())
 }

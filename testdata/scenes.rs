@@ -26,7 +26,7 @@ pub struct Recipe {
 }
 
 /// Every scene, as `testdata/` holds it.
-pub const ALL: [Recipe; 8] = [
+pub const ALL: [Recipe; 11] = [
     Recipe::small("slanted", slanted),
     Recipe::small("thin", thin),
     Recipe::small("wall", wall),
@@ -34,6 +34,9 @@ pub const ALL: [Recipe; 8] = [
     Recipe::small("exposure", exposure),
     Recipe::small("light", light),
     Recipe::small("steep", steep),
+    Recipe::small("rows", rows),
+    Recipe::small("focus", focus),
+    Recipe::small("grain", grain),
     Recipe { name: "mixed", width: 320, height: 240, labels: 48, world: mixed },
 ];
 
@@ -307,5 +310,26 @@ fn mixed() -> World {
         0.014,
         paint(Rings(0.16), [0xb8332c, 0xf0eadc]).grain(0.08, 0.05),
     );
+    world
+}
+
+/// The still life, seen by a right camera that records it a part of a row lower.
+fn rows() -> World {
+    let mut world = mixed();
+    world.sensors[1].lower = 0.6;
+    world
+}
+
+/// The still life, seen by a right camera that is out of focus.
+fn focus() -> World {
+    let mut world = mixed();
+    world.sensors[1].spread = 5.0;
+    world
+}
+
+/// The still life in the dark: both sensors are noisy.
+fn grain() -> World {
+    let mut world = mixed();
+    world.sensors.iter_mut().for_each(|sensor| sensor.noise = 12.0);
     world
 }

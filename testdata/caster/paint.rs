@@ -1,0 +1,69 @@
+//! The textures of bodies.
+
+use super::noise::{noise, octaves};
+use super::vector::{Vec3, mix, scale};
+
+#[derive(Clone, Copy)]
+pub enum Pattern {
+    /// The first colour alone.
+    Plain,
+    /// A slow change between the two colours, over about this length.
+    Wash(f64),
+    /// Patches of this size with ragged borders.
+    Blotches(f64),
+    /// Stripes across the body's x, with this period.
+    Stripes(f64),
+    /// Rings across the body's z, with this period.
+    Rings(f64),
+    /// Cubes of this size.
+    Checker(f64),
+}
+
+/// A pattern of two colours under a band-limited grain that is carved out of the solid.
+#[derive(Clone, Copy)]
+pub struct Paint {
+    pattern: Pattern,
+    colours: [Vec3; 2],
+    /// Standard deviation of the grain, as a part of the colour.
+    grain: f64,
+    /// Size of the coarsest grain.
+    cell: f64,
+    /// Factors on the body's coordinates before the grain is looked up: below 1 draws it out.
+    stretch: Vec3,
+}
+
+/// A paint of two colours, given as 0xRRGGBB, with a medium grain.
+pub fn paint(pattern: Pattern, colours: [u32; 2]) -> Paint {
+    let colours = colours.map(|c| [c >> 16, c >> 8, c].map(|byte| f64::from(byte & 255) / 255.0));
+    Paint { pattern, colours, grain: 0.16, cell: 0.12, stretch: [1.0; 3] }
+}
+
+impl Paint {
+    pub fn grain(self, grain: f64, cell: f64) -> Self {
+        Self { grain, cell, ..self }
+    }
+
+    pub fn stretch(self, stretch: Vec3) -> Self {
+        Self { stretch, ..self }
+    }
+
+    /// The colour at a point of the body; no detail is much finer than `pixel`.
+    pub fn colour(&self, p: Vec3, pixel: f64, seed: u32) -> Vec3 {
+        let odd = |cells: f64| if cells.floor() as i64 & 1 == 0 { 0.0 } else { 1.0 };
+        let t = match self.pattern {
+            Pattern::Plain => 0.0,
+            Pattern::Wash(size) => 0.5 + 0.7 * noise(scale(p, 1.0 / size), seed ^ 1),
+            Pattern::Blotches(size) => 0.5 + 2.0 * octaves(p, size, pixel, 0.45, seed ^ 1),
+            Pattern::Stripes(period) => odd(2.0 * p[0] / period),
+            Pattern::Rings(period) => odd(2.0 * p[2] / period),
+            Pattern::Checker(size) => odd(p.iter().map(|c| (c / size).floor()).sum()),
+        };
+        let base = mix(self.colours[0], self.colours[1], t.clamp(0.0, 1.0));
+        if self.grain == 0.0 {
+            return base;
+        }
+        let q = [p[0] * self.stretch[0], p[1] * self.stretch[1], p[2] * self.stretch[2]];
+        let grain = octaves(q, self.cell, pixel, 0.8, seed).clamp(-2.5, 2.5);
+        scale(base, 1.0 + self.grain * grain)
+    }
+}
