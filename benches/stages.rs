@@ -41,8 +41,9 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
         ("flood", vec![Stage::Flood(0)]),
         ("winner_takes_all", vec![Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel]),
         ("speckle_filter", vec![Stage::LeftRightCheck, Stage::SpeckleFilter]),
-        ("fill", vec![Stage::Fill, Stage::FillMedian]),
+        ("fill", vec![Stage::Fill, Stage::VoteFill, Stage::FillMedian]),
         ("median", vec![Stage::Median]),
+        ("plane", vec![Stage::Plane]),
     ]
 }
 

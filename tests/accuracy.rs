@@ -1,13 +1,14 @@
-//! Accuracy floors of the default preset: always on rendered scenes, and on real pairs where
+//! Accuracy floors of the presets: always on rendered scenes, and on real pairs where
 //! `MRFGS_MIDDLEBURY` names their folder. The maps are integers, so the figures are the same on every
 //! machine. The floors leave a little room for changes that trade one figure for another.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
+use mrfgs::evaluation::paper::Figures;
 use mrfgs::evaluation::{Report, evaluate};
 use mrfgs::image::{Pair, Plane, calib::Calibration, pfm, read};
 use mrfgs::maps::FRACTION;
-use mrfgs::options::{DisparityRange, Method, Nearer};
+use mrfgs::options::{Agreement, DisparityRange, Method, Nearer};
 use mrfgs::{Matched, Matcher};
 use std::io::Write;
 use std::path::Path;
@@ -47,14 +48,17 @@ fn rounded(matched: &Matched) -> Plane<f32> {
 fn rendered_scenes() {
     // Average error in pixels, bad2.0 and bad0.5 in percent. The method is worst at the plain wall.
     let floors = [
-        ("slanted", 0.20, 0.9, 8.3),
-        ("thin", 0.62, 7.8, 18.5),
-        ("wall", 1.6, 27.0, 57.0),
-        ("repetitive", 0.27, 0.9, 10.4),
-        ("exposure", 0.23, 1.0, 9.0),
-        ("mixed", 0.38, 3.4, 16.5),
-        ("light", 0.55, 4.0, 21.0),
-        ("steep", 0.45, 3.6, 17.5),
+        ("slanted", 0.16, 0.9, 6.8),
+        ("thin", 0.57, 7.1, 15.5),
+        ("wall", 2.1, 26.0, 46.0),
+        ("repetitive", 0.23, 0.7, 7.6),
+        ("exposure", 0.19, 0.9, 7.5),
+        ("mixed", 0.33, 2.9, 12.4),
+        ("light", 0.42, 2.1, 17.5),
+        ("steep", 0.38, 2.6, 14.5),
+        ("rows", 0.44, 5.0, 20.5),
+        ("focus", 0.91, 12.6, 33.0),
+        ("grain", 1.08, 16.2, 54.5),
     ];
     for (scene, avg, bad2, bad05) in floors {
         let folder = Path::new("testdata").join(scene);
@@ -105,21 +109,20 @@ fn nearer_may_be_smaller() {
         let told = figures(&in_the_mirror(Nearer::Smaller));
         let untold = figures(&in_the_mirror(Nearer::Larger));
         println!("{scene}: {told:.2?}, not told {untold:.2?}");
-        assert!(told.0 < 2.0 && told.0 < 0.6 * untold.0 && told.1 < 0.8 * untold.1, "{scene}");
+        assert!(told.0 < 2.0 && told.0 < 0.9 * untold.0 && told.1 < untold.1, "{scene}");
     }
 }
 
 #[test]
 fn real_pairs() {
     let Some(folder) = folder_of_pairs() else { return };
-    // Final: average error in pixels and bad2.0 in percent, at the level of the best fast matchers
-    // (AD-Census, MGM, SGBM) on each pair. Raw: average error and bad2.0 of the paper's table 1.
+    // Final: average error in pixels and bad2.0 in percent, with a little room. Raw: average error and bad2.0 of the paper's table 1.
     let floors = [
-        ("Teddy", (0.72, 6.62), (2.09, 13.90)),
-        ("Cones", (0.78, 7.44), (2.29, 16.52)),
-        ("Dolls", (0.78, 9.00), (2.63, 18.50)),
-        ("Rocks1", (0.59, 3.09), (3.21, 11.96)),
-        ("Motorcycle", (1.50, 8.32), (3.40, 19.53)),
+        ("Teddy", (0.55, 6.5), (2.09, 13.90)),
+        ("Cones", (0.61, 6.3), (2.29, 16.52)),
+        ("Dolls", (0.67, 6.8), (2.63, 18.50)),
+        ("Rocks1", (0.45, 2.9), (3.21, 11.96)),
+        ("Motorcycle", (1.22, 6.7), (3.40, 19.53)),
     ];
     for (pair, (avg, bad2), (raw_avg, raw_bad2)) in floors {
         let folder = Path::new(&folder).join(pair);
@@ -161,6 +164,43 @@ fn fast_on_real_pairs() {
     assert!(fast < 6.4 && default < fast, "{fast}, {default}");
 }
 
+/// The presets of the paper are as near to its tables as `docs/paper.md` says: means of average error, PSNR and bad2.0 over the
+/// five pairs, raw and final.
+#[test]
+fn the_papers_presets_on_real_pairs() {
+    let Some(folder) = folder_of_pairs() else { return };
+    let pairs = ["Teddy", "Cones", "Dolls", "Rocks1", "Motorcycle"];
+    let means = |method: &Method| {
+        let figures = pairs.map(|pair| {
+            let folder = Path::new(&folder).join(pair);
+            let maps = matched(&folder, method).maps;
+            [maps.raw_map(), maps.final_map()].map(|map| Figures::from(&report(&folder, &map).all))
+        });
+        [0, 1].map(|map| {
+            let mean = |value: fn(&Figures) -> f64| {
+                figures.iter().map(|f| value(&f[map])).sum::<f64>() / pairs.len() as f64
+            };
+            [mean(|f| f.avg.unwrap()), mean(|f| f.psnr.unwrap()), mean(|f| f.bad2)]
+        })
+    };
+    let floors = [
+        ("paper", [[2.26, 35.7, 22.7], [2.06, 36.8, 21.3]]),
+        ("fgs", [[2.30, 35.4, 22.9], [1.90, 36.8, 19.4]]),
+    ];
+    for (preset, floors) in floors {
+        let found = means(&Method::preset(preset).unwrap());
+        println!("{preset}: raw {:.2?}, final {:.2?}", found[0], found[1]);
+        for ([avg, psnr, bad2], floor) in found.into_iter().zip(floors) {
+            assert!(avg <= floor[0] && psnr >= floor[1] && bad2 <= floor[2], "{preset}: {found:.2?}");
+        }
+    }
+    // Control: one reading turned costs three points.
+    let mut strict = Method::paper();
+    strict.messages.agreement = Agreement::Strict;
+    let [_, [_, _, bad2]] = means(&strict);
+    assert!(bad2 > 23.5, "{bad2}");
+}
+
 /// FNV-1a of a map's values.
 fn checksum(map: &Plane<i32>) -> u64 {
     let bytes = map.data().iter().flat_map(|d| d.to_le_bytes());
@@ -171,14 +211,14 @@ fn checksum(map: &Plane<i32>) -> u64 {
 #[test]
 fn the_presets_of_the_paper_are_pinned() {
     let pins = [
-        ("paper", "slanted", 0xb8c3_44eb_108e_a005),
-        ("paper", "thin", 0xe754_6744_374c_452d),
-        ("paper", "wall", 0x51ea_9763_840b_f5cd),
-        ("paper", "repetitive", 0xede6_8a6d_460d_24cd),
-        ("paper", "exposure", 0x6714_41c9_89fb_b59d),
-        ("paper", "mixed", 0x7df3_5eaa_cdce_2f5d),
-        ("fgs", "slanted", 0x475f_b1f1_afb4_9402),
-        ("fgs", "mixed", 0x02fe_8b50_2570_aa99),
+        ("paper", "slanted", 0xcdd8_699e_9808_b317),
+        ("paper", "thin", 0x1d57_7f25_1e91_d775),
+        ("paper", "wall", 0x23ec_0a3b_ace9_9d47),
+        ("paper", "repetitive", 0x8e18_f607_93b9_d687),
+        ("paper", "exposure", 0xf3ca_a352_d074_f4d0),
+        ("paper", "mixed", 0xb327_22c3_7944_75b2),
+        ("fgs", "slanted", 0x139c_243c_de6e_db6e),
+        ("fgs", "mixed", 0x665c_813d_b690_5fbb),
     ];
     let found = pins.map(|(preset, scene, _)| {
         let method = Method::preset(preset).unwrap();

@@ -230,7 +230,7 @@ fn a_device_without_a_clock() {
         assert_eq!(of(sweep).count(), matched.plan.levels.len());
         assert_eq!(of("graph").count(), matched.plan.levels.len());
         assert_eq!(of(sweep).map(|t| t.runs).max(), Some(15));
-        for stage in ["upload", "cost", "median", "download"] {
+        for stage in ["upload", "cost", "plane", "download"] {
             assert!(of(stage).all(|t| t.runs == 1 && t.time > Duration::ZERO), "{stage}, {no_clock}");
             assert_eq!(of(stage).count(), 1, "{stage}");
         }

@@ -59,10 +59,12 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     if plan.method.refinement.fill != Fill::None {
         twin::fill::fill(plan, maps);
     }
-    if plan.method.refinement.fill == Fill::Median {
+    if plan.method.refinement.fill == Fill::Votes {
+        twin::vote_fill::vote_fill(plan, pair, maps);
         twin::fill_median::fill_median(plan, pair, maps);
     }
-    twin::median::median(plan, pair, maps);
+    let last = if plan.method.refinement.plane { twin::plane::plane } else { twin::median::median };
+    last(plan, pair, maps);
 }
 
 /// Where the maps of two matches differ.
@@ -145,6 +147,7 @@ fn the_right_map_is_the_map_of_the_mirrored_pair() {
     let mut method = Method::default();
     method.refinement.left_right_check = LeftRightCheck::SecondMatch;
     (method.refinement.right_map, method.refinement.speckle_size) = (true, 9);
+    method.front = random::as_it_is();
     let mut random = Random::new(12);
     let plan = random::plan((41, 30), -3, 17, &method);
     for _ in 0..4 {

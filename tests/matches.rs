@@ -83,14 +83,14 @@ fn moved(image: &Image, from: impl Fn(i32, i32) -> (i32, i32)) -> Image {
 }
 
 /// Zones of five brightness bands in three columns of the image.
-fn crude_zones(image: &Image) -> Plane<u8> {
+fn crude_zones(image: &Image) -> Plane<u32> {
     let mut greys: Vec<u16> = image.pixels.data().iter().map(|p| p[3]).collect();
     greys.sort_unstable();
     let limits: Vec<u16> = (1..5).map(|i| greys[greys.len() * i / 5]).collect();
     let (width, height) = image.pixels.size();
     Plane::from_fn(width, height, |x, y| {
         let band = limits.iter().filter(|limit| image.pixels[(x, y)][3] >= **limit).count();
-        (3 * band + 3 * x / width) as u8
+        (3 * band + 3 * x / width) as u32
     })
 }
 
@@ -237,7 +237,7 @@ fn masked_pixels_are_never_used() {
 fn pixels_of_no_zone_give_no_match() {
     let case = Case::scene("slanted");
     let (width, height) = case.pair.size();
-    let zones = Plane::from_fn(width, height, |x, _| u8::from(x >= 120));
+    let zones = Plane::from_fn(width, height, |x, _| u32::from(x >= 120));
     let beyond = |count| {
         let found = matches::find(&case.pair, Some((&zones, count)), Some(case.range));
         assert!(found.iter().any(|m| m.x < 120));

@@ -6,7 +6,6 @@
 mod common;
 
 use common::devices;
-use mrfgs::Error;
 use mrfgs::error::{DeviceError, MemoryError};
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::low_level::backend::cpu::Cpu;
@@ -16,6 +15,7 @@ use mrfgs::low_level::engine::{Solution, solve};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
+use mrfgs::{Conditioning, Error};
 use pollster::block_on;
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -177,7 +177,15 @@ fn matched_maps_only(backend: &mut dyn Backend) -> Solution {
     let requested = backend.request_maps().unwrap();
     let (maps, traffic, cells) =
         (block_on(backend.maps(requested)).unwrap().0, backend.traffic(), backend.cells());
-    Solution { maps, iterations: 0, host_times: Vec::new(), mosaic_times: Vec::new(), traffic, cells }
+    Solution {
+        maps,
+        iterations: 0,
+        conditioning: Conditioning::default(),
+        host_times: Vec::new(),
+        mosaic_times: Vec::new(),
+        traffic,
+        cells,
+    }
 }
 
 /// The pair is uploaded once, the maps are read back once, and nothing is transferred in between.

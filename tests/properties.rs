@@ -18,7 +18,7 @@ use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::tiles::Tiles;
 use mrfgs::maps::{FRACTION, Maps, flag, has_disparity};
-use mrfgs::options::{DisparityRange, Illumination, Method};
+use mrfgs::options::{DisparityRange, Illumination, Method, ZoneExtent};
 use mrfgs::{Error, Matcher};
 use pollster::block_on;
 use proptest::prelude::*;
@@ -90,8 +90,10 @@ impl Case {
         let mut method = random::method(&mut random, self.neighbours);
         method.tiles.memory = if self.tiled { 1 } else { method.tiles.memory };
         if self.front {
-            method.front.illumination = Illumination::Homomorphic;
-            method.front.zones = random.within(1, 6);
+            method.front.illumination =
+                random.pick(&[Illumination::Homomorphic, Illumination::HomomorphicFirst]);
+            method.front.zone_extent = random.pick(&[ZoneExtent::Region, ZoneExtent::Cluster]);
+            method.front.clusters = random.within(1, 6);
             method.front.zone_sigmas = f64::from(random.within(1, 3));
         }
         method.schedule.tolerance = random.pick(&[0.0, 0.5]);

@@ -67,7 +67,8 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
             ..Plan::new(w, h, range, &whole.method).unwrap()
         };
         if tiles.count() > 1 {
-            let beside = (whole.pair_bytes() + whole.mosaic_bytes()).div_ceil(1 << 20);
+            let pairs = whole.pair_bytes() + whole.conditioning_bytes();
+            let beside = (pairs + whole.mosaic_bytes()).div_ceil(1 << 20);
             expected.method.tiles.memory -= beside as u32;
             ensure(
                 bytes(&tile.plan) <= u64::from(expected.method.tiles.memory + 1) << 20,
@@ -280,7 +281,7 @@ fn the_matcher_cuts_what_its_method_says() {
         if tiled {
             assert!(matched.maps == in_tiles(&mut Cpu::default(), &tiles, &pair).maps);
         }
-        for (stage, runs) in [("cost", tiles.count()), ("graph", tiles.count()), ("median", 1)] {
+        for (stage, runs) in [("cost", tiles.count()), ("graph", tiles.count()), ("plane", 1)] {
             let timing = matched.timings.iter().find(|timing| timing.stage == stage).unwrap();
             assert_eq!(timing.runs as usize, runs, "{stage}");
         }

@@ -23,7 +23,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
-use commands::{batch, bench, completions, devices, evaluate, inspect, man, r#match, presets};
+use commands::{batch, bench, completions, devices, evaluate, inspect, man, r#match, presets, rectify};
 use failure::Failure;
 pub use pairs::list;
 
@@ -37,6 +37,7 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
+  mrfgs rectify left.png right.png rectified --calib stereo.yml
   mrfgs batch pairs.csv maps                  # many pairs; again, it resumes
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
@@ -58,6 +59,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Match(r#match::Args),
+    Rectify(rectify::Args),
     Batch(batch::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
@@ -78,7 +80,7 @@ impl Command {
             Self::Evaluate(args) => args.asks_drivers(),
             Self::Inspect(args) => args.execution.device.asks_drivers(),
             Self::Bench(_) | Self::Devices => true,
-            Self::Presets(_) | Self::Completions(_) | Self::Man(_) => false,
+            Self::Rectify(_) | Self::Presets(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
 }
@@ -113,6 +115,7 @@ fn run() -> Result<(), Failure> {
     }
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
+        Command::Rectify(args) => rectify::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,
         Command::Bench(args) => bench::run(&args)?,
@@ -163,12 +166,13 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 17),
+            ("match", 19),
+            ("rectify", 7),
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),
             ("evaluate paper", 6),
-            ("evaluate ablations", 6),
+            ("evaluate ablations", 7),
             ("evaluate submission", 9),
             ("bench", 10),
             ("inspect", 12),

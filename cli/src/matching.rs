@@ -51,6 +51,10 @@ pub(crate) fn run(
             time.as_secs_f64(),
             matched.ran_on
         ));
+        let corrected = matched.conditioning.to_string();
+        if !corrected.is_empty() {
+            console::say(&format!("{name}{corrected}"));
+        }
     }
     Ok((matched, time))
 }

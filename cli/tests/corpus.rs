@@ -12,9 +12,10 @@ use std::path::{Path, PathBuf};
 type Target = fn(&[u8]);
 
 /// Every target with its name, which is that of its folder.
-const TARGETS: [(&str, Target); 5] = [
+const TARGETS: [(&str, Target); 6] = [
     ("pfm", targets::pfm),
     ("calib", targets::calib),
+    ("cameras", targets::cameras),
     ("image", targets::image),
     ("list", targets::list),
     ("config", targets::config),

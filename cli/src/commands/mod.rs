@@ -9,3 +9,4 @@ pub(crate) mod inspect;
 pub(crate) mod man;
 pub(crate) mod r#match;
 pub(crate) mod presets;
+pub(crate) mod rectify;

@@ -6,7 +6,8 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
-use mrfgs::image::{Image, Plane, ply, write};
+use mrfgs::image::write::Writer;
+use mrfgs::image::{Georeference, Image, Plane, ply, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
 
@@ -28,31 +29,40 @@ pub(crate) struct Also {
 /// What an output shows, and thereby the format of its file.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
-    /// A map of disparities, in the format of the disparity map.
-    Disparity(fn(&Maps) -> Option<Plane<f32>>),
+    /// A map of disparities of a view, in the format of the disparity map.
+    Disparity(View, fn(&Maps) -> Option<Plane<f32>>),
     /// A map of bytes, as 8-bit PNG.
     Bytes(fn(&Maps) -> &Plane<u8>),
     /// The depth of every disparity, as float PFM, or TIFF where the disparity map is one.
     Depth,
+    /// The same in whole millimetres, as 16-bit PNG.
+    Millimetres,
     /// A cloud of points, as PLY.
     Points,
     /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
     Picture { beside: bool },
 }
 
+/// The view whose pixels a map has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum View {
+    Left,
+    Right,
+}
+
 /// All outputs, in the order in which they are written. One more is one more row.
-static ALL: [Also; 8] = [
+static ALL: [Also; 9] = [
     Also {
         word: "raw",
         help: "The disparity map before post-processing, in the format of the disparity map",
-        kind: Kind::Disparity(|maps| Some(maps.raw_map())),
+        kind: Kind::Disparity(View::Left, |maps| Some(maps.raw_map())),
         key: None,
     },
     Also {
         word: "right",
         help: "The disparity map of the right view, refined like that of the left one, in the format of the disparity \
                map: right (x, y) with disparity d is seen at left (x + d, y)",
-        kind: Kind::Disparity(Maps::right_map),
+        kind: Kind::Disparity(View::Right, Maps::right_map),
         key: Some("right-map"),
     },
     Also {
@@ -60,6 +70,13 @@ static ALL: [Also; 8] = [
         help: "The depth of every pixel, as float: .pfm (+infinity where there is none), or .tif (NaN) if the disparity \
                map is TIFF",
         kind: Kind::Depth,
+        key: None,
+    },
+    Also {
+        word: "depth-mm",
+        help: "The depth of every pixel in millimetres, as ROS and TUM have it: 16-bit .png, 0 where there is none or it is \
+               above 65535. It takes a calibration whose unit is known",
+        kind: Kind::Millimetres,
         key: None,
     },
     Also {
@@ -145,6 +162,15 @@ pub(crate) struct Outcome<'a> {
     pub(crate) left: Option<&'a Image>,
     /// The cameras, where an output [takes them](AlsoArgs::take_cameras).
     pub(crate) rig: Option<Rig>,
+    /// The georeferences of the views.
+    pub(crate) georeferences: [Option<Georeference>; 2],
+}
+
+impl Outcome<'_> {
+    /// What writes a map with the pixels of `view`.
+    pub(crate) fn writer(&self, view: View) -> Writer {
+        Writer { georeference: self.georeferences[view as usize].clone() }
+    }
 }
 
 impl AlsoArgs {
@@ -169,9 +195,10 @@ impl AlsoArgs {
         Ok(method)
     }
 
-    /// The first wanted output that takes the cameras.
+    /// The wanted output that takes most of the cameras.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
-        self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points))
+        let first = || self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points));
+        self.wanted().find(|also| also.takes_unit()).or_else(first)
     }
 
     /// Whether a wanted output shows the left image.
@@ -181,22 +208,28 @@ impl AlsoArgs {
 
     /// Writes `also` to `path`. Returns what there is to say of it.
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
-        let &Outcome { maps, range, sign, left, ref rig } = outcome;
+        let &Outcome { maps, range, sign, left, ref rig, .. } = outcome;
         match also.kind {
-            Kind::Disparity(map) => {
+            Kind::Disparity(view, map) => {
                 let Some(map) = map(maps) else { return Ok(None) };
-                write::disparity(path, &sign.map(map))?;
+                outcome.writer(view).disparity(path, &sign.map(map))?;
             }
             Kind::Bytes(map) => write::grey8(path, map(maps))?,
             Kind::Depth => {
                 let Some(rig) = rig else { return Ok(None) };
                 let depths = rig.depths(&maps.final_map());
-                write::depth(path, &depths)?;
+                outcome.writer(View::Left).depth(path, &depths)?;
                 let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
                 return Ok(Some(match known().reduce(f32::min).zip(known().reduce(f32::max)) {
                     Some((least, most)) => format!("depths {least:.3} to {most:.3}"),
                     None => "no pixel has a depth".into(),
                 }));
+            }
+            Kind::Millimetres => {
+                let Some(depths) = rig.and_then(|rig| rig.millimetres(&maps.final_map())) else {
+                    return Ok(None);
+                };
+                write::grey16(path, &depths)?;
             }
             Kind::Points => {
                 let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
@@ -224,16 +257,21 @@ impl Also {
         format!("--also {}", self.word)
     }
 
+    /// Whether it takes the unit of the baseline, too.
+    pub(crate) fn takes_unit(&self) -> bool {
+        matches!(self.kind, Kind::Millimetres)
+    }
+
     /// Its file beside the disparity map `output`.
     pub(crate) fn beside(&self, output: &Path) -> PathBuf {
         let own = output.extension().unwrap_or_default().to_string_lossy();
         let is_tiff = ["tif", "tiff"].iter().any(|tiff| own.eq_ignore_ascii_case(tiff));
         let extension = match self.kind {
-            Kind::Disparity(_) => &*own,
+            Kind::Disparity(..) => &*own,
             Kind::Depth if is_tiff => &*own,
             Kind::Depth => "pfm",
             Kind::Points => "ply",
-            Kind::Bytes(_) | Kind::Picture { .. } => "png",
+            Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => "png",
         };
         output.with_extension(format!("{}.{extension}", self.word))
     }
@@ -241,10 +279,10 @@ impl Also {
     /// Says before any computing whether it can be written to `path`, with disparities in `range`.
     pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> mrfgs::Result<()> {
         match self.kind {
-            Kind::Disparity(_) => write::check_disparity_path(path, range.min, range.max),
+            Kind::Disparity(..) => write::check_disparity_path(path, range.min, range.max),
             Kind::Depth => write::check_depth_path(path),
             Kind::Points => write::check_ply_path(path),
-            Kind::Bytes(_) | Kind::Picture { .. } => write::check_png_path(path),
+            Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => write::check_png_path(path),
         }
     }
 }
@@ -272,12 +310,13 @@ mod tests {
             "raw.pfm",
             "right.pfm",
             "depth.pfm",
+            "depth-mm.png",
             "points.ply",
             "confidence.png",
             "validity.png",
             "preview.png",
         ];
-        assert_eq!(names("a/b.c.pfm")[..7], of_pfm.map(|end| format!("a/b.c.{end}")));
+        assert_eq!(names("a/b.c.pfm")[..8], of_pfm.map(|end| format!("a/b.c.{end}")));
         assert_eq!(names("d.png")[..2], ["d.raw.png", "d.right.png"]);
         assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.right.TIFF", "d.depth.TIFF"]);
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use mrfgs::maps::{flag, has_disparity};
+use mrfgs::maps::{FRACTION, flag, has_disparity};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Matched, Timing};
 use serde::Serialize;
@@ -27,6 +27,8 @@ pub(crate) struct Files {
 pub(crate) struct MatchRecord<'a> {
     version: &'static str,
     files: &'a Files,
+    /// Whether the images were rectified before.
+    pub(crate) rectified: bool,
     width: usize,
     height: usize,
     sign: Sign,
@@ -37,6 +39,10 @@ pub(crate) struct MatchRecord<'a> {
     driver: Option<&'a str>,
     note: Option<String>,
     tiles: usize,
+    /// How far the right view was moved up, in pixels.
+    moved_up: f64,
+    /// By how much the left and the right view were smoothed, in pixels.
+    smoothed: [f64; 2],
     iterations: u32,
     seconds: f64,
     /// Milliseconds by stage and level, where they were measured.
@@ -63,6 +69,7 @@ impl<'a> MatchRecord<'a> {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             files,
+            rectified: false,
             width,
             height,
             sign,
@@ -73,6 +80,8 @@ impl<'a> MatchRecord<'a> {
             driver: matched.driver.as_deref(),
             note: matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)),
             tiles: matched.tiles.count(),
+            moved_up: f64::from(matched.conditioning.offset) / f64::from(FRACTION),
+            smoothed: matched.conditioning.smoothing,
             iterations: matched.iterations,
             seconds: time.as_secs_f64(),
             stages: matched.timings.iter().map(|t| (stage_and_level(t), ms(t.time))).collect(),

@@ -241,6 +241,26 @@ fn tables_stand_beside_the_papers() {
     let mean = finished["mean"]["published"]["fgs"]["psnr"].as_f64().unwrap();
     assert!((mean - f64::midpoint(33.25, 33.33)).abs() < 1e-9);
 
+    // MR-FGS is ahead by less error, a higher PSNR and fewer bad pixels.
+    let mut ahead = [0, 0];
+    for line in [raw, finished].into_iter().flat_map(|table| table["pairs"].as_array().unwrap()) {
+        for (i, (methods, fgs, mr_fgs)) in
+            [("published", "fgs", "mr-fgs"), ("ours", "fgs", "paper")].into_iter().enumerate()
+        {
+            let value = |method: &str, key: &str| line[methods][method][key].as_f64().unwrap();
+            let lead = |key: &str| value(mr_fgs, key) - value(fgs, key);
+            ahead[i] += [lead("avg") < 0.0, lead("psnr") > 0.0, lead("bad2.0") < 0.0]
+                .map(usize::from)
+                .iter()
+                .sum::<usize>();
+        }
+    }
+    let expected = serde_json::json!({"figures": 12, "published": 12, "ours": ahead[1]});
+    assert_eq!((ahead[0], &all["ahead"]), (12, &expected));
+    let words =
+        format!("MR-FGS is ahead of FGS in {} of 12 figures; the paper prints it ahead in 12.", ahead[1]);
+    assert!(text.contains(&words), "no `{words}` in:\n{text}");
+
     // Ours are those that the preset gives by itself.
     for preset in presets {
         let alone = evaluated(folder.path(), &["Teddy", "Cones", "--method", preset, "--json", "-"]);
@@ -262,6 +282,7 @@ fn tables_stand_beside_the_papers() {
         let empty = format!("\n{line} | - - - | - - - | ");
         assert!(in_cells(&text).contains(&empty), "no `{empty}` in:\n{text}");
     }
+    assert!(text.contains(" of 12 figures.\n"), "{text}");
     let printed = json(&evaluated(folder.path(), &["paper", "thin", "--json", "-"]));
     assert!(printed["tables"][0]["pairs"][0]["published"].is_null());
 
@@ -358,7 +379,7 @@ fn a_breakdown_adds_up() {
 }
 
 #[test]
-fn ablations_are_held_against_the_default() {
+fn ablations_are_held_against_their_preset() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     // A part of a scene, to be quick.
@@ -405,9 +426,30 @@ fn ablations_are_held_against_the_default() {
     }
     assert!(number(changed, "bad0.5") > number(default, "bad0.5"));
 
+    // Around the preset paper, with its own figures.
+    let text = evaluated(folder.path(), &["ablations", "part", "--method", "paper", "--json", "out.json"]);
+    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    let all = json(&fs::read_to_string(at("out.json")).unwrap());
+    let rows = all["rows"].as_array().unwrap();
+    let changed = rows.iter().find(|row| row["changes"]["zone-sigmas"] == "0").unwrap();
+    for (row, flags) in [(&rows[0], &[][..]), (changed, &["--set", "zone-sigmas=0"])] {
+        let alone = [&["part", "--json", "-", "--method", "paper"], flags].concat();
+        let alone = json(&evaluated(folder.path(), &alone));
+        let cells = [("raw", &row["raw"]), ("final", row)].map(|(map, ours)| {
+            let figures = ["avg", "psnr", "bad2.0"].map(|key| {
+                assert_eq!(ours[key], alone["mean"][map]["all"][key], "{flags:?}, {map}, {key}");
+                format!("{:.2}", number(ours, key))
+            });
+            figures.join(" ")
+        });
+        let cells = format!(" | {} ", cells.join(" | "));
+        assert!(in_cells(&text).contains(&cells), "no `{cells}` in:\n{text}");
+    }
+    assert_eq!(rows[0]["name"], "paper");
+    refused(folder.path(), &["ablations", "part", "--method", "fgs"], 2, &["fgs", "default, paper"]);
+
     for flags in [
-        &["--method", "paper"][..],
-        &["--set", "levels=2"],
+        &["--set", "levels=2"][..],
         &["--memory", "1GiB"],
         &["--report", "r"],
         &["--breakdown"],

@@ -11,7 +11,7 @@ type Failure = (&'static str, i32, &'static [&'static str]);
 /// `M` stands for a `match` that would succeed, up to its output, and `I` for such an `inspect`.
 const FAILURES: &[Failure] = &[
     // The command line itself.
-    ("", 2, &["subcommand", "match, batch, evaluate", "--help"]),
+    ("", 2, &["subcommand", "match, rectify, batch", "--help"]),
     ("frobnicate", 2, &["frobnicate", "--help"]),
     ("match left.png", 2, &["<RIGHT> <OUTPUT>", "mrfgs match --help"]),
     ("completions", 2, &["<SHELL>", "mrfgs completions --help"]),
@@ -67,8 +67,8 @@ const FAILURES: &[Failure] = &[
     ("M taken.pfm", 1, &["taken.pfm", "is a folder", "name of a file"]),
     ("M taken.tif --also raw", 1, &["taken.raw.tif", "is a folder"]),
     ("M taken.tif --also confidence,validity", 1, &["taken.validity.png", "is a folder"]),
-    ("M out.pfm --also", 2, &["--also", "raw, right, depth, points", "preview, side-by-side"]),
-    ("M out.pfm --also raw,row", 2, &["--also", "'row'", "raw, right, depth, points"]),
+    ("M out.pfm --also", 2, &["--also", "raw, right, depth, depth-mm, points", "preview, side-by-side"]),
+    ("M out.pfm --also raw,row", 2, &["--also", "'row'", "raw, right, depth, depth-mm, points"]),
     ("M none/out.pfm --also preview", 1, &["none/out.pfm", "create it"]),
     ("M out.png --min-disparity -1", 1, &["out.png", "-1 to 9", ".pfm or .tif"]),
     ("match left.png right.png out.png --max-disparity 256", 1, &["out.png", "0 to 256", ".pfm or .tif"]),
@@ -256,7 +256,7 @@ const FAILURES: &[Failure] = &[
     ("batch pairs.csv out --method best", 2, &["--method", "default, fast, paper"]),
     ("batch pairs.csv out --set levels=17", 2, &["--set levels", "17 is outside 1 to 16"]),
     ("batch pairs.csv out --device cpu --device 0", 2, &["--device", "multiple times"]),
-    ("batch pairs.csv out --also raw,row", 2, &["--also", "'row'", "raw, right, depth, points"]),
+    ("batch pairs.csv out --also raw,row", 2, &["--also", "'row'", "raw, right, depth, depth-mm, points"]),
     ("batch pairs.csv out --colours grey", 2, &["--colours", "add --also preview"]),
     // Benches.
     ("bench none", 1, &["none/im0.png", "a folder to match holds im0.png, im1.png, calib.txt; or"]),

@@ -66,8 +66,14 @@ export class Visit {
 
     /** Waits until the page is at one of these. */
     async state(...states) {
-        await this.tab.waitForFunction((states) => states.includes(document.getElementById('app').dataset.state), { timeout: PATIENCE }, states);
-        return this.tab.$eval('#app', (app) => app.dataset.state);
+        const now = () => this.tab.$eval('#app', (app) => app.dataset.state);
+        try {
+            await this.tab.waitForFunction((states) => states.includes(document.getElementById('app').dataset.state), { timeout: PATIENCE }, states);
+        } catch {
+            const said = await Promise.all(['#problem', '#stage'].map((selector) => this.text(selector)));
+            assert.fail(`the page is ${await now()}, not ${states.join(' or ')}, and says ${JSON.stringify(said)}`);
+        }
+        return now();
     }
 
     /** Waits until nothing runs. */

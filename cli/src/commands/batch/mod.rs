@@ -23,7 +23,7 @@ use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
 use crate::args::sign::Sign;
 use crate::failure::{self, Failure, Result};
-use crate::outputs::also::{self, Also, AlsoArgs, Outcome};
+use crate::outputs::also::{self, Also, AlsoArgs, Outcome, View};
 use crate::outputs::claim::Claim;
 use crate::outputs::files;
 use crate::outputs::record::MatchRecord;
@@ -347,14 +347,18 @@ impl Batch<'_> {
         };
         let Input { pair, range, rig, mut files, .. } = input;
         let wanted = &self.args.maps;
+        let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign) = (&matched.maps, Sign::default());
-        let outcome = Outcome { maps, range, sign, left: pair.as_ref().map(Pair::left), rig };
+        let outcome = Outcome { maps, range, sign, left: pair.as_ref().map(Pair::left), rig, georeferences };
         let staged = |file: &str| claim.folder().join(file);
         // The user knows the file by its place in the output folder.
         let at = |file: &str, result: Result<()>| result.map_err(|e| e.at(&self.args.folder.join(file)));
         let map = wanted.map(&listed.name);
-        at(&map, write::disparity(&staged(&map), &maps.final_map()).map_err(Failure::from))?;
+        at(
+            &map,
+            outcome.writer(View::Left).disparity(&staged(&map), &maps.final_map()).map_err(Failure::from),
+        )?;
         for (word, file) in wanted.also(&listed.name) {
             at(&file, wanted.also.write(word, &staged(&file), &outcome).map(drop))?;
         }

@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let method = args.method.method()?;
     let mut execution = args.execution.execution();
     execution.timings = true;
-    let input = args.pair.read(Sign::default(), false)?;
+    let input = args.pair.read(Sign::default(), false, None)?;
     input.say_range(Sign::default());
     check_outputs(args, &input)?;
     input.warn();

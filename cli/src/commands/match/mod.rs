@@ -12,9 +12,10 @@ use mrfgs::low_level::tiles::Tiles;
 
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
+use crate::args::rectification::RectificationArgs;
 use crate::args::sign::Sign;
 use crate::failure::{Failure, Result};
-use crate::outputs::also::{Also, AlsoArgs, Outcome};
+use crate::outputs::also::{Also, AlsoArgs, Outcome, View};
 use crate::outputs::files::{self, Written};
 use crate::outputs::record::MatchRecord;
 use crate::pairs::cameras;
@@ -32,7 +33,9 @@ Examples:
   # The plan, with its memory, without running:
   mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run
   # Range and cameras from the calib.txt beside im0.png:
-  mrfgs match im0.png im1.png d.pfm --also depth,points";
+  mrfgs match im0.png im1.png d.pfm --also depth,points
+  # Images as the cameras took them:
+  mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth";
 
 /// Match a rectified pair and write its disparity map
 ///
@@ -40,13 +43,15 @@ Examples:
 /// content. Pixels that are transparent, not finite, or without data are ignored.
 ///
 /// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels,
-/// .tif or .tiff as float with NaN, .png as in KITTI: 16 bits with disparity times 256 and 0 for invalid pixels (ranges
+/// .tif or .tiff as float with NaN and with the georeference of LEFT, .png as in KITTI: 16 bits with disparity times 256 and 0 for invalid pixels (ranges
 /// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output. If OUTPUT is a symbolic link,
 /// the file it leads to is written.
 ///
-/// Depth and points take the cameras from a calibration file in Middlebury's format: cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels),
-/// doffs (cx1 - cx0, pixels) and baseline. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the unit of the
-/// baseline (Middlebury: millimetres). Where d + doffs is 0 or less there is no depth.
+/// Depth and points take the cameras from a calibration: P1 and P2 of OpenCV, the projections of ROS, or Middlebury's
+/// cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels), doffs (cx1 - cx0, pixels) and baseline; with --rectify any that `mrfgs rectify`
+/// takes. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the unit of the baseline: metres of ROS and Kalibr,
+/// millimetres of Middlebury, and that of the chessboard of OpenCV. Where d + doffs is 0 or less there is no depth.
+/// An entry `unit` in the file (mm, cm or m) states the unit.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -58,6 +63,12 @@ pub(crate) struct Args {
     /// Which way disparities count in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes right-minus-left
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
+    /// LEFT and RIGHT are as the cameras took them: rectifies them by --calib first, as `mrfgs rectify` does. All outputs are of
+    /// the rectified left view
+    #[arg(long, requires = "calib")]
+    rectify: bool,
+    #[command(flatten)]
+    rectification: RectificationArgs,
     /// Checks everything and prints the plan (levels, schedule, memory), but runs and writes nothing
     #[arg(long)]
     dry_run: bool,
@@ -74,10 +85,12 @@ pub(crate) struct Args {
     also: AlsoArgs,
     /// Writes what ran and what it found as JSON; `-` prints it
     ///
-    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `width`, `height`, `sign`,
+    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`, `width`, `height`, `sign`,
     /// `range` (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why another device
-    /// was taken), `tiles`, `iterations` and `seconds` (of the match). In percent of all pixels: `density` (with a
-    /// disparity), which is the sum of `measured` and `filled`. `mean_confidence` is that of the measured pixels.
+    /// was taken), `tiles`, `moved_up` (how far the right view was, in pixels), `smoothed` (the standard deviations by
+    /// which the left and the right view were, in pixels), `iterations` and `seconds` (of the match). In percent of all
+    /// pixels: `density` (with a disparity), which is the sum of `measured` and `filled`. `mean_confidence` is that of the
+    /// measured pixels.
     #[arg(long, value_name = "FILE", help_heading = "More outputs")]
     json: Option<PathBuf>,
 }
@@ -87,7 +100,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let method = args.also.made_by(args.method.method()?)?;
     let execution = args.execution.execution();
     let cameras = args.also.take_cameras();
-    let input = args.pair.read(args.sign, cameras.is_some())?;
+    if args.rectification.alpha.is_some() && !args.rectify {
+        let reason = "is of a rectification; add --rectify, or leave --alpha out";
+        return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
+    }
+    let options = args.rectification.options();
+    let input = args.pair.read(args.sign, cameras.is_some(), args.rectify.then_some(&options))?;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign);
@@ -115,10 +133,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     drop(matcher);
     let files = args.pair.files(&input, Some(&args.output));
     let unit = input.calibration().map(|(file, _)| file.display().to_string());
+    let georeferences = input.pair.georeferences();
     let pair = Some(input.pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
-    let outcome = Outcome { maps: &matched.maps, range, sign: args.sign, left, rig };
-    let said = write_outputs(args, &also, &outcome, &MatchRecord::new(&files, &matched, time, args.sign))?;
+    let outcome = Outcome { maps: &matched.maps, range, sign: args.sign, left, rig, georeferences };
+    let mut record = MatchRecord::new(&files, &matched, time, args.sign);
+    record.rectified = args.rectify;
+    let said = write_outputs(args, &also, &outcome, &record)?;
     if let Some(file) = unit.filter(|_| !args.quiet && !said.is_empty()) {
         console::say(&format!("{}; unit: that of the baseline in {file}", said.join("; ")));
     }
@@ -163,7 +184,7 @@ fn write_outputs(
     let mut written = Written::default();
     let mut said = Vec::new();
     if !files::is_printed(output) {
-        written.note(output, write::disparity(output, &map()))?;
+        written.note(output, outcome.writer(View::Left).disparity(output, &map()))?;
     }
     for (word, path) in also {
         said.extend(written.note(path, args.also.write(word, path, outcome))?);

@@ -1,0 +1,209 @@
+//! Rectification of made-up rigs: raw pairs of a rendered scene, seen through known lenses, rectified and matched.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
+
+#[path = "../testdata/raw.rs"]
+mod raw;
+#[path = "../testdata/scenes.rs"]
+mod scenes;
+
+use std::path::Path;
+
+use mrfgs::calibration::of_texts;
+use mrfgs::image::{Image, Pair, Plane, read};
+use mrfgs::options::DisparityRange;
+use mrfgs::rectification::{Options, Rectification};
+use mrfgs::{Error, Matcher};
+use raw::{CAMERAS, Camera, Lens, Matrix, SIZE};
+
+/// A quarter turn: the left eye is above the right one in such a camera, and below it.
+const QUARTERS: [Matrix; 2] = [
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+    [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+];
+
+fn rectification(cameras: &[Camera; 2], size: (usize, usize), baseline: f64) -> Rectification {
+    let text = raw::calibration(cameras, size, baseline);
+    let calibration = of_texts(&[(Path::new("cameras.yml"), text)]).unwrap();
+    Rectification::new(&calibration, size, &Options::default()).unwrap()
+}
+
+fn photographs(cameras: &[Camera; 2], size: (usize, usize), scene: &scenes::Scene) -> Pair {
+    let [left, right] = [(&cameras[0], &scene.left), (&cameras[1], &scene.right)]
+        .map(|(camera, view)| Image::from_rgb8(&camera.photograph(size, view)));
+    Pair::new(left, right).unwrap()
+}
+
+/// Average error of a match, over the pixels of the left view that `truth` knows.
+fn error(pair: &Pair, truth: impl Fn(usize, usize) -> Option<f64>) -> f64 {
+    let mut matcher = Matcher::builder().device("cpu").build().unwrap();
+    let found = matcher.run(pair, DisparityRange::new(0, 40).unwrap()).unwrap().disparity();
+    let (width, height) = pair.size();
+    let errors: Vec<f64> = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .filter(|&(x, y)| !pair.left().masked[(x, y)])
+        .filter_map(|(x, y)| truth(x, y).map(|truth| (f64::from(found[(x, y)]) - truth).abs()))
+        .collect();
+    assert!(errors.len() > width * height / 2, "{} of {width} x {height}", errors.len());
+    errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+/// The true disparity of a rectified pixel: its point in the scene, seen along the axis of the rectified view.
+fn truth(by: &Rectification, left: &Camera, scene: &scenes::Scene, x: usize, y: usize) -> Option<f64> {
+    let calibration = by.calibration().unwrap();
+    let (camera, baseline) = (calibration.camera.unwrap(), calibration.baseline.unwrap());
+    assert_eq!(calibration.doffs, Some(0.0), "what is infinitely far has a disparity of 0");
+    let [u, v] = [x as f64, y as f64];
+    let [fx, fy] = camera.focal_length;
+    let [cx, cy] = camera.principal_point;
+    let from_scene = raw::product(&by.rotations()[0], &left.turn);
+    let ray = raw::turned(&raw::inverse(&from_scene), [(u - cx) / fx, (v - cy) / fy, 1.0]);
+    let [px, py] = raw::pixel(scene.truth.size(), ray).map(|v| (v + 0.5).floor());
+    let inside =
+        px >= 0.0 && py >= 0.0 && px < scene.truth.width() as f64 && py < scene.truth.height() as f64;
+    if !inside {
+        return None;
+    }
+    let depth = baseline * scene.truth.height() as f64 / f64::from(scene.truth[(px as usize, py as usize)]);
+    let point = ray.map(|v| v / ray[2] * depth);
+    Some(baseline * fx / raw::turned(&from_scene, point)[2])
+}
+
+#[test]
+fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
+    let scene = raw::scene();
+    let baseline = raw::baseline(&scene);
+    let perfect = scenes::render("slanted", SIZE.0, SIZE.1, 32);
+    let pair = Pair::new(Image::from_rgb8(&perfect.left), Image::from_rgb8(&perfect.right)).unwrap();
+    let reference = error(&pair, |x, y| Some(f64::from(perfect.truth[(x, y)])));
+
+    let fisheye = |camera: Camera, k1: f64| Camera {
+        focal: camera.focal - 6.0,
+        lens: Lens::Equidistant([k1, 0.004, -0.001, 0.0]),
+        ..camera
+    };
+    let fisheyes = [fisheye(CAMERAS[0], 0.02), fisheye(CAMERAS[1], -0.01)];
+    let upright = |quarter: &Matrix| {
+        CAMERAS.map(|camera| Camera {
+            centre: [camera.centre[1], camera.centre[0]],
+            turn: raw::product(quarter, &camera.turn),
+            ..camera
+        })
+    };
+    let high = (SIZE.1, SIZE.0);
+    for (name, cameras, size) in [
+        ("pinholes", CAMERAS, SIZE),
+        ("fisheyes", fisheyes, SIZE),
+        ("the left one above", upright(&QUARTERS[0]), high),
+        ("the left one below", upright(&QUARTERS[1]), high),
+    ] {
+        let by = rectification(&cameras, size, baseline);
+        assert_eq!(by.size(), SIZE, "{name}");
+        let raw = photographs(&cameras, size, &scene);
+        let rectified = by.apply(&raw).unwrap();
+        let found = error(&rectified, |x, y| truth(&by, &cameras[0], &scene, x, y));
+        println!("{name}: {found:.3} px, perfect pair {reference:.3} px");
+        assert!(found <= reference + 0.1, "{name}: {found} against {reference}");
+
+        // Control: as the cameras took them, or rectified by another lens, they are matched far worse.
+        if name == "pinholes" {
+            let crooked = error(&raw, |x, y| truth(&by, &cameras[0], &scene, x, y));
+            assert!(crooked > reference + 0.5, "{crooked}");
+            let mut other = cameras;
+            other[1].lens = Lens::RadialTangential([0.0; 5]);
+            let by = rectification(&other, size, baseline);
+            let wrong = error(&by.apply(&raw).unwrap(), |x, y| truth(&by, &cameras[0], &scene, x, y));
+            assert!(wrong > reference + 0.1, "{wrong}");
+        }
+    }
+}
+
+#[test]
+fn the_raw_pair_is_what_the_cameras_see() {
+    let scene = raw::scene();
+    let raw = photographs(&CAMERAS, SIZE, &scene);
+    let folder = Path::new("testdata/raw");
+    assert_eq!(read::pair(&folder.join("left.png"), &folder.join("right.png"), None).unwrap(), raw);
+    let text = std::fs::read_to_string(folder.join("cameras.yml")).unwrap();
+    assert_eq!(text, raw::calibration(&CAMERAS, SIZE, raw::baseline(&scene)));
+}
+
+/// The bits of the rectified pair and of its calibration are the same on every machine.
+#[test]
+fn the_bits_are_the_same_everywhere() {
+    let folder = Path::new("testdata/raw");
+    let raw = read::pair(&folder.join("left.png"), &folder.join("right.png"), None).unwrap();
+    let hash = |bytes: &mut dyn Iterator<Item = u8>| {
+        bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    };
+    let fisheyes =
+        CAMERAS.map(|camera| Camera { lens: Lens::Equidistant([0.02, 0.004, -0.001, 0.0]), ..camera });
+    let found = [CAMERAS, fisheyes].map(|cameras| {
+        let by = rectification(&cameras, SIZE, 0.16);
+        let pair = by.apply(&raw).unwrap();
+        let pixels =
+            [pair.left(), pair.right()].into_iter().flat_map(|image| image.pixels.data().as_flattened());
+        let place = by.left(17.0, 150.0).unwrap();
+        [
+            hash(&mut pixels.flat_map(|v| v.to_le_bytes())),
+            hash(&mut place.iter().flat_map(|v| v.to_le_bytes())),
+        ]
+    });
+    let known =
+        [[0x1ca3_0d39_68e1_e174, 0xdf2e_7b0a_6265_df70], [0x9a4e_1f9c_8623_73d4, 0x43e4_090a_f0ca_82e4]];
+    assert_eq!(found, known, "{found:#x?}");
+}
+
+#[test]
+fn a_mask_is_rectified_with_its_image() {
+    let by = rectification(&CAMERAS, SIZE, 0.1);
+    let noise = |x: usize, y: usize| [(x * 31 + y * 17) as u8; 3];
+    let image = Image::from_rgb8(&Plane::from_fn(SIZE.0, SIZE.1, noise));
+    let mut right = image.clone();
+    for at in (60..80).flat_map(|y| (100..130).map(move |x| (x, y))) {
+        right.masked[at] = true;
+    }
+    let whole = by.apply(&Pair::new(image.clone(), image.clone()).unwrap()).unwrap();
+    let pair = by.apply(&Pair::new(image, right).unwrap()).unwrap();
+    assert_eq!(pair.left(), whole.left());
+    for (x, y) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))) {
+        let [u, v] = by.right(x as f64, y as f64).unwrap();
+        // The cubic takes pixels up to two away.
+        let well_inside = (100.0..129.0).contains(&u) && (60.0..79.0).contains(&v);
+        let well_outside = !((97.0..132.0).contains(&u) && (57.0..82.0).contains(&v));
+        let masked = pair.right().masked[(x, y)];
+        assert!(!well_inside || masked, "{x}, {y}");
+        if well_outside {
+            assert_eq!(masked, whole.right().masked[(x, y)], "{x}, {y}");
+            assert_eq!(pair.right().pixels[(x, y)], whole.right().pixels[(x, y)], "{x}, {y}");
+        }
+        assert!(!masked || pair.right().pixels[(x, y)] == [0; 4], "a masked pixel holds zeros");
+    }
+}
+
+#[test]
+fn rigs_that_give_no_pair_are_told() {
+    let refused = |change: &dyn Fn(&mut [Camera; 2], &mut f64), options: Options, size, words: &str| {
+        let (mut cameras, mut baseline) = (CAMERAS, 0.1);
+        change(&mut cameras, &mut baseline);
+        let text = raw::calibration(&cameras, SIZE, baseline);
+        let calibration = of_texts(&[(Path::new("cameras.yml"), text)]).unwrap();
+        let error = Rectification::new(&calibration, size, &options).unwrap_err();
+        assert!(matches!(error, Error::Calibration(_) | Error::Mismatch(_)), "{error:?}");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let default = Options::default();
+    refused(&|_, baseline| *baseline = -0.1, default, SIZE, "on the left of the left one");
+    refused(&|_, _| (), default, (241, 180), "is for images of 240 x 180");
+    refused(&|_, _| (), Options { alpha: Some(1.5), ..default }, SIZE, "alpha of 0 to 1");
+    let forward = |cameras: &mut [Camera; 2], _: &mut f64| {
+        for camera in cameras {
+            camera.turn = raw::product(&[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], &camera.turn);
+        }
+    };
+    refused(&forward, default, SIZE, "in front of the other");
+    let apart = |cameras: &mut [Camera; 2], _: &mut f64| cameras[1].turn = raw::rotation([0.0, 1.2, 0.0]);
+    refused(&apart, default, SIZE, "more than 90 degrees apart");
+}
