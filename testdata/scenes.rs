@@ -9,7 +9,7 @@
 mod caster;
 
 pub use caster::Scene;
-use caster::{Pattern, UP, VIEWER, Vec3, World, add, paint, scale, unit};
+use caster::{Pattern, Sensor, UP, VIEWER, Vec3, World, add, paint, scale, unit};
 
 /// A scene and the size at which `testdata/` holds it.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +60,23 @@ pub fn render(name: &str, width: usize, height: usize, labels: u32) -> Scene {
     let recipe = ALL.iter().find(|recipe| recipe.name == name);
     let Some(recipe) = recipe else { panic!("no scene is called {name:?}") };
     Recipe { width, height, labels, ..*recipe }.render()
+}
+
+/// The scene `slanted` while a ball and a card pass before it, `step` frames after the first. Where nothing moves, frames
+/// differ by the noise of the sensors alone.
+///
+/// # Panics
+/// As [`render`].
+pub fn passing(step: u32, width: usize, height: usize, labels: u32) -> Scene {
+    use Pattern::{Blotches, Checker};
+    let mut world = World::new(11);
+    slants(&mut world);
+    let way = 0.02 * f64::from(step);
+    world.ball([-0.75 + way, 0.28, 1.35], 0.15, [0.5, -1.0, 0.2], paint(Blotches(0.1), [0x5d7f4c, 0xd5cf8f]));
+    let checker = paint(Checker(0.06), [0x46637e, 0xefe2c4]);
+    world.card([0.6 - 0.5 * way, -0.05, 1.6], [0.3, 0.1, -1.0], UP, [0.16, 0.12], checker);
+    world.sensors = [2 * step + 1000, 2 * step + 1001].map(Sensor::new);
+    world.shoot("passing", width, height, labels)
 }
 
 /// Planes at many slants, a ball and a tube: nothing is parallel to the image.

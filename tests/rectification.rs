@@ -156,6 +156,23 @@ fn the_bits_are_the_same_everywhere() {
     assert_eq!(found, known, "{found:#x?}");
 }
 
+/// Where the places are kept, nothing changes.
+#[test]
+fn places_may_be_kept() {
+    let scene = raw::scene();
+    let raw = photographs(&CAMERAS, SIZE, &scene);
+    let fisheyes =
+        CAMERAS.map(|camera| Camera { lens: Lens::Equidistant([0.02, 0.004, -0.001, 0.0]), ..camera });
+    let pairs = [CAMERAS, fisheyes].map(|cameras| {
+        let mut by = rectification(&cameras, SIZE, 0.16);
+        let pair = by.apply(&raw).unwrap();
+        by.keep_places().unwrap();
+        assert!(by.apply(&raw).unwrap() == pair);
+        pair
+    });
+    assert!(pairs[0] != pairs[1], "control: other lenses give another pair");
+}
+
 #[test]
 fn a_mask_is_rectified_with_its_image() {
     let by = rectification(&CAMERAS, SIZE, 0.1);

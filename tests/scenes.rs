@@ -29,6 +29,27 @@ fn pfm(plane: &Plane<f32>) -> Vec<u8> {
     bytes
 }
 
+/// Between frames of the sequence, what passes by moves, and all else stays but for the noise.
+#[test]
+fn things_pass_by() {
+    let [first, next] = [0, 1].map(|step| scenes::passing(step, 120, 90, 24));
+    let moves = |x: usize, y: usize| (first.truth[(x, y)] - next.truth[(x, y)]).abs() > 1e-6;
+    let moving = (0..90).flat_map(|y| (0..120).map(move |x| (x, y))).filter(|(x, y)| moves(*x, *y)).count();
+    assert!((100..2000).contains(&moving), "{moving} pixels move");
+    let mut still = Vec::new();
+    for (y, x) in (1..89).flat_map(|y| (1..119).map(move |x| (y, x))) {
+        if !(y - 1..=y + 1).any(|y| (x - 1..=x + 1).any(|x| moves(x, y))) {
+            let [a, b] = [&first, &next].map(|scene| i32::from(scene.left[(x, y)][1]));
+            still.push((a - b).abs());
+        }
+    }
+    let changed = still.iter().filter(|off| **off > 0).count();
+    assert!(2 * changed > still.len(), "noise changes most pixels");
+    // But for shadows.
+    let small = still.iter().filter(|off| **off <= 6).count();
+    assert!(small as f64 > 0.97 * still.len() as f64, "{small} of {}", still.len());
+}
+
 #[test]
 fn the_files_are_a_fresh_rendering() {
     let mut names: Vec<_> = SCENES.iter().map(|scene| scene.name.to_owned()).collect();

@@ -13,6 +13,7 @@ mod pairs;
 mod process;
 mod progress;
 mod remedy;
+mod sequences;
 mod stop;
 mod table;
 mod text;
@@ -23,7 +24,9 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
-use commands::{batch, bench, completions, devices, evaluate, inspect, man, r#match, presets, rectify};
+use commands::{
+    batch, bench, completions, devices, evaluate, inspect, man, r#match, presets, rectify, sequence,
+};
 use failure::Failure;
 pub use pairs::list;
 
@@ -39,6 +42,7 @@ Examples:
   mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
   mrfgs rectify left.png right.png rectified --calib stereo.yml
   mrfgs batch pairs.csv maps                  # many pairs; again, it resumes
+  mrfgs sequence left right maps              # the frames of a video
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
@@ -60,6 +64,7 @@ struct Cli {
 enum Command {
     Match(r#match::Args),
     Rectify(rectify::Args),
+    Sequence(sequence::Args),
     Batch(batch::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
@@ -76,6 +81,7 @@ impl Command {
     fn asks_drivers(&self) -> bool {
         match self {
             Self::Match(args) => args.execution.device.asks_drivers(),
+            Self::Sequence(args) => args.execution.device.asks_drivers(),
             Self::Batch(args) => args.execution.device.asks_drivers(),
             Self::Evaluate(args) => args.asks_drivers(),
             Self::Inspect(args) => args.execution.device.asks_drivers(),
@@ -116,6 +122,7 @@ fn run() -> Result<(), Failure> {
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
         Command::Rectify(args) => rectify::run(&args)?,
+        Command::Sequence(args) => sequence::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,
         Command::Bench(args) => bench::run(&args)?,
@@ -168,6 +175,7 @@ mod tests {
         let caps = [
             ("match", 19),
             ("rectify", 7),
+            ("sequence", 17),
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),

@@ -1,4 +1,4 @@
-//! The bars that show how far a match is, and how far a batch.
+//! The bars that show how far a match is, how far a batch, and how far a sequence.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -109,6 +109,57 @@ impl PairBar {
 }
 
 impl Drop for PairBar {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.drawn {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// The frames done of a sequence: a line on a terminal that is drawn anew, elsewhere one now and then.
+pub(crate) struct FrameBar {
+    start: Instant,
+    frames: usize,
+    all: Option<usize>,
+    drawn: Option<ProgressBar>,
+    /// When a log was last told; `None` where nothing is to be.
+    told: Option<Instant>,
+}
+
+impl FrameBar {
+    /// For `all` frames, where their number is known.
+    pub(crate) fn new(all: Option<usize>, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let start = Instant::now();
+        let drawn = (terminal && !quiet).then(|| {
+            let style = ProgressStyle::with_template("mrfgs {spinner} {msg}");
+            ProgressBar::new_spinner().with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
+        });
+        Self { start, frames: 0, all, drawn, told: (!terminal && !quiet).then_some(start) }
+    }
+
+    /// Counts a frame that is done.
+    pub(crate) fn end(&mut self) {
+        self.frames += 1;
+        if let Some(bar) = &self.drawn {
+            bar.set_message(self.line());
+            bar.tick();
+        }
+        let now = Instant::now();
+        if self.told.is_some_and(|told| now.duration_since(told) >= SILENCE) {
+            console::say(&self.line());
+            self.told = Some(now);
+        }
+    }
+
+    fn line(&self) -> String {
+        let rate = self.frames as f64 / self.start.elapsed().as_secs_f64();
+        let of = self.all.map(|all| format!(" of {all}")).unwrap_or_default();
+        format!("{}{of} frames, {rate:.1} a second", self.frames)
+    }
+}
+
+impl Drop for FrameBar {
     fn drop(&mut self) {
         if let Some(bar) = &self.drawn {
             bar.finish_and_clear();

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::georeference::Georeference;
-use super::{Image, Pair, Pixel, Plane, grey};
+use super::{Image, Pair, Pixel, Plane, Rect, grey};
 use crate::error::{Error, MemoryError, Purpose, Result};
 use crate::memory;
 
@@ -159,8 +159,41 @@ impl<'a> Raster<'a> {
         Ok(self)
     }
 
-    pub(super) fn size(&self) -> (usize, usize) {
+    /// (width, height) in pixels.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
+    }
+
+    /// What is inside `part`, without a georeference.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] when `part` is empty or not inside the image; [`Error::Memory`] when the system has not enough
+    /// memory.
+    pub fn crop(&self, part: &Rect) -> Result<Raster<'static>> {
+        fn rows<S: Copy>(samples: &[S], of: usize, part: &Rect, each: usize) -> Result<Vec<S>> {
+            let mut out = memory::reserved(part.x.len() * part.y.len() * each)?;
+            for row in samples.chunks(of * each).take(part.y.end).skip(part.y.start) {
+                out.extend_from_slice(&row[part.x.start * each..part.x.end * each]);
+            }
+            Ok(out)
+        }
+        if part.x.is_empty() || part.y.is_empty() || part.x.end > self.width || part.y.end > self.height {
+            let (width, height) = self.size();
+            return Err(Error::Mismatch(format!(
+                "columns {:?} and rows {:?} of an image of {width} x {height}",
+                part.x, part.y
+            )));
+        }
+        let (of, n) = (self.width, self.channels);
+        let samples = match &self.samples {
+            Samples::Byte(v) => Samples::Byte(rows(v, of, part, n)?.into()),
+            Samples::Word(v) => Samples::Word(rows(v, of, part, n)?.into()),
+            Samples::Float(v) => Samples::Float(rows(v, of, part, n)?.into()),
+            Samples::Double(v) => Samples::Double(rows(v, of, part, n)?.into()),
+        };
+        let no_data = self.no_data.as_ref().map(|marked| rows(marked, of, part, 1)).transpose()?;
+        Ok(Raster { no_data, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
     }
 
     /// `f` applied to the grey or colour samples of each pixel.

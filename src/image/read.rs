@@ -69,6 +69,14 @@ impl Reader {
         self.joined([left, right], [first?, second?], mask)
     }
 
+    /// Reads one image, as it is stored: one view, or both beside each other. [`Pair::of_frames`] makes a pair of two.
+    ///
+    /// # Errors
+    /// [`Error::Read`], as [`Reader::pair`].
+    pub fn raster(self, path: &Path) -> Result<Raster<'static>> {
+        self.decode(path, self.no_data)
+    }
+
     /// As [`Reader::pair`], from files that are in memory, each with the name by which errors call it.
     ///
     /// # Errors

@@ -149,25 +149,75 @@ fn link(file: &File, name: &Path) -> io::Result<()> {
     Ok(linkat(CWD, place(file), CWD, name, AtFlags::SYMLINK_FOLLOW)?)
 }
 
-/// Writes a file completely or not at all. An existing path that is not a regular file is written to
-/// directly; a symbolic link is followed.
+/// A file that is written piece by piece. It appears when it is [finished](Self::finish), and until then what was there before
+/// stays; dropped before, it leaves nothing. An existing path that is not a regular file is written to directly; a symbolic
+/// link is followed.
+pub struct Growing {
+    path: PathBuf,
+    to: Sink,
+}
+
+/// Where the pieces go.
+enum Sink {
+    Special(File),
+    /// Gets its name when it is finished.
+    Whole(Temporary, PathBuf),
+}
+
+impl Growing {
+    /// Begins the file `path`.
+    ///
+    /// # Errors
+    /// [`Error::Write`] when it cannot be written.
+    pub fn new(path: &Path) -> Result<Self> {
+        let to = match Target::of(path)? {
+            Target::Special => {
+                let file = fs::OpenOptions::new().write(true).open(path);
+                Sink::Special(file.map_err(|e| Error::write(path, e))?)
+            }
+            Target::File { file, folder } => Sink::Whole(Temporary::new(path, &folder)?, file),
+        };
+        Ok(Self { path: path.to_owned(), to })
+    }
+
+    /// Ends the file, and gives it its name.
+    ///
+    /// # Errors
+    /// [`Error::Write`] when it cannot be written.
+    pub fn finish(self) -> Result<()> {
+        let Self { path, to } = self;
+        let Sink::Whole(mut temporary, name) = to else { return Ok(()) };
+        // Otherwise a crash of the machine could leave the name without the contents.
+        let written = temporary.file().sync_all().and_then(|()| temporary.persist(&name));
+        written.map_err(|e| Error::write(&path, e))
+    }
+
+    fn file(&mut self) -> &mut File {
+        match &mut self.to {
+            Sink::Special(file) => file,
+            Sink::Whole(temporary, _) => temporary.file(),
+        }
+    }
+}
+
+impl Write for Growing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file().flush()
+    }
+}
+
+/// Writes a file completely or not at all, as [`Growing`] does.
 ///
 /// # Errors
 /// [`Error::Write`] when the file cannot be written.
 pub fn save(path: &Path, bytes: &[u8]) -> Result<()> {
-    let error = |e: io::Error| Error::write(path, e);
-    match Target::of(path)? {
-        Target::Special => {
-            fs::OpenOptions::new().write(true).open(path).and_then(|mut f| f.write_all(bytes)).map_err(error)
-        }
-        Target::File { file, folder } => {
-            let mut temporary = Temporary::new(path, &folder)?;
-            temporary.file().write_all(bytes).map_err(error)?;
-            // Otherwise a crash of the machine could leave the name without the contents.
-            temporary.file().sync_all().map_err(error)?;
-            temporary.persist(&file).map_err(error)
-        }
-    }
+    let mut file = Growing::new(path)?;
+    file.write_all(bytes).map_err(|e| Error::write(path, e))?;
+    file.finish()
 }
 
 /// Moves the file `staged` to `path`, replacing what is there; a symbolic link is followed.

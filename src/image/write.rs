@@ -10,7 +10,7 @@ use super::save::Target;
 use super::{Georeference, Plane, pfm, tiff};
 use crate::error::{Error, Result};
 
-pub use super::save::{publish, remove, save};
+pub use super::save::{Growing, publish, remove, save};
 
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;

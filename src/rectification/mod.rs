@@ -33,6 +33,9 @@ use crate::calibration::matrix::{Matrix, product, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::{Pair, Plane};
+use crate::memory;
+use rayon::prelude::*;
+use sampling::{NOWHERE, Place};
 
 /// How a pair of images becomes a rectified pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +46,8 @@ pub struct Rectification {
     /// Of the images, and of the rectified ones.
     sizes: [(usize, usize); 2],
     unit: Unit,
+    /// Where the pixels of both rectified views come from, row by row, where they are [kept](Self::keep_places).
+    places: Option<[Vec<Place>; 2]>,
 }
 
 impl Rectification {
@@ -76,7 +81,7 @@ impl Rectification {
         let (views, rectified) = turned(views, size);
         // Says where the right camera is on the left.
         views.calibration(None, calibration.unit)?;
-        Ok(Self { lenses, views, sizes: [size, rectified], unit: calibration.unit })
+        Ok(Self { lenses, views, sizes: [size, rectified], unit: calibration.unit, places: None })
     }
 
     /// (width, height) of the rectified images.
@@ -111,6 +116,28 @@ impl Rectification {
         })
     }
 
+    /// Finds out now where each pixel comes from, instead of for each pair: for many pairs of the same cameras. It keeps 16
+    /// bytes a pixel, and changes no bit of what [`Rectification::apply`] gives.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when the system has not enough memory.
+    pub fn keep_places(&mut self) -> Result<()> {
+        let (width, height) = self.size();
+        let of_view = |view: usize| {
+            let mut places = memory::filled(width * height, NOWHERE)?;
+            places.par_chunks_mut(width).enumerate().for_each(|(y, places)| {
+                places.iter_mut().enumerate().for_each(|(x, place)| *place = self.place(view, x, y));
+            });
+            Ok::<_, Error>(places)
+        };
+        self.places = Some([of_view(0)?, of_view(1)?]);
+        Ok(())
+    }
+
+    fn place(&self, view: usize, x: usize, y: usize) -> Place {
+        self.source(view, x as f64, y as f64).map_or(NOWHERE, sampling::place)
+    }
+
     fn source(&self, view: usize, x: f64, y: f64) -> Option<[f64; 2]> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.views.cameras[view];
         let back = transposed(&self.views.rotations[view]);
@@ -132,8 +159,11 @@ impl Rectification {
         }
         let images = [pair.left(), pair.right()];
         let bytes = sampling::hold_bytes(images);
-        let view = |view: usize| {
-            sampling::resample(images[view], rectified, bytes, |x, y| self.source(view, x as f64, y as f64))
+        let view = |view: usize| match &self.places {
+            Some(places) => {
+                sampling::resample(images[view], rectified, bytes, |x, y| places[view][y * rectified.0 + x])
+            }
+            None => sampling::resample(images[view], rectified, bytes, |x, y| self.place(view, x, y)),
         };
         Pair::new(view(0)?, view(1)?)
     }

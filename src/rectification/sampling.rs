@@ -7,8 +7,20 @@ use crate::image::cubic::{BITS, STEPS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::memory;
 
-/// `image` at the places that `source` says for each pixel of an image of `size`. A pixel is masked where there is no place,
-/// and where its value takes one that is masked or outside. With `bytes`, values are whole 8-bit levels.
+/// A place in an image: x and y, in 1/[`STEPS`] px.
+pub(super) type Place = [i32; 2];
+
+/// What stands for no place: outside of every image.
+pub(super) const NOWHERE: Place = [i32::MIN; 2];
+
+/// The nearest place to x and y.
+pub(super) fn place(at: [f64; 2]) -> Place {
+    // What is not finite or far away ends up outside, too.
+    at.map(|v| (v * STEPS as f64 + 0.5).floor() as i32)
+}
+
+/// `image` at the places that `source` says for each pixel of an image of `size`. A pixel is masked where its value takes one that is
+/// masked or outside. With `bytes`, values are whole 8-bit levels.
 ///
 /// # Errors
 /// [`Error::Memory`](crate::Error::Memory) when the system has not enough memory.
@@ -16,14 +28,14 @@ pub(super) fn resample(
     image: &Image,
     (width, height): (usize, usize),
     bytes: bool,
-    source: impl Fn(usize, usize) -> Option<[f64; 2]> + Sync,
+    source: impl Fn(usize, usize) -> Place + Sync,
 ) -> Result<Image> {
     let mut pixels: Vec<Pixel> = memory::filled(width * height, [0; 4])?;
     let mut masked = memory::filled(width * height, true)?;
     let rows = pixels.par_chunks_mut(width).zip(masked.par_chunks_mut(width));
     rows.enumerate().for_each(|(y, (pixels, masked))| {
         for x in 0..width {
-            if let Some(value) = source(x, y).and_then(|at| sample(image, at)) {
+            if let Some(value) = sample(image, source(x, y)) {
                 pixels[x] = pixel(value, bytes);
                 masked[x] = false;
             }
@@ -47,11 +59,10 @@ fn pixel(value: [i64; 3], bytes: bool) -> Pixel {
 }
 
 /// The colour at `at`, times 2^28.
-fn sample(image: &Image, at: [f64; 2]) -> Option<[i64; 3]> {
+fn sample(image: &Image, at: Place) -> Option<[i64; 3]> {
     let (width, height) = image.pixels.size();
-    let [(x, across), (y, down)] = at.map(|v| {
-        // What is not finite or far away ends up outside, too.
-        let steps = (v * STEPS as f64 + 0.5).floor() as i64;
+    let [(x, across), (y, down)] = at.map(|steps| {
+        let steps = i64::from(steps);
         (steps.div_euclid(STEPS), &WEIGHTS[steps.rem_euclid(STEPS) as usize])
     });
     let mut sum = [0; 3];
@@ -87,9 +98,9 @@ mod tests {
     #[test]
     fn whole_pixels_stay_as_they_are() {
         let image = noise(20, 11);
-        let same = resample(&image, (20, 11), false, |x, y| Some([x as f64, y as f64])).unwrap();
+        let same = resample(&image, (20, 11), false, |x, y| place([x as f64, y as f64])).unwrap();
         assert_eq!(same, image);
-        let moved = resample(&image, (20, 11), false, |x, y| Some([x as f64 + 3.0, y as f64])).unwrap();
+        let moved = resample(&image, (20, 11), false, |x, y| place([x as f64 + 3.0, y as f64])).unwrap();
         assert_eq!(moved.pixels[(4, 5)], image.pixels[(7, 5)]);
         assert!(moved.masked[(17, 5)] && !moved.masked[(16, 5)]);
     }
@@ -100,7 +111,7 @@ mod tests {
         let pixels = Plane::from_fn(30, 30, |x, y| [value(x, y); 4]);
         let image = Image { pixels, masked: Plane::filled(30, 30, false) };
         let moved =
-            resample(&image, (30, 30), false, |x, y| Some([x as f64 + 0.25, y as f64 - 0.5])).unwrap();
+            resample(&image, (30, 30), false, |x, y| place([x as f64 + 0.25, y as f64 - 0.5])).unwrap();
         assert_eq!(moved.pixels[(10, 10)], [value(10, 10) + 150 - 50; 4]);
         // What takes a pixel outside is masked: three columns and rows are read beyond whole pixels.
         assert!(moved.masked[(28, 10)] && !moved.masked[(27, 10)] && moved.masked[(0, 10)]);
@@ -112,14 +123,15 @@ mod tests {
         let mut image = noise(12, 12);
         image.masked[(6, 6)] = true;
         let masked = |dx: f64| {
-            let moved = resample(&image, (12, 12), false, |x, y| Some([x as f64 + dx, y as f64])).unwrap();
+            let moved = resample(&image, (12, 12), false, |x, y| place([x as f64 + dx, y as f64])).unwrap();
             (0..12).filter(|&x| moved.masked[(x, 6)]).collect::<Vec<_>>()
         };
         assert_eq!(masked(0.0), [6]);
         assert_eq!(masked(0.5), [0, 4, 5, 6, 7, 10, 11]);
+        assert_eq!(sample(&image, NOWHERE), None);
         for nowhere in [[f64::NAN, 3.0], [f64::INFINITY, 3.0], [3.0, -1e300], [1e18, 1e18]] {
-            // NaN becomes 0, which is a place; the lens never gives it.
-            let at = sample(&image, nowhere);
+            // NaN becomes 0, which is in the image; the lens never gives it.
+            let at = sample(&image, place(nowhere));
             assert!(nowhere[0].is_nan() || at.is_none(), "{nowhere:?}");
         }
     }
@@ -129,7 +141,7 @@ mod tests {
         let image = noise(16, 16);
         let image = Image { pixels: image.pixels.map(|p| p.map(|v| v & 0xff00)), ..image };
         assert!(hold_bytes([&image, &image]) && !hold_bytes([&image, &noise(4, 4)]));
-        let moved = resample(&image, (16, 16), true, |x, y| Some([x as f64 + 0.3, y as f64 + 0.3])).unwrap();
+        let moved = resample(&image, (16, 16), true, |x, y| place([x as f64 + 0.3, y as f64 + 0.3])).unwrap();
         assert!(hold_bytes([&moved, &moved]));
     }
 }

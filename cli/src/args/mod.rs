@@ -1,6 +1,7 @@
 //! Groups of flags that several commands share.
 
 pub(crate) mod execution;
+pub(crate) mod format;
 pub(crate) mod method;
 pub(crate) mod reading;
 pub(crate) mod rectification;

@@ -10,3 +10,4 @@ pub(crate) mod man;
 pub(crate) mod r#match;
 pub(crate) mod presets;
 pub(crate) mod rectify;
+pub(crate) mod sequence;

@@ -206,9 +206,37 @@ impl AlsoArgs {
         self.wanted().any(|also| matches!(also.kind, Kind::Points | Kind::Picture { beside: true }))
     }
 
+    /// The disparity map in colours, with the left image `beside` it.
+    fn picture(&self, beside: bool, outcome: &Outcome) -> Plane<[u8; 3]> {
+        let (DisparityRange { min, max }, map) = (outcome.range, outcome.maps.final_map());
+        let colours = self.colours.map(ColourMap::from).unwrap_or_default();
+        let preview = colour::preview(&map, min as f32, max as f32, colours);
+        match outcome.left.filter(|_| beside) {
+            Some(left) => colour::side_by_side(&left.to_rgb8(), &preview),
+            None => preview,
+        }
+    }
+
+    /// What a film shows: the preview, or that with the left image beside it where that is the wanted output.
+    pub(crate) fn film_picture(&self, outcome: &Outcome) -> Plane<[u8; 3]> {
+        self.picture(self.show_left(), outcome)
+    }
+
+    /// Refuses outputs that no film shows.
+    pub(crate) fn check_film(&self) -> Result<()> {
+        match self.wanted().find(|also| !matches!(also.kind, Kind::Picture { .. })) {
+            Some(also) => {
+                let reason =
+                    "is a file of each frame, and OUTPUT is a film; give the name of a folder as OUTPUT";
+                Err(Failure::Usage(format!("{}: {reason}", also.flag())))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Writes `also` to `path`. Returns what there is to say of it.
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
-        let &Outcome { maps, range, sign, left, ref rig, .. } = outcome;
+        let &Outcome { maps, sign, left, ref rig, .. } = outcome;
         match also.kind {
             Kind::Disparity(view, map) => {
                 let Some(map) = map(maps) else { return Ok(None) };
@@ -237,15 +265,7 @@ impl AlsoArgs {
                 ply::write(path, &points)?;
                 return Ok(Some(format!("{} point{}", points.len(), plural(points.len()))));
             }
-            Kind::Picture { beside } => {
-                let colours = self.colours.map(ColourMap::from).unwrap_or_default();
-                let mut picture =
-                    colour::preview(&maps.final_map(), range.min as f32, range.max as f32, colours);
-                if let Some(left) = left.filter(|_| beside) {
-                    picture = colour::side_by_side(&left.to_rgb8(), &picture);
-                }
-                write::rgb8(path, &picture)?;
-            }
+            Kind::Picture { beside } => write::rgb8(path, &self.picture(beside, outcome))?,
         }
         Ok(None)
     }

@@ -3,5 +3,6 @@
 pub(crate) mod also;
 pub(crate) mod claim;
 pub(crate) mod files;
+pub(crate) mod film;
 pub(crate) mod record;
 pub(crate) mod staged;

@@ -134,7 +134,7 @@ impl Input {
 }
 
 /// What the calibration in `files` says of images that are rectified.
-fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
+pub(crate) fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
     let named = |reason: &str| Error::read(rectification::shown(files), reason);
     let known = calibration::read(files)?;
     let calibration = known

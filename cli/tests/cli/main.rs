@@ -19,6 +19,7 @@ mod plugin;
 mod render_cloud;
 mod report;
 mod robust;
+mod sequences;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -7,8 +7,8 @@ use crate::maps::FRACTION;
 use std::array::from_fn;
 
 /// By how much both views are smoothed (a standard deviation in pixels), where they share less of their finest detail than this
-/// (open). Of 50 pairs that nobody disturbed, 39 share 0.70 or more; noise of 5, 10 and 20 levels leaves about 0.79, 0.65 and
-/// 0.40.
+/// (open). Of 49 real pairs 37 share 0.7 or more, and all but one 0.57. Of eight clean pairs, noise of 5 levels takes two below
+/// 0.7, noise of 10 all eight, and noise of 20 all below 0.5.
 const SMOOTHING: [(f64, f64); 3] = [(0.5, 1.0), (0.57, 0.7), (0.7, 0.5)];
 /// Radius of the patches that are compared, in pixels.
 const RADIUS: usize = 4;
@@ -24,7 +24,6 @@ const MOST_DETAIL: i32 = 2;
 /// The standard deviation of the Gaussian by which both views are to be smoothed, from matches at half their size; 0 for none.
 pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
     let shared = shared_detail(pair, matches);
-
     let smoothing = SMOOTHING.iter().find(|(least, _)| shared.is_some_and(|shared| shared < *least));
     smoothing.map_or(0.0, |(_, sigma)| *sigma)
 }

@@ -5,7 +5,7 @@ use crate::image::Pair;
 use crate::options::DisparityRange;
 
 /// Approximate number of corners whose matches are looked at.
-const SAMPLE: usize = 400;
+const SAMPLE: usize = 600;
 /// Fewer matches than this tell nothing.
 pub(super) const FEWEST: usize = 30;
 /// Rows above and below its own on which a corner is looked for, at half the size.

@@ -5,7 +5,8 @@ use crate::image::{Image, Pair};
 
 /// The standard deviations by which a view may be smoothed, in pixels.
 const SIGMAS: [f64; 12] = [0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.8, 3.4];
-/// Views are equally sharp where the detail of one is at least this share of the other's (open).
+/// Views are equally sharp where the detail of one is at least this share of the other's (open): so are those of all of 49 real
+/// pairs. Where one view of eight of them is blurred by 1.5 px, none is.
 const EQUAL: f64 = 0.7;
 
 /// The standard deviations by which the left and the right view are to be smoothed to be equally sharp: 0 for one of them at least. The

@@ -19,6 +19,7 @@ use mrfgs::options::Method;
 use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::execution::ExecutionArgs;
+use crate::args::format::Format;
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
 use crate::args::sign::Sign;
@@ -123,27 +124,6 @@ impl MapArgs {
 
 fn shown(path: &Path) -> String {
     path.display().to_string()
-}
-
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum Format {
-    /// Float, +infinity for invalid pixels
-    #[default]
-    Pfm,
-    /// Float, NaN for invalid pixels
-    Tif,
-    /// 16 bits, disparity times 256, 0 for invalid pixels
-    Png,
-}
-
-impl Format {
-    fn extension(self) -> &'static str {
-        match self {
-            Self::Pfm => "pfm",
-            Self::Tif => "tif",
-            Self::Png => "png",
-        }
-    }
 }
 
 /// How long to wait for pairs that other runs match.

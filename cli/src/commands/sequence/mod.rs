@@ -1,0 +1,204 @@
+//! `mrfgs sequence`.
+
+mod pipeline;
+mod writer;
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::calibration;
+use mrfgs::image::Pair;
+use mrfgs::image::calib::Calibration;
+use mrfgs::options::DisparityRange;
+use mrfgs::rectification::Rectification;
+use mrfgs::{Error, Matcher};
+
+use crate::args::execution::ExecutionArgs;
+use crate::args::format::Format;
+use crate::args::method::MethodArgs;
+use crate::args::reading::ReadingArgs;
+use crate::args::rectification::RectificationArgs;
+use crate::args::search::{Found, Search};
+use crate::args::sign::Sign;
+use crate::failure::{Failure, Result};
+use crate::outputs::also::AlsoArgs;
+use crate::outputs::files::{self, is_printed};
+use crate::pairs::{cameras, input, raw};
+use crate::sequences::{Frames, Layout, RawFrames, raw_frames};
+use crate::{console, stop};
+
+use pipeline::Pipeline;
+use writer::Writer;
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs sequence left right maps --max-disparity 127
+  mrfgs sequence 'cam/*_L.png' 'cam/*_R.png' maps --method fast
+  # Frames with both views, to a film:
+  mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
+  # A video with the left view on the left, matched and played:
+  ffmpeg -i stereo.mkv -f yuv4mpegpipe - |
+    mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
+  # Images as the cameras took them, to depth in millimetres:
+  mrfgs sequence left right maps --rectify --calib stereo.yml \\
+    --also depth-mm";
+
+/// Match the frames of a video, one after the other
+///
+/// LEFT and RIGHT are each a folder of images, a pattern of their names ('left/*.png'), a stream in YUV4MPEG2 as ffmpeg writes it
+/// (-f yuv4mpegpipe), or - for a stream on standard input. Images come in the order of their numbers. Without RIGHT each frame
+/// holds both views, as --layout says. All frames have one size.
+///
+/// OUTPUT is a folder, or a film: NAME.y4m, or - for a film on standard output. A folder gets a map of each frame, named after
+/// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
+/// with --also side-by-side, LEFT stands beside it. ffmpeg and ffplay read it.
+///
+/// The range is that of the first frame where none is given. While a frame is matched, the next ones are read and
+/// rectified, and the last one is written. Whatever ends a sequence early, an error or Ctrl-C, the maps of all frames before
+/// are there and whole.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, allow_missing_positional = true)]
+pub(crate) struct Args {
+    /// Frames of the left camera, or frames with both views
+    left: PathBuf,
+    /// Frames of the right camera
+    right: Option<PathBuf>,
+    /// Folder for the maps, or film to write: NAME.y4m or -
+    #[arg(required = true)]
+    output: PathBuf,
+
+    /// How both views lie in a frame, where RIGHT is not given
+    #[arg(long, value_enum, value_name = "WHICH", default_value = "side-by-side")]
+    layout: Layout,
+    /// What streams hold that are no YUV4MPEG2 but pixels alone (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are
+    /// gray, gray16le, rgb24 and bgr24
+    #[arg(long, value_name = "SIZE,FORMAT", value_parser = raw_frames)]
+    raw_frames: Option<RawFrames>,
+    #[command(flatten)]
+    search: Search,
+    /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; as `mrfgs match` takes it
+    #[arg(long, value_name = "FILE")]
+    calib: Vec<PathBuf>,
+    /// Frames are as the cameras took them: rectifies them by --calib first
+    #[arg(long, requires = "calib")]
+    rectify: bool,
+    #[command(flatten)]
+    rectification: RectificationArgs,
+    /// Format of the disparity maps in a folder, as the extensions of `mrfgs match`
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    format: Format,
+    #[command(flatten)]
+    also: AlsoArgs,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    /// Prints nothing but failures
+    #[arg(long)]
+    quiet: bool,
+
+    #[command(flatten)]
+    method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+}
+
+/// Whether an output is a film.
+fn is_film(output: &Path) -> bool {
+    is_printed(output) || output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m"))
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    stop::listen();
+    let film = is_film(&args.output);
+    if film {
+        args.also.check_film()?;
+    } else {
+        args.also.check()?;
+    }
+    let method = args.also.made_by(args.method.method()?)?;
+    if args.rectification.alpha.is_some() && !args.rectify {
+        let reason = "is of a rectification; add --rectify, or leave --alpha out";
+        return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
+    }
+    let mut frames = open(args)?;
+    check_output(args, &frames)?;
+    let (all, rate) = (frames.len(), frames.rate());
+    // The first frame decides on the range and, for all that follow, on the size.
+    let Some(first) = frames.next() else { return Err(empty(&args.left).into()) };
+    let mut first = first?;
+    let mut rectification = None;
+    let mut calibration = None;
+    if args.rectify {
+        let options = args.rectification.options();
+        let (by, pair) = raw::rectify(&calibration::read(&args.calib)?, &args.calib, &first.pair, &options)?;
+        calibration = Some(by.calibration()?);
+        first.pair = pair;
+        rectification = Some(by);
+    } else if !args.calib.is_empty() {
+        calibration = Some(input::of_rectified_images(&args.calib)?);
+    }
+    let known = calibration.as_ref().map(|calibration| (args.calib[0].as_path(), calibration));
+    let range = range(args, &first.pair, known)?;
+    let rig = args.also.take_cameras();
+    let remedy = "give one with --calib";
+    let rig = rig.map(|word| cameras::rig(word, known, &args.left, first.pair.size(), remedy)).transpose()?;
+    let writer = Writer { output: &args.output, format: args.format, also: &args.also, range, rig };
+    let matcher = Matcher::builder().method(method).execution(args.execution.execution()).build()?;
+    if let Some(by) = rectification.as_mut() {
+        by.keep_places()?;
+    }
+    let mut sink = writer.begin(film.then_some(rate))?;
+    let pipeline = Pipeline { matcher, range, all, quiet: args.quiet };
+    pipeline.run(first, frames, rectification, &mut sink)
+}
+
+fn empty(left: &Path) -> Error {
+    Error::read(left, "holds no frame")
+}
+
+/// The frames that the arguments name.
+fn open(args: &Args) -> Result<Frames> {
+    let (left, right) = (args.left.as_path(), args.right.as_deref());
+    if is_printed(left) && right.is_some_and(is_printed) {
+        let reason = "standard input holds one stream; give the frames of one camera another way, or both views \
+                      in one stream";
+        return Err(Failure::Usage(format!("RIGHT: {reason}")));
+    }
+    Ok(Frames::open(left, right, args.layout, args.raw_frames, args.reading.reader())?)
+}
+
+/// Refuses an output that is an input, a terminal, or a file where it must be a folder.
+fn check_output(args: &Args, frames: &Frames) -> Result<()> {
+    let output = args.output.as_path();
+    if is_printed(output) {
+        return Ok(console::check_takes_data()?);
+    }
+    let inputs = frames.files();
+    if is_film(output) {
+        let inputs: Vec<_> = inputs.into_iter().map(|file| ("an input", file)).collect();
+        return files::distinct(&inputs, &[("OUTPUT", output)]);
+    }
+    let place = files::folder_place(output)?;
+    let inside = |file: &&Path| file.canonicalize().is_ok_and(|file| file.parent() == Some(&place));
+    match inputs.iter().find(|file| inside(file)) {
+        Some(_) => Err(Error::write(output, "holds frames that are read; give another folder").into()),
+        None => Ok(()),
+    }
+}
+
+/// The range to search in all frames, by the first.
+fn range(args: &Args, pair: &Pair, known: Option<(&Path, &Calibration)>) -> Result<DisparityRange> {
+    let Found { range, by_matches } = args.search.range(pair, known, Sign::default())?;
+    if !args.quiet {
+        if by_matches {
+            let DisparityRange { min, max } = range;
+            let text = format!(
+                "disparities {min} to {max}, by sparse matches in the first frame; set them with --max-disparity"
+            );
+            console::say(&text);
+        }
+        input::warn(mrfgs::check::warnings(pair, (!by_matches).then_some(range)));
+    }
+    Ok(range)
+}
+
+/// What rectifies the frames that follow.
+type By = Option<Rectification>;

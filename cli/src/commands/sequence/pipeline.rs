@@ -1,0 +1,179 @@
+//! Reading, matching and writing at once.
+
+use std::ops::ControlFlow;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use mrfgs::Matcher;
+use mrfgs::image::Pair;
+use mrfgs::options::DisparityRange;
+
+use crate::failure::{Failure, Result};
+use crate::progress::FrameBar;
+use crate::sequences::{Frame, Frames};
+use crate::text::plural;
+use crate::{console, remedy, stop};
+
+use super::By;
+use super::writer::{Found, Sink};
+
+/// Frames that wait between two steps: enough to keep both at work.
+const WAITING: usize = 2;
+/// How often a wait for a frame looks whether the user has stopped it.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// What matches the frames.
+pub(super) struct Pipeline {
+    pub(super) matcher: Matcher,
+    pub(super) range: DisparityRange,
+    /// How many frames there are, where that is known.
+    pub(super) all: Option<usize>,
+    pub(super) quiet: bool,
+}
+
+/// A frame, or why there is none.
+type Next = Result<Frame>;
+
+impl Pipeline {
+    /// Matches `first`, which is rectified, and all `frames`, which `by` rectifies, and writes what it finds.
+    ///
+    /// # Errors
+    /// Of reading, matching and writing, and when the user stops it. What was found before is written then.
+    pub(super) fn run(mut self, first: Frame, frames: Frames, by: By, sink: &mut Sink) -> Result<()> {
+        let start = Instant::now();
+        let (size, takes_pair) = (first.pair.size(), sink.takes_pair());
+        let (sender, receiver) = sync_channel(WAITING);
+        // It may wait for standard input for ever, so nobody waits for it.
+        thread::spawn(move || read(frames, by, &sender));
+        let (found, to_write) = sync_channel::<Found>(WAITING);
+        let mut bar = FrameBar::new(self.all, self.quiet);
+        let (matched, written) = thread::scope(|scope| {
+            let writing = scope.spawn(|| write(to_write, sink, &mut bar));
+            let matched = self.matched(first, &receiver, takes_pair, found);
+            (matched, writing.join())
+        });
+        drop(bar);
+        let (done, written) =
+            written.unwrap_or((0, Err(Failure::Failed("the writer of maps failed".into()))));
+        let Ran { on, note, ended } = matched;
+        // A failure to write ends the matching, so it is the cause.
+        let ended = written.and(ended);
+        if !self.quiet {
+            if let Some(note) = note {
+                console::say(&note);
+            }
+            let seconds = start.elapsed().as_secs_f64();
+            let (width, height) = size;
+            console::say(&format!(
+                "{done} frame{} of {width} x {height}, {} labels, in {seconds:.2} s: {:.1} a second{}",
+                plural(done),
+                self.range.labels(),
+                done as f64 / seconds,
+                on.map(|on| format!(" on {on}")).unwrap_or_default()
+            ));
+        }
+        ended.map_err(|failure| match failure {
+            Failure::Stopped(_) => Failure::Stopped(format!("stopped after {done} frame{}", plural(done))),
+            failure => failure,
+        })
+    }
+
+    /// Matches all frames and hands on what it finds.
+    fn matched(
+        &mut self,
+        first: Frame,
+        frames: &Receiver<Next>,
+        takes_pair: bool,
+        found: SyncSender<Found>,
+    ) -> Ran {
+        let range = self.range;
+        // Names and pairs of the frames that are being matched.
+        let (started, under_way) = std::sync::mpsc::channel::<(String, Option<Pair>)>();
+        let mut failure = None;
+        let mut next = Some(Ok(first));
+        let pairs = std::iter::from_fn(|| {
+            let frame = match next.take().map_or_else(|| received(frames), Some)? {
+                Ok(frame) => frame,
+                Err(error) => {
+                    failure = Some(error);
+                    return None;
+                }
+            };
+            // The receiver lives as long as this.
+            let _ = started.send((frame.name, takes_pair.then(|| frame.pair.clone())));
+            Some((frame.pair, range))
+        });
+        let mut ran = Ran { on: None, note: None, ended: Ok(()) };
+        let ended = self.matcher.run_all(pairs, |matched| {
+            let Ok((name, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
+            ran.note =
+                matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)).or(ran.note.take());
+            ran.on = Some(matched.ran_on);
+            match found.send(Found { name, maps: matched.maps, pair }) {
+                Ok(()) => ControlFlow::Continue(()),
+                // It tells why.
+                Err(_) => ControlFlow::Break(()),
+            }
+        });
+        ran.ended = match (ended, failure) {
+            (Err(error), _) => Err(error.into()),
+            (Ok(()), Some(failure)) => Err(failure),
+            (Ok(()), None) => Ok(()),
+        };
+        ran
+    }
+}
+
+/// What came of the matching.
+struct Ran {
+    /// What ran the stages.
+    on: Option<String>,
+    /// Why it did not run on the preferred device.
+    note: Option<String>,
+    ended: Result<()>,
+}
+
+/// The next frame; `None` after the last one.
+fn received(frames: &Receiver<Next>) -> Option<Next> {
+    loop {
+        if stop::go_on().is_break() {
+            return Some(Err(Failure::Stopped(String::new())));
+        }
+        match frames.recv_timeout(PATIENCE) {
+            Ok(frame) => return Some(frame),
+            Err(RecvTimeoutError::Disconnected) => return None,
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+    }
+}
+
+/// Reads and rectifies frames until one fails or nobody takes them.
+fn read(frames: Frames, by: By, to: &SyncSender<Next>) {
+    for frame in frames {
+        let rectified = |frame: Frame| match &by {
+            Some(by) => Ok(Frame { pair: by.apply(&frame.pair)?, ..frame }),
+            None => Ok(frame),
+        };
+        let frame = frame.and_then(rectified).map_err(Failure::from);
+        let failed = frame.is_err();
+        if to.send(frame).is_err() || failed {
+            return;
+        }
+    }
+}
+
+/// Writes what comes. Returns how many frames it wrote.
+fn write(found: Receiver<Found>, sink: &mut Sink, bar: &mut FrameBar) -> (usize, Result<()>) {
+    let mut done = 0;
+    let mut ended = Ok(());
+    for found in found {
+        ended = sink.add(&found);
+        if ended.is_err() {
+            break;
+        }
+        done += 1;
+        bar.end();
+    }
+    (done, sink.finish().and(ended))
+}

@@ -1,0 +1,115 @@
+//! Where the maps of a sequence go.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use mrfgs::Error;
+use mrfgs::depth::Rig;
+use mrfgs::image::{Pair, write};
+use mrfgs::maps::Maps;
+use mrfgs::options::DisparityRange;
+
+use crate::args::format::Format;
+use crate::args::sign::Sign;
+use crate::failure::Result;
+use crate::outputs::also::{AlsoArgs, Outcome, View};
+use crate::outputs::files::Written;
+use crate::outputs::film::Film;
+use crate::sequences::FrameRate;
+
+/// What is written of every frame.
+pub(super) struct Writer<'a> {
+    pub(super) output: &'a Path,
+    pub(super) format: Format,
+    pub(super) also: &'a AlsoArgs,
+    pub(super) range: DisparityRange,
+    pub(super) rig: Option<Rig>,
+}
+
+/// A frame that has been matched.
+pub(super) struct Found {
+    pub(super) name: String,
+    pub(super) maps: Maps,
+    /// The pair, where an output shows it.
+    pub(super) pair: Option<Pair>,
+}
+
+/// The folder or the film, with what is in it so far.
+pub(super) struct Sink<'a> {
+    writer: Writer<'a>,
+    film: Option<Film>,
+}
+
+impl<'a> Writer<'a> {
+    /// Begins a film with the frame rate of the input, or a folder.
+    ///
+    /// # Errors
+    /// Where the folder cannot be made, or a map cannot be stored in its format.
+    pub(super) fn begin(self, film: Option<Option<FrameRate>>) -> Result<Sink<'a>> {
+        if let Some(rate) = film {
+            if self.output != Path::new("-") {
+                write::check_path(self.output)?;
+            }
+            let film = Some(Film::new(self.output, rate));
+            return Ok(Sink { writer: self, film });
+        }
+        match fs::create_dir(self.output) {
+            Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(self.output, e).into()),
+            made => {
+                let map = self.map("000000");
+                let checked =
+                    write::check_disparity_path(&map, self.range.min, self.range.max).and_then(|()| {
+                        self.also.wanted().try_for_each(|word| word.check(&word.beside(&map), self.range))
+                    });
+                if checked.is_err() && made.is_ok() {
+                    // It is empty.
+                    let _ = fs::remove_dir(self.output);
+                }
+                checked?;
+            }
+        }
+        Ok(Sink { writer: self, film: None })
+    }
+
+    /// Whether it takes the pair, too.
+    pub(super) fn takes_pair(&self) -> bool {
+        self.also.show_left()
+    }
+
+    fn map(&self, name: &str) -> PathBuf {
+        self.output.join(format!("{name}.{}", self.format.extension()))
+    }
+}
+
+impl Sink<'_> {
+    pub(super) fn takes_pair(&self) -> bool {
+        self.writer.takes_pair()
+    }
+
+    /// Writes a frame.
+    pub(super) fn add(&mut self, found: &Found) -> Result<()> {
+        let Writer { also, range, .. } = self.writer;
+        let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
+        let rig = self.writer.rig;
+        let georeferences = found.pair.as_ref().map(Pair::georeferences).unwrap_or_default();
+        let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, georeferences };
+        if let Some(film) = &mut self.film {
+            return Ok(film.add(&also.film_picture(&outcome))?);
+        }
+        let map = self.writer.map(&found.name);
+        let mut written = Written::default();
+        written.note(&map, outcome.writer(View::Left).disparity(&map, &maps.final_map()))?;
+        for word in also.wanted() {
+            let path = word.beside(&map);
+            written.note(&path, also.write(word, &path, &outcome))?;
+        }
+        written.keep();
+        Ok(())
+    }
+
+    /// Ends a film.
+    pub(super) fn finish(&mut self) -> Result<()> {
+        Ok(self.film.take().map_or(Ok(()), Film::finish)?)
+    }
+}

@@ -1,0 +1,114 @@
+//! Films of maps, as YUV4MPEG2 for ffmpeg and players.
+
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use mrfgs::image::{Plane, write::Growing};
+use mrfgs::{Error, Result};
+
+use crate::outputs::files::is_printed;
+
+/// Frames a second where the input does not say it.
+const RATE: (usize, usize) = (25, 1);
+
+/// A film in the making. A file appears when it is [finished](Self::finish).
+pub(crate) struct Film {
+    path: PathBuf,
+    rate: (usize, usize),
+    /// `None` before the first frame.
+    sink: Option<Sink>,
+}
+
+/// Where the frames go.
+enum Sink {
+    Printed(io::Stdout),
+    File(Growing),
+}
+
+impl Film {
+    /// A film at `path`, or `-` for standard output, of `rate` frames a second.
+    pub(crate) fn new(path: &Path, rate: Option<(usize, usize)>) -> Self {
+        Self { path: path.to_owned(), rate: rate.unwrap_or(RATE), sink: None }
+    }
+
+    /// Adds a frame; all have one size.
+    ///
+    /// # Errors
+    /// [`Error::Write`] when it cannot be written, or its reader has left.
+    pub(crate) fn add(&mut self, picture: &Plane<[u8; 3]>) -> Result<()> {
+        let mut bytes = Vec::with_capacity(3 * picture.data().len() + 100);
+        let sink = match &mut self.sink {
+            Some(sink) => sink,
+            None => {
+                let ((width, height), (frames, seconds)) = (picture.size(), self.rate);
+                let header = format!(
+                    "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED\n"
+                );
+                bytes.extend_from_slice(header.as_bytes());
+                self.sink.insert(if is_printed(&self.path) {
+                    Sink::Printed(io::stdout())
+                } else {
+                    Sink::File(Growing::new(&self.path)?)
+                })
+            }
+        };
+        bytes.extend_from_slice(b"FRAME\n");
+        let yuv: Vec<[u8; 3]> = picture.data().iter().map(|rgb| to_yuv(*rgb)).collect();
+        (0..3).for_each(|plane| bytes.extend(yuv.iter().map(|pixel| pixel[plane])));
+        let written = match sink {
+            Sink::Printed(out) => out.write_all(&bytes).and_then(|()| out.flush()),
+            Sink::File(file) => file.write_all(&bytes),
+        };
+        written.map_err(|e| match (sink, e.kind()) {
+            (Sink::Printed(_), ErrorKind::BrokenPipe) => {
+                Error::write("standard output", "its reader left before the end of the film")
+            }
+            (Sink::Printed(_), _) => Error::write("standard output", e),
+            (Sink::File(_), _) => Error::write(&self.path, e),
+        })
+    }
+
+    /// Ends the film.
+    ///
+    /// # Errors
+    /// [`Error::Write`] when it cannot be written.
+    pub(crate) fn finish(self) -> Result<()> {
+        match self.sink {
+            Some(Sink::File(file)) => file.finish(),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Luma and chroma by ITU-R BT.601: black is 16, white 235.
+fn to_yuv([r, g, b]: [u8; 3]) -> [u8; 3] {
+    let [r, g, b] = [r, g, b].map(i32::from);
+    // In 1/2^16.
+    let sum = |offset: i32, sum: i32| ((sum + 32_768) / 65_536 + offset) as u8;
+    let chroma = |sum: i32| ((sum + (128 << 16) + 32_768) >> 16) as u8;
+    [
+        sum(16, 16_829 * r + 33_039 * g + 6_416 * b),
+        chroma(-9_714 * r - 19_070 * g + 28_784 * b),
+        chroma(28_784 * r - 24_103 * g - 4_681 * b),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_are_those_of_the_standard() {
+        let colours = [
+            ([0, 0, 0], [16, 128, 128]),
+            ([255, 255, 255], [235, 128, 128]),
+            ([255, 0, 0], [82, 90, 240]),
+            ([0, 255, 0], [145, 54, 34]),
+            ([0, 0, 255], [41, 240, 110]),
+        ];
+        for (rgb, yuv) in colours {
+            let off = to_yuv(rgb).iter().zip(yuv).map(|(a, b): (&u8, u8)| a.abs_diff(b)).max();
+            assert!(off.is_some_and(|off| off <= 1), "{:?} for {rgb:?}, not {yuv:?}", to_yuv(rgb));
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Images of a folder or of a pattern, in the order of their numbers.
+
+use std::cmp::Ordering;
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mrfgs::{Error, Result};
+
+/// What an image in a folder may be called.
+const EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "tif", "tiff", "pfm"];
+
+/// The images that `path`, a folder or a pattern, names; `None` where it names something else.
+///
+/// # Errors
+/// Where there is no image, or two have one stem.
+pub(super) fn list(path: &Path) -> Result<Option<Vec<PathBuf>>> {
+    let text = path.to_string_lossy();
+    let (mut files, none) = if path.is_dir() {
+        (in_folder(path)?, "holds no images")
+    } else if text.contains(['*', '?', '[']) && !path.exists() {
+        (of_pattern(path, &text)?, "no image has such a name")
+    } else if text.contains('%') && !path.exists() {
+        return Err(Error::read(
+            path,
+            "there is no such file; where numbers differ, write * as in 'left/*.png'",
+        ));
+    } else {
+        return Ok(None);
+    };
+    if files.is_empty() {
+        return Err(Error::read(path, none));
+    }
+    files.sort_by(|a, b| by_number(&a.to_string_lossy(), &b.to_string_lossy()));
+    let mut stems = HashMap::new();
+    for file in &files {
+        if let Some(other) = stems.insert(stem(file).to_lowercase(), file) {
+            let reason = format!("has the stem of {}, and maps are named after it", other.display());
+            return Err(Error::read(file, reason));
+        }
+    }
+    Ok(Some(files))
+}
+
+fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
+    let entries = entries.map_err(|e| Error::read(folder, e))?;
+    let is_image = |path: &Path| {
+        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        !hidden && EXTENSIONS.contains(&extension.as_str()) && path.is_file()
+    };
+    Ok(entries.into_iter().map(|entry| entry.path()).filter(|path| is_image(path)).collect())
+}
+
+fn of_pattern(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
+    // As shells have it, * leaves hidden files out.
+    let options = glob::MatchOptions {
+        require_literal_separator: true,
+        require_literal_leading_dot: true,
+        ..glob::MatchOptions::new()
+    };
+    let found =
+        glob::glob_with(pattern, options).map_err(|e| Error::read(path, format!("is no pattern: {e}")))?;
+    let found = found.collect::<Result<Vec<_>, _>>();
+    let found = found.map_err(|e| Error::read(e.path().to_owned(), e.error().to_string()))?;
+    Ok(found.into_iter().filter(|file| file.is_file()).collect())
+}
+
+/// The name of a file without its last extension.
+pub(super) fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The order of texts in which 9 comes before 10.
+fn by_number(a: &str, b: &str) -> Ordering {
+    parts(a).cmp(parts(b)).then_with(|| a.cmp(b))
+}
+
+/// What is no number, and the number that follows: how many digits it has without leading zeros, and these.
+fn parts(text: &str) -> impl Iterator<Item = (&str, usize, &str)> {
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let (words, tail) = rest.split_at(rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len()));
+        let (digits, tail) = tail.split_at(tail.find(|c: char| !c.is_ascii_digit()).unwrap_or(tail.len()));
+        rest = tail;
+        let number = digits.trim_start_matches('0');
+        Some((words, number.len(), number))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_count() {
+        let mut names = ["f10.png", "f9.png", "f009.png", "e11b2.png", "f.png", "f1.png", "e11b10.png"];
+        names.sort_by(|a, b| by_number(a, b));
+        assert_eq!(names, ["e11b2.png", "e11b10.png", "f.png", "f1.png", "f009.png", "f9.png", "f10.png"]);
+    }
+}

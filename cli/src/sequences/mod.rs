@@ -1,0 +1,225 @@
+//! Sequences of pairs: numbered images, and streams of frames.
+
+mod files;
+mod stream;
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use mrfgs::image::raster::Raster;
+use mrfgs::image::read::Reader;
+use mrfgs::image::{Pair, Rect};
+use mrfgs::{Error, Result};
+
+use stream::Stream;
+pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
+
+/// How both views lie in one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Layout {
+    /// The left view on the left
+    SideBySide,
+    /// The left view on top
+    TopBottom,
+}
+
+impl Layout {
+    /// The left and the right view.
+    fn split(self, frame: &Raster) -> Result<[Raster<'static>; 2]> {
+        let (width, height) = frame.size();
+        let (whole, halves) = match self {
+            Self::SideBySide => (width, "columns"),
+            Self::TopBottom => (height, "rows"),
+        };
+        if whole % 2 != 0 {
+            let reason =
+                format!("{width} x {height} pixels are no two views: the {halves} are an odd number");
+            return Err(Error::Mismatch(reason));
+        }
+        let half = whole / 2;
+        let parts = [0..half, half..whole].map(|part| match self {
+            Self::SideBySide => Rect { x: part, y: 0..height },
+            Self::TopBottom => Rect { x: 0..width, y: part },
+        });
+        let [left, right] = parts.map(|part| frame.crop(&part));
+        Ok([left?, right?])
+    }
+}
+
+/// Where frames come from.
+enum Source {
+    Files { left: VecDeque<PathBuf>, reader: Reader },
+    Stream(Stream),
+}
+
+impl Source {
+    /// What `path` holds: a folder, a pattern, or a stream; `raw` says what a stream without a header holds.
+    fn open(path: &Path, raw: Option<RawFrames>, reader: Reader) -> Result<Self> {
+        match files::list(path)? {
+            Some(left) => Ok(Self::Files { left: left.into(), reader }),
+            None => Stream::open(path, raw, reader.max_pixels).map(Self::Stream),
+        }
+    }
+
+    fn files(&self) -> Vec<&Path> {
+        match self {
+            Self::Files { left, .. } => left.iter().map(PathBuf::as_path).collect(),
+            Self::Stream(stream) => stream.file().into_iter().collect(),
+        }
+    }
+
+    /// The next frame and, where it has one, its name; `None` after the last one.
+    fn next(&mut self) -> Option<Result<(Option<String>, Raster<'static>)>> {
+        match self {
+            Self::Files { left, reader } => {
+                let file = left.pop_front()?;
+                Some(reader.raster(&file).map(|frame| (Some(files::stem(&file)), frame)))
+            }
+            Self::Stream(stream) => stream.next().map(|frame| frame.map(|frame| (None, frame))),
+        }
+    }
+}
+
+/// Both views at one time.
+pub(crate) struct Frame {
+    /// The stem of the file of the left view, or the number of the frame, from 000000 on.
+    pub(crate) name: String,
+    pub(crate) pair: Pair,
+}
+
+/// The frames of a sequence, in order.
+pub(crate) struct Frames {
+    views: Views,
+    /// How many came so far.
+    count: usize,
+    /// (width, height) of the first pair.
+    size: Option<(usize, usize)>,
+    /// The names of both sources.
+    names: [String; 2],
+}
+
+enum Views {
+    Two(Source, Source),
+    One(Source, Layout),
+}
+
+/// Both views of one time, and the name of the left one.
+type Rasters = (Option<String>, [Raster<'static>; 2]);
+
+impl Frames {
+    /// The frames of two sources, or of one with both views in each frame.
+    ///
+    /// # Errors
+    /// Where there is none, or they are not as many of both; errors of streams.
+    pub(crate) fn open(
+        left: &Path,
+        right: Option<&Path>,
+        layout: Layout,
+        raw: Option<RawFrames>,
+        reader: Reader,
+    ) -> Result<Self> {
+        let shown = |path: &Path| match path == Path::new("-") {
+            true => "standard input".into(),
+            false => path.display().to_string(),
+        };
+        let names = [shown(left), shown(right.unwrap_or(left))];
+        let first = Source::open(left, raw, reader)?;
+        let Some(right) = right else {
+            return Ok(Self { views: Views::One(first, layout), count: 0, size: None, names });
+        };
+        let second = Source::open(right, raw, reader)?;
+        if let (Source::Files { left: l, .. }, Source::Files { left: r, .. }) = (&first, &second)
+            && l.len() != r.len()
+        {
+            return Err(Error::Mismatch(format!(
+                "{} holds {} images and {} {}: give as many of the left as of the right camera",
+                names[0],
+                l.len(),
+                names[1],
+                r.len()
+            )));
+        }
+        Ok(Self { views: Views::Two(first, second), count: 0, size: None, names })
+    }
+
+    /// How many there are, where that is known.
+    pub(crate) fn len(&self) -> Option<usize> {
+        match &self.views {
+            Views::Two(Source::Files { left, .. }, _) | Views::One(Source::Files { left, .. }, _) => {
+                Some(left.len() + self.count)
+            }
+            Views::Two(..) | Views::One(..) => None,
+        }
+    }
+
+    /// How many frames a second the left source has, where it says so.
+    pub(crate) fn rate(&self) -> Option<FrameRate> {
+        match &self.views {
+            Views::Two(Source::Stream(stream), _) | Views::One(Source::Stream(stream), _) => stream.rate(),
+            Views::Two(..) | Views::One(..) => None,
+        }
+    }
+
+    /// The files that are read, none of which an output may overwrite.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let sources = match &self.views {
+            Views::Two(left, right) => vec![left, right],
+            Views::One(both, _) => vec![both],
+        };
+        sources.into_iter().flat_map(Source::files).collect()
+    }
+
+    fn rasters(&mut self) -> Option<Result<Rasters>> {
+        match &mut self.views {
+            Views::One(source, layout) => Some(source.next()?.and_then(|(name, frame)| {
+                let at = self.names[0].as_str();
+                let views = layout.split(&frame).map_err(|e| named(e, &name.clone().unwrap_or(at.into())))?;
+                Ok((name, views))
+            })),
+            Views::Two(left, right) => {
+                let (l, r) = rayon::join(|| left.next(), || right.next());
+                let ended = |which: usize| {
+                    let (one, other) = (&self.names[which], &self.names[1 - which]);
+                    Error::Mismatch(format!("{one} ends here and {other} goes on"))
+                };
+                match (l, r) {
+                    (None, None) => None,
+                    (Some(Err(e)), _) | (_, Some(Err(e))) => Some(Err(e)),
+                    (None, Some(_)) => Some(Err(ended(0))),
+                    (Some(_), None) => Some(Err(ended(1))),
+                    (Some(Ok((name, l))), Some(Ok((_, r)))) => Some(Ok((name, [l, r]))),
+                }
+            }
+        }
+    }
+
+    fn frame(&mut self, (name, [left, right]): Rasters) -> Result<Frame> {
+        let name = name.unwrap_or_else(|| format!("{:06}", self.count));
+        let pair = Pair::of_frames(left, right).map_err(|e| named(e, &name))?;
+        let (size, (width, height)) = (*self.size.get_or_insert(pair.size()), pair.size());
+        if size != (width, height) {
+            let reason = format!("is {width} x {height} and those before it are {} x {}", size.0, size.1);
+            return Err(Error::Mismatch(format!("frame {name} {reason}: all frames have one size")));
+        }
+        self.count += 1;
+        Ok(Frame { name, pair })
+    }
+}
+
+/// An error of a frame that names it.
+fn named(error: Error, name: &str) -> Error {
+    match error {
+        Error::Mismatch(reason) => Error::Mismatch(format!("frame {name}: {reason}")),
+        error => error,
+    }
+}
+
+impl Iterator for Frames {
+    type Item = Result<Frame>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rasters = self.rasters()?;
+        Some(rasters.and_then(|rasters| self.frame(rasters)))
+    }
+}

@@ -1,0 +1,341 @@
+//! Frames one after the other in a file or a pipe: YUV4MPEG2, which ffmpeg calls yuv4mpegpipe, or pixels alone.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use mrfgs::image::raster::{Raster, Samples};
+use mrfgs::{Error, Result};
+
+/// Frames a second, as a fraction.
+pub(crate) type FrameRate = (usize, usize);
+
+/// What a stream without a header holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct RawFrames {
+    size: (usize, usize),
+    format: PixelFormat,
+}
+
+/// The pixels of raw frames, by ffmpeg's names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PixelFormat {
+    Gray,
+    Gray16le,
+    Rgb24,
+    Bgr24,
+}
+
+/// `WIDTHxHEIGHT,FORMAT`.
+///
+/// # Errors
+/// What to give instead.
+pub(crate) fn raw_frames(text: &str) -> Result<RawFrames, String> {
+    let said = "give WIDTHxHEIGHT,FORMAT, such as 1280x480,gray; formats are gray, gray16le, rgb24 and bgr24";
+    let parsed = || {
+        let (size, format) = text.split_once(',')?;
+        let (width, height) = size.split_once('x')?;
+        let number = |text: &str| text.parse().ok().filter(|n| (1..=1 << 24).contains(n));
+        let format = match format {
+            "gray" => PixelFormat::Gray,
+            "gray16le" => PixelFormat::Gray16le,
+            "rgb24" => PixelFormat::Rgb24,
+            "bgr24" => PixelFormat::Bgr24,
+            _ => return None,
+        };
+        Some(RawFrames { size: (number(width)?, number(height)?), format })
+    };
+    parsed().ok_or_else(|| said.into())
+}
+
+impl PixelFormat {
+    fn bytes(self) -> usize {
+        match self {
+            Self::Gray => 1,
+            Self::Gray16le => 2,
+            Self::Rgb24 | Self::Bgr24 => 3,
+        }
+    }
+}
+
+/// Bytes that are counted as they are read.
+struct Counted {
+    bytes: Box<dyn BufRead + Send>,
+    count: Arc<AtomicU64>,
+}
+
+impl Read for Counted {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let count = self.bytes.read(out)?;
+        self.count.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+}
+
+/// A stream of frames.
+pub(super) struct Stream {
+    name: PathBuf,
+    frames: Format,
+    /// How many came so far.
+    count: usize,
+    /// Bytes that have been read, and those up to the last whole frame.
+    read: Arc<AtomicU64>,
+    whole: u64,
+    ended: bool,
+}
+
+enum Format {
+    Yuv(y4m::Decoder<Counted>, Range),
+    Raw(Counted, RawFrames),
+}
+
+/// What the levels of black and white are.
+#[derive(Clone, Copy)]
+enum Range {
+    /// 16 and 235 of 8 bits.
+    Limited,
+    /// 0 and 255.
+    Full,
+}
+
+impl Stream {
+    /// The stream in the file `path`, or `-` for standard input.
+    pub(super) fn open(path: &Path, raw: Option<RawFrames>, max_pixels: u64) -> Result<Self> {
+        let stdin = path == Path::new("-");
+        let name = if stdin { PathBuf::from("standard input") } else { path.to_owned() };
+        let error = |reason: String| Error::read(&name, reason);
+        let mut bytes: Box<dyn BufRead + Send> = if stdin {
+            Box::new(BufReader::new(io::stdin()))
+        } else {
+            Box::new(BufReader::new(File::open(path).map_err(|e| Error::read(path, e))?))
+        };
+        if let Some(raw) = raw {
+            check_size(raw.size, max_pixels).map_err(error)?;
+        } else {
+            let header = bytes.fill_buf().map_err(|e| Error::read(&name, e))?;
+            check_header(header, max_pixels).map_err(error)?;
+        }
+        let read = Arc::new(AtomicU64::new(0));
+        let counted = Counted { bytes, count: read.clone() };
+        let frames = if let Some(raw) = raw {
+            Format::Raw(counted, raw)
+        } else {
+            let decoder = y4m::Decoder::new_with_limits(counted, y4m::Limits { bytes: usize::MAX });
+            let decoder = decoder.map_err(|e| Error::read(&name, said(&e)))?;
+            let full = decoder.get_raw_params().split(|b| *b == b' ').any(|word| word == b"XCOLORRANGE=FULL");
+            Format::Yuv(decoder, if full { Range::Full } else { Range::Limited })
+        };
+        let whole = read.load(Ordering::Relaxed);
+        Ok(Self { name, frames, count: 0, read, whole, ended: false })
+    }
+
+    pub(super) fn rate(&self) -> Option<FrameRate> {
+        match &self.frames {
+            Format::Yuv(decoder, _) => {
+                let rate = decoder.get_framerate();
+                (rate.num > 0 && rate.den > 0).then_some((rate.num, rate.den))
+            }
+            Format::Raw(..) => None,
+        }
+    }
+
+    /// The file that it reads.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.name.is_file().then_some(&self.name)
+    }
+
+    /// The next frame; `None` after the last one, and after an error.
+    pub(super) fn next(&mut self) -> Option<Result<Raster<'static>>> {
+        if self.ended {
+            return None;
+        }
+        let frame = match &mut self.frames {
+            Format::Yuv(decoder, range) => yuv_frame(decoder, *range),
+            Format::Raw(bytes, raw) => raw_frame(bytes, *raw),
+        };
+        let read = self.read.load(Ordering::Relaxed);
+        let count = self.count;
+        self.ended = !matches!(frame, Ok(Some(_)));
+        let error = |reason: &str| Some(Err(Error::read(&self.name, format!("frame {count:06} {reason}"))));
+        match frame {
+            Ok(Some(frame)) => {
+                (self.count, self.whole) = (count + 1, read);
+                Some(Ok(frame))
+            }
+            Ok(None) if read > self.whole => error("is cut off"),
+            Ok(None) if count == 0 => Some(Err(Error::read(&self.name, "holds no frame"))),
+            Ok(None) => None,
+            Err(reason) => error(&reason),
+        }
+    }
+}
+
+fn check_size((width, height): (usize, usize), max_pixels: u64) -> Result<(), String> {
+    let pixels = (width as u64).checked_mul(height as u64).filter(|pixels| *pixels <= max_pixels);
+    let many = format!("frames of {width} x {height} pixels are more than the limit of {max_pixels}");
+    pixels.map(drop).ok_or(many)
+}
+
+/// Refuses what is no YUV4MPEG2, and frames that are too large.
+fn check_header(start: &[u8], max_pixels: u64) -> Result<(), String> {
+    if start.is_empty() {
+        return Err("is empty".into());
+    }
+    let line = start.split(|b| *b == b'\n').next().unwrap_or_default();
+    if !line.starts_with(b"YUV4MPEG2") {
+        return Err("is neither a folder, nor a pattern such as 'left/*.png', nor a stream in YUV4MPEG2 \
+                    (ffmpeg: -f yuv4mpegpipe)"
+            .into());
+    }
+    let number = |letter: u8| {
+        let word = line.split(|b| *b == b' ').skip(1).find(|word| word.first() == Some(&letter))?;
+        std::str::from_utf8(&word[1..]).ok()?.parse::<usize>().ok().filter(|number| *number > 0)
+    };
+    let size = number(b'W').zip(number(b'H')).ok_or("its header does not say the size of frames")?;
+    check_size(size, max_pixels)
+}
+
+/// What the decoder complains of.
+fn said(error: &y4m::Error) -> String {
+    match error {
+        y4m::Error::UnknownColorspace => {
+            "its kind of pixels is not supported; let ffmpeg write -pix_fmt gray or yuv444p".into()
+        }
+        y4m::Error::EOF => "is cut off".into(),
+        y4m::Error::IoError(e) => e.to_string(),
+        y4m::Error::BadInput | y4m::Error::ParseError(_) | y4m::Error::OutOfMemory => "is damaged".into(),
+    }
+}
+
+fn yuv_frame(decoder: &mut y4m::Decoder<Counted>, range: Range) -> Result<Option<Raster<'static>>, String> {
+    use y4m::Colorspace as C;
+    let (width, height) = (decoder.get_width(), decoder.get_height());
+    let (colours, bits) = (decoder.get_colorspace(), decoder.get_bit_depth());
+    let frame = match decoder.read_frame() {
+        Ok(frame) => frame,
+        Err(y4m::Error::EOF) => return Ok(None),
+        Err(e) => return Err(said(&e)),
+    };
+    let planes = [frame.get_y_plane(), frame.get_u_plane(), frame.get_v_plane()];
+    let raster = if matches!(colours, C::Cmono | C::Cmono12) {
+        let words = || planes[0].chunks_exact(2).map(|v| u16::from_le_bytes([v[0], v[1]])).collect();
+        let samples =
+            if bits == 8 { Samples::Byte(planes[0].to_vec().into()) } else { Samples::Word(words()) };
+        Raster::new(width, height, 1, samples)
+    } else {
+        // How many pixels share a chroma sample.
+        let shared = match colours {
+            C::C444 | C::C444p10 | C::C444p12 => (1, 1),
+            C::C422 | C::C422p10 | C::C422p12 => (2, 1),
+            _ => (2, 2),
+        };
+        let rgb = to_rgb(planes, (width, height), shared, bits, range);
+        Raster::new(width, height, 3, Samples::Byte(rgb.into()))
+    };
+    raster.map(Some).map_err(|e| e.to_string())
+}
+
+/// 8-bit RGB from luma and chroma of ITU-R BT.601. Chroma samples count for all the pixels that share them.
+fn to_rgb(
+    planes: [&[u8]; 3],
+    (width, height): (usize, usize),
+    (across, down): (usize, usize),
+    bits: usize,
+    range: Range,
+) -> Vec<u8> {
+    // In 1/2^16 of a level of 8 bits: luma from `black` on, and what red, green and blue take of chroma.
+    let (black, luma, [rv, gu, gv, bu]) = match range {
+        Range::Limited => (16, 76_309, [104_597, -25_675, -53_279, 132_201]),
+        Range::Full => (0, 65_536, [91_881, -22_554, -46_802, 116_130]),
+    };
+    let more = bits - 8;
+    let sample = |plane: &[u8], at: usize| match more {
+        0 => i64::from(plane[at]),
+        _ => i64::from(u16::from_le_bytes([plane[2 * at], plane[2 * at + 1]])),
+    };
+    let chroma_width = width.div_ceil(across);
+    let mut out = Vec::with_capacity(3 * width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let at = y / down * chroma_width + x / across;
+            let luma = luma * (sample(planes[0], y * width + x) - (black << more));
+            let [u, v] = [planes[1], planes[2]].map(|plane| sample(plane, at) - (128 << more));
+            let half = 1 << (15 + more);
+            for sum in [luma + rv * v, luma + gu * u + gv * v, luma + bu * u] {
+                out.push(((sum + half) >> (16 + more)).clamp(0, 255) as u8);
+            }
+        }
+    }
+    out
+}
+
+fn raw_frame(bytes: &mut Counted, raw: RawFrames) -> Result<Option<Raster<'static>>, String> {
+    let RawFrames { size: (width, height), format } = raw;
+    let mut data = vec![0; width * height * format.bytes()];
+    match bytes.read_exact(&mut data) {
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
+        Err(e) => return Err(e.to_string()),
+        Ok(()) => {}
+    }
+    let (channels, samples) = match format {
+        PixelFormat::Gray => (1, Samples::Byte(data.into())),
+        PixelFormat::Gray16le => {
+            (1, Samples::Word(data.chunks_exact(2).map(|v| u16::from_le_bytes([v[0], v[1]])).collect()))
+        }
+        PixelFormat::Rgb24 => (3, Samples::Byte(data.into())),
+        PixelFormat::Bgr24 => {
+            data.chunks_exact_mut(3).for_each(|pixel| pixel.swap(0, 2));
+            (3, Samples::Byte(data.into()))
+        }
+    };
+    Raster::new(width, height, channels, samples).map(Some).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_are_those_of_the_standard() {
+        // Luma and chroma of black, white, red, green and blue at 75 and 100 %, from the tables of BT.601.
+        let colours = [
+            ([16, 128, 128], [0, 0, 0]),
+            ([235, 128, 128], [255, 255, 255]),
+            ([82, 90, 240], [255, 0, 0]),
+            ([145, 54, 34], [0, 255, 0]),
+            ([41, 240, 110], [0, 0, 255]),
+        ];
+        for (yuv, rgb) in colours {
+            let yuv: [u8; 3] = yuv;
+            let found = to_rgb([&yuv[..1], &yuv[1..2], &yuv[2..]], (1, 1), (1, 1), 8, Range::Limited);
+            let off = found.iter().zip(rgb).map(|(a, b): (&u8, i32)| (i32::from(*a) - b).abs()).max();
+            assert!(off.is_some_and(|off| off <= 2), "{found:?} for {rgb:?}");
+            // Ten bits say the same.
+            let words = yuv.map(|v| (4 * u16::from(v)).to_le_bytes());
+            let more = to_rgb([&words[0], &words[1], &words[2]], (1, 1), (1, 1), 10, Range::Limited);
+            assert_eq!(more, found);
+        }
+        let grey = to_rgb([&[77], &[128], &[128]], (1, 1), (1, 1), 8, Range::Full);
+        assert_eq!(grey, [77; 3]);
+    }
+
+    #[test]
+    fn chroma_is_shared() {
+        let luma = [100; 15];
+        let planes: [&[u8]; 3] = [&luma, &[128, 200, 128, 128, 128, 128], &[128; 6]];
+        let rgb = to_rgb(planes, (5, 3), (2, 2), 8, Range::Full);
+        let blue: Vec<usize> = (0..15).filter(|at| rgb[3 * at + 2] != 100).collect();
+        assert_eq!(blue, [2, 3, 7, 8]);
+    }
+
+    #[test]
+    fn raw_frames_are_said_in_one_way() {
+        let wanted = RawFrames { size: (1280, 480), format: PixelFormat::Gray16le };
+        assert_eq!(raw_frames("1280x480,gray16le"), Ok(wanted));
+        for text in ["", "1280x480", "0x4,gray", "4x4,yuv420p", "4,4,gray", "99999999x1,gray"] {
+            assert!(raw_frames(text).is_err(), "{text}");
+        }
+    }
+}

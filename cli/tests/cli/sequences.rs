@@ -1,0 +1,429 @@
+//! `mrfgs sequence`: whatever the frames come in, the maps are those of `match`; and whatever ends a sequence early, what was done
+//! before stays.
+
+use std::io::Read;
+use std::process::{Child, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use super::*;
+
+const SIZE: (u32, u32) = (64, 48);
+/// Scenes whose corners are the frames, in this order: the tenth comes after the second.
+const SCENES: [(&str, &str); 3] = [("f1", "slanted"), ("f2", "thin"), ("f10", "repetitive")];
+const RANGE: [&str; 4] = ["--max-disparity", "23", "--device", "cpu"];
+
+fn frame(scene_name: &str, view: usize) -> image::RgbImage {
+    let image = image::open(scene(scene_name).join(format!("im{view}.png"))).unwrap();
+    image.crop_imm(90, 70, SIZE.0, SIZE.1).to_rgb8()
+}
+
+/// A folder with the frames of both cameras, and of both in one.
+fn cameras() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for camera in ["left", "right", "beside", "above"] {
+        fs::create_dir(at(camera)).unwrap();
+    }
+    let (w, h) = SIZE;
+    for (name, scene) in SCENES {
+        let [left, right] = [0, 1].map(|view| frame(scene, view));
+        left.save(at(&format!("left/{name}.png"))).unwrap();
+        right.save(at(&format!("right/{name}.ppm"))).unwrap();
+        let mut beside = image::RgbImage::new(2 * w, h);
+        let mut above = image::RgbImage::new(w, 2 * h);
+        image::imageops::replace(&mut beside, &left, 0, 0);
+        image::imageops::replace(&mut beside, &right, w.into(), 0);
+        image::imageops::replace(&mut above, &left, 0, 0);
+        image::imageops::replace(&mut above, &right, 0, h.into());
+        beside.save(at(&format!("beside/{name}.png"))).unwrap();
+        above.save(at(&format!("above/{name}.tif"))).unwrap();
+    }
+    fs::write(at("left/times.txt"), "no image").unwrap();
+    fs::write(at("left/.hidden.png"), "no image").unwrap();
+    folder
+}
+
+/// The maps of `match` for the frames, in order.
+fn wanted(folder: &Path, options: &[&str]) -> Vec<Vec<u8>> {
+    let maps = SCENES.map(|(name, _)| {
+        let (left, right) = (format!("left/{name}.png"), format!("right/{name}.ppm"));
+        let line = [&["match", &left, &right, "wanted.pfm", "--quiet"], &RANGE[..], options].concat();
+        run(folder, &line).succeeded();
+        fs::read(folder.join("wanted.pfm")).unwrap()
+    });
+    fs::remove_file(folder.join("wanted.pfm")).unwrap();
+    assert!(maps[0] != maps[1] && maps[1] != maps[2] && maps[0] != maps[2], "control: all frames differ");
+    maps.into()
+}
+
+fn maps(folder: &Path, names: [&str; 3]) -> Vec<Vec<u8>> {
+    names.map(|name| fs::read(folder.join(format!("{name}.pfm"))).unwrap()).into()
+}
+
+/// Runs the program with `bytes` on standard input.
+fn fed(folder: &Path, args: &[&str], bytes: &[u8]) -> Output {
+    let mut child = started(folder, args);
+    // Where it ends early, it does not take them all.
+    let _ = child.stdin.take().unwrap().write_all(bytes);
+    child.wait_with_output().unwrap()
+}
+
+fn started(folder: &Path, args: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mrfgs"));
+    command.current_dir(folder).args(args).env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE");
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// All frames with both views beside each other, by the luma alone.
+fn grey_stream(header: &str) -> Vec<u8> {
+    let mut bytes = header.as_bytes().to_vec();
+    for (_, scene) in SCENES {
+        bytes.extend(b"FRAME\n");
+        let [left, right] = [0, 1].map(|view| frame(scene, view));
+        for y in 0..SIZE.1 {
+            for view in [&left, &right] {
+                bytes.extend((0..SIZE.0).map(|x| view.get_pixel(x, y)[1]));
+            }
+        }
+    }
+    bytes
+}
+
+const GREY: &str = "YUV4MPEG2 W128 H48 F30000:1001 Ip A1:1 Cmono XYSCSS=400\n";
+
+#[test]
+fn files_in_any_order_give_the_maps_of_match() {
+    let folder = cameras();
+    let at = folder.path();
+    let wanted = wanted(at, &[]);
+    let names = SCENES.map(|(name, _)| name);
+    for (i, (left, right, layout)) in [
+        ("left", Some("right"), None),
+        ("left/*.png", Some("right/f*.ppm"), None),
+        ("beside", None, None),
+        ("above", None, Some("top-bottom")),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let output = format!("maps{i}");
+        let mut line = vec!["sequence", left];
+        line.extend(right);
+        line.push(&output);
+        line.extend(layout.iter().flat_map(|layout| ["--layout", layout]));
+        line.extend(RANGE);
+        let said = run(at, &line).succeeded().stderr;
+        assert!(said.contains("3 frames of 64 x 48, 24 labels"), "{said}");
+        assert_eq!(maps(&at.join(&output), names), wanted, "{line:?}");
+        assert_eq!(listing(&at.join(&output)).len(), 3);
+    }
+    // Control: views exchanged are another pair.
+    run(at, &[&["sequence", "right", "left", "swapped", "--quiet"], &RANGE[..]].concat()).succeeded();
+    assert_ne!(maps(&at.join("swapped"), names), wanted);
+}
+
+#[test]
+fn streams_give_the_maps_of_their_pixels() {
+    let folder = cameras();
+    let at = folder.path();
+    let numbers = ["000000", "000001", "000002"];
+    // Pixels alone: what the files hold.
+    let mut raw = Vec::new();
+    for (_, scene) in SCENES {
+        for view in [0, 1] {
+            raw.extend(frame(scene, view).into_raw());
+        }
+    }
+    let line = ["sequence", "-", "raw", "--raw-frames", "64x96,rgb24", "--layout", "top-bottom", "--quiet"];
+    let output = fed(at, &[&line, &RANGE[..]].concat(), &raw);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(maps(&at.join("raw"), numbers), wanted(at, &[]));
+    // Luma alone, in a stream, a file, and grey images.
+    let grey = grey_stream(GREY);
+    fs::write(at.join("both.y4m"), &grey).unwrap();
+    let output = fed(at, &[&["sequence", "-", "piped"], &RANGE[..]].concat(), &grey);
+    assert!(output.status.success(), "{output:?}");
+    run(at, &[&["sequence", "both.y4m", "filed", "--quiet"], &RANGE[..]].concat()).succeeded();
+    for (name, scene) in SCENES {
+        for (view, path) in [format!("left/{name}.png"), format!("right/{name}.ppm")].iter().enumerate() {
+            let green = frame(scene, view).pixels().map(|pixel| pixel[1]).collect();
+            let image = image::GrayImage::from_raw(SIZE.0, SIZE.1, green).unwrap();
+            image.save_with_format(at.join(path), image::ImageFormat::Png).unwrap();
+        }
+    }
+    let of_grey = wanted(at, &[]);
+    assert_eq!(maps(&at.join("piped"), numbers), of_grey);
+    assert_eq!(maps(&at.join("filed"), numbers), of_grey);
+}
+
+/// The header, and the pictures of a film, as luma.
+fn film(bytes: &[u8], (width, height): (usize, usize)) -> (String, Vec<Vec<u8>>) {
+    let end = bytes.iter().position(|byte| *byte == b'\n').unwrap();
+    let header = String::from_utf8(bytes[..end].into()).unwrap();
+    let frames = bytes[end + 1..].chunks(6 + 3 * width * height).map(|frame| {
+        assert_eq!(&frame[..6], b"FRAME\n");
+        assert_eq!(frame.len(), 6 + 3 * width * height);
+        frame[6..6 + width * height].to_vec()
+    });
+    (header, frames.collect())
+}
+
+#[test]
+fn films_show_the_previews() {
+    let folder = cameras();
+    let at = folder.path();
+    let line = ["sequence", "left", "right", "film.y4m", "--colours", "grey"];
+    run(at, &[&line, &RANGE[..]].concat()).succeeded();
+    let files = ["sequence", "left", "right", "maps", "--colours", "grey", "--also", "preview,side-by-side"];
+    run(at, &[&files, &RANGE[..]].concat()).succeeded();
+    let preview =
+        |name: &str, what: &str| image::open(at.join(format!("maps/{name}.{what}.png"))).unwrap().to_luma8();
+    let size = preview("f1", "preview").dimensions();
+    let (header, pictures) =
+        film(&fs::read(at.join("film.y4m")).unwrap(), (size.0 as usize, size.1 as usize));
+    assert_eq!(header, format!("YUV4MPEG2 W64 H{} F25:1 Ip A1:1 C444 XCOLORRANGE=LIMITED", size.1));
+    let off = |picture: &[u8], name: &str| {
+        let levels =
+            preview(name, "preview").into_raw().into_iter().map(|v| 16.0 + f64::from(v) * 219.0 / 255.0);
+        picture.iter().zip(levels).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max)
+    };
+    assert_eq!(pictures.len(), 3);
+    for ((name, _), picture) in SCENES.iter().zip(&pictures) {
+        assert!(off(picture, name) <= 1.0, "{name}");
+    }
+    assert!(off(&pictures[0], "f10") > 20.0, "control: another frame looks different");
+    // To standard output, beside the left image, at the rate of the stream.
+    let output = fed(
+        at,
+        &[&["sequence", "-", "-", "--also", "side-by-side", "--quiet"], &RANGE[..]].concat(),
+        &grey_stream(GREY),
+    );
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let wide = preview("f1", "side-by-side").dimensions();
+    let (header, pictures) = film(&output.stdout, (wide.0 as usize, wide.1 as usize));
+    assert!(header.starts_with(&format!("YUV4MPEG2 W128 H{} F30000:1001 ", wide.1)), "{header}");
+    assert_eq!(pictures.len(), 3);
+}
+
+#[test]
+fn raw_frames_are_rectified_once_and_for_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (camera, file) in [("left", "left.png"), ("right", "right.png")] {
+        fs::create_dir(at.join(camera)).unwrap();
+        for name in ["a.png", "b.png"] {
+            fs::copy(scene_file("raw", file), at.join(camera).join(name)).unwrap();
+        }
+    }
+    let calib = scene_file("raw", "cameras.yml");
+    let options = ["--rectify", "--calib", &calib, "--max-disparity", "31", "--device", "cpu", "--quiet"];
+    let line = ["sequence", "left", "right", "maps", "--also", "depth,points"];
+    run(at, &[&line, &options[..]].concat()).succeeded();
+    let line = ["match", "left/a.png", "right/a.png", "a.pfm", "--also", "depth,points"];
+    run(at, &[&line, &options[..]].concat()).succeeded();
+    for (of_sequence, of_match) in [
+        ("a.pfm", "a.pfm"),
+        ("b.pfm", "a.pfm"),
+        ("b.depth.pfm", "a.depth.pfm"),
+        ("b.points.ply", "a.points.ply"),
+    ] {
+        assert_eq!(
+            fs::read(at.join("maps").join(of_sequence)).unwrap(),
+            fs::read(at.join(of_match)).unwrap()
+        );
+    }
+    // Control: unrectified views are another pair.
+    let line = ["sequence", "left", "right", "others", "--max-disparity", "31", "--device", "cpu", "--quiet"];
+    run(at, &line).succeeded();
+    assert_ne!(fs::read(at.join("others/a.pfm")).unwrap(), fs::read(at.join("a.pfm")).unwrap());
+}
+
+#[test]
+fn sequences_that_make_no_sense_are_told_in_one_line() {
+    let folder = cameras();
+    let at = folder.path();
+    fs::create_dir_all(at.join("none")).unwrap();
+    fs::create_dir_all(at.join("fewer")).unwrap();
+    fs::create_dir_all(at.join("twice")).unwrap();
+    fs::create_dir_all(at.join("odd")).unwrap();
+    fs::copy(at.join("right/f1.ppm"), at.join("fewer/f1.ppm")).unwrap();
+    fs::copy(at.join("left/f1.png"), at.join("twice/f1.png")).unwrap();
+    fs::copy(at.join("right/f1.ppm"), at.join("twice/F1.ppm")).unwrap();
+    image::GrayImage::new(63, 48).save(at.join("odd/a.png")).unwrap();
+    fs::write(at.join("text.y4m"), "a picture is worth a thousand words").unwrap();
+    fs::write(at.join("empty.y4m"), "").unwrap();
+    fs::write(at.join("head.y4m"), GREY).unwrap();
+    for (name, header) in [
+        ("huge.y4m", "YUV4MPEG2 W4294967295 H4294967295 F25:1 C420\n"),
+        ("wide.y4m", "YUV4MPEG2 W99999999999999999999 H4 F25:1 C420\n"),
+        ("none.y4m", "YUV4MPEG2 W0 H4 F25:1 C420\n"),
+        ("size.y4m", "YUV4MPEG2 F25:1 C420\n"),
+        ("kind.y4m", "YUV4MPEG2 W128 H48 F25:1 C411\n"),
+        ("rate.y4m", "YUV4MPEG2 W128 H48 F25 Cmono\n"),
+    ] {
+        fs::write(at.join(name), header.to_owned() + "FRAME\n").unwrap();
+    }
+    let before = listing(at);
+    let none = |words: &'static [&'static str]| (1, words);
+    let usage = |words: &'static [&'static str]| (2, words);
+    for (line, (code, words)) in [
+        ("left right maps --max-disparity auto --calib nothing.yml", none(&["nothing.yml"])),
+        ("nowhere right maps", none(&["nowhere"])),
+        ("none maps", none(&["none", "holds no images"])),
+        ("left/*.jpg right/* maps", none(&["left/*.jpg", "no image"])),
+        ("left/f%d.png right maps", none(&["left/f%d.png", "write *"])),
+        ("left fewer maps", none(&["left holds 3", "fewer 1"])),
+        ("twice maps", none(&["f1.png", "F1.ppm"])),
+        ("odd maps", none(&["frame a", "63 x 48", "odd"])),
+        ("left/f1.png right/f1.ppm maps", none(&["left/f1.png", "neither a folder"])),
+        ("text.y4m maps", none(&["text.y4m", "yuv4mpegpipe"])),
+        ("empty.y4m maps", none(&["empty.y4m", "is empty"])),
+        ("head.y4m maps", none(&["head.y4m", "no frame"])),
+        ("huge.y4m maps", none(&["huge.y4m", "4294967295", "limit"])),
+        ("wide.y4m maps", none(&["wide.y4m", "size"])),
+        ("none.y4m maps", none(&["none.y4m", "size"])),
+        ("size.y4m maps", none(&["size.y4m", "size"])),
+        ("kind.y4m maps", none(&["kind.y4m", "yuv444p"])),
+        ("rate.y4m maps", none(&["rate.y4m", "damaged"])),
+        (
+            "head.y4m maps --raw-frames 8000x8000,rgb24 --max-pixels 1000",
+            none(&["head.y4m", "limit of 1000"]),
+        ),
+        ("head.y4m maps --raw-frames 80x80,yuv420p", usage(&["--raw-frames", "gray16le"])),
+        ("- - maps", usage(&["RIGHT", "one stream"])),
+        ("left right left", none(&["left", "another folder"])),
+        ("left right head.y4m/maps", none(&["maps"])),
+        ("head.y4m head.y4m", usage(&["OUTPUT", "already"])),
+        ("left right none/film.y4m --also validity", usage(&["--also validity", "folder"])),
+        ("left right nowhere/film.y4m", none(&["nowhere"])),
+        ("left right nowhere/maps", none(&["nowhere"])),
+        ("left right maps --also depth", usage(&["--also depth", "--calib"])),
+        ("left right maps --colours grey", usage(&["--colours", "preview"])),
+        ("left right maps --rectify", usage(&["--calib"])),
+        ("left right maps --alpha 0.5", usage(&["--alpha", "--rectify"])),
+        ("left right maps --format png --min-disparity -9", none(&["png"])),
+        ("left", usage(&["OUTPUT"])),
+    ] {
+        let mut words_of_line = vec!["sequence"];
+        words_of_line.extend(line.split(' '));
+        if !line.contains("--max-disparity") {
+            words_of_line.extend(["--max-disparity", "23"]);
+        }
+        words_of_line.extend(["--device", "cpu", "--quiet"]);
+        run(at, &words_of_line).failed(code, words, line);
+        assert_eq!(listing(at), before, "{line}");
+    }
+}
+
+/// What stops in the middle of a sequence leaves whole maps of all frames before.
+#[test]
+fn what_was_done_before_a_failure_stays() {
+    let folder = cameras();
+    let at = folder.path();
+    let wanted = wanted(at, &[]);
+    let whole = grey_stream(GREY);
+    fs::write(at.join("cut.y4m"), &whole[..whole.len() - 1]).unwrap();
+    fs::write(at.join("short.y4m"), &whole[..GREY.len() + 2 * (6 + 128 * 48)]).unwrap();
+    let second = GREY.len() + 6 + 128 * 48;
+    fs::write(at.join("torn.y4m"), [&whole[..second], b"FRAMING\n", &whole[second + 6..]].concat()).unwrap();
+    fs::write(at.join("whole.y4m"), &whole).unwrap();
+    fs::write(at.join("cut.raw"), &whole[..5 * 64 * 48 + 7]).unwrap();
+    fs::create_dir(at.join("bad")).unwrap();
+    fs::create_dir(at.join("larger")).unwrap();
+    for (name, _) in SCENES {
+        for folder in ["bad", "larger"] {
+            fs::copy(at.join(format!("right/{name}.ppm")), at.join(format!("{folder}/{name}.ppm"))).unwrap();
+        }
+    }
+    fs::write(at.join("bad/f10.ppm"), "P6 64 48 255\nshort").unwrap();
+    let larger = image::imageops::resize(&frame("thin", 1), 80, 48, image::imageops::FilterType::Nearest);
+    larger.save(at.join("larger/f2.ppm")).unwrap();
+    for (i, (line, done, words)) in [
+        ("cut.y4m OUT", 2, ["cut.y4m", "frame 000002 is cut off"]),
+        ("torn.y4m OUT", 1, ["torn.y4m", "frame 000001 is damaged"]),
+        ("whole.y4m short.y4m OUT", 2, ["short.y4m ends here", "whole.y4m goes on"]),
+        ("short.y4m whole.y4m OUT", 2, ["short.y4m ends here", "whole.y4m goes on"]),
+        ("cut.raw OUT --raw-frames 128x48,gray", 2, ["cut.raw", "frame 000002 is cut off"]),
+        ("left bad OUT", 2, ["f10.ppm", "truncated"]),
+        ("left larger OUT", 1, ["frame f2", "80 x 48"]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (output, film) = (format!("maps{i}"), format!("film{i}.y4m"));
+        for output in [&output, &film] {
+            let line = line.replace("OUT", output);
+            let args: Vec<_> = ["sequence"].into_iter().chain(line.split(' ')).chain(RANGE).collect();
+            let run = run(at, &[&args[..], &["--quiet"]].concat());
+            run.failed(1, &words[..1], &line);
+            assert!(words.iter().all(|word| run.stderr.contains(word)), "{line}: {}", run.stderr);
+        }
+        assert_eq!(listing(&at.join(&output)).len(), done, "{line}");
+        if line.starts_with("left") {
+            assert_eq!(fs::read(at.join(&output).join("f1.pfm")).unwrap(), wanted[0], "{line}");
+        }
+        let film = fs::read(at.join(film)).unwrap();
+        let frames = film.windows(6).filter(|bytes| bytes == b"FRAME\n").count();
+        assert_eq!(frames, done, "{line}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_was_done_before_a_signal_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let stream = grey_stream(GREY);
+    for (output, signal) in [("maps", "-INT"), ("film.y4m", "-TERM")] {
+        let mut child = started(at, &[&["sequence", "-", output], &RANGE[..]].concat());
+        // Two frames, and a third that never ends.
+        let mut stdin = child.stdin.take().unwrap();
+        stdin.write_all(&stream[..stream.len() - 100]).unwrap();
+        stdin.flush().unwrap();
+        let start = Instant::now();
+        while output == "maps" && !at.join("maps/000001.pfm").exists() {
+            assert!(start.elapsed() < Duration::from_secs(60), "no second map");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        if output != "maps" {
+            // It has no name before its end.
+            std::thread::sleep(Duration::from_secs(3));
+        }
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let mut said = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
+        assert!(said.ends_with("mrfgs: stopped after 2 frames\n"), "{said}");
+        drop(stdin);
+    }
+    assert_eq!(listing(&at.join("maps")).len(), 2);
+    let film = fs::read(at.join("film.y4m")).unwrap();
+    assert_eq!(film.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
+}
+
+/// A reader of a film that leaves ends the sequence in one line.
+#[cfg(unix)]
+#[test]
+fn a_player_that_is_closed_ends_it() {
+    let folder = cameras();
+    let mut child =
+        started(folder.path(), &[&["sequence", "left", "right", "-", "--quiet"], &RANGE[..]].concat());
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{said}");
+    assert!(said.contains("its reader left"), "{said}");
+}
+
+/// On a GPU frames overlap; the maps are the same.
+#[test]
+fn a_device_gives_the_same_maps() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = cameras();
+    let at = folder.path();
+    run(at, &["sequence", "left", "right", "maps", "--max-disparity", "23", "--device", "gpu", "--quiet"])
+        .succeeded();
+    assert_eq!(maps(&at.join("maps"), SCENES.map(|(name, _)| name)), wanted(at, &[]));
+}
