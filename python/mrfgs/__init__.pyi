@@ -11,7 +11,7 @@ _Image = npt.ArrayLike
 
 # The path of a calibration file, or those of two that belong together.
 _Path = str | os.PathLike[str]
-_Cameras = Calibration | _Path | list[_Path] | tuple[_Path, ...]
+_Cameras = Calibration | _Path | Iterable[_Path]
 
 class MatchWarning(UserWarning):
     """What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."""
@@ -20,6 +20,20 @@ class MatchWarning(UserWarning):
 class Matched:
     """The maps of a pair, and what made them. All maps have the shape (height, width) of the images."""
 
+    def __new__(
+        cls,
+        disparity: npt.NDArray[np.float32],
+        raw: npt.NDArray[np.float32],
+        confidence: npt.NDArray[np.uint8],
+        validity: npt.NDArray[np.uint8],
+        right: npt.NDArray[np.float32] | None,
+        min_disparity: int,
+        max_disparity: int,
+        iterations: int,
+        tiles: int,
+        ran_on: str,
+        note: str | None,
+    ) -> Matched: ...
     @property
     def disparity(self) -> npt.NDArray[np.float32]:
         """Disparity in pixels, +inf where there is none."""

@@ -8,7 +8,7 @@ use mrfgs::calibration::cameras::StereoCalibration;
 use mrfgs::image::calib::Unit;
 use pyo3::exceptions::{PyFileNotFoundError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyTuple};
+use pyo3::types::PyTuple;
 
 use crate::{exception, words};
 
@@ -35,12 +35,12 @@ impl PyCalibration {
         if let Ok(calibration) = given.cast::<Self>() {
             return Ok(calibration.get().clone());
         }
-        if let Ok(files) = given.cast::<PyTuple>() {
-            return Self::read(files.iter(), None);
-        }
-        match given.cast::<PyList>() {
-            Ok(files) => Self::read(files.iter(), None),
-            Err(_) => Self::read([given.clone()].into_iter(), None),
+        match given.try_iter() {
+            // What is one path counts as such, even where it has parts.
+            Ok(files) if given.extract::<PathBuf>().is_err() => {
+                Self::read(files.collect::<PyResult<Vec<_>>>()?.into_iter(), None)
+            }
+            _ => Self::read(std::iter::once(given.clone()), None),
         }
     }
 

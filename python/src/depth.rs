@@ -15,7 +15,7 @@ use pyo3::types::{PyTuple, PyType};
 
 use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
-use crate::rectification::matrix;
+use crate::rectification::matrices;
 use crate::{PyMatched, exception};
 
 /// The cameras of a rectified pair: from disparities to depths and points.
@@ -150,13 +150,10 @@ impl PyRig {
 
     /// The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera: two float64 arrays (3, 3), in pixels.
     #[getter]
-    fn cameras<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
-        let camera = |cx: f64| matrix(py, &[[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]);
-        Ok((camera(cx)?, camera(cx + self.doffs)?))
+        let camera = |cx: f64| [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]];
+        matrices(py, &[camera(cx), camera(cx + self.doffs)])
     }
 
     /// Distance of the principal points along the row, cx of the right camera less cx of the left one, in pixels.

@@ -113,12 +113,8 @@ impl PyRectification {
     /// The rotations from the frame of each camera to that of its rectified view: two arrays (3, 3), left and right, R1 and R2 of
     /// OpenCV.
     #[getter]
-    fn rotations<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
-        let [left, right] = self.by.rotations();
-        Ok((matrix(py, left)?, matrix(py, right)?))
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        matrices(py, self.by.rotations())
     }
 
     /// The cameras of the rectified pair, as a Rig: for depth and points.
@@ -154,8 +150,11 @@ fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
     both.ok_or_else(|| PyValueError::new_err("size: give (width, height), both above 0"))
 }
 
-/// A matrix as an array of float64.
-pub(crate) fn matrix<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let rows: Vec<Vec<f64>> = matrix.iter().map(|row| row.to_vec()).collect();
-    Ok(PyArray2::from_vec2(py, &rows)?)
+/// The matrices of both views as arrays of float64.
+pub(crate) fn matrices<'py>(py: Python<'py>, both: &[Matrix; 2]) -> PyResult<Bound<'py, PyTuple>> {
+    let matrix = |matrix: &Matrix| {
+        let rows: Vec<Vec<f64>> = matrix.iter().map(|row| row.to_vec()).collect();
+        PyArray2::from_vec2(py, &rows)
+    };
+    PyTuple::new(py, [matrix(&both[0])?, matrix(&both[1])?])
 }

@@ -371,7 +371,8 @@ class Match(unittest.TestCase):
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_match(self):
-        code = ("import numpy as np, mrfgs; a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8); "
+        code = ("import signal, numpy as np, mrfgs; signal.signal(signal.SIGINT, signal.default_int_handler); "
+                "a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8); "
                 "print('ready', flush=True); mrfgs.match(a, a, 255, device='cpu', options={'final-iterations': 1000})")
         with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             self.addCleanup(process.kill)
@@ -1065,7 +1066,10 @@ class Sequences(Folder):
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_sequence(self):
-        code = ("import itertools, numpy as np, mrfgs; a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8)\n"
+        # Who starts the tests in the background may have told them to ignore Ctrl-C.
+        code = ("import itertools, signal, numpy as np, mrfgs\n"
+                "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+                "a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8)\n"
                 "matcher = mrfgs.Matcher(device='cpu')\n"
                 "results = matcher.match_all(itertools.repeat((a, a)), 255, options={'final-iterations': 1000}, warn=False)\n"
                 "print('ready', flush=True)\n"
