@@ -15,6 +15,7 @@ use mrfgs::{Error, Matched, Matcher, Result};
 use std::cell::RefCell;
 use std::fmt::Write;
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pairs of several sizes and ranges; some recur, and one needs tiles under [`method`].
 fn pairs() -> Vec<(Pair, DisparityRange)> {
@@ -147,5 +148,37 @@ fn results_before_a_failure_are_handed_out() {
         let error = result.unwrap_err();
         assert!(matches!(error, Error::Budget(_)), "{error}");
         assert_same(found, &expected[..2]);
+    }
+}
+
+/// A sequence that is told to stop ends within the match that runs.
+#[test]
+fn a_sequence_can_be_stopped() {
+    let expected = one_by_one();
+    let mut matchers = vec![on_cpu()];
+    matchers.extend(
+        device(FaultInjection::default())
+            .map(|gpu| Matcher::on(Ok(gpu), false, &Execution::default()).unwrap()),
+    );
+    for mut matcher in matchers {
+        matcher.set_method(method());
+        let (stop, mut found) = (AtomicBool::new(false), Vec::new());
+        let asked = pairs().into_iter().enumerate().map(|(i, pair)| {
+            stop.store(i == 2, Ordering::Relaxed);
+            pair
+        });
+        let result = matcher.run_all_until(asked, &stop, |matched| {
+            found.push(matched);
+            ControlFlow::Continue(())
+        });
+        assert_eq!(result, Err(Error::Interrupted));
+        assert_same(found, &expected[..2]);
+        // Control: without a reason to stop it goes to the end, also after that.
+        let (stop, mut count) = (AtomicBool::new(false), 0);
+        let result = matcher.run_all_until(pairs(), &stop, |_| {
+            count += 1;
+            ControlFlow::Continue(())
+        });
+        assert_eq!((result, count), (Ok(()), expected.len()));
     }
 }

@@ -6,9 +6,47 @@ Give `match` a rectified pair as arrays; it returns a `Matched`:
 >>> matched.disparity                      # float32, pixels; +inf where there is none
 
 Left (x, y) with disparity d is seen at right (x - d, y). A `Matcher` keeps device, shaders and buffers from pair to pair;
-help(mrfgs.Matcher) explains every argument, `options()` every option of the method. What is probably wrong with a pair is told as a `MatchWarning`.
+help(mrfgs.Matcher) explains every argument, `options()` every option of the method. What is probably wrong with a pair is told as a
+`MatchWarning`.
+
+Images as the cameras took them are rectified by a calibration of OpenCV, ROS, Kalibr or Middlebury, which also gives depth and points:
+
+>>> rectification = mrfgs.Rectification("stereo.yml", size=(640, 480))
+>>> left, right = rectification.apply(raw_left, raw_right)
+>>> matched = mrfgs.match(left, right, max_disparity=63)
+>>> rectification.rig.depth(matched.disparity)              # float32, in the unit of the baseline
+>>> rectification.rig.points(matched, left).save("scene.ply")
+
+`Rig` does the same for a pair that is rectified already, `Matcher.match_all` matches pair after pair, and `evaluate` compares a map with
+the truth.
 """
 
-from ._mrfgs import Matched, Matcher, MatchWarning, __version__, match, options
+from ._mrfgs import (
+    Calibration,
+    Matched,
+    MatchedSequence,
+    Matcher,
+    MatchWarning,
+    Points,
+    Rectification,
+    Rig,
+    __version__,
+    evaluate,
+    match,
+    options,
+)
 
-__all__ = ["Matched", "Matcher", "MatchWarning", "__version__", "match", "options"]
+__all__ = [
+    "Calibration",
+    "Matched",
+    "MatchedSequence",
+    "Matcher",
+    "MatchWarning",
+    "Points",
+    "Rectification",
+    "Rig",
+    "__version__",
+    "evaluate",
+    "match",
+    "options",
+]

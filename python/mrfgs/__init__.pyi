@@ -1,4 +1,5 @@
-from typing import Any, Mapping, TypedDict, final
+import os
+from typing import Any, Iterable, Iterator, Mapping, Sequence, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
@@ -8,6 +9,10 @@ __version__: str
 # Whatever numpy makes an array of: uint8, uint16, float32 or float64, (height, width) or (height, width, channels).
 _Image = npt.ArrayLike
 
+# The path of a calibration file, or those of two that belong together.
+_Path = str | os.PathLike[str]
+_Cameras = Calibration | _Path | Iterable[_Path]
+
 class MatchWarning(UserWarning):
     """What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."""
 
@@ -15,6 +20,20 @@ class MatchWarning(UserWarning):
 class Matched:
     """The maps of a pair, and what made them. All maps have the shape (height, width) of the images."""
 
+    def __new__(
+        cls,
+        disparity: npt.NDArray[np.float32],
+        raw: npt.NDArray[np.float32],
+        confidence: npt.NDArray[np.uint8],
+        validity: npt.NDArray[np.uint8],
+        right: npt.NDArray[np.float32] | None,
+        min_disparity: int,
+        max_disparity: int,
+        iterations: int,
+        tiles: int,
+        ran_on: str,
+        note: str | None,
+    ) -> Matched: ...
     @property
     def disparity(self) -> npt.NDArray[np.float32]:
         """Disparity in pixels, +inf where there is none."""
@@ -70,6 +89,137 @@ class Matcher:
         warn: bool = True,
     ) -> Matched:
         """Matches a rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
+    def match_all(
+        self,
+        pairs: Iterable[Sequence[_Image]],
+        max_disparity: int | None = None,
+        *,
+        min_disparity: int | None = None,
+        no_data: float | None = None,
+        preset: str = "default",
+        options: Mapping[str, Any] | None = None,
+        warn: bool = True,
+    ) -> MatchedSequence:
+        """Matches pair after pair, and returns an iterator over their results, in order. At most three pairs are taken ahead of the
+        results; an exception of `pairs` comes after the results of the pairs before it."""
+
+@final
+class MatchedSequence(Iterator[Matched]):
+    """The results of Matcher.match_all, in the order of the pairs."""
+
+    def __next__(self) -> Matched: ...
+    def close(self) -> None:
+        """Ends the sequence: stops the match that runs, takes no more pairs, and gives the matcher back."""
+
+@final
+class Calibration:
+    """What is known of a pair of cameras, read from the files of OpenCV, ROS, Kalibr or Middlebury."""
+
+    def __new__(cls, *files: _Path, unit: str | None = None) -> Calibration: ...
+    @staticmethod
+    def of_texts(*texts: str, unit: str | None = None) -> Calibration:
+        """The same of the texts of such files: one, or two that belong together."""
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """(width, height) of the images as the cameras took them; None where the files do not say it."""
+    @property
+    def unit(self) -> str:
+        """The unit of the baseline: "mm", "cm", "m", or "unknown"."""
+    @property
+    def max_disparity(self) -> int | None:
+        """The largest disparity of the pair, in pixels, from the line ndisp of a calib.txt; else None."""
+
+@final
+class Rectification:
+    """How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs."""
+
+    def __new__(
+        cls,
+        calibration: _Cameras,
+        size: tuple[int, int] | None = None,
+        *,
+        alpha: float | None = None,
+        zero_disparity: bool = True,
+    ) -> Rectification: ...
+    def apply(
+        self,
+        left: _Image,
+        right: _Image,
+        *,
+        mask: npt.ArrayLike | None = None,
+        no_data: float | None = None,
+    ) -> tuple[np.ma.MaskedArray[Any, Any], np.ma.MaskedArray[Any, Any]]:
+        """Rectifies a pair, and returns both views as masked arrays, masked where there is no source: uint8 of two uint8 images, else
+        uint16; of shape (height, width) or (height, width, 3)."""
+    def maps(
+        self,
+    ) -> tuple[
+        tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]],
+        tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]],
+    ]:
+        """Where each pixel of the rectified views is in the images: ((left_x, left_y), (right_x, right_y)), in pixels; +inf where it is
+        nowhere."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the rectified views, in pixels."""
+    @property
+    def raw_size(self) -> tuple[int, int]:
+        """(width, height) of the images that it rectifies, in pixels."""
+    @property
+    def rotations(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """The rotations from the frame of each camera to that of its rectified view: R1 and R2 of OpenCV, of shape (3, 3)."""
+    @property
+    def rig(self) -> Rig:
+        """The cameras of the rectified pair: for depth and points."""
+    def calib_txt(self) -> str:
+        """The calibration of the rectified pair in Middlebury's form, in millimetres where the unit is known."""
+    def cameras_yml(self) -> str:
+        """The calibration of the rectified pair for OpenCV, in the unit of the calibration."""
+
+@final
+class Rig:
+    """The cameras of a rectified pair: from disparities to depths and points, in the unit of the baseline."""
+
+    def __new__(cls, calibration: _Cameras) -> Rig: ...
+    def depth(self, disparity: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """The depth of every pixel along the optical axis, in the unit of the baseline, +inf where there is none."""
+    def millimetres(self, disparity: npt.ArrayLike) -> npt.NDArray[np.uint16]:
+        """The depth of every pixel in whole millimetres: 0 where there is none, and where it is above 65535."""
+    def points(self, matched: Matched, left: _Image) -> Points:
+        """The points that were measured and are trusted (validity 0), with the colours of the rectified left image."""
+    @property
+    def cameras(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera, in pixels."""
+    @property
+    def doffs(self) -> float:
+        """Distance of the principal points along the row, cx of the right camera less cx of the left one, in pixels."""
+    @property
+    def baseline(self) -> float:
+        """Distance of the cameras, in `unit`."""
+    @property
+    def unit(self) -> str:
+        """The unit of the baseline, of depths and of points: "mm", "cm", "m", or "unknown"."""
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """(width, height) of the rectified images, in pixels; None where the calibration does not say it."""
+
+@final
+class Points:
+    """A cloud of points."""
+
+    def __new__(cls, positions: npt.ArrayLike, colours: npt.ArrayLike, confidence: npt.ArrayLike) -> Points: ...
+    @property
+    def positions(self) -> npt.NDArray[np.float32]:
+        """Where the points are, of shape (N, 3): x to the right, y down, z forward of the left camera, in the unit of the baseline."""
+    @property
+    def colours(self) -> npt.NDArray[np.uint8]:
+        """Their colours, of shape (N, 3): red, green and blue."""
+    @property
+    def confidence(self) -> npt.NDArray[np.uint8]:
+        """Their confidence, of shape (N,), in 1/8 nat."""
+    def save(self, path: _Path) -> None:
+        """Writes the points as binary PLY, as the program does; the confidence is called `quality`."""
+    def __len__(self) -> int: ...
 
 def match(
     left: _Image,
@@ -93,9 +243,37 @@ class _Option(TypedDict):
     words: dict[str, str]
     source: str
     default: bool | int | float | str
+    fast: bool | int | float | str
     paper: bool | int | float | str
     fgs: bool | int | float | str
 
 def options() -> dict[str, dict[str, _Option]]:
     """Describes the options: a dict from each group to a dict from each of its keys to what it does, which values it takes, where
     it comes from, and its value in each preset."""
+
+_Errors = TypedDict(
+    "_Errors",
+    {
+        "pixels": int,
+        "density": float,
+        "avg": float | None,
+        "rms": float | None,
+        "psnr": float | None,
+        "bad0.5": float,
+        "bad1.0": float,
+        "bad2.0": float,
+        "bad4.0": float,
+        "a50": float | None,
+        "a90": float | None,
+        "a95": float | None,
+        "a99": float | None,
+    },
+)
+
+class _Report(TypedDict):
+    all: _Errors
+    nonocc: _Errors | None
+
+def evaluate(disparity: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> _Report:
+    """Compares a disparity map with the truth, as `mrfgs evaluate map` does: errors in pixels and shares in percent, over all pixels
+    with known truth and over those of them that both views see."""

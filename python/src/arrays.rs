@@ -1,15 +1,17 @@
-//! Arrays of any layout, byte order and masking, as images and masks of the crate `mrfgs`.
+//! Arrays of any layout, byte order and masking, as images, maps and masks of the crate `mrfgs`, and back.
 
 use std::borrow::Cow;
 
-use mrfgs::image::Plane;
-use mrfgs::image::raster::{Raster, Samples};
+use mrfgs::image::raster::{self, Raster, Samples};
+use mrfgs::image::{self, Pair, Plane};
 use numpy::{
-    Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, IntoPyArray, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::exception;
 
 /// What is given for `name` as an array, in the byte order of this machine and aligned; copied where it is not. A masked array
 /// stays one.
@@ -113,6 +115,151 @@ impl<'py> Image<'py> {
     }
 }
 
+impl Image<'_> {
+    /// How its rectified image is stored: with one channel or three, and in 8 bits where the other image has them, too.
+    pub(crate) fn stored(&self, other: &Self) -> Stored {
+        let shape = match &self.pixels {
+            Pixels::Byte(a) => a.shape(),
+            Pixels::Word(a) => a.shape(),
+            Pixels::Float(a) => a.shape(),
+            Pixels::Double(a) => a.shape(),
+        };
+        let bytes = [self, other].iter().all(|image| matches!(image.pixels, Pixels::Byte(_)));
+        Stored { channels: if matches!(shape, [_, _, channels] if *channels > 2) { 3 } else { 1 }, bytes }
+    }
+}
+
+/// The pair of two images, less what a mask and a value for no data say.
+pub(crate) fn pair(
+    left: &Image,
+    right: &Image,
+    mask: Option<&Bound<PyAny>>,
+    no_data: Option<f64>,
+) -> PyResult<Pair> {
+    let mask = mask.map(self::mask).transpose()?;
+    let rasters = [left.raster()?, right.raster()?].map(|raster| match no_data {
+        Some(value) => raster.without(value),
+        None => Ok(raster),
+    });
+    let [left, right] = rasters;
+    left.and_then(|left| raster::pair(left, right?, mask.as_ref())).map_err(exception)
+}
+
+/// How an image is stored in an array.
+#[derive(Clone, Copy)]
+pub(crate) struct Stored {
+    channels: usize,
+    bytes: bool,
+}
+
+/// The images of a pair as masked arrays. Those of more than 8 bits hold what `match` takes for the same levels again.
+pub(crate) fn images<'py>(
+    py: Python<'py>,
+    pair: &Pair,
+    stored: [Stored; 2],
+) -> PyResult<[Bound<'py, PyAny>; 2]> {
+    let images = [pair.left(), pair.right()];
+    let levels =
+        images.iter().all(|image| image.pixels.data().iter().all(|pixel| pixel.iter().all(|v| v % 256 == 0)));
+    let word = |v: u16| if levels { (v >> 8) * 257 } else { v };
+    let [left, right] = [0, 1].map(|i| {
+        let (image, Stored { channels, bytes }) = (images[i], stored[i]);
+        if bytes {
+            masked_array(py, image, channels, |v| (v >> 8) as u8)
+        } else {
+            masked_array(py, image, channels, word)
+        }
+    });
+    Ok([left?, right?])
+}
+
+fn masked_array<'py, T: Element>(
+    py: Python<'py>,
+    image: &image::Image,
+    channels: usize,
+    value: impl Fn(u16) -> T,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (width, height) = image.pixels.size();
+    let values = image.pixels.data().iter().flat_map(|pixel| pixel[..channels].iter().map(|v| value(*v)));
+    let masked = image.masked.data().iter().flat_map(|masked| std::iter::repeat_n(*masked, channels));
+    let shape = if channels == 1 { vec![height, width] } else { vec![height, width, channels] };
+    let values = values.collect::<Vec<_>>().into_pyarray(py).reshape(shape.clone())?;
+    let masked = masked.collect::<Vec<_>>().into_pyarray(py).reshape(shape)?;
+    py.import("numpy")?.getattr("ma")?.call_method1("masked_array", (values, masked))
+}
+
+/// A map as an array of shape (height, width).
+pub(crate) fn map<T: Element>(py: Python, plane: Plane<T>) -> PyResult<Bound<PyArray2<T>>> {
+    let shape = [plane.height(), plane.width()];
+    plane.into_data().into_pyarray(py).reshape(shape)
+}
+
+/// A map of disparities; what a masked array masks is not finite.
+pub(crate) fn disparities(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<f32>> {
+    let array = array(name, given)?;
+    let masked = masked(name, &array)?;
+    let plane = if let Ok(array) = array.as_any().cast::<PyArrayDyn<f32>>() {
+        self::plane(name, &array.readonly())?
+    } else if let Ok(array) = array.as_any().cast::<PyArrayDyn<f64>>() {
+        self::plane(name, &array.readonly())?.map(|d| *d as f32)
+    } else {
+        let kind = array.dtype().to_string();
+        return Err(PyTypeError::new_err(format!(
+            "{name}: give an array of float32 or float64, in pixels, not {kind}; divide whole numbers by their scale"
+        )));
+    };
+    let Some(masked) = masked else { return Ok(plane) };
+    let (width, height) = plane.size();
+    Ok(Plane::from_fn(width, height, |x, y| if masked[(x, y)] { f32::INFINITY } else { plane[(x, y)] }))
+}
+
+/// A map of bytes.
+pub(crate) fn bytes(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<u8>> {
+    let array = array(name, given)?;
+    match array.as_any().cast::<PyArrayDyn<u8>>() {
+        Ok(array) => plane(name, &array.readonly()),
+        Err(_) => {
+            let kind = array.dtype().to_string();
+            Err(PyTypeError::new_err(format!("{name}: give an array of uint8, not {kind}")))
+        }
+    }
+}
+
+/// A visibility mask as files have it: 255 where both views see a pixel.
+pub(crate) fn visible(given: &Bound<PyAny>) -> PyResult<Plane<u8>> {
+    const EXPECTED: &str =
+        "mask: give an array of bool, or of uint8 that is 255 where both views see the pixel";
+    let array = array("mask", given)?;
+    if let Ok(array) = array.as_any().cast::<PyArrayDyn<bool>>() {
+        return Ok(plane("mask", &array.readonly())?.map(|seen| if *seen { 255 } else { 0 }));
+    }
+    let array = array.as_any().cast::<PyArrayDyn<u8>>().map_err(|_| PyTypeError::new_err(EXPECTED))?;
+    let mask = plane("mask", &array.readonly())?;
+    // Zeros and ones would leave no pixel, without a word.
+    if mask.data().iter().max() == Some(&1) {
+        return Err(PyValueError::new_err(format!("{EXPECTED}; this one has 1 there")));
+    }
+    Ok(mask)
+}
+
+/// The values of an array of one type and shape, row by row; a `None` in the shape is any length. `expected` is what to give.
+pub(crate) fn table<T: Element + Copy>(
+    name: &str,
+    given: &Bound<PyAny>,
+    columns: Option<usize>,
+    expected: &str,
+) -> PyResult<Vec<T>> {
+    let wrong = || PyTypeError::new_err(format!("{name}: give an array of {expected}"));
+    let array = array(name, given)?;
+    let array = array.as_any().cast::<PyArrayDyn<T>>().map_err(|_| wrong())?.readonly();
+    match (array.shape(), columns) {
+        ([_], None) => {}
+        ([_, found], Some(columns)) if *found == columns => {}
+        _ => return Err(PyValueError::new_err(format!("{name}: give an array of {expected}"))),
+    }
+    Ok(values(name, &array)?.into_owned())
+}
+
 /// Where a masked array is masked, in any of its channels; `None` for other arrays.
 fn masked(name: &str, array: &Bound<PyUntypedArray>) -> PyResult<Option<Plane<bool>>> {
     let numpy = array.py().import("numpy")?;
@@ -124,7 +271,7 @@ fn masked(name: &str, array: &Bound<PyUntypedArray>) -> PyResult<Option<Plane<bo
     if array.ndim() == 3 {
         mask = mask.call_method1("any", (2,))?;
     }
-    plane(name, &mask).map(Some)
+    flags(name, &mask).map(Some)
 }
 
 /// A mask: where an array of shape (height, width) is not 0.
@@ -136,13 +283,16 @@ pub(crate) fn mask(given: &Bound<PyAny>) -> PyResult<Plane<bool>> {
             "mask: give an array of bool, or of numbers that are 0 where pixels count",
         ));
     }
-    plane("mask", &array.call_method1("astype", ("bool",))?)
+    flags("mask", &array.call_method1("astype", ("bool",))?)
 }
 
-fn plane(name: &str, mask: &Bound<PyAny>) -> PyResult<Plane<bool>> {
-    let mask = mask.cast::<PyArrayDyn<bool>>()?.readonly();
-    match *mask.shape() {
-        [height, width] => Ok(Plane::new(width, height, values(name, &mask)?.into_owned())),
+fn flags(name: &str, mask: &Bound<PyAny>) -> PyResult<Plane<bool>> {
+    plane(name, &mask.cast::<PyArrayDyn<bool>>()?.readonly())
+}
+
+fn plane<T: Element + Copy>(name: &str, array: &PyReadonlyArrayDyn<T>) -> PyResult<Plane<T>> {
+    match *array.shape() {
+        [height, width] => Ok(Plane::new(width, height, values(name, array)?.into_owned())),
         _ => Err(PyValueError::new_err(format!("{name}: give an array of shape (height, width)"))),
     }
 }

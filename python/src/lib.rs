@@ -1,24 +1,33 @@
-//! The Python module `mrfgs._mrfgs`: arrays in, the matcher of the crate `mrfgs`, arrays out.
+//! The Python module `mrfgs._mrfgs`: arrays in, the crate `mrfgs`, arrays out.
 
 mod arrays;
+mod calibration;
+mod depth;
+mod evaluation;
+mod rectification;
+mod sequence;
 mod words;
 
 use std::ffi::CString;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use mrfgs::check::{self, Warning};
 use mrfgs::error::RangeError;
-use mrfgs::image::{Pair, Plane, raster};
+use mrfgs::image::Pair;
 use mrfgs::options::{DisparityRange, Execution, GROUPS, Key, Method, PRESETS, Takes};
 use mrfgs::{Error, Matched, Matcher};
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError, PyUserWarning, PyValueError};
+use numpy::{PyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::{
+    PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyTypeError, PyUserWarning, PyValueError,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple, PyType};
+
+use sequence::{PyMatchedSequence, Settings, Shared};
 
 pyo3::create_exception!(
     mrfgs,
@@ -33,6 +42,7 @@ fn exception(error: Error) -> PyErr {
     match error {
         Error::Memory(_) => PyMemoryError::new_err(text),
         Error::Device(_) => PyRuntimeError::new_err(text),
+        Error::Write { .. } => PyOSError::new_err(text),
         Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         _ => PyValueError::new_err(text),
     }
@@ -109,18 +119,14 @@ struct PyMatched {
 
 impl PyMatched {
     fn of(py: Python, matched: Matched) -> PyResult<Self> {
-        fn array<T: numpy::Element>(py: Python, plane: Plane<T>) -> PyResult<Py<PyArray2<T>>> {
-            let shape = [plane.height(), plane.width()];
-            Ok(plane.into_data().into_pyarray(py).reshape(shape)?.unbind())
-        }
         let range = matched.plan.range;
-        let right = matched.maps.right_map().map(|map| array(py, map)).transpose()?;
+        let right = matched.maps.right_map().map(|map| arrays::map(py, map)).transpose()?;
         Ok(Self {
-            right,
-            disparity: array(py, matched.maps.final_map())?,
-            raw: array(py, matched.maps.raw_map())?,
-            confidence: array(py, matched.maps.confidence)?,
-            validity: array(py, matched.maps.validity)?,
+            right: right.map(Bound::unbind),
+            disparity: arrays::map(py, matched.maps.final_map())?.unbind(),
+            raw: arrays::map(py, matched.maps.raw_map())?.unbind(),
+            confidence: arrays::map(py, matched.maps.confidence)?.unbind(),
+            validity: arrays::map(py, matched.maps.validity)?.unbind(),
             min_disparity: range.min,
             max_disparity: range.max,
             iterations: matched.iterations,
@@ -192,7 +198,7 @@ impl PyMatched {
 ///     name, as `mrfgs devices` lists them. The maps are the same, bit for bit.
 /// threads: those of the CPU path; None takes one a core.
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
-struct PyMatcher(Mutex<Matcher>);
+struct PyMatcher(Shared);
 
 #[pymethods]
 impl PyMatcher {
@@ -201,7 +207,8 @@ impl PyMatcher {
     fn new(py: Python, device: &str, threads: Option<usize>) -> PyResult<Self> {
         let execution = execution(device, threads);
         let matcher = py.detach(|| Matcher::builder().execution(execution).build()).map_err(exception)?;
-        Ok(Self(Mutex::new(matcher)))
+        let matcher = Arc::new(Mutex::new(matcher));
+        Ok(Self(Shared { matcher, taken: Arc::new(AtomicBool::new(false)) }))
     }
 
     /// Matches a rectified pair, and returns its maps as a Matched.
@@ -241,29 +248,18 @@ impl PyMatcher {
         options: Option<&Bound<PyDict>>,
         warn: bool,
     ) -> PyResult<PyMatched> {
+        self.0.check()?;
         let method = method(preset, options)?;
         let (left, right) = (arrays::Image::of("left", left)?, arrays::Image::of("right", right)?);
-        let mask = mask.map(arrays::mask).transpose()?;
-        let rasters = [left.raster()?, right.raster()?].map(|raster| match no_data {
-            Some(value) => raster.without(value),
-            None => Ok(raster),
-        });
-        let [left, right] = rasters;
-        let pair = left.and_then(|left| raster::pair(left, right?, mask.as_ref())).map_err(exception)?;
-        let given = max_disparity
-            .is_some()
-            .then(|| DisparityRange::new(min_disparity.unwrap_or(0), max_disparity.unwrap_or(0)));
-        let given = given.transpose().map_err(exception)?;
-        let range = match given {
-            Some(range) => range,
-            None => py.detach(|| found_range(&pair, min_disparity))?,
-        };
+        let pair = arrays::pair(&left, &right, mask, no_data)?;
+        let given = given_range(max_disparity, min_disparity)?;
+        let range = searched(py, &pair, given, min_disparity)?;
         if warn {
             self::warn(py, py.detach(|| check::warnings(&pair, given)))?;
         }
         let matched = py.detach(|| {
             interruptible(|stop| {
-                let mut matcher = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut matcher = self.0.matcher.lock().unwrap_or_else(PoisonError::into_inner);
                 matcher.job(&pair, range).method(&method).cancel(stop).run()
             })
         })?;
@@ -271,6 +267,38 @@ impl PyMatcher {
             self::warn(py, check::clipped(&matched.maps, range))?;
         }
         PyMatched::of(py, matched)
+    }
+
+    /// Matches pair after pair, and returns an iterator that yields the Matched of each, in order. While a device is at one pair the next
+    /// one goes up and the maps of the last one come down.
+    ///
+    /// pairs: an iterable of pairs (left, right) of arrays as `match` takes them, such as a list, a generator, or
+    ///     map(rectification.apply, lefts, rights). Up to three pairs are under way at a time, so a result comes when two more pairs
+    ///     have been taken. The arrays of a pair may be used again for the next one.
+    ///
+    /// The other arguments are those of `match`, for all pairs; masked arrays tell what to ignore in each. The pairs are taken, and
+    /// exceptions raised, in the thread that asks for results. An exception of `pairs`, or of a pair that makes no sense, comes after the
+    /// results of the pairs before it; messages count pairs from 0. Ctrl-C ends the sequence. So does `close()` of the iterator, which
+    /// happens by itself when nothing refers to it any more. Until its end, the Matcher raises RuntimeError for other matches.
+    #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, preset="default", options=None, warn=true))]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn match_all(
+        &self,
+        pairs: &Bound<PyAny>,
+        max_disparity: Option<i32>,
+        min_disparity: Option<i32>,
+        no_data: Option<f64>,
+        preset: &str,
+        options: Option<&Bound<PyDict>>,
+        warn: bool,
+    ) -> PyResult<PyMatchedSequence> {
+        let method = method(preset, options)?;
+        let range = given_range(max_disparity, min_disparity)?;
+        let pairs = pairs.try_iter().map_err(|_| {
+            PyTypeError::new_err("pairs: give an iterable of pairs of arrays, such as zip(lefts, rights)")
+        })?;
+        let settings = Settings { method, range, min_disparity, no_data, warn };
+        Ok(PyMatchedSequence::new(self.0.clone(), settings, pairs))
     }
 }
 
@@ -377,6 +405,21 @@ fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send)
     })
 }
 
+/// The range that is given.
+fn given_range(max: Option<i32>, min: Option<i32>) -> PyResult<Option<DisparityRange>> {
+    max.map(|max| DisparityRange::new(min.unwrap_or(0), max)).transpose().map_err(exception)
+}
+
+/// The range to search: the one that is given, or that of sparse matches.
+fn searched(
+    py: Python,
+    pair: &Pair,
+    given: Option<DisparityRange>,
+    min: Option<i32>,
+) -> PyResult<DisparityRange> {
+    given.map_or_else(|| py.detach(|| found_range(pair, min)), Ok)
+}
+
 /// The range that sparse matches find, from `min` on where that is given.
 fn found_range(pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
     let Some(found) = check::range(pair).map_err(exception)? else {
@@ -391,6 +434,12 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("MatchWarning", module.py().get_type::<MatchWarning>())?;
     module.add_function(wrap_pyfunction!(match_, module)?)?;
     module.add_function(wrap_pyfunction!(options, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;
+    module.add_class::<calibration::PyCalibration>()?;
     module.add_class::<PyMatched>()?;
-    module.add_class::<PyMatcher>()
+    module.add_class::<PyMatchedSequence>()?;
+    module.add_class::<PyMatcher>()?;
+    module.add_class::<depth::PyPoints>()?;
+    module.add_class::<rectification::PyRectification>()?;
+    module.add_class::<depth::PyRig>()
 }

@@ -27,6 +27,15 @@ pub(crate) fn error(error: &Error) -> String {
     }
 }
 
+/// An error of what the calibration of the files `names` says; `None` for other errors.
+pub(crate) fn calibration(error: &Error, names: &str) -> Option<String> {
+    match error {
+        Error::Calibration(_) => Some(format!("{names}: {error}")),
+        Error::Mismatch(cause) => Some(format!("{names}: {cause}; size is (width, height)")),
+        _ => None,
+    }
+}
+
 fn range(cause: &RangeError) -> String {
     match cause {
         RangeError::Empty { .. } => format!("max_disparity: {cause}: raise it or lower min_disparity"),

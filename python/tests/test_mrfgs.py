@@ -1,7 +1,11 @@
 """The Python package against the command line: the same pair gives the same bits. MRFGS is the program's path."""
 
+import contextlib
 import copy
+import gc
 import inspect
+import itertools
+import json
 import os
 import pickle
 import signal
@@ -12,6 +16,8 @@ import threading
 import time
 import unittest
 import warnings
+import weakref
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +25,9 @@ import numpy as np
 import mrfgs
 
 PROGRAM = os.environ["MRFGS"]
+TESTDATA = Path(__file__).resolve().parents[2] / "testdata"
+RAW = TESTDATA / "raw"
+CAMERAS = RAW / "cameras.yml"
 
 
 def pair(height=60, width=80, channels=3, seed=1):
@@ -53,6 +62,56 @@ def by_program(left, right, *arguments, file="out.pfm"):
         subprocess.run([PROGRAM, "match", folder / "left.ppm", folder / "right.ppm", folder / "out.pfm", "--quiet",
                         "--device", "cpu", *arguments], check=True)
         return read_pfm(folder / file)
+
+
+def read_png(path):
+    """The samples of a PNG without a palette, of shape (height, width[, channels])."""
+    data, at, packed = Path(path).read_bytes(), 8, b""
+    while at < len(data):
+        length, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
+        body = data[at + 8:at + 8 + length]
+        if kind == b"IHDR":
+            width, height, depth, colours = int.from_bytes(body[:4], "big"), int.from_bytes(body[4:8], "big"), body[8], body[9]
+            assert depth in (8, 16) and body[12] == 0, body
+        elif kind == b"IDAT":
+            packed += body
+        at += 12 + length
+    channels = {0: 1, 2: 3, 4: 2, 6: 4}[colours]
+    step = channels * depth // 8
+    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + width * step)
+    above = [0] * (width * step)
+    out = []
+    for kind, *row in rows.tolist():
+        for i in range(len(row)):
+            left, up, corner = (row[i - step] if i >= step else 0), above[i], (above[i - step] if i >= step else 0)
+            if kind == 4:
+                p = left + up - corner
+                row[i] += min((abs(p - left), 0, left), (abs(p - up), 1, up), (abs(p - corner), 2, corner))[2]
+            else:
+                row[i] += (0, left, up, (left + up) // 2)[kind]
+            row[i] &= 255
+        out.append(row)
+        above = row
+    samples = np.array(out, np.uint8).view(">u2" if depth == 16 else np.uint8)
+    samples = samples.astype(samples.dtype.newbyteorder("=")).reshape(height, width, channels)
+    return samples[..., 0] if channels == 1 else samples
+
+
+def program(folder, *arguments):
+    done = subprocess.run([PROGRAM, *map(str, arguments)], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def parameters(thing):
+    """The names of the arguments; Python 3.9 finds none of a class that is not written in Python."""
+    if isinstance(thing, type) and sys.version_info < (3, 10):
+        return []
+    return list(inspect.signature(thing).parameters)
+
+
+def raw_pair():
+    return read_png(RAW / "left.png"), read_png(RAW / "right.png")
 
 
 class Match(unittest.TestCase):
@@ -211,7 +270,7 @@ class Match(unittest.TestCase):
 
     def test_help_explains_every_argument(self):
         for function in (mrfgs.match, mrfgs.Matcher.match, mrfgs.Matcher):
-            for name in inspect.signature(function).parameters:
+            for name in parameters(function):
                 text = inspect.getdoc(mrfgs.Matcher) + inspect.getdoc(mrfgs.Matcher.match)
                 self.assertTrue(name == "self" or name in text, name)
         self.assertIn("Matcher", inspect.getdoc(mrfgs.match))
@@ -319,7 +378,8 @@ class Match(unittest.TestCase):
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_match(self):
-        code = ("import numpy as np, mrfgs; a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8); "
+        code = ("import signal, numpy as np, mrfgs; signal.signal(signal.SIGINT, signal.default_int_handler); "
+                "a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8); "
                 "print('ready', flush=True); mrfgs.match(a, a, 255, device='cpu', options={'final-iterations': 1000})")
         with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             self.addCleanup(process.kill)
@@ -328,6 +388,746 @@ class Match(unittest.TestCase):
             process.send_signal(signal.SIGINT)
             _, told = process.communicate(timeout=60)
         self.assertIn("KeyboardInterrupt", told)
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def refused(self, error, words, call):
+        with self.assertRaises(error) as raised:
+            call()
+        self.assertIs(type(raised.exception), error)
+        said = str(raised.exception)
+        self.assertIn(words, said)
+        # One line, in the words of Python.
+        self.assertNotIn("\n", said)
+        self.assertNotIn("--", said)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return path
+
+
+class Rectification(Folder):
+    def same(self, left, right, calibration, files, *arguments, **keywords):
+        """That the program gives the same for the files LEFT RIGHT."""
+        if (self.folder / "out").exists():
+            (self.folder / "out").rename(tempfile.mkdtemp(dir=self.folder) + "/out")
+        program(self.folder, "rectify", *files, "out", "--calib", *arguments, "--maps", "--quiet")
+        out = self.folder / "out"
+        rectification = mrfgs.Rectification(calibration, left.shape[1::-1], **keywords)
+        views = rectification.apply(left, right)
+        for i, view in enumerate(views):
+            self.assertIsInstance(view, np.ma.MaskedArray)
+            expected, mask = read_png(out / f"im{i}.png"), read_png(out / f"mask{i}.png") != 0
+            self.assertEqual(view.shape[1::-1], rectification.size)
+            self.assertEqual(view.dtype, expected.dtype)
+            self.assertTrue(np.array_equal(view.mask if view.ndim == 2 else view.mask.all(2), mask))
+            self.assertTrue(np.array_equal(view.mask if view.ndim == 2 else view.mask.any(2), mask))
+            colours = expected[..., 0] if view.ndim == 2 and expected.ndim == 3 else expected[..., :3] if view.ndim == 3 else expected
+            self.assertTrue(np.array_equal(np.where(view.mask, 0, view.data), np.where(view.mask, 0, colours)))
+            for axis, found in zip("xy", rectification.maps()[i]):
+                self.assertEqual(found.dtype, np.float32)
+                self.assertTrue(np.array_equal(found, read_pfm(out / f"map{i}{axis}.pfm")))
+        self.assertEqual(rectification.calib_txt(), (out / "calib.txt").read_text())
+        self.assertEqual(rectification.cameras_yml(), (out / "cameras.yml").read_text())
+        return rectification, views
+
+    def test_it_is_the_programs(self):
+        left, right = raw_pair()
+        files = RAW / "left.png", RAW / "right.png"
+        by, views = self.same(left, right, CAMERAS, files, CAMERAS)
+        self.assertTrue(0.01 < views[0].mask.mean() < 0.3)
+        self.assertEqual((by.size, by.raw_size), ((240, 180), (240, 180)))
+        self.assertIn("240 x 180", repr(by))
+        self.assertEqual(mrfgs.Rectification(CAMERAS, [np.int64(240), np.uint8(180)]).maps()[0][0].shape, (180, 240))
+        for rotation in by.rotations:
+            self.assertEqual((rotation.shape, rotation.dtype), ((3, 3), np.float64))
+            self.assertLess(np.abs(rotation @ rotation.T - np.eye(3)).max(), 1e-12)
+        text = by.cameras_yml()
+        for i, rotation in enumerate(by.rotations):
+            data = text.split(f"fromRaw{i + 1}:")[1].split("data: [")[1].split("]")[0]
+            self.assertTrue(np.array_equal(rotation.ravel(), np.array(data.split(","), float)))
+        for alpha in (0, 0.5, 1):
+            other, other_views = self.same(left, right, str(CAMERAS), files, CAMERAS, "--alpha", alpha, alpha=alpha)
+            # Control: another choice makes other views.
+            self.assertFalse(np.array_equal(other_views[0].data, views[0].data))
+        self.assertTrue(views[0].mask.mean() < other_views[0].mask.mean())
+        self.assertNotEqual(mrfgs.Rectification(CAMERAS, zero_disparity=False).rig.doffs, 0)
+        self.assertEqual(by.rig.doffs, 0)
+        # The same again: it is found once.
+        again = by.apply(left, right)
+        self.assertTrue(all(np.array_equal(a.data, b.data) and np.array_equal(a.mask, b.mask) for a, b in zip(views, again)))
+        # Control: the views are not exchanged.
+        swapped = by.apply(right, left)
+        self.assertFalse(np.array_equal(swapped[0].data, views[0].data))
+
+    def test_kinds_of_images(self):
+        colour = raw_pair()
+        grey = tuple(image[..., 1].copy() for image in colour)
+        for left, right in (grey, tuple(image.astype(np.uint16) * 16 + 5 for image in colour),
+                            tuple(image.astype(np.uint16) * 257 for image in grey),
+                            tuple(image.astype(np.uint16) * 200 + 9 for image in grey)):
+            files = self.folder / "left.ppm", self.folder / "right.ppm"
+            write_ppm(files[0], left)
+            write_ppm(files[1], right)
+            if left.dtype == np.uint16 and (left % 257 == 0).all():
+                # Words that hold 8 bits stay words here, and are bytes in the program's files.
+                by = mrfgs.Rectification(CAMERAS)
+                views, bytes_ = by.apply(left, right), by.apply(*grey)
+                self.assertTrue(np.array_equal(views[0].data, bytes_[0].data.astype(np.uint16) * 257))
+            else:
+                by, views = self.same(left, right, CAMERAS, files, CAMERAS)
+            # What is matched is what the program matches of its files.
+            found = mrfgs.match(*views, 31, device="cpu", warn=False).disparity
+            program(self.folder, "match", *files, "d.pfm", "--rectify", "--calib", CAMERAS, "--max-disparity", 31, "--device", "cpu", "--quiet")
+            if left.dtype == np.uint8 or (left % 257 == 0).all():
+                self.assertTrue(np.array_equal(found, read_pfm(self.folder / "d.pfm")))
+            else:
+                program(self.folder, "match", "out/im0.png", "out/im1.png", "d.pfm", "--max-disparity", 31, "--device", "cpu", "--quiet")
+                self.assertTrue(np.array_equal(found, read_pfm(self.folder / "d.pfm")))
+        by = mrfgs.Rectification(CAMERAS)
+        expected = by.apply(*colour)
+        # Alpha is a mask, and one kind of image may meet another.
+        opaque = [np.dstack([image, np.full(image.shape[:2], 9, np.uint8)]) for image in colour]
+        found = by.apply(*opaque)
+        self.assertEqual(found[0].shape, expected[0].shape)
+        self.assertTrue(np.array_equal(found[0].data, expected[0].data))
+        mixed = by.apply(colour[0], grey[1])
+        self.assertEqual((mixed[0].shape, mixed[1].shape), ((180, 240, 3), (180, 240)))
+        floats = by.apply(*(image / 255 for image in colour))
+        self.assertEqual(floats[0].dtype, np.uint16)
+        self.assertLess(np.abs(floats[0].data / 256.0 - expected[0].data)[~expected[0].mask].max(), 20)
+
+    def test_layouts_and_masks(self):
+        left, right = raw_pair()
+        by = mrfgs.Rectification(CAMERAS)
+        expected = by.apply(left, right)
+        for name, change in (("Fortran", np.asfortranarray), ("flipped", lambda a: a[::-1].copy()[::-1]),
+                             ("every second", lambda a: np.repeat(a, 2, 1)[:, ::2]),
+                             ("BGR", lambda a: a[..., ::-1].copy()[..., ::-1])):
+            found = by.apply(change(left), change(right))
+            self.assertTrue(np.array_equal(found[0].data, expected[0].data), name)
+            self.assertTrue(np.array_equal(found[1].data, expected[1].data), name)
+        # Control.
+        self.assertFalse(np.array_equal(by.apply(left[::-1], right)[0].data, expected[0].data))
+        for order in ("<u2", ">u2"):
+            wide = [image.astype(order) * 16 for image in (left, right)]
+            self.assertTrue(np.array_equal(by.apply(*wide)[0].data, by.apply(*(w.astype(np.uint16) for w in wide))[0].data))
+        mask = np.zeros(left.shape[:2], bool)
+        mask[60:100, 90:130] = True
+        masked = by.apply(left, right, mask=mask)
+        self.assertGreater(masked[0].mask[..., 0].sum(), expected[0].mask[..., 0].sum() + 1000)
+        self.assertTrue(np.array_equal(masked[1].mask, expected[1].mask))
+        both = np.ma.masked_array(left, np.repeat(mask[..., None], 3, 2)), np.ma.masked_array(right, np.repeat(mask[..., None], 3, 2))
+        found = by.apply(*both)
+        self.assertTrue(np.array_equal(found[0].mask, masked[0].mask))
+        self.assertFalse(np.array_equal(found[1].mask, expected[1].mask))
+        holed = left.copy()
+        holed[mask] = 7
+        self.assertTrue(np.array_equal(by.apply(holed, right, no_data=7)[0].mask, masked[0].mask))
+
+    def test_from_raw_frames_to_depth_and_points(self):
+        left, right = raw_pair()
+        program(self.folder, "match", RAW / "left.png", RAW / "right.png", "d.pfm", "--rectify", "--calib", CAMERAS,
+                "--max-disparity", 31, "--also", "depth,depth-mm,points", "--device", "cpu", "--quiet")
+        rectification = mrfgs.Rectification(CAMERAS)
+        views = rectification.apply(left, right)
+        found = mrfgs.match(*views, 31, device="cpu")
+        self.assertTrue(np.array_equal(found.disparity, read_pfm(self.folder / "d.pfm")))
+        rig = rectification.rig
+        depth, millimetres = rig.depth(found.disparity), rig.millimetres(found.disparity)
+        self.assertEqual((depth.dtype, millimetres.dtype, depth.shape), (np.float32, np.uint16, (180, 240)))
+        self.assertTrue(np.array_equal(depth, read_pfm(self.folder / "d.depth.pfm")))
+        self.assertTrue(np.array_equal(millimetres, read_png(self.folder / "d.depth-mm.png")))
+        near = np.isfinite(depth) & (depth < 65)
+        self.assertLessEqual(np.abs(millimetres[near] - depth[near] * 1000).max(), 0.51)
+        self.assertTrue((millimetres[~np.isfinite(depth)] == 0).all() and np.isinf(depth).any())
+        points = rig.points(found, views[0])
+        points.save(self.folder / "python.ply")
+        self.assertEqual((self.folder / "python.ply").read_bytes(), (self.folder / "d.points.ply").read_bytes())
+        self.assertEqual((rig.unit, rig.size), ("m", (240, 180)))
+        self.assertAlmostEqual(rig.baseline, 0.16361, 5)
+        # Control: of another map, other depths and points.
+        other = mrfgs.match(*views, 12, device="cpu", warn=False)
+        self.assertFalse(np.array_equal(rig.depth(other.disparity), depth))
+        rig.points(other, views[0]).save(self.folder / "python.ply")
+        self.assertNotEqual((self.folder / "python.ply").read_bytes(), (self.folder / "d.points.ply").read_bytes())
+
+    def test_forms_of_calibrations(self):
+        text = CAMERAS.read_text()
+
+        def numbers(name):
+            return text.split(f"\n{name}: ")[1].split("data: [ ")[1].split(" ]")[0].split(", ")
+
+        def xml():
+            out = "<?xml version=\"1.0\"?>\n<opencv_storage>\n<imageSize>240 180</imageSize>\n<unit>m</unit>\n"
+            for name, rows in (("K1", 3), ("D1", 1), ("K2", 3), ("D2", 1), ("R", 3), ("T", 3)):
+                data = numbers(name)
+                out += (f"<{name} type_id=\"opencv-matrix\"><rows>{rows}</rows><cols>{len(data) // rows}</cols><dt>d</dt>"
+                        f"<data>{' '.join(data)}</data></{name}>\n")
+            return out + "</opencv_storage>\n"
+
+        def kalibr():
+            out = ""
+            for n in (1, 2):
+                k, d = numbers(f"K{n}"), numbers(f"D{n}")
+                out += (f"cam{n - 1}:\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [{', '.join(d[:4])}]\n"
+                        f"  intrinsics: [{k[0]}, {k[4]}, {k[2]}, {k[5]}]\n  resolution: [240, 180]\n")
+            r, t = numbers("R"), numbers("T")
+            rows = "".join(f"  - [{', '.join(r[3 * y:3 * y + 3])}, {t[y]}]\n" for y in range(3))
+            return out + f"  T_cn_cnm1:\n{rows}  - [0.0, 0.0, 0.0, 1.0]\n"
+
+        expected = mrfgs.Rectification(CAMERAS).maps()
+        lenses, pose = text.split("R: ")
+        files = self.write("intrinsics.yml", lenses), self.write("extrinsics.yml", "%YAML:1.0\n---\nunit: m\nR: " + pose)
+        for form in (mrfgs.Calibration(CAMERAS), mrfgs.Calibration(str(CAMERAS)), mrfgs.Calibration.of_texts(text),
+                     mrfgs.Calibration.of_texts(xml()), mrfgs.Calibration.of_texts(kalibr()), mrfgs.Calibration(*files),
+                     list(files), tuple(map(str, files)), iter(files)):
+            found = mrfgs.Rectification(form, (240, 180)).maps()
+            self.assertTrue(np.array_equal(found, expected), form)
+            calibration = form if isinstance(form, mrfgs.Calibration) else mrfgs.Calibration(*files)
+            self.assertEqual((calibration.unit, calibration.size, calibration.max_disparity), ("m", (240, 180), None))
+        # Control: a lens that bends otherwise.
+        other = mrfgs.Calibration.of_texts(text.replace("-0.16,", "-0.15,"))
+        self.assertFalse(np.array_equal(mrfgs.Rectification(other).maps(), expected))
+        camera = ("image_width: 240\nimage_height: 180\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [200, 0, 120, 0, 200, 90, 0, 0, 1]\n"
+                  "distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0, 0, 0, 0, 0]\n"
+                  "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+                  "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [200, 0, 120, {}, 0, 200, 90, 0, 0, 0, 1, 0]\n")
+        ros = self.write("left.yaml", camera.format("0")), self.write("right.yaml", camera.format("-24"))
+        for order in (ros, ros[::-1]):
+            rig = mrfgs.Rig(order)
+            self.assertEqual((rig.baseline, rig.doffs, rig.unit, rig.size), (0.12, 0, "m", (240, 180)))
+            self.assertTrue(np.array_equal(rig.cameras[0], [[200, 0, 120], [0, 200, 90], [0, 0, 1]]))
+            self.assertTrue(np.array_equal(rig.depth(np.full((180, 240), 6.0)), np.full((180, 240), 4, np.float32)))
+        self.assertIn("left.yaml, ", repr(mrfgs.Calibration(*ros)))
+
+    def test_one_camera_above_the_other(self):
+        text = CAMERAS.read_text()
+        head, pose = text.split("R: ")
+        # Down by a baseline, without rotation.
+        below = head + ("R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1, 0, 0, 0, 1, 0, 0, 0, 1 ]\n"
+                        "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ 0.0, -0.2, 0.0 ]\n")
+        path = self.write("below.yml", below)
+        left, right = raw_pair()
+        by, views = self.same(left, right, path, (RAW / "left.png", RAW / "right.png"), path)
+        self.assertEqual((by.raw_size, by.size, by.rig.size), ((240, 180), (180, 240), (180, 240)))
+        self.assertEqual(views[0].shape, (240, 180, 3))
+        self.assertEqual(by.rig.baseline, 0.2)
+
+    def test_units(self):
+        text = CAMERAS.read_text().replace("unit: m\n", "")
+        disparity = np.full((180, 240), 10, np.float32)
+        unknown = mrfgs.Rectification(mrfgs.Calibration.of_texts(text)).rig
+        metres = mrfgs.Rectification(CAMERAS).rig
+        self.assertEqual(unknown.unit, "unknown")
+        self.assertTrue(np.array_equal(unknown.depth(disparity), metres.depth(disparity)))
+        self.refused(ValueError, "does not say the unit of the baseline; give it by Calibration(..., unit=", lambda: unknown.millimetres(disparity))
+        for unit, factor in (("m", 1), ("cm", 0.01), ("mm", 0.001)):
+            rig = mrfgs.Rectification(mrfgs.Calibration.of_texts(text, unit=unit)).rig
+            self.assertEqual(rig.unit, unit)
+            expected = np.rint(metres.millimetres(disparity) * factor)
+            self.assertLessEqual(np.abs(rig.millimetres(disparity) - expected).max(), 1)
+        self.refused(ValueError, "unit: give mm, cm, m or unknown, not \"feet\"", lambda: mrfgs.Calibration(CAMERAS, unit="feet"))
+
+    def test_what_makes_no_sense_is_an_exception(self):
+        left, right = raw_pair()
+        by = mrfgs.Rectification(CAMERAS)
+        text = CAMERAS.read_text()
+        of_texts = mrfgs.Calibration.of_texts
+        sizeless = of_texts(text.replace("imageSize: [ 240, 180 ]\n", ""))
+        swapped = text.replace("data: [ -0.16356857928250576", "data: [ 0.16356857928250576")
+        self.assertNotEqual(swapped, text)
+        for error, words, call in (
+            (FileNotFoundError, "nowhere.yml: there is no such file", lambda: mrfgs.Rectification("nowhere.yml")),
+            (FileNotFoundError, "nowhere.txt", lambda: mrfgs.Rig("nowhere.txt")),
+            (ValueError, "cannot read", lambda: mrfgs.Calibration(self.folder)),
+            (ValueError, "left.png", lambda: mrfgs.Rectification(RAW / "left.png", (240, 180))),
+            (ValueError, "expected the entries of OpenCV", lambda: of_texts("a: 1\n")),
+            (ValueError, "calibration: give the path", lambda: mrfgs.Calibration()),
+            (ValueError, "calibration: give the path", lambda: mrfgs.Rectification([])),
+            (ValueError, "Calibration.of_texts", lambda: mrfgs.Rectification(text)),
+            (TypeError, "calibration: give the path", lambda: mrfgs.Rectification(7)),
+            (TypeError, "calibration: give the path", lambda: mrfgs.Rectification([7])),
+            (ValueError, "one too many", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS)),
+            (ValueError, "the text: K1", lambda: of_texts(text.replace("214.0, 0.0, 121.4", "wide, 0.0, 121.4"))),
+            (ValueError, "the text: R is missing", lambda: mrfgs.Rectification(of_texts(text.split("R: ")[0]), (240, 180))),
+            (ValueError, "right camera on the left", lambda: mrfgs.Rectification(of_texts(swapped))),
+            (ValueError, "cameras.yml: the calibration is for images of 240 x 180 and these are 180 x 240; size is (width, height)",
+             lambda: mrfgs.Rectification(CAMERAS, (180, 240))),
+            (ValueError, "size: the text does not say the size of the images; give (width, height)", lambda: mrfgs.Rectification(sizeless)),
+            (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (0, 180))),
+            (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rectification(sizeless, (-240, 180))),
+            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, left.shape)),
+            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, 240)),
+            (TypeError, "size: give (width, height), two whole numbers", lambda: mrfgs.Rectification(sizeless, (240.5, 180))),
+            (ValueError, "alpha: give a number from 0 to 1, not 1.5", lambda: mrfgs.Rectification(CAMERAS, alpha=1.5)),
+            (ValueError, "alpha", lambda: mrfgs.Rectification(CAMERAS, alpha=float("nan"))),
+            (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
+            (ValueError, "one size", lambda: by.apply(left, right[:, 1:])),
+            (TypeError, "left: give an array of uint8", lambda: by.apply(left.astype(np.int32), right)),
+            (TypeError, "right", lambda: by.apply(left, "right.png")),
+            (ValueError, "mask", lambda: by.apply(left, right, mask=np.zeros((3, 3), bool))),
+            (ValueError, "cameras.yml: is of images that are not rectified; take the rig of a Rectification", lambda: mrfgs.Rig(CAMERAS)),
+            (ValueError, "the text: the calibration does not say cam0 and doffs and baseline", lambda: mrfgs.Rig(of_texts("ndisp=64\n"))),
+            (ValueError, "baseline=0 is not above 0", lambda: mrfgs.Rig(of_texts("cam0=[9 0 2; 0 9 2; 0 0 1]\ndoffs=0\nbaseline=0\n"))),
+        ):
+            with self.subTest(words):
+                self.refused(error, words, call)
+        # Maps of a size that no machine holds.
+        flat = of_texts("cam0=[1e9 0 1e8; 0 1e9 1e8; 0 0 1]\ndoffs=0\nbaseline=20\n")
+        self.refused(MemoryError, "of memory are needed", mrfgs.Rectification(flat, (1 << 28, 1 << 28)).maps)
+
+
+class Depth(Folder):
+    def test_a_rectified_pair_needs_its_calib_txt_alone(self):
+        scene = TESTDATA / "mixed"
+        program(self.folder, "match", scene / "im0.png", scene / "im1.png", "d.pfm", "--also", "depth,depth-mm,points", "--device", "cpu",
+                "--quiet")
+        left, right = read_png(scene / "im0.png"), read_png(scene / "im1.png")
+        calibration = mrfgs.Calibration(scene / "calib.txt")
+        found = mrfgs.match(left, right, calibration.max_disparity, device="cpu")
+        rig = mrfgs.Rig(calibration)
+        self.assertEqual(rig.size, left.shape[1::-1])
+        self.assertTrue(np.array_equal(found.disparity, read_pfm(self.folder / "d.pfm")))
+        self.assertTrue(np.array_equal(rig.depth(found.disparity), read_pfm(self.folder / "d.depth.pfm")))
+        self.assertTrue(np.array_equal(rig.millimetres(found.disparity), read_png(self.folder / "d.depth-mm.png")))
+        points = rig.points(found, left)
+        points.save(str(self.folder / "python.ply"))
+        expected = (self.folder / "d.points.ply").read_bytes()
+        self.assertEqual((self.folder / "python.ply").read_bytes(), expected)
+        # The arrays are what the file holds.
+        dtype = [("position", "<f4", 3), ("colour", "u1", 3), ("quality", "<f4")]
+        cloud = np.frombuffer(expected.split(b"end_header\n", 1)[1], dtype)
+        self.assertTrue(np.array_equal(points.positions, cloud["position"]))
+        self.assertTrue(np.array_equal(points.colours, cloud["colour"]))
+        self.assertTrue(np.array_equal(points.confidence, cloud["quality"]))
+        self.assertEqual((points.positions.dtype, points.colours.dtype, points.confidence.dtype), (np.float32, np.uint8, np.uint8))
+        self.assertEqual(len(points), (found.validity == 0).sum())
+        self.assertIn(str(len(points)), repr(points))
+        # By the definition: Z = baseline f / d, at trusted pixels, row by row.
+        y, x = np.nonzero(found.validity == 0)
+        (f, _, cx), (_, _, cy) = rig.cameras[0][:2]
+        z = rig.baseline * f / (found.disparity[y, x] + rig.doffs)
+        self.assertLess(np.abs(points.positions - np.stack([(x - cx) * z / f, (y - cy) * z / f, z], 1)).max(), 1e-4 * z.max())
+        self.assertTrue(np.array_equal(points.colours, left[y, x]))
+        for other in (pickle.loads(pickle.dumps(points)), copy.deepcopy(points)):
+            self.assertTrue(np.array_equal(other.positions, points.positions))
+        # A part of a cloud is a cloud.
+        near = points.positions[:, 2] < np.median(points.positions[:, 2])
+        part = mrfgs.Points(points.positions[near].astype(np.float64), points.colours[near], points.confidence[near])
+        part.save(self.folder / "part.ply")
+        data = (self.folder / "part.ply").read_bytes().split(b"end_header\n", 1)[1]
+        self.assertEqual(data, cloud[near].tobytes())
+        self.assertEqual(len(mrfgs.Points(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), np.zeros(0, np.uint8))), 0)
+
+    def test_rectified_files_and_rectified_arrays_agree(self):
+        program(self.folder, "rectify", RAW / "left.png", RAW / "right.png", "out", "--calib", CAMERAS, "--quiet")
+        rig = mrfgs.Rectification(CAMERAS).rig
+        disparity = np.random.default_rng(3).uniform(1, 31, (180, 240)).astype(np.float32)
+        # calib.txt is in millimetres, cameras.yml in the unit of the calibration.
+        for name, factor in (("calib.txt", 1000), ("cameras.yml", 1)):
+            other = mrfgs.Rig(self.folder / "out" / name)
+            self.assertTrue(np.array_equal(other.millimetres(disparity), rig.millimetres(disparity)))
+            self.assertLess(np.abs(other.depth(disparity) / factor - rig.depth(disparity)).max(), 1e-5)
+
+    def test_where_there_is_no_depth(self):
+        rig = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))
+        self.assertIsNone(rig.size)
+        disparity = np.array([[5, -5, -6, np.inf, np.nan, -np.inf, -4.99]])
+        for kind in (np.float64, np.float32, ">f4", ">f8"):
+            self.assertTrue(np.array_equal(rig.depth(disparity.astype(kind))[:, :6], [[200] + 5 * [np.inf]]))
+            self.assertEqual(rig.millimetres(disparity.astype(kind)).tolist(), [[200, 0, 0, 0, 0, 0, 0]])
+        masked = np.ma.masked_array(np.full((2, 3), 5.0), [[1, 0, 0], [0, 0, 1]])
+        self.assertTrue(np.array_equal(np.isinf(rig.depth(masked)), masked.mask))
+        ramp = np.arange(60, dtype=np.float32).reshape(6, 10)
+        expected = 2000 / (ramp + 5)
+        for other in (np.asfortranarray(ramp), ramp[::-1].copy()[::-1], np.repeat(ramp, 2, 1)[:, ::2], ramp.T.copy().T):
+            self.assertTrue(np.array_equal(rig.depth(other), expected.astype(np.float32)))
+        self.assertFalse(np.array_equal(rig.depth(ramp[::-1]), expected))
+
+    def test_what_makes_no_sense_is_an_exception(self):
+        left, right = pair()
+        rig = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))
+        sized = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\nwidth=81\nheight=60\n"))
+        found = mrfgs.match(left, right, 15, device="cpu")
+        positions, colours, confidence = np.zeros((4, 3), np.float32), np.zeros((4, 3), np.uint8), np.zeros(4, np.uint8)
+        points = mrfgs.Points(positions, colours, confidence)
+        changed = copy.deepcopy(found)
+        changed.disparity[:] = np.nan
+        self.assertEqual(len(rig.points(changed, left)), 0)
+        for error, words, call in (
+            (TypeError, "disparity: give an array, such as Matched.disparity", lambda: rig.depth(found)),
+            (TypeError, "divide whole numbers by their scale", lambda: rig.depth(np.zeros((3, 3), np.int16))),
+            (TypeError, "disparity", lambda: rig.depth("d.pfm")),
+            (ValueError, "disparity: give an array of shape (height, width)", lambda: rig.depth(np.zeros(3))),
+            (ValueError, "disparity: is 80 x 60, and the text is of images of 81 x 60", lambda: sized.depth(found.disparity)),
+            (ValueError, "matched: is 80 x 60", lambda: sized.points(found, left)),
+            (ValueError, "left: is 79 x 60 and the maps are 80 x 60", lambda: rig.points(found, left[:, 1:])),
+            (TypeError, "left: give an array of uint8", lambda: rig.points(found, left.astype(int))),
+            (ValueError, "positions: give an array of shape (N, 3)", lambda: mrfgs.Points(positions[:, :2], colours, confidence)),
+            (TypeError, "colours: give an array of shape (N, 3), uint8", lambda: mrfgs.Points(positions, colours / 255, confidence)),
+            (ValueError, "4 positions, 3 colours and 4 values", lambda: mrfgs.Points(positions, colours[1:], confidence)),
+            (OSError, "python.pcd", lambda: points.save(self.folder / "python.pcd")),
+            (OSError, "there is no folder", lambda: points.save(self.folder / "nowhere" / "python.ply")),
+        ):
+            with self.subTest(words):
+                self.refused(error, words, call)
+        self.assertEqual(os.listdir(self.folder), [])
+
+
+class Evaluation(Folder):
+    def test_the_figures_are_the_programs(self):
+        random = np.random.default_rng(5)
+        truth = random.uniform(0, 60, (50, 70)).astype(np.float32)
+        truth[random.random(truth.shape) < 0.1] = np.inf
+        map_ = truth + random.normal(0, 1.5, truth.shape).astype(np.float32)
+        map_[~np.isfinite(map_)] = 3
+        map_[random.random(truth.shape) < 0.05] = np.inf
+        mask = random.choice([0, 128, 255], truth.shape, p=[0.1, 0.2, 0.7]).astype(np.uint8)
+
+        def write_pfm(name, array):
+            height, width = array.shape
+            (self.folder / name).write_bytes(f"Pf\n{width} {height}\n-1\n".encode() + array[::-1].astype("<f4").tobytes())
+
+        write_pfm("map.pfm", map_)
+        write_pfm("truth.pfm", truth)
+        (self.folder / "mask.pgm").write_bytes(b"P5\n70 50\n255\n" + mask.tobytes())
+        program(self.folder, "evaluate", "map", "map.pfm", "--truth", "truth.pfm", "--json", "without.json")
+        program(self.folder, "evaluate", "map", "map.pfm", "--truth", "truth.pfm", "--mask", "mask.pgm", "--json", "with.json")
+        expected = {name: json.loads((self.folder / name).read_text())["pairs"][0]["final"] for name in ("with.json", "without.json")}
+        found = mrfgs.evaluate(map_, truth, mask)
+        self.assertEqual(found, expected["with.json"])
+        self.assertEqual(list(found["all"]), list(expected["with.json"]["all"]))
+        self.assertEqual(mrfgs.evaluate(map_, truth), expected["without.json"])
+        self.assertIsNone(expected["without.json"]["nonocc"])
+        # By the definitions.
+        known = np.isfinite(truth)
+        error = np.abs(map_[known].astype(np.float64) - truth[known])
+        valid = np.isfinite(error)
+        everything = found["all"]
+        self.assertEqual(everything["pixels"], known.sum())
+        self.assertAlmostEqual(everything["avg"], error[valid].mean(), 12)
+        self.assertAlmostEqual(everything["psnr"], 10 * np.log10(255**2 / (error[valid] ** 2).mean()), 9)
+        for threshold in (0.5, 1.0, 2.0, 4.0):
+            self.assertAlmostEqual(everything[f"bad{threshold}"], 100 * (~valid | (error > threshold)).mean(), 9)
+        self.assertEqual(found["nonocc"]["pixels"], (known & (mask == 255)).sum())
+        # The same in other kinds of arrays.
+        for other in (mrfgs.evaluate(np.asfortranarray(map_), truth[::-1].copy()[::-1], mask == 255),
+                      mrfgs.evaluate(map_.astype(">f8"), truth.astype(np.float64), np.asfortranarray(mask)),
+                      mrfgs.evaluate(np.ma.masked_invalid(map_), np.ma.masked_array(np.where(known, truth, 7), ~known), mask)):
+            self.assertEqual(other, found)
+        # Controls: another map, another truth, another mask.
+        self.assertNotEqual(mrfgs.evaluate(map_[::-1], truth, mask), found)
+        self.assertNotEqual(mrfgs.evaluate(map_, np.ma.masked_array(np.where(known, truth, 7)), mask), found)
+        self.assertNotEqual(mrfgs.evaluate(map_, truth, mask != 255), found)
+
+    def test_what_does_not_exist_is_none(self):
+        truth = np.ones((4, 5), np.float32)
+        perfect = mrfgs.evaluate(truth, truth, np.zeros((4, 5), bool))
+        self.assertIsNone(perfect["nonocc"])
+        self.assertEqual((perfect["all"]["avg"], perfect["all"]["psnr"], perfect["all"]["bad0.5"]), (0, None, 0))
+        nothing = mrfgs.evaluate(truth * np.inf, truth)["all"]
+        self.assertEqual((nothing["avg"], nothing["density"], nothing["bad4.0"]), (None, 0, 100))
+
+    def test_a_match_against_its_scene(self):
+        scene = TESTDATA / "slanted"
+        found = mrfgs.match(read_png(scene / "im0.png"), read_png(scene / "im1.png"), 31, device="cpu")
+        figures = mrfgs.evaluate(found.disparity, read_pfm(scene / "disp0GT.pfm"), read_png(scene / "mask0nocc.png"))
+        self.assertLess(figures["nonocc"]["avg"], 0.5)
+        self.assertLess(figures["nonocc"]["bad2.0"], figures["all"]["bad2.0"] + 1)
+
+    def test_what_makes_no_sense_is_an_exception(self):
+        map_ = np.ones((4, 5), np.float32)
+        for error, words, call in (
+            (ValueError, "the disparity map is 5 x 4 and the ground truth 5 x 3", lambda: mrfgs.evaluate(map_, map_[1:])),
+            (ValueError, "no known (finite) pixel", lambda: mrfgs.evaluate(map_, map_ * np.nan)),
+            (ValueError, "the mask is 5 x 3", lambda: mrfgs.evaluate(map_, map_, np.ones((3, 5), bool))),
+            (ValueError, "mask: give an array of bool, or of uint8 that is 255", lambda: mrfgs.evaluate(map_, map_, np.ones((4, 5), np.uint8))),
+            (TypeError, "mask: give an array of bool", lambda: mrfgs.evaluate(map_, map_, map_)),
+            (TypeError, "truth: give an array of float32 or float64", lambda: mrfgs.evaluate(map_, map_.astype(np.uint8))),
+            (TypeError, "disparity: give an array of float32", lambda: mrfgs.evaluate(map_ > 0, map_)),
+            (ValueError, "truth: give an array of shape (height, width)", lambda: mrfgs.evaluate(map_, map_[None])),
+        ):
+            with self.subTest(words):
+                self.refused(error, words, call)
+
+
+class Sequences(Folder):
+    def setUp(self):
+        super().setUp()
+        self.matcher = mrfgs.Matcher(device="cpu")
+
+    def test_a_sequence_is_its_pairs_in_order(self):
+        pairs = [pair(seed=seed) for seed in (1, 2, 3, 4, 1)] + [pair(50, 90, seed=6)]
+        expected = [self.matcher.match(*images, 15).disparity for images in pairs]
+        # Control: confusing two of them would be found.
+        self.assertFalse(np.array_equal(expected[0], expected[1]))
+        for given in (pairs, iter(pairs), [list(images) for images in pairs], [np.stack(images) for images in pairs], zip(*zip(*pairs))):
+            found = list(self.matcher.match_all(given, 15))
+            self.assertEqual(len(found), len(expected))
+            for one, other in zip(found, expected):
+                self.assertIsInstance(one, mrfgs.Matched)
+                self.assertTrue(np.array_equal(one.disparity, other))
+        self.assertEqual(list(self.matcher.match_all([], 15)), [])
+        # The arguments of `match`, and the range of each pair by itself.
+        found = list(self.matcher.match_all(pairs, 15, min_disparity=-2, preset="fast", options={"fill": "none"}, no_data=7))
+        for one, images in zip(found, pairs):
+            self.assertTrue(np.array_equal(one.disparity, self.matcher.match(
+                *images, 15, min_disparity=-2, preset="fast", options={"fill": "none"}, no_data=7).disparity))
+        large = [pair(200, 300, seed=seed) for seed in (1, 2)]
+        for one, images in zip(self.matcher.match_all(large), large):
+            self.assertEqual(one.max_disparity, mrfgs.match(*images, device="cpu").max_disparity)
+
+    def test_rectified_on_the_way(self):
+        left, right = raw_pair()
+        by = mrfgs.Rectification(CAMERAS)
+        expected = self.matcher.match(*by.apply(left, right), 31).disparity
+        frames = [(left, right), (left, right)]
+        for found in self.matcher.match_all((by.apply(*frame) for frame in frames), 31):
+            self.assertTrue(np.array_equal(found.disparity, expected))
+
+    def test_no_more_pairs_are_taken_than_are_needed(self):
+        taken = []
+
+        def endless():
+            for i in itertools.count():
+                taken.append(i)
+                yield pair(seed=1)
+
+        results = self.matcher.match_all(endless(), 15)
+        self.assertEqual(taken, [])
+        for i, _ in enumerate(itertools.islice(results, 6)):
+            # The result i, and no more than two ahead.
+            self.assertEqual(len(taken), i + 3)
+        results.close()
+        self.assertEqual(len(taken), 8)
+        self.assertEqual(list(results), [])
+
+    def test_memory_does_not_grow_with_the_sequence(self):
+        class Array(np.ndarray):
+            __hash__ = object.__hash__
+
+        alive, most = weakref.WeakSet(), 0
+
+        def pairs():
+            for seed in range(12):
+                left, right = (image.view(Array) for image in pair(seed=seed))
+                alive.add(left)
+                yield left, right
+                del left, right
+
+        for found in self.matcher.match_all(pairs(), 15):
+            del found
+            gc.collect()
+            most = max(most, len(alive))
+        self.assertLessEqual(most, 3)
+
+    def test_exceptions_of_the_pairs_come_after_the_results_before(self):
+        class Own(Exception):
+            pass
+
+        def broken():
+            yield pair(seed=1)
+            yield pair(seed=2)
+            raise Own("the camera is gone")
+
+        results = self.matcher.match_all(broken(), 15)
+        found = []
+        with self.assertRaises(Own) as raised:
+            for one in results:
+                found.append(one)
+        self.assertEqual((len(found), str(raised.exception)), (2, "the camera is gone"))
+        self.assertEqual(list(results), [])
+        # The matcher is free again.
+        self.matcher.match(*pair(), 15)
+        left, right = pair()
+        for error, words, bad in (
+            (TypeError, "pair 1: left: give an array of uint8", (left.astype(np.int64), right)),
+            (ValueError, "pair 1: the left image is 80 x 60 and the right one 79 x 60", (left, right[:, 1:])),
+            (TypeError, "pair 1: give two arrays, left and right", left),
+            (TypeError, "pair 1: give two arrays, left and right", None),
+            (TypeError, "pair 1: give two arrays, left and right", {"left": left, "right": right}),
+            (TypeError, "pair 1: give two arrays, left and right", (left, right, left)),
+        ):
+            found = []
+
+            def go():
+                for one in self.matcher.match_all([(left, right), bad, (left, right)], 15):
+                    found.append(one)
+
+            self.refused(error, words, go)
+            self.assertEqual(len(found), 1)
+        # What the match itself refuses.
+        self.refused(ValueError, "pair 0: max_disparity", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
+        self.refused(ValueError, "pair 0: options[\"memory\"]: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
+        # Before any pair is taken.
+        taken = iter([(left, right)])
+        for error, words, call in (
+            (ValueError, "no preset", lambda: self.matcher.match_all(taken, 15, preset="best")),
+            (ValueError, "max_disparity", lambda: self.matcher.match_all(taken, -5)),
+            (TypeError, "pairs: give an iterable of pairs", lambda: self.matcher.match_all(7, 15)),
+        ):
+            self.refused(error, words, call)
+        self.assertEqual(len(list(taken)), 1)
+
+    def test_what_ends_a_program_ends_a_sequence_at_once(self):
+        def interrupted():
+            yield pair(seed=1)
+            raise KeyboardInterrupt
+
+        with self.assertRaises(KeyboardInterrupt):
+            next(self.matcher.match_all(interrupted(), 15))
+        self.matcher.match(*pair(), 15)
+
+    def test_closing_early(self):
+        closed = []
+
+        def pairs():
+            try:
+                while True:
+                    yield pair(400, 600)
+            finally:
+                closed.append(True)
+
+        # Before its first pair it has nothing to give back.
+        results = self.matcher.match_all(pairs(), 63, warn=False)
+        results.close()
+        self.assertEqual(list(results), [])
+        results = self.matcher.match_all(pairs(), 63, warn=False)
+        next(results)
+        # Until it ends, it has the matcher.
+        self.refused(RuntimeError, "in the middle of match_all", lambda: self.matcher.match(*pair(), 15))
+        self.refused(RuntimeError, "in the middle of match_all", lambda: next(self.matcher.match_all([pair()], 15)))
+        self.assertEqual(closed, [])
+        start = time.monotonic()
+        results.close()
+        results.close()
+        self.assertLess(time.monotonic() - start, 5)
+        self.assertEqual(closed, [True])
+        self.matcher.match(*pair(), 15)
+        with contextlib.closing(self.matcher.match_all(pairs(), 15, warn=False)) as results:
+            next(results)
+        self.matcher.match(*pair(), 15)
+        # A loop that is left lets go of it.
+        for found in self.matcher.match_all(pairs(), 15, warn=False):
+            break
+        self.matcher.match(*pair(), 15)
+        self.assertEqual(closed, [True] * 3)
+
+    def test_one_at_a_time(self):
+        def pairs():
+            yield pair(seed=1)
+            with self.assertRaises(ValueError) as raised:
+                next(results)
+            said.append(str(raised.exception))
+            yield pair(seed=2)
+
+        said = []
+        results = self.matcher.match_all(pairs(), 15)
+        self.assertEqual(len(list(results)), 2)
+        self.assertIn("in use already", said[0])
+        # Another thread may ask for the next one.
+        results, found = self.matcher.match_all([pair(seed=1), pair(seed=2)], 15), []
+        for _ in range(2):
+            thread = threading.Thread(target=lambda: found.append(next(results)))
+            thread.start()
+            thread.join()
+        self.assertEqual(len(found), 2)
+
+    def test_warnings(self):
+        left, right = pair(200, 300)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            self.assertEqual(len(list(self.matcher.match_all([(right, left), (left, right)], 9))), 2)
+        said = [str(w.message) for w in caught]
+        self.assertTrue(all(w.category is mrfgs.MatchWarning and w.filename == __file__ for w in caught))
+        self.assertTrue(any("swapped" in text for text in said) and any("raise max_disparity" in text for text in said), said)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", mrfgs.MatchWarning)
+            with self.assertRaises(mrfgs.MatchWarning):
+                list(self.matcher.match_all([(right, left)], 15))
+            list(self.matcher.match_all([(right, left)], 15, warn=False))
+
+    def test_other_threads_run_meanwhile(self):
+        ticks, done = [], threading.Event()
+
+        def tick():
+            while not done.is_set():
+                ticks.append(time.monotonic())
+                time.sleep(0.002)
+
+        thread = threading.Thread(target=tick)
+        thread.start()
+        start = time.monotonic()
+        list(self.matcher.match_all([pair(400, 600)] * 2, 63))
+        end = time.monotonic()
+        done.set()
+        thread.join()
+        self.assertGreater(sum(start < t < end for t in ticks), 5)
+
+    @unittest.skipIf(sys.platform == "win32", "no signals there")
+    def test_ctrl_c_ends_a_sequence(self):
+        # Who starts the tests in the background may have told them to ignore Ctrl-C.
+        code = ("import itertools, signal, numpy as np, mrfgs\n"
+                "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+                "a = np.random.default_rng(1).integers(0, 256, (1500, 1500), dtype=np.uint8)\n"
+                "matcher = mrfgs.Matcher(device='cpu')\n"
+                "results = matcher.match_all(itertools.repeat((a, a)), 255, options={'final-iterations': 1000}, warn=False)\n"
+                "print('ready', flush=True)\n"
+                "try: next(results)\n"
+                "except KeyboardInterrupt: print('told', list(results), matcher.match(a[:60, :80], a[:60, :80], 15, warn=False))\n")
+        with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            self.addCleanup(process.kill)
+            self.assertEqual(process.stdout.readline(), "ready\n")
+            time.sleep(1)
+            process.send_signal(signal.SIGINT)
+            said, told = process.communicate(timeout=60)
+        self.assertTrue(said.startswith("told [] <mrfgs.Matched: 80 x 60"), said + told)
+
+    def test_an_open_sequence_does_not_keep_the_program(self):
+        code = ("import itertools, numpy as np, mrfgs; a = np.random.default_rng(1).integers(0, 256, (60, 80), dtype=np.uint8)\n"
+                "results = mrfgs.Matcher(device='cpu').match_all(itertools.repeat((a, a)), 15, warn=False)\n"
+                "print(next(results))\n")
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
+class Help(unittest.TestCase):
+    def test_everything_is_explained(self):
+        for name in mrfgs.__all__:
+            thing = getattr(mrfgs, name)
+            if name == "__version__":
+                continue
+            self.assertTrue(inspect.getdoc(thing), name)
+            own = [] if not isinstance(thing, type) or issubclass(thing, Warning) else vars(thing).items()
+            for inner, value in own:
+                if not inner.startswith("_"):
+                    self.assertTrue(inspect.getdoc(value), f"{name}.{inner}")
+        for thing, more in ((mrfgs.Calibration, None), (mrfgs.Calibration.of_texts, mrfgs.Calibration), (mrfgs.Rectification, None),
+                            (mrfgs.Rectification.apply, None), (mrfgs.Rig, None), (mrfgs.Rig.depth, None), (mrfgs.Rig.millimetres, None),
+                            (mrfgs.Rig.points, None), (mrfgs.Points, None), (mrfgs.Points.save, None), (mrfgs.evaluate, None),
+                            (mrfgs.Matcher.match_all, mrfgs.Matcher.match)):
+            text = inspect.getdoc(thing) + (inspect.getdoc(more) if more else "")
+            for name in parameters(thing):
+                self.assertTrue(name == "self" or name in text, f"{thing}: {name}")
+
+    def test_the_stubs_name_what_there_is(self):
+        stubs = (Path(mrfgs.__file__).parent / "__init__.pyi").read_text()
+        for name in mrfgs.__all__:
+            thing = getattr(mrfgs, name)
+            self.assertRegex(stubs, rf"(class|def) {name}\b|{name}:")
+            if isinstance(thing, type) and not issubclass(thing, Warning):
+                body = stubs.split(f"class {name}")[1].split("\nclass ")[0]
+                for inner in vars(thing):
+                    self.assertTrue(inner.startswith("_") or f"def {inner}(" in body, f"{name}.{inner}")
+                listed = {line.split("def ")[1].split("(")[0] for line in body.splitlines() if line.startswith("    def ")}
+                self.assertTrue(all(hasattr(thing, inner) for inner in listed), listed)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ use matched::summed;
 pub use matched::{Matched, Timing};
 pub use search::Search;
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use threads::Threads;
 
 /// Chooses what a [`Matcher`] does, and where.
@@ -214,6 +215,20 @@ impl Matcher {
         pollster::block_on(self.run_all_async(pairs, take))
     }
 
+    /// As `run_all`, and ends with [`Error::Interrupted`] soon after `cancel` becomes true.
+    ///
+    /// # Errors
+    /// Those of [`Job::run`]; the results of all pairs before have been handed out then.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn run_all_until(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        cancel: &AtomicBool,
+        take: impl FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        pollster::block_on(self.run_each(pairs, cancel, take))
+    }
+
     /// As `run_all`, for a browser.
     ///
     /// # Errors
@@ -221,10 +236,22 @@ impl Matcher {
     pub async fn run_all_async(
         &mut self,
         pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        take: impl FnMut(Matched) -> ControlFlow<()>,
+    ) -> Result<()> {
+        self.run_each(pairs, &AtomicBool::new(false), take).await
+    }
+
+    async fn run_each(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        cancel: &AtomicBool,
         mut take: impl FnMut(Matched) -> ControlFlow<()>,
     ) -> Result<()> {
         let method = &self.method.clone();
-        let observer: Observer = &mut |_| ControlFlow::Continue(());
+        let observer: Observer = &mut |_| {
+            let stopped = cancel.load(Ordering::Relaxed);
+            if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
         let mut last: Option<Flight> = None;
         for (pair, range) in pairs {
             let started = self.start(&pair, range, method, &mut *observer).await;

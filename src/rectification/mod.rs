@@ -30,7 +30,7 @@ pub use options::Options;
 use crate::calibration::cameras::{StereoCalibration, Views};
 use crate::calibration::lens::Lens;
 use crate::calibration::matrix::{Matrix, product, rotated, transposed};
-use crate::error::{Error, Result};
+use crate::error::{Error, Purpose, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::{Pair, Plane};
 use crate::memory;
@@ -104,16 +104,20 @@ impl Rectification {
     }
 
     /// [`Rectification::left`] and [`Rectification::right`] of every pixel: x, then y; +infinity where there is nothing.
-    #[must_use]
-    pub fn maps(&self) -> [[Plane<f32>; 2]; 2] {
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when the system has not enough memory.
+    pub fn maps(&self) -> Result<[[Plane<f32>; 2]; 2]> {
         let (width, height) = self.size();
-        [0, 1].map(|view| {
+        let values = (width as u64).saturating_mul(height as u64).saturating_mul(4);
+        memory::check(values.saturating_mul(size_of::<f32>() as u64), Purpose::Image)?;
+        Ok([0, 1].map(|view| {
             [0, 1].map(|i| {
                 Plane::from_fn(width, height, |x, y| {
                     self.source(view, x as f64, y as f64).map_or(f32::INFINITY, |at| at[i] as f32)
                 })
             })
-        })
+        }))
     }
 
     /// Finds out now where each pixel comes from, instead of for each pair: for many pairs of the same cameras. It keeps 16

@@ -98,7 +98,7 @@ fn write_all(folder: &Path, by: &Rectification, images: [&Image; 2], maps: bool)
         write::grey8(&at(&format!("mask{i}.png")), &mask)?;
     }
     if maps {
-        for (i, map) in by.maps().iter().enumerate() {
+        for (i, map) in by.maps()?.iter().enumerate() {
             for (axis, map) in ["x", "y"].into_iter().zip(map) {
                 write::save(&at(&format!("map{i}{axis}.pfm")), &pfm::encode(map))?;
             }

@@ -1,0 +1,290 @@
+//! Depths and points.
+
+use std::path::PathBuf;
+
+use mrfgs::depth::Rig;
+use mrfgs::image::Plane;
+use mrfgs::image::calib::{Calibration, Camera};
+use mrfgs::image::ply::{self, Point};
+use mrfgs::image::raster;
+use mrfgs::maps::{FRACTION, Maps, flag};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyTuple, PyType};
+
+use crate::arrays::{self, Image};
+use crate::calibration::PyCalibration;
+use crate::rectification::matrices;
+use crate::{PyMatched, exception};
+
+/// The cameras of a rectified pair: from disparities to depths and points.
+///
+/// calibration: that of the rectified pair, as a Calibration, the path of a file, or a list of the paths of two: calib.txt, OpenCV's
+///     P1 and P2, ROS's projections. For raw images, Rectification.rig has it.
+///
+/// A point at depth Z has the disparity d with d + doffs = baseline * f / Z. Depths and points have the unit of the baseline.
+/// Raises ValueError for a calibration that does not say the rectified cameras.
+#[pyclass(name = "Rig", frozen, module = "mrfgs")]
+pub(crate) struct PyRig {
+    rig: Rig,
+    camera: Camera,
+    doffs: f64,
+    baseline: f64,
+    size: Option<(usize, usize)>,
+    names: String,
+}
+
+impl PyRig {
+    /// That of a rectified pair, by the calibration that it comes from.
+    pub(crate) fn of(rectified: &Calibration, known: &PyCalibration) -> PyResult<Self> {
+        let rig = Rig::new(rectified).map_err(|error| known.wrong(error))?;
+        let size =
+            rectified.width.zip(rectified.height).map(|(width, height)| (width as usize, height as usize));
+        let names = known.names.clone();
+        // What a rig has, its calibration says.
+        let camera = rectified.camera.unwrap_or(Camera { focal_length: [0.0; 2], principal_point: [0.0; 2] });
+        let (doffs, baseline) = (rectified.doffs.unwrap_or_default(), rectified.baseline.unwrap_or_default());
+        Ok(Self { rig, camera, doffs, baseline, size, names })
+    }
+
+    /// Refuses a map of another size than that of the calibration.
+    fn check(&self, name: &str, (w, h): (usize, usize)) -> PyResult<()> {
+        match self.size {
+            Some((width, height)) if (width, height) != (w, h) => Err(PyValueError::new_err(format!(
+                "{name}: is {w} x {h}, and {} is of images of {width} x {height}: depth takes the calibration of this size",
+                self.names
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn disparities(&self, disparity: &Bound<PyAny>) -> PyResult<Plane<f32>> {
+        if disparity.cast::<PyMatched>().is_ok() {
+            return Err(PyTypeError::new_err("disparity: give an array, such as Matched.disparity"));
+        }
+        let map = arrays::disparities("disparity", disparity)?;
+        self.check("disparity", map.size())?;
+        Ok(map)
+    }
+}
+
+#[pymethods]
+impl PyRig {
+    #[new]
+    fn new(calibration: &Bound<PyAny>) -> PyResult<Self> {
+        let known = PyCalibration::of(calibration)?;
+        let rectified = known.cameras.of_rectified_images().map_err(|error| known.wrong(error))?;
+        let rectified = rectified.ok_or_else(|| {
+            PyValueError::new_err(format!(
+                "{}: is of images that are not rectified; take the rig of a Rectification, or give the calibration of the \
+                 rectified pair",
+                known.names
+            ))
+        })?;
+        Self::of(&rectified, &known)
+    }
+
+    /// The depth of every pixel along the optical axis, float32 in the unit of the baseline, +inf where there is none: where the
+    /// disparity is not finite or masked, and where d + doffs is 0 or less.
+    ///
+    /// disparity: array of shape (height, width), float32 or float64, in pixels, such as Matched.disparity.
+    fn depth<'py>(&self, py: Python<'py>, disparity: &Bound<PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let map = self.disparities(disparity)?;
+        arrays::map(py, py.detach(|| self.rig.depths(&map)))
+    }
+
+    /// The depth of every pixel in whole millimetres, uint16, as ROS and TUM have it: 0 where there is none, and where it is above 65535.
+    ///
+    /// disparity: as in `depth`.
+    ///
+    /// Raises ValueError where the unit of the baseline is not known; Calibration(..., unit="m") states it.
+    fn millimetres<'py>(
+        &self,
+        py: Python<'py>,
+        disparity: &Bound<PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u16>>> {
+        let map = self.disparities(disparity)?;
+        let depths = py.detach(|| self.rig.millimetres(&map)).ok_or_else(|| {
+            PyValueError::new_err(format!(
+                "{}: does not say the unit of the baseline; give it by Calibration(..., unit=\"m\"), or add an entry `unit` to the \
+                 file: mm, cm or m",
+                self.names
+            ))
+        })?;
+        arrays::map(py, depths)
+    }
+
+    /// The points that were measured and are trusted (validity 0), row by row, in the frame of the left camera: x to the right, y down,
+    /// z forward.
+    ///
+    /// matched: what the match of the rectified pair has returned.
+    /// left: the rectified left image, as `match` takes it. It gives the colours; 16 bits and floats fill the range of it alone.
+    fn points(&self, py: Python, matched: &Bound<PyMatched>, left: &Bound<PyAny>) -> PyResult<PyPoints> {
+        let matched = matched.get();
+        let disparity = arrays::disparities("matched.disparity", matched.disparity.bind(py).as_any())?;
+        let confidence = arrays::bytes("matched.confidence", matched.confidence.bind(py).as_any())?;
+        let mut validity = arrays::bytes("matched.validity", matched.validity.bind(py).as_any())?;
+        self.check("matched", disparity.size())?;
+        let image = Image::of("left", left)?;
+        let pair = raster::pair(image.raster()?, image.raster()?, None).map_err(exception)?;
+        let sizes = [confidence.size(), validity.size(), pair.size()];
+        if sizes.iter().any(|size| *size != disparity.size()) {
+            let ((width, height), (w, h)) = (disparity.size(), pair.size());
+            return Err(PyValueError::new_err(format!(
+                "left: is {w} x {h} and the maps are {width} x {height}; give the rectified image that was matched"
+            )));
+        }
+        // Arrays may have been changed since the match.
+        for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
+            *validity |= if d.is_finite() { 0 } else { flag::MASKED };
+        }
+        let (width, height) = disparity.size();
+        // Floats hold every disparity of a match exactly.
+        let disparity = disparity.map(|d| (d * FRACTION as f32) as i32);
+        let maps =
+            Maps { disparity, raw: Plane::filled(width, height, 0), confidence, validity, right: None };
+        let points = py.detach(|| self.rig.points(&maps, pair.left()));
+        PyPoints::of(py, &points)
+    }
+
+    /// The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera: two float64 arrays (3, 3), in pixels.
+    #[getter]
+    fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
+        let camera = |cx: f64| [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]];
+        matrices(py, &[camera(cx), camera(cx + self.doffs)])
+    }
+
+    /// Distance of the principal points along the row, cx of the right camera less cx of the left one, in pixels.
+    #[getter]
+    fn doffs(&self) -> f64 {
+        self.doffs
+    }
+
+    /// Distance of the cameras, in `unit`.
+    #[getter]
+    fn baseline(&self) -> f64 {
+        self.baseline
+    }
+
+    /// The unit of the baseline, of depths and of points: "mm", "cm", "m", or "unknown" where the calibration does not say it.
+    #[getter]
+    fn unit(&self) -> &'static str {
+        self.rig.unit().name()
+    }
+
+    /// (width, height) of the rectified images, in pixels; None where the calibration does not say it.
+    #[getter]
+    fn size(&self) -> Option<(usize, usize)> {
+        self.size
+    }
+
+    fn __repr__(&self) -> String {
+        let unit = if self.unit() == "unknown" { "of an unknown unit" } else { self.unit() };
+        format!(
+            "<mrfgs.Rig: baseline {} {unit}, focal length {} px>",
+            self.baseline, self.camera.focal_length[0]
+        )
+    }
+}
+
+/// A cloud of points.
+///
+/// positions: array (N, 3) of float32 or float64: x, y, z.
+/// colours: array (N, 3) of uint8: red, green, blue.
+/// confidence: array (N,) of uint8.
+///
+/// Rig.points makes one; make another one of a part of it, as in Points(p.positions[near], p.colours[near], p.confidence[near]).
+#[pyclass(name = "Points", frozen, get_all, module = "mrfgs")]
+pub(crate) struct PyPoints {
+    /// Where the points are: float32 of shape (N, 3), x to the right, y down, z forward of the left camera, in the unit of the
+    /// baseline.
+    positions: Py<PyArray2<f32>>,
+    /// Their colours: uint8 of shape (N, 3), red, green and blue.
+    colours: Py<PyArray2<u8>>,
+    /// Their confidence: uint8 of shape (N,), in 1/8 nat.
+    confidence: Py<PyArray1<u8>>,
+}
+
+impl PyPoints {
+    fn of(py: Python, points: &[Point]) -> PyResult<Self> {
+        let count = points.len();
+        let positions: Vec<f32> = points.iter().flat_map(|point| point.position).collect();
+        let colours: Vec<u8> = points.iter().flat_map(|point| point.colour).collect();
+        let confidence: Vec<u8> = points.iter().map(|point| point.confidence).collect();
+        Ok(Self {
+            positions: positions.into_pyarray(py).reshape([count, 3])?.unbind(),
+            colours: colours.into_pyarray(py).reshape([count, 3])?.unbind(),
+            confidence: confidence.into_pyarray(py).unbind(),
+        })
+    }
+}
+
+#[pymethods]
+impl PyPoints {
+    #[new]
+    fn new(
+        py: Python,
+        positions: &Bound<PyAny>,
+        colours: &Bound<PyAny>,
+        confidence: &Bound<PyAny>,
+    ) -> PyResult<Self> {
+        const EXPECTED: &str = "shape (N, 3), float32 or float64";
+        let doubles = arrays::table::<f64>("positions", positions, Some(3), EXPECTED);
+        let positions = match doubles {
+            Ok(doubles) => doubles.into_iter().map(|v| v as f32).collect(),
+            Err(_) => arrays::table::<f32>("positions", positions, Some(3), EXPECTED)?,
+        };
+        let colours = arrays::table::<u8>("colours", colours, Some(3), "shape (N, 3), uint8")?;
+        let confidence = arrays::table::<u8>("confidence", confidence, None, "shape (N,), uint8")?;
+        let counts = [positions.len() / 3, colours.len() / 3, confidence.len()];
+        let [count, ..] = counts;
+        if counts != [count; 3] {
+            return Err(PyValueError::new_err(format!(
+                "{} positions, {} colours and {} values of confidence: give as many of each",
+                counts[0], counts[1], counts[2]
+            )));
+        }
+        let points = (0..count).map(|i| Point {
+            position: [0, 1, 2].map(|axis| positions[3 * i + axis]),
+            colour: [0, 1, 2].map(|channel| colours[3 * i + channel]),
+            confidence: confidence[i],
+        });
+        Self::of(py, &points.collect::<Vec<_>>())
+    }
+
+    /// Writes the points as binary PLY, completely or not at all: the file that `mrfgs match --also points` writes. The confidence is
+    /// called `quality`, as MeshLab has it.
+    ///
+    /// path: a name that ends in .ply.
+    ///
+    /// Raises OSError where it cannot be written.
+    fn save(&self, py: Python, path: PathBuf) -> PyResult<()> {
+        let positions =
+            arrays::table::<f32>("positions", self.positions.bind(py), Some(3), "shape (N, 3), float32")?;
+        let colours = arrays::table::<u8>("colours", self.colours.bind(py), Some(3), "shape (N, 3), uint8")?;
+        let confidence =
+            arrays::table::<u8>("confidence", self.confidence.bind(py), None, "shape (N,), uint8")?;
+        let (positions, _) = positions.as_chunks::<3>();
+        let (colours, _) = colours.as_chunks::<3>();
+        let points = positions.iter().zip(colours).zip(confidence);
+        let points = points.map(|((&position, &colour), confidence)| Point { position, colour, confidence });
+        let points: Vec<Point> = points.collect();
+        py.detach(|| ply::write(&path, &points)).map_err(exception)
+    }
+
+    fn __len__(&self, py: Python) -> usize {
+        self.confidence.bind(py).len()
+    }
+
+    fn __repr__(&self, py: Python) -> String {
+        format!("<mrfgs.Points: {}>", self.__len__(py))
+    }
+
+    /// How `pickle` and `copy` make another one.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
+        let all = (self.positions.bind(py), self.colours.bind(py), self.confidence.bind(py));
+        Ok((py.get_type::<Self>(), all.into_pyobject(py)?))
+    }
+}

@@ -1,0 +1,160 @@
+//! Rectified pairs of what two cameras saw.
+
+use mrfgs::calibration::matrix::Matrix;
+use mrfgs::calibration::write;
+use mrfgs::image::calib::Calibration;
+use mrfgs::rectification::{Options, Rectification};
+use numpy::PyArray2;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+use crate::arrays::{self, Image};
+use crate::calibration::PyCalibration;
+use crate::depth::PyRig;
+use crate::exception;
+
+/// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
+///
+/// calibration: a Calibration, the path of a calibration file, or a list of the paths of two.
+/// size: (width, height) of the images, in pixels; None takes that of the calibration.
+/// alpha: from 0, where every pixel of the rectified views has a source, to 1, where no pixel of the images is lost. None takes the
+///     rectification of the calibration where it has one, else one that keeps the focal length (fisheyes: 0).
+/// zero_disparity: whether both views have the same principal point, so that what is infinitely far has a disparity of 0.
+///
+/// The views are those of OpenCV's stereoRectify. Where one camera is above the other, both views are turned by a quarter, so that
+/// matches are on the same row. Raises ValueError for a calibration that gives no rectified pair, and for one of another size.
+#[pyclass(name = "Rectification", frozen, module = "mrfgs")]
+pub(crate) struct PyRectification {
+    by: Rectification,
+    raw_size: (usize, usize),
+    calibration: Calibration,
+    rig: Py<PyRig>,
+}
+
+#[pymethods]
+impl PyRectification {
+    #[new]
+    #[pyo3(signature = (calibration, size=None, *, alpha=None, zero_disparity=true))]
+    fn new(
+        py: Python,
+        calibration: &Bound<PyAny>,
+        size: Option<&Bound<PyAny>>,
+        alpha: Option<f64>,
+        zero_disparity: bool,
+    ) -> PyResult<Self> {
+        if let Some(alpha) = alpha.filter(|alpha| !(0.0..=1.0).contains(alpha)) {
+            return Err(PyValueError::new_err(format!("alpha: give a number from 0 to 1, not {alpha}")));
+        }
+        let known = PyCalibration::of(calibration)?;
+        let size = match size {
+            Some(size) => self::size(size)?,
+            None => known.cameras.size.ok_or_else(|| {
+                let names = &known.names;
+                PyValueError::new_err(format!(
+                    "size: {names} does not say the size of the images; give (width, height)"
+                ))
+            })?,
+        };
+        let by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
+            .map_err(|error| known.wrong(error))?;
+        let calibration = by.calibration().map_err(|error| known.wrong(error))?;
+        let rig = Py::new(py, PyRig::of(&calibration, &known)?)?;
+        Ok(Self { by, raw_size: size, calibration, rig })
+    }
+
+    /// Rectifies a pair, and returns the left and the right view as masked arrays: masked where there is no source, or where the
+    /// source is ignored. `match` ignores such pixels; `.data` and `.mask` are plain arrays.
+    ///
+    /// left, right: arrays as `match` takes them, of the size of the rectification.
+    /// mask: array of the shape (height, width) of left: where it is not 0 left is ignored.
+    /// no_data: a value that stands for no data in both images.
+    ///
+    /// The views have shape (height, width) or (height, width, 3), and no alpha. Those of two uint8 images are uint8; all others are
+    /// uint16 and fill its range, as `match` takes them: the least to the largest value of floats are 0 to 65280. The values are those
+    /// of the files that `mrfgs rectify` writes. Raises ValueError for images of another size.
+    #[pyo3(signature = (left, right, *, mask=None, no_data=None))]
+    fn apply<'py>(
+        &self,
+        py: Python<'py>,
+        left: &Bound<'py, PyAny>,
+        right: &Bound<'py, PyAny>,
+        mask: Option<&Bound<PyAny>>,
+        no_data: Option<f64>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (left, right) = (Image::of("left", left)?, Image::of("right", right)?);
+        let stored = [left.stored(&right), right.stored(&left)];
+        let pair = arrays::pair(&left, &right, mask, no_data)?;
+        let pair = py.detach(|| self.by.apply(&pair)).map_err(exception)?;
+        let [left, right] = arrays::images(py, &pair, stored)?;
+        Ok((left, right))
+    }
+
+    /// Where each pixel of the rectified views is in the images: ((left_x, left_y), (right_x, right_y)), float32, in pixels, of shape
+    /// (height, width); +inf where it is nowhere. cv2.remap takes them. Raises MemoryError where they do not fit.
+    fn maps<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyTuple>)> {
+        let [left, right] = py.detach(|| self.by.maps()).map_err(exception)?;
+        let both = |[x, y]: [_; 2]| PyTuple::new(py, [arrays::map(py, x)?, arrays::map(py, y)?]);
+        Ok((both(left)?, both(right)?))
+    }
+
+    /// (width, height) of the rectified views, in pixels.
+    #[getter]
+    fn size(&self) -> (usize, usize) {
+        self.by.size()
+    }
+
+    /// (width, height) of the images that it rectifies, in pixels.
+    #[getter]
+    fn raw_size(&self) -> (usize, usize) {
+        self.raw_size
+    }
+
+    /// The rotations from the frame of each camera to that of its rectified view: two arrays (3, 3), left and right, R1 and R2 of
+    /// OpenCV.
+    #[getter]
+    fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        matrices(py, self.by.rotations())
+    }
+
+    /// The cameras of the rectified pair, as a Rig: for depth and points.
+    #[getter]
+    fn rig(&self, py: Python) -> Py<PyRig> {
+        self.rig.clone_ref(py)
+    }
+
+    /// The calibration of the rectified pair in Middlebury's form, in millimetres where the unit is known: the text of calib.txt.
+    fn calib_txt(&self) -> String {
+        write::middlebury(&self.calibration).unwrap_or_default()
+    }
+
+    /// The same for OpenCV, in the unit of the calibration: the text of a YAML file with K1, D1, R1, P1, K2, D2, R2, P2, R, T, Q, and the
+    /// rotations as fromRaw1 and fromRaw2.
+    fn cameras_yml(&self) -> String {
+        write::opencv(&self.calibration, self.by.rotations()).unwrap_or_default()
+    }
+
+    fn __repr__(&self) -> String {
+        let ((w, h), (width, height)) = (self.raw_size, self.size());
+        format!("<mrfgs.Rectification: {w} x {h} to {width} x {height}>")
+    }
+}
+
+/// Width and height.
+fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
+    let [width, height]: [i64; 2] = given
+        .extract()
+        .map_err(|_| PyTypeError::new_err("size: give (width, height), two whole numbers of pixels"))?;
+    let pixels = |count: i64| usize::try_from(count).ok().filter(|count| *count > 0);
+    let both = pixels(width).zip(pixels(height));
+    both.ok_or_else(|| PyValueError::new_err("size: give (width, height), both above 0"))
+}
+
+/// The matrices of both views as arrays of float64.
+pub(crate) fn matrices<'py>(py: Python<'py>, both: &[Matrix; 2]) -> PyResult<Bound<'py, PyTuple>> {
+    let matrix = |matrix: &Matrix| {
+        let rows: Vec<Vec<f64>> = matrix.iter().map(|row| row.to_vec()).collect();
+        PyArray2::from_vec2(py, &rows)
+    };
+    PyTuple::new(py, [matrix(&both[0])?, matrix(&both[1])?])
+}

@@ -1,0 +1,250 @@
+//! Pairs in sequence: an iterator of pairs in, one of results out, and a device that is kept busy in between.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+use mrfgs::image::Pair;
+use mrfgs::options::{DisparityRange, Method};
+use mrfgs::{Error, Matched, Matcher, check};
+use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyIterator;
+
+use crate::arrays::{self, Image};
+use crate::{PATIENCE, PyMatched, exception, searched, warn};
+
+/// Pairs that are taken before their results are asked for: one whose maps come down, one that is matched, and one that waits.
+const AHEAD: usize = 3;
+
+/// The matcher that an iterator takes, and whether one has it.
+#[derive(Clone)]
+pub(crate) struct Shared {
+    pub(crate) matcher: Arc<Mutex<Matcher>>,
+    pub(crate) taken: Arc<AtomicBool>,
+}
+
+impl Shared {
+    /// Refuses a matcher that is in the middle of a sequence: it would wait for pairs that nobody gives.
+    pub(crate) fn check(&self) -> PyResult<()> {
+        if self.taken.load(Ordering::Acquire) {
+            let reason = "this Matcher is in the middle of match_all; finish or close that iterator, or use another Matcher";
+            return Err(PyRuntimeError::new_err(reason));
+        }
+        Ok(())
+    }
+}
+
+/// What holds for all pairs of a sequence.
+pub(crate) struct Settings {
+    pub(crate) method: Method,
+    pub(crate) range: Option<DisparityRange>,
+    pub(crate) min_disparity: Option<i32>,
+    pub(crate) no_data: Option<f64>,
+    pub(crate) warn: bool,
+}
+
+/// The results of Matcher.match_all, in the order of the pairs.
+#[pyclass(name = "MatchedSequence", frozen, module = "mrfgs")]
+pub(crate) struct PyMatchedSequence(Mutex<State>);
+
+struct State {
+    shared: Shared,
+    settings: Settings,
+    /// `None` once it has no more pairs.
+    pairs: Option<Py<PyIterator>>,
+    /// What ended it, told after the results of the pairs before.
+    failure: Option<PyErr>,
+    /// Pairs that went in, and results that came out.
+    counts: [usize; 2],
+    /// From the first pair to the last result.
+    worker: Option<Worker>,
+    ended: bool,
+}
+
+impl PyMatchedSequence {
+    pub(crate) fn new(shared: Shared, settings: Settings, pairs: Bound<PyIterator>) -> Self {
+        let pairs = Some(pairs.unbind());
+        let state =
+            State { shared, settings, pairs, failure: None, counts: [0; 2], worker: None, ended: false };
+        Self(Mutex::new(state))
+    }
+}
+
+#[pymethods]
+impl PyMatchedSequence {
+    fn __iter__(this: Py<Self>) -> Py<Self> {
+        this
+    }
+
+    fn __next__(&self, py: Python) -> PyResult<Option<PyMatched>> {
+        // Whoever waited here for another thread would keep Python from it.
+        let mut state = self.0.try_lock().map_err(|_| in_use())?;
+        let next = state.next(py);
+        if !matches!(next, Ok(Some(_))) {
+            state.end(py);
+        }
+        next
+    }
+
+    /// Ends the sequence: stops the match that runs, takes no more pairs, and gives the matcher back. It happens by itself at the end of
+    /// the pairs, after an exception, and when nothing refers to the iterator any more.
+    fn close(&self, py: Python) -> PyResult<()> {
+        self.0.try_lock().map_err(|_| in_use())?.end(py);
+        Ok(())
+    }
+}
+
+fn in_use() -> PyErr {
+    PyValueError::new_err("this iterator is in use already, by another thread or by its own pairs")
+}
+
+impl State {
+    fn next(&mut self, py: Python) -> PyResult<Option<PyMatched>> {
+        if self.ended {
+            return Ok(None);
+        }
+        if self.worker.is_none() {
+            self.shared.check()?;
+            self.worker = Some(Worker::new(&self.shared, &self.settings.method));
+        }
+        while self.pairs.is_some() && self.counts[0] - self.counts[1] < AHEAD {
+            match self.take(py) {
+                Ok(Some(job)) => {
+                    self.counts[0] += 1;
+                    // A worker that has ended says why below.
+                    if !self.worker.as_ref().is_some_and(|worker| worker.send(job)) {
+                        self.pairs = None;
+                    }
+                }
+                Ok(None) => self.pairs = None,
+                Err(error) if error.is_instance_of::<PyException>(py) => {
+                    self.failure = Some(error);
+                    self.pairs = None;
+                }
+                // Ctrl-C and the like.
+                Err(error) => return Err(error),
+            }
+        }
+        let Some(worker) = &mut self.worker else { return Ok(None) };
+        if self.pairs.is_none() {
+            worker.pairs = None;
+        }
+        loop {
+            let results = &mut worker.results;
+            match py.detach(move || results.recv_timeout(PATIENCE)) {
+                Ok(matched) => {
+                    self.counts[1] += 1;
+                    if self.settings.warn {
+                        warn(py, matched.warnings())?;
+                    }
+                    return PyMatched::of(py, matched).map(Some);
+                }
+                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        worker.result().map_err(|error| numbered(py, self.counts[1], error))?;
+        self.failure.take().map_or(Ok(None), Err)
+    }
+
+    /// The next pair, and where to search it.
+    fn take(&mut self, py: Python) -> PyResult<Option<(Pair, DisparityRange)>> {
+        let Some(item) = self.pairs.as_ref().and_then(|pairs| pairs.bind(py).clone().next()) else {
+            return Ok(None);
+        };
+        let item = item?;
+        self.job(&item).map(Some).map_err(|error| numbered(py, self.counts[0], error))
+    }
+
+    fn job(&self, item: &Bound<PyAny>) -> PyResult<(Pair, DisparityRange)> {
+        let py = item.py();
+        let Settings { range, min_disparity, no_data, warn, .. } = self.settings;
+        let one = |i: usize| item.get_item(i).ok().filter(|_| item.len().is_ok_and(|count| count == 2));
+        let Some((left, right)) = one(0).zip(one(1)) else {
+            return Err(PyTypeError::new_err("give two arrays, left and right"));
+        };
+        let (left, right) = (Image::of("left", &left)?, Image::of("right", &right)?);
+        let pair = arrays::pair(&left, &right, None, no_data)?;
+        let found = searched(py, &pair, range, min_disparity)?;
+        if warn {
+            self::warn(py, py.detach(|| check::warnings(&pair, range)))?;
+        }
+        Ok((pair, found))
+    }
+
+    fn end(&mut self, py: Python) {
+        self.ended = true;
+        self.pairs = None;
+        let worker = self.worker.take();
+        py.detach(move || drop(worker));
+    }
+}
+
+/// The same exception, of the pair with this index.
+fn numbered(py: Python, index: usize, error: PyErr) -> PyErr {
+    let kind = error.get_type(py);
+    let ours = [
+        py.get_type::<PyValueError>(),
+        py.get_type::<PyTypeError>(),
+        py.get_type::<PyMemoryError>(),
+        py.get_type::<PyRuntimeError>(),
+    ];
+    if !ours.iter().any(|ours| kind.is(ours)) {
+        return error;
+    }
+    PyErr::from_type(kind, format!("pair {index}: {}", error.value(py)))
+}
+
+/// A thread that matches what it gets.
+struct Worker {
+    pairs: Option<SyncSender<(Pair, DisparityRange)>>,
+    results: Receiver<Matched>,
+    thread: Option<JoinHandle<mrfgs::Result<()>>>,
+    stop: Arc<AtomicBool>,
+    taken: Arc<AtomicBool>,
+}
+
+impl Worker {
+    fn new(shared: &Shared, method: &Method) -> Self {
+        let (pairs, asked) = mpsc::sync_channel(AHEAD);
+        let (found, results) = mpsc::channel();
+        let (stop, taken) = (Arc::new(AtomicBool::new(false)), Arc::clone(&shared.taken));
+        taken.store(true, Ordering::Release);
+        let (matcher, method, told) = (Arc::clone(&shared.matcher), method.clone(), Arc::clone(&stop));
+        let thread = thread::spawn(move || {
+            let mut matcher = matcher.lock().unwrap_or_else(PoisonError::into_inner);
+            matcher.set_method(method);
+            matcher.run_all_until(asked, &told, |matched| match found.send(matched) {
+                Ok(()) => std::ops::ControlFlow::Continue(()),
+                Err(_) => std::ops::ControlFlow::Break(()),
+            })
+        });
+        Self { pairs: Some(pairs), results, thread: Some(thread), stop, taken }
+    }
+
+    /// Whether it has taken a pair: there is always room for one, so it has unless it has ended.
+    fn send(&self, job: (Pair, DisparityRange)) -> bool {
+        self.pairs.as_ref().is_some_and(|pairs| pairs.send(job).is_ok())
+    }
+
+    /// How it ended.
+    fn result(&mut self) -> PyResult<()> {
+        match self.thread.take().map(JoinHandle::join) {
+            None | Some(Ok(Ok(()) | Err(Error::Interrupted))) => Ok(()),
+            Some(Ok(Err(error))) => Err(exception(error)),
+            Some(Err(_)) => Err(PyRuntimeError::new_err("the match panicked, which is a defect of mrfgs")),
+        }
+    }
+}
+
+impl Drop for Worker {
+    /// Ends the thread, which needs nothing of Python, and waits until the matcher is free.
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.pairs = None;
+        let _ = self.thread.take().map(JoinHandle::join);
+        self.taken.store(false, Ordering::Release);
+    }
+}
