@@ -4,9 +4,10 @@
 //! / Z, where f is the focal length in pixels and doffs the distance of the principal points along the row
 //! (cx1 - cx0). Depth has the unit of the baseline.
 
+use crate::calibration::matrix::{Matrix, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
-use crate::image::ply::Point;
+use crate::image::cloud::{Cloud, Frame, Point};
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps};
 
@@ -17,6 +18,8 @@ pub struct Rig {
     doffs: f64,
     baseline: f64,
     unit: Unit,
+    /// The rotation from the frame of the rectified left camera to that of the original one, where points are in that.
+    to_original: Option<Matrix>,
 }
 
 impl Rig {
@@ -40,7 +43,15 @@ impl Rig {
         if baseline <= 0.0 {
             return error(format!("baseline={baseline} is not above 0; give the distance of the cameras"));
         }
-        Ok(Self { camera, doffs, baseline, unit })
+        Ok(Self { camera, doffs, baseline, unit, to_original: None })
+    }
+
+    /// The same rig with points in the frame of the original left camera. `rectifying` is the rotation from that frame to the
+    /// rectified one, the first of [`Rectification::rotations`](crate::rectification::Rectification::rotations). Depths stay
+    /// those along the axis of the rectified camera.
+    #[must_use]
+    pub fn in_original_frame(self, rectifying: &Matrix) -> Self {
+        Self { to_original: Some(transposed(rectifying)), ..self }
     }
 
     /// The depth at disparity `d` (pixels), along the optical axis and in the unit of the baseline. `None`
@@ -52,12 +63,14 @@ impl Rig {
         (apart > 0.0 && d.is_finite() && depth.is_finite()).then_some(depth)
     }
 
-    /// The point that the left pixel (x, y) shows at disparity `d`, in the frame of the left camera: x to the
-    /// right, y down, z forward, in the unit of the baseline. `None` where [`Rig::depth`] is `None`.
+    /// The point that the left pixel (x, y) shows at disparity `d`: x to the right, y down, z forward, in the unit of the
+    /// baseline. The frame is that of the left camera, the rectified one unless [`Rig::in_original_frame`] has changed that.
+    /// `None` where [`Rig::depth`] is `None`.
     #[must_use]
     pub fn point(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
-        self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])
+        let point = self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])?;
+        Some(self.to_original.map_or(point, |matrix| rotated(&matrix, point)))
     }
 
     /// The depths of a map of disparities in pixels; +infinity where there is no depth.
@@ -90,7 +103,7 @@ impl Rig {
     /// # Panics
     /// When maps and image differ in size.
     #[must_use]
-    pub fn points(&self, maps: &Maps, left: &Image) -> Vec<Point> {
+    pub fn cloud(&self, maps: &Maps, left: &Image) -> Cloud {
         assert_eq!(maps.disparity.size(), left.pixels.size(), "the maps of this image");
         let (width, height) = maps.disparity.size();
         let colours = left.to_rgb8();
@@ -106,7 +119,8 @@ impl Rig {
                 confidence: maps.confidence[(x, y)],
             }));
         }
-        points
+        let frame = if self.to_original.is_some() { Frame::Original } else { Frame::Matched };
+        Cloud { points, frame }
     }
 }
 
@@ -173,10 +187,17 @@ mod tests {
             right: None,
         };
         let left = Image::from_rgb8(&Plane::from_fn(6, 1, |x, _| [x as u8, 10, 20]));
-        let points = rig.points(&maps, &left);
+        let cloud = rig.cloud(&maps, &left);
         let point = |position, red, confidence| Point { position, colour: [red, 10, 20], confidence };
         // The fifth is at infinity.
-        assert_eq!(points, [point([-4.0, -4.0, 2000.0], 0, 200), point([15.0, -10.0, 5000.0], 5, 255)]);
+        let expected = [point([-4.0, -4.0, 2000.0], 0, 200), point([15.0, -10.0, 5000.0], 5, 255)];
+        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], Frame::Matched));
+        // A quarter turn about the axis: the right of the rectified camera is the down of the original one.
+        let turned = rig.in_original_frame(&[[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+        let cloud = turned.cloud(&maps, &left);
+        let expected = [point([4.0, -4.0, 2000.0], 0, 200), point([10.0, 15.0, 5000.0], 5, 255)];
+        assert_eq!((&cloud.points[..], cloud.frame), (&expected[..], Frame::Original));
+        assert_eq!(turned.depth(60.0), rig.depth(60.0));
     }
 
     #[test]

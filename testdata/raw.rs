@@ -118,6 +118,29 @@ impl Camera {
         turned(&inverse(&self.turn), [a, b, 1.0])
     }
 
+    /// The pixel that shows a point in the frame of the camera.
+    pub fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
+        let [a, b] = [x / z, y / z];
+        let r2 = a * a + b * b;
+        let [u, v] = match self.lens {
+            Lens::RadialTangential([k1, k2, p1, p2, k3]) => {
+                let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+                let across = 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a);
+                let down = p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b;
+                [a * radial + across, b * radial + down]
+            }
+            Lens::Equidistant([k1, k2, k3, k4]) => {
+                let radius = r2.sqrt();
+                let angle = radius.atan();
+                let a2 = angle * angle;
+                let found = angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))));
+                let factor = if radius > 0.0 { found / radius } else { 1.0 };
+                [a * factor, b * factor]
+            }
+        };
+        [self.focal * u + self.centre[0], self.focal * v + self.centre[1]]
+    }
+
     /// What it sees of a view of the scene. Where that ends it is black.
     pub fn photograph(&self, (width, height): (usize, usize), view: &Plane<[u8; 3]>) -> Plane<[u8; 3]> {
         const RAYS: usize = 4;

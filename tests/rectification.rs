@@ -10,6 +10,7 @@ mod scenes;
 use std::path::Path;
 
 use mrfgs::calibration::of_texts;
+use mrfgs::depth::Rig;
 use mrfgs::image::{Image, Pair, Plane, read};
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Options, Rectification};
@@ -69,14 +70,8 @@ fn truth(by: &Rectification, left: &Camera, scene: &scenes::Scene, x: usize, y: 
     Some(baseline * fx / raw::turned(&from_scene, point)[2])
 }
 
-#[test]
-fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
-    let scene = raw::scene();
-    let baseline = raw::baseline(&scene);
-    let perfect = scenes::render("slanted", SIZE.0, SIZE.1, 32);
-    let pair = Pair::new(Image::from_rgb8(&perfect.left), Image::from_rgb8(&perfect.right)).unwrap();
-    let reference = error(&pair, |x, y| Some(f64::from(perfect.truth[(x, y)])));
-
+/// Rigs with their names and the sizes of their images.
+fn rigs() -> [(&'static str, [Camera; 2], (usize, usize)); 4] {
     let fisheye = |camera: Camera, k1: f64| Camera {
         focal: camera.focal - 6.0,
         lens: Lens::Equidistant([k1, 0.004, -0.001, 0.0]),
@@ -91,12 +86,23 @@ fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
         })
     };
     let high = (SIZE.1, SIZE.0);
-    for (name, cameras, size) in [
+    [
         ("pinholes", CAMERAS, SIZE),
         ("fisheyes", fisheyes, SIZE),
         ("the left one above", upright(&QUARTERS[0]), high),
         ("the left one below", upright(&QUARTERS[1]), high),
-    ] {
+    ]
+}
+
+#[test]
+fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
+    let scene = raw::scene();
+    let baseline = raw::baseline(&scene);
+    let perfect = scenes::render("slanted", SIZE.0, SIZE.1, 32);
+    let pair = Pair::new(Image::from_rgb8(&perfect.left), Image::from_rgb8(&perfect.right)).unwrap();
+    let reference = error(&pair, |x, y| Some(f64::from(perfect.truth[(x, y)])));
+
+    for (name, cameras, size) in rigs() {
         let by = rectification(&cameras, size, baseline);
         assert_eq!(by.size(), SIZE, "{name}");
         let raw = photographs(&cameras, size, &scene);
@@ -115,6 +121,31 @@ fn a_rectified_pair_is_matched_as_well_as_a_perfect_one() {
             let wrong = error(&by.apply(&raw).unwrap(), |x, y| truth(&by, &cameras[0], &scene, x, y));
             assert!(wrong > reference + 0.1, "{wrong}");
         }
+    }
+}
+
+/// A point in the frame of the original camera is seen through its lens at the pixel that it comes from.
+#[test]
+fn points_are_where_the_original_camera_sees_them() {
+    for (name, cameras, size) in rigs() {
+        let by = rectification(&cameras, size, 0.16);
+        let rectified = Rig::new(&by.calibration().unwrap()).unwrap();
+        let original = rectified.in_original_frame(&by.rotations()[0]);
+        let (mut most, mut least) = (0.0_f64, f64::INFINITY);
+        for (x, y) in (0..SIZE.1).step_by(7).flat_map(|y| (0..SIZE.0).step_by(7).map(move |x| (x, y))) {
+            let (at, d) = ([x as f64, y as f64], 5.0 + (x * 7 + y * 3) as f64 % 30.0);
+            let pixel = by.left(at[0], at[1]).unwrap();
+            let miss = |rig: &Rig| {
+                let [u, v] = cameras[0].project(rig.point(at[0], at[1], d).unwrap());
+                (u - pixel[0]).hypot(v - pixel[1])
+            };
+            most = most.max(miss(&original));
+            least = least.min(miss(&rectified));
+        }
+        println!("{name}: {most:.1e} px at most, {least:.2} px at least in the rectified frame");
+        assert!(most < 1e-9, "{name}: {most}");
+        // Control: the points of the rectified frame are seen elsewhere.
+        assert!(least > 0.5, "{name}: {least}");
     }
 }
 

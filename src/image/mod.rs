@@ -1,12 +1,14 @@
 //! Planes of pixels, and the stereo pair.
 
 pub mod calib;
+pub mod cloud;
 pub(crate) mod cubic;
 mod decode;
 mod downsampled;
 mod file;
 mod georeference;
 mod jpeg;
+pub mod pcd;
 pub mod pfm;
 pub mod picture;
 pub mod ply;

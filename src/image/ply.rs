@@ -1,39 +1,16 @@
 //! Point clouds as PLY files, which `MeshLab`, `CloudCompare` and most others open.
 
-use std::path::Path;
+use super::cloud::Cloud;
 
-use super::write;
-use crate::error::Result;
-
-/// A point of a cloud.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
-    /// Where it is: x, y, z.
-    pub position: [f32; 3],
-    /// Red, green, blue.
-    pub colour: [u8; 3],
-    /// Confidence 0 ..= 255.
-    pub confidence: u8,
-}
-
-/// Writes points as binary little-endian PLY, completely or not at all: one element `vertex` with `x`, `y`,
-/// `z` (float), `red`, `green`, `blue` (uchar) and `quality` (float), which is the confidence. `MeshLab`
-/// shows it under this name and type. It misreads a float called `confidence`, and ignores any other name.
-///
-/// # Errors
-/// [`crate::Error::Write`] when the name does not end in `.ply`, or the file cannot be written.
-pub fn write(path: &Path, points: &[Point]) -> Result<()> {
-    write::check_ply_extension(path)?;
-    write::save(path, &encode(points))
-}
-
-/// The bytes of the file that [`write`](self::write()) would write.
+/// A cloud as binary little-endian PLY: one element `vertex` with `x`, `y`, `z` (float), `red`, `green`, `blue` (uchar) and
+/// `quality` (float), which is the confidence. `MeshLab` shows it under this name and type. It misreads a float
+/// called `confidence`, and ignores any other name.
 #[must_use]
-pub fn encode(points: &[Point]) -> Vec<u8> {
+pub fn encode(cloud: &Cloud) -> Vec<u8> {
     let header = format!(
         "ply\n\
          format binary_little_endian 1.0\n\
-         comment frame of the left camera: x right, y down, z forward; unit that of the baseline\n\
+         comment {}\n\
          comment quality is the confidence, 0 to 255\n\
          element vertex {}\n\
          property float x\n\
@@ -44,11 +21,12 @@ pub fn encode(points: &[Point]) -> Vec<u8> {
          property uchar blue\n\
          property float quality\n\
          end_header\n",
-        points.len()
+        cloud.about(),
+        cloud.points.len()
     );
     let mut bytes = header.into_bytes();
-    bytes.reserve_exact(points.len() * 19);
-    for point in points {
+    bytes.reserve_exact(cloud.points.len() * 19);
+    for point in &cloud.points {
         bytes.extend(point.position.iter().flat_map(|v| v.to_le_bytes()));
         bytes.extend(point.colour);
         bytes.extend(f32::from(point.confidence).to_le_bytes());
@@ -58,13 +36,14 @@ pub fn encode(points: &[Point]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cloud::{Frame, Point};
     use super::*;
 
     #[test]
     fn the_header_says_what_the_bytes_are() {
         let point = Point { position: [1.5, -2.0, 1e6], colour: [7, 8, 9], confidence: 200 };
         let other = Point { position: [0.0; 3], colour: [0; 3], confidence: 0 };
-        let bytes = encode(&[point, other]);
+        let bytes = encode(&Cloud { points: vec![point, other], frame: Frame::Matched });
         let end = b"end_header\n";
         let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
         let header: Vec<_> = std::str::from_utf8(&bytes[..start]).unwrap().lines().collect();
@@ -86,12 +65,9 @@ mod tests {
     }
 
     #[test]
-    fn another_name_is_refused_and_no_point_is_a_cloud() {
-        let folder = tempfile::tempdir().unwrap();
-        let error = write(&folder.path().join("a.pcd"), &[]).unwrap_err().to_string();
-        assert!(error.contains("a.pcd") && error.contains(".ply"), "{error}");
-        write(&folder.path().join("a.PLY"), &[]).unwrap();
-        assert!(std::fs::read(folder.path().join("a.PLY")).unwrap().ends_with(b"end_header\n"));
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    fn the_header_says_the_frame() {
+        let header = |frame| String::from_utf8(encode(&Cloud { points: Vec::new(), frame })).unwrap();
+        assert!(header(Frame::Matched).contains("comment frame of the left camera: x right"));
+        assert!(header(Frame::Original).contains("comment frame of the original left camera, before"));
     }
 }

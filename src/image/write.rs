@@ -6,8 +6,9 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
+use super::cloud::Cloud;
 use super::save::Target;
-use super::{Georeference, Plane, pfm, tiff};
+use super::{Georeference, Plane, pcd, pfm, ply, tiff};
 use crate::error::{Error, Result};
 
 pub use super::save::{Growing, publish, remove, save};
@@ -141,12 +142,12 @@ pub fn check_depth_path(path: &Path) -> Result<()> {
     Target::of(path)?.check(path)
 }
 
-/// Checks before any computation that a point cloud can be written to `path`.
+/// Checks before any computation that [`cloud`] will be able to write points to `path`.
 ///
 /// # Errors
-/// [`Error::Write`] when the extension is not `.ply`, the path is a folder, or its folder is not writable.
-pub fn check_ply_path(path: &Path) -> Result<()> {
-    check_ply_extension(path)?;
+/// [`Error::Write`] when the extension is neither `.ply` nor `.pcd`, the path is a folder, or its folder is not writable.
+pub fn check_cloud_path(path: &Path) -> Result<()> {
+    cloud_encoder(path)?;
     Target::of(path)?.check(path)
 }
 
@@ -165,6 +166,15 @@ pub fn check_png_path(path: &Path) -> Result<()> {
 /// [`Error::Write`] when the path is a folder, or its folder is not writable.
 pub fn check_path(path: &Path) -> Result<()> {
     Target::of(path)?.check(path)
+}
+
+/// Writes a cloud of points in the format of the extension: `.ply` as [`ply::encode`] has it, `.pcd` as [`pcd::encode`] has it. An
+/// existing path that is not a regular file takes PLY when its name has no such extension.
+///
+/// # Errors
+/// [`Error::Write`] for another extension, or a file that cannot be written.
+pub fn cloud(path: &Path, cloud: &Cloud) -> Result<()> {
+    save(path, &cloud_encoder(path)?(cloud))
 }
 
 /// Writes 8-bit grey levels as PNG.
@@ -217,11 +227,14 @@ fn check_float(path: &Path) -> Result<()> {
     }
 }
 
-pub(super) fn check_ply_extension(path: &Path) -> Result<()> {
-    if extension(path).as_deref() == Some("ply") || is_special(path) {
-        return Ok(());
+/// What makes the bytes of a cloud for `path`.
+fn cloud_encoder(path: &Path) -> Result<fn(&Cloud) -> Vec<u8>> {
+    match extension(path).as_deref() {
+        Some("ply") => Ok(ply::encode),
+        Some("pcd") => Ok(pcd::encode),
+        _ if is_special(path) => Ok(ply::encode),
+        _ => Err(Error::write(path, "point clouds end in .ply or .pcd")),
     }
-    Err(Error::write(path, "point clouds are written as PLY; give a name that ends in .ply"))
 }
 
 fn png_extension(path: &Path) -> Result<()> {
@@ -314,6 +327,23 @@ mod tests {
             assert_eq!(read_disparity(&path).unwrap(), map, "{name}");
         }
         assert_eq!(names(folder.path()).len(), 5, "nothing temporary stays");
+    }
+
+    #[test]
+    fn the_name_of_a_cloud_says_its_format() {
+        let folder = tempfile::tempdir().unwrap();
+        for refused in ["a.xyz", "a"] {
+            let error = cloud(&folder.path().join(refused), &Cloud::default()).unwrap_err().to_string();
+            assert!(error.contains(refused) && error.contains(".ply or .pcd"), "{error}");
+        }
+        // No point is a cloud, too.
+        for (name, end) in [("a.PLY", &b"end_header\n"[..]), ("a.pcd", b"DATA binary\n")] {
+            let path = folder.path().join(name);
+            check_cloud_path(&path).unwrap();
+            cloud(&path, &Cloud::default()).unwrap();
+            assert!(fs::read(path).unwrap().ends_with(end), "{name}");
+        }
+        assert_eq!(names(folder.path()), ["a.PLY", "a.pcd"]);
     }
 
     #[test]

@@ -4,7 +4,8 @@ use crate::Thrown;
 use crate::pair::{Cameras, StereoPair, rgba};
 use crate::words::{error, thrown, warning};
 use mrfgs::colour::{self, ColourMap};
-use mrfgs::image::ply::{self, Point};
+use mrfgs::image::cloud::{Cloud, Point};
+use mrfgs::image::ply;
 use mrfgs::image::{Plane, Rect, write};
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -124,15 +125,15 @@ impl Matched {
     /// The points that were measured and are trusted, with the colours of `pair`.
     #[must_use]
     pub fn points(&self, cameras: &Cameras, pair: &StereoPair) -> Points {
-        Points { points: self.cloud(cameras, pair) }
+        Points { points: self.cloud(cameras, pair).points }
     }
 
     /// The points of at least this confidence as the program writes them to PLY.
     #[must_use]
     pub fn ply(&self, cameras: &Cameras, pair: &StereoPair, least_confidence: u8) -> Vec<u8> {
-        let mut points = self.cloud(cameras, pair);
-        points.retain(|point| point.confidence >= least_confidence);
-        ply::encode(&points)
+        let mut cloud = self.cloud(cameras, pair);
+        cloud.points.retain(|point| point.confidence >= least_confidence);
+        ply::encode(&cloud)
     }
 
     /// The number of pixels in which any map differs, of all where the sizes do.
@@ -161,8 +162,8 @@ impl Matched {
         }
     }
 
-    fn cloud(&self, cameras: &Cameras, pair: &StereoPair) -> Vec<Point> {
-        cameras.rig.points(&self.matched.maps, pair.pair.left())
+    fn cloud(&self, cameras: &Cameras, pair: &StereoPair) -> Cloud {
+        cameras.rig.cloud(&self.matched.maps, pair.pair.left())
     }
 }
 

@@ -4,22 +4,27 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mrfgs::calibration::matrix::Matrix;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
+use mrfgs::image::cloud::Frame;
 use mrfgs::image::write::Writer;
-use mrfgs::image::{Georeference, Image, Plane, ply, write};
+use mrfgs::image::{Georeference, Image, Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
 
 use crate::args::sign::Sign;
 use crate::failure::{Failure, Result};
+use crate::outputs::cloud::CloudFormat;
 use crate::text::plural;
 
 /// An output beside the disparity map.
 #[derive(Debug)]
 pub(crate) struct Also {
-    /// The word of `--also`, which is also in the name of the file.
+    /// The word of `--also`, which is also in the name of the file. With an extension it asks for another format than that of
+    /// the word alone.
     pub(crate) word: &'static str,
+    /// Empty where the help of another word tells of it.
     help: &'static str,
     kind: Kind,
     /// The key of the method that makes it.
@@ -37,8 +42,8 @@ enum Kind {
     Depth,
     /// The same in whole millimetres, as 16-bit PNG.
     Millimetres,
-    /// A cloud of points, as PLY.
-    Points,
+    /// A cloud of points.
+    Points(Frame, CloudFormat),
     /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
     Picture { beside: bool },
 }
@@ -51,7 +56,7 @@ pub(crate) enum View {
 }
 
 /// All outputs, in the order in which they are written. One more is one more row.
-static ALL: [Also; 9] = [
+static ALL: [Also; 16] = [
     Also {
         word: "raw",
         help: "The disparity map before post-processing, in the format of the disparity map",
@@ -79,13 +84,26 @@ static ALL: [Also; 9] = [
         kind: Kind::Millimetres,
         key: None,
     },
-    Also {
-        word: "points",
-        help: "Points with the colours of LEFT and their confidence (`quality`): binary .ply, x to the right, y down, z \
-               forward of the left camera. Invalid, filled and low-confidence pixels are left out",
-        kind: Kind::Points,
-        key: None,
-    },
+    points(
+        "points",
+        "Points with the colours of LEFT and their confidence: binary .ply (`quality`), x to the right, y down, z forward \
+         of the left camera. Invalid, filled and low-confidence pixels are left out. points.pcd writes PCD (`intensity`, \
+         for ROS, PCL and Open3D), points.las and points.laz write LAS 1.2 and LAZ (intensity: 257 times the confidence)",
+        Frame::Matched,
+        CloudFormat::Ply,
+    ),
+    points("points.pcd", "", Frame::Matched, CloudFormat::Pcd),
+    points("points.las", "", Frame::Matched, CloudFormat::Las),
+    points("points.laz", "", Frame::Matched, CloudFormat::Laz),
+    points(
+        "points-original",
+        "The same in the frame of the left camera before --rectify: that of the calibration. Also as .pcd, .las and .laz",
+        Frame::Original,
+        CloudFormat::Ply,
+    ),
+    points("points-original.pcd", "", Frame::Original, CloudFormat::Pcd),
+    points("points-original.las", "", Frame::Original, CloudFormat::Las),
+    points("points-original.laz", "", Frame::Original, CloudFormat::Laz),
     Also {
         word: "confidence",
         help: "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
@@ -113,6 +131,11 @@ static ALL: [Also; 9] = [
     },
 ];
 
+/// A row for points.
+const fn points(word: &'static str, help: &'static str, frame: Frame, format: CloudFormat) -> Also {
+    Also { word, help, kind: Kind::Points(frame, format), key: None }
+}
+
 /// The outputs beside the disparity map.
 #[derive(clap::Args)]
 #[command(next_help_heading = "More outputs")]
@@ -127,7 +150,8 @@ pub(crate) struct AlsoArgs {
 }
 
 fn parser() -> impl TypedValueParser<Value = &'static Also> {
-    let words = ALL.iter().map(|also| PossibleValue::new(also.word).help(also.help));
+    let words =
+        ALL.iter().map(|also| PossibleValue::new(also.word).help(also.help).hide(also.help.is_empty()));
     PossibleValuesParser::new(words)
         .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
 }
@@ -162,6 +186,8 @@ pub(crate) struct Outcome<'a> {
     pub(crate) left: Option<&'a Image>,
     /// The cameras, where an output [takes them](AlsoArgs::take_cameras).
     pub(crate) rig: Option<Rig>,
+    /// The rotation from the frame of the left camera to the rectified one, where the images were rectified.
+    pub(crate) rectifying: Option<Matrix>,
     /// The georeferences of the views.
     pub(crate) georeferences: [Option<Georeference>; 2],
 }
@@ -179,12 +205,18 @@ impl AlsoArgs {
         ALL.iter().filter(|also| self.also.iter().any(|wanted| wanted.word == also.word))
     }
 
-    /// Refuses colours without a picture.
-    pub(crate) fn check(&self) -> Result<()> {
+    /// Refuses colours without a picture, and the original camera where the images are not rectified.
+    pub(crate) fn check(&self, rectifies: bool) -> Result<()> {
         let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
         if self.colours.is_some() && !self.wanted().any(is_picture) {
             let reason = "are those of a preview; add --also preview, or leave --colours out";
             return Err(Failure::Usage(format!("{}: {reason}", "--colours")));
+        }
+        let is_original = |also: &&Also| matches!(also.kind, Kind::Points(Frame::Original, _));
+        if let Some(word) = self.wanted().find(is_original).filter(|_| !rectifies) {
+            let reason =
+                "is of images that `mrfgs match` rectifies; add --rectify there, or take --also points";
+            return Err(Failure::Usage(format!("{}: {reason}", word.flag())));
         }
         Ok(())
     }
@@ -197,13 +229,13 @@ impl AlsoArgs {
 
     /// The wanted output that takes most of the cameras.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
-        let first = || self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points));
+        let first = || self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points(..)));
         self.wanted().find(|also| also.takes_unit()).or_else(first)
     }
 
     /// Whether a wanted output shows the left image.
     pub(crate) fn show_left(&self) -> bool {
-        self.wanted().any(|also| matches!(also.kind, Kind::Points | Kind::Picture { beside: true }))
+        self.wanted().any(|also| matches!(also.kind, Kind::Points(..) | Kind::Picture { beside: true }))
     }
 
     /// The disparity map in colours, with the left image `beside` it.
@@ -236,7 +268,7 @@ impl AlsoArgs {
 
     /// Writes `also` to `path`. Returns what there is to say of it.
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
-        let &Outcome { maps, sign, left, ref rig, .. } = outcome;
+        let &Outcome { maps, sign, left, rig, rectifying, .. } = outcome;
         match also.kind {
             Kind::Disparity(view, map) => {
                 let Some(map) = map(maps) else { return Ok(None) };
@@ -259,11 +291,16 @@ impl AlsoArgs {
                 };
                 write::grey16(path, &depths)?;
             }
-            Kind::Points => {
+            Kind::Points(frame, format) => {
+                let rig = match frame {
+                    Frame::Matched => rig,
+                    Frame::Original => rig.zip(rectifying).map(|(rig, by)| rig.in_original_frame(&by)),
+                };
                 let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
-                let points = rig.points(maps, left);
-                ply::write(path, &points)?;
-                return Ok(Some(format!("{} point{}", points.len(), plural(points.len()))));
+                let cloud = rig.cloud(maps, left);
+                format.write(path, &cloud)?;
+                let count = cloud.points.len();
+                return Ok(Some(format!("{count} point{}", plural(count))));
             }
             Kind::Picture { beside } => write::rgb8(path, &self.picture(beside, outcome))?,
         }
@@ -282,6 +319,11 @@ impl Also {
         matches!(self.kind, Kind::Millimetres)
     }
 
+    /// Its word without an extension.
+    fn stem(&self) -> &'static str {
+        self.word.split('.').next().unwrap_or(self.word)
+    }
+
     /// Its file beside the disparity map `output`.
     pub(crate) fn beside(&self, output: &Path) -> PathBuf {
         let own = output.extension().unwrap_or_default().to_string_lossy();
@@ -290,10 +332,10 @@ impl Also {
             Kind::Disparity(..) => &*own,
             Kind::Depth if is_tiff => &*own,
             Kind::Depth => "pfm",
-            Kind::Points => "ply",
+            Kind::Points(_, format) => format.extension(),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => "png",
         };
-        output.with_extension(format!("{}.{extension}", self.word))
+        output.with_extension(format!("{}.{extension}", self.stem()))
     }
 
     /// Says before any computing whether it can be written to `path`, with disparities in `range`.
@@ -301,7 +343,7 @@ impl Also {
         match self.kind {
             Kind::Disparity(..) => write::check_disparity_path(path, range.min, range.max),
             Kind::Depth => write::check_depth_path(path),
-            Kind::Points => write::check_ply_path(path),
+            Kind::Points(..) => write::check_path(path),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => write::check_png_path(path),
         }
     }
@@ -309,7 +351,7 @@ impl Also {
 
 /// What stands between stem and extension in the names of all such files: ".raw" and the like.
 pub(crate) fn endings() -> impl Iterator<Item = String> {
-    ALL.iter().map(|also| format!(".{}", also.word))
+    ALL.iter().map(|also| format!(".{}", also.stem()))
 }
 
 /// The files of all outputs beside the disparity map `output`, wanted or not.
@@ -332,11 +374,18 @@ mod tests {
             "depth.pfm",
             "depth-mm.png",
             "points.ply",
+            "points.pcd",
+            "points.las",
+            "points.laz",
+            "points-original.ply",
+            "points-original.pcd",
+            "points-original.las",
+            "points-original.laz",
             "confidence.png",
             "validity.png",
             "preview.png",
         ];
-        assert_eq!(names("a/b.c.pfm")[..8], of_pfm.map(|end| format!("a/b.c.{end}")));
+        assert_eq!(names("a/b.c.pfm")[..15], of_pfm.map(|end| format!("a/b.c.{end}")));
         assert_eq!(names("d.png")[..2], ["d.raw.png", "d.right.png"]);
         assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.right.TIFF", "d.depth.TIFF"]);
     }

@@ -2,6 +2,7 @@
 
 pub(crate) mod also;
 pub(crate) mod claim;
+pub(crate) mod cloud;
 pub(crate) mod files;
 pub(crate) mod film;
 pub(crate) mod record;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
-use mrfgs::calibration;
+use mrfgs::calibration::{self, matrix::Matrix};
 use mrfgs::check::{self, Warning};
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
@@ -50,6 +50,8 @@ pub(crate) struct Input {
     by_matches: bool,
     /// The calibration of the rectified pair.
     calibration: Option<Known>,
+    /// The rotation from the frame of the left camera to the rectified one, where the images were rectified.
+    pub(crate) rectifying: Option<Matrix>,
 }
 
 /// A calibration of a rectified pair, and where it comes from.
@@ -71,9 +73,11 @@ impl PairArgs {
     pub(crate) fn read(&self, sign: Sign, cameras: bool, rectify: Option<&Options>) -> Result<Input> {
         let mut pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
         let files = self.calib.clone();
+        let mut rectifying = None;
         let calibration = if let Some(options) = rectify {
             let rectification;
             (rectification, pair) = raw::rectify(&calibration::read(&files)?, &files, &pair, options)?;
+            rectifying = Some(rectification.rotations()[0]);
             Some(Known { files, calibration: rectification.calibration()? })
         } else if !files.is_empty() {
             Some(Known { calibration: of_rectified_images(&files)?, files })
@@ -85,7 +89,7 @@ impl PairArgs {
         };
         let known = calibration.as_ref().map(Known::named);
         let Found { range, by_matches } = self.search.range(&pair, known, sign)?;
-        Ok(Input { pair, range, by_matches, calibration })
+        Ok(Input { pair, range, by_matches, calibration, rectifying })
     }
 
     /// The paths for a record.

@@ -144,6 +144,12 @@ fn a_batch_writes_depth_and_points() {
         let inputs = record(&folder.path().join(&out), "wall")["request"]["inputs"].to_string();
         assert!(inputs.contains("calib.txt"), "a new calibration is another request: {inputs}");
     }
+    // Points in another format take the place of the old ones.
+    let las = ["--also", "points.las"];
+    run(folder.path(), &[&args[..], &las].concat()).succeeded();
+    batch(folder.path(), &[&["data", "out-data", "--format", "tif"], &las[..]].concat()).succeeded();
+    assert!(at("one.points.las") == at("out-data/wall.points.las"));
+    assert!(!folder.path().join("out-data/wall.points.ply").exists());
     fs::remove_file(folder.path().join("data/wall/calib.txt")).unwrap();
     let told = batch(folder.path(), &[&["list.csv", "none"], &also[..]].concat());
     assert!(

@@ -1,6 +1,8 @@
 //! Calibrations that people have: each format gives the same pair and the same depths, and what is wrong in a file is told in
 //! one line.
 
+use mrfgs::image::{pfm, read};
+
 use super::*;
 
 fn raw(file: &str) -> String {
@@ -132,6 +134,58 @@ fn rectified_first_or_on_the_way_gives_the_same_bits() {
         .filter(|mm| *mm > 0)
         .fold((u16::MAX, 0), |(l, m), mm| (l.min(mm), m.max(mm)));
     assert!((1000..2000).contains(&least) && (2500..6000).contains(&most), "{least} to {most}");
+}
+
+/// The pixel at which the left camera of `testdata/raw` shows a point, by the numbers of its calibration.
+fn seen([x, y, z]: [f64; 3], k: &[f64], d: &[f64]) -> [f64; 2] {
+    let [a, b] = [x / z, y / z];
+    let r2 = a * a + b * b;
+    let radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+    let across = 2.0 * d[2] * a * b + d[3] * (r2 + 2.0 * a * a);
+    let down = d[2] * (r2 + 2.0 * b * b) + 2.0 * d[3] * a * b;
+    [k[0] * (a * radial + across) + k[2], k[4] * (b * radial + down) + k[5]]
+}
+
+#[test]
+fn points_of_the_original_camera_are_seen_at_their_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (left, right, calib) = (raw("left.png"), raw("right.png"), raw("cameras.yml"));
+    run(folder.path(), &["rectify", &left, &right, "out", "--calib", &calib, "--maps"]).succeeded();
+    let args = ["match", &left, &right, "a.pfm", "--rectify", "--calib", &calib, "--max-disparity", "40"];
+    let also =
+        ["--device", "cpu", "--quiet", "--also", "validity,points,points-original,points-original.pcd"];
+    run(folder.path(), &[&args[..], &also].concat()).succeeded();
+    let says = |name: &str| {
+        String::from_utf8_lossy(&fs::read(at(name)).unwrap()).contains("frame of the original left camera")
+    };
+    assert!(says("a.points-original.ply") && says("a.points-original.pcd") && !says("a.points.ply"));
+
+    let validity = read::grey8(&at("a.validity.png")).unwrap();
+    let places = [at("out/map0x.pfm"), at("out/map0y.pfm")].map(|path| {
+        let pfm::Pfm::Grey(map) = pfm::read(&path).unwrap() else { panic!("one channel") };
+        map
+    });
+    let [k, d] =
+        ["K1", "D1"].map(|name| numbers(name).iter().map(|v| v.parse().unwrap()).collect::<Vec<f64>>());
+    let misses = |name: &str| -> Vec<f64> {
+        let points = outputs::cloud(&at(name));
+        let pixels = (0..180).flat_map(|y| (0..240).map(move |x| (x, y))).filter(|at| validity[*at] == 0);
+        let pixels: Vec<_> = pixels.collect();
+        assert_eq!(points.len(), pixels.len());
+        let pairs = pixels.iter().zip(points);
+        let misses = pairs.map(|(&at, (position, ..))| {
+            let [u, v] = seen(position, &k, &d);
+            (u - f64::from(places[0][at])).hypot(v - f64::from(places[1][at]))
+        });
+        misses.collect()
+    };
+    let most = misses("a.points-original.ply").into_iter().fold(0.0, f64::max);
+    assert!(most < 1e-4, "{most} px");
+    // Control: the points of the rectified frame are seen elsewhere.
+    let least = misses("a.points.ply").into_iter().fold(f64::INFINITY, f64::min);
+    assert!(least > 0.5, "{least} px");
+    println!("{most:.1e} px at most, {least:.2} px at least in the rectified frame");
 }
 
 #[test]
@@ -324,6 +378,14 @@ fn files_that_are_no_calibration_are_told() {
         &[&m[..], &["--rectify", "--calib", &calib, "--alpha", "2"]].concat(),
         2,
         &["--alpha", "from 0 to 1"],
+    );
+    let original = ["--calib", &calib, "--also", "points-original.las"];
+    let words = ["--also points-original.las", "add --rectify", "take --also points"];
+    flags(&[&m[..], &original].concat(), 2, &words);
+    flags(
+        &["batch", "list.csv", "maps", "--also", "points-original"],
+        2,
+        &["--also points-original:", words[2]],
     );
     flags(&[&m[..], &["--calib", &calib, "--also", "depth"]].concat(), 1, &["not rectified", "--rectify"]);
     flags(

@@ -162,7 +162,7 @@ fn the_pictures_of_the_guide_are_those_of_its_commands() {
 }
 
 /// A point of a cloud: position, colour, confidence.
-type Point = ([f64; 3], [u8; 3], u8);
+pub(super) type Point = ([f64; 3], [u8; 3], u8);
 
 /// A level that a float holds.
 fn whole(value: f32) -> u8 {
@@ -171,7 +171,7 @@ fn whole(value: f32) -> u8 {
 }
 
 /// Reads a cloud by nothing but what its header says.
-fn cloud(path: &Path) -> Vec<Point> {
+pub(super) fn cloud(path: &Path) -> Vec<Point> {
     let bytes = fs::read(path).unwrap();
     let end = b"end_header\n";
     let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
@@ -230,6 +230,109 @@ fn points_are_what_is_measured_and_trusted() {
         }
         assert_eq!(*colour, image.get_pixel(x as u32, y as u32).0, "{x}, {y}");
         assert_eq!(*sure, confidence[(x, y)]);
+    }
+}
+
+/// Reads PCD by nothing but what its header says.
+fn pcd(path: &Path) -> Vec<Point> {
+    let bytes = fs::read(path).unwrap();
+    let end = b"\nDATA binary\n";
+    let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
+    let header = std::str::from_utf8(&bytes[..start]).unwrap();
+    let entry = |key: &str| -> Vec<&str> {
+        header.lines().find_map(|line| line.strip_prefix(key)).unwrap().split_whitespace().collect()
+    };
+    let [fields, sizes, kinds] = ["FIELDS ", "SIZE ", "TYPE "].map(entry);
+    assert!(sizes.iter().all(|size| *size == "4") && kinds.iter().all(|kind| *kind == "F"), "{header}");
+    let count: usize = entry("POINTS ")[0].parse().unwrap();
+    assert_eq!(bytes.len(), start + count * 4 * fields.len(), "{header}");
+    let points = bytes[start..].chunks_exact(4 * fields.len()).map(|point| {
+        let place = |name: &str| 4 * fields.iter().position(|field| *field == name).unwrap();
+        let bits = |name| u32::from_le_bytes(point[place(name)..][..4].try_into().unwrap());
+        let float = |name| f32::from_bits(bits(name));
+        let [_, red, green, blue] = bits("rgb").to_be_bytes();
+        (["x", "y", "z"].map(|name| f64::from(float(name))), [red, green, blue], whole(float("intensity")))
+    });
+    points.collect()
+}
+
+/// Reads uncompressed LAS by the offsets of the standard; the step of its coordinates, and the points.
+fn las(path: &Path) -> (f64, Vec<Point>) {
+    let bytes = fs::read(path).unwrap();
+    let u16_at = |at: usize| u16::from_le_bytes(bytes[at..][..2].try_into().unwrap());
+    let u32_at = |at: usize| u32::from_le_bytes(bytes[at..][..4].try_into().unwrap()) as usize;
+    let f64_at = |at: usize| f64::from_le_bytes(bytes[at..][..8].try_into().unwrap());
+    assert_eq!((&bytes[..4], &bytes[24..26]), (&b"LASF"[..], &[1, 2][..]), "LAS 1.2");
+    assert_eq!((bytes[104], u16_at(105), u16_at(90), u16_at(92)), (2, 26, 0, 0), "point format, and no date");
+    let (start, count, step) = (u32_at(96), u32_at(107), f64_at(131));
+    assert!(bytes[131..139] == bytes[139..147] && bytes[131..139] == bytes[147..155], "one step");
+    assert_eq!(bytes[155..179], [0; 24], "positions count from the camera");
+    assert_eq!((bytes.len(), u32_at(111)), (start + 26 * count, count), "first returns");
+    let words = String::from_utf8_lossy(&bytes[227..start]).into_owned();
+    assert!(words.contains("Text Area") && words.contains("y down"), "{words}");
+    let points = (0..count).map(|i| start + 26 * i).map(|at| {
+        let position = [0, 4, 8].map(|i| step * f64::from(u32_at(at + i) as u32 as i32));
+        let level = |i: usize| {
+            assert_eq!(u16_at(at + i) % 257, 0, "all 16 bits");
+            (u16_at(at + i) / 257) as u8
+        };
+        (position, [20, 22, 24].map(level), level(12))
+    });
+    let points: Vec<_> = points.collect();
+    for (axis, at) in [(0, 179), (1, 195), (2, 211)] {
+        let values = || points.iter().map(|point| point.0[axis]);
+        let ends = [values().fold(f64::MIN, f64::max), values().fold(f64::MAX, f64::min)];
+        assert!(
+            (f64_at(at) - ends[0]).abs() < 1.001 * step && (f64_at(at + 8) - ends[1]).abs() < 1.001 * step,
+            "bounds"
+        );
+    }
+    (step, points)
+}
+
+/// The largest distance along an axis of points that are otherwise the same.
+fn apart(some: &[Point], others: &[Point]) -> f64 {
+    assert_eq!(some.len(), others.len());
+    let pairs = some.iter().zip(others).flat_map(|(a, b)| {
+        assert_eq!((a.1, a.2), (b.1, b.2), "colour and confidence");
+        [0, 1, 2].map(|i| (a.0[i] - b.0[i]).abs())
+    });
+    pairs.fold(0.0, f64::max)
+}
+
+#[test]
+fn every_format_holds_the_same_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let said =
+        matched(folder.path(), "slanted", &["d.pfm", "--also", "points,points.pcd,points.las,points.laz"]);
+    let points = cloud(&at("d.points.ply"));
+    assert!(points.len() > 20_000);
+    assert_eq!(said.matches(" points").count(), 1, "{said}");
+    assert!(apart(&pcd(&at("d.points.pcd")), &points).total_cmp(&0.0).is_eq(), "all bits");
+    let (step, rounded) = las(&at("d.points.las"));
+    let off = apart(&rounded, &points);
+    assert!(off > 0.0 && off <= 0.5001 * step, "{off} with steps of {step}");
+    let nearest = points.iter().map(|(p, ..)| p[2]).fold(f64::MAX, f64::min);
+    assert!((1e-7..=1e-6).contains(&(step / nearest)), "{step} at {nearest}");
+    // Control: the comparison sees a point that is a step off.
+    let mut moved = rounded.clone();
+    moved[7].0[1] += step;
+    assert!(apart(&moved, &points) > 0.5001 * step);
+
+    let unpacked = las::Reader::from_path(at("d.points.laz")).unwrap().read_all().unwrap();
+    let plain = fs::read(at("d.points.las")).unwrap();
+    assert!(plain.ends_with(unpacked.raw_bytes()), "packing loses nothing");
+    assert_eq!(unpacked.len(), points.len());
+    let bytes = |name: &str| fs::metadata(at(name)).unwrap().len();
+    assert!(2 * bytes("d.points.laz") < bytes("d.points.las"), "{}", bytes("d.points.laz"));
+
+    let before = listing(folder.path());
+    let (left, right) = (scene_file("slanted", "im0.png"), scene_file("slanted", "im1.png"));
+    for word in ["points.xyz", "points.ply.las", "depth.las", "points."] {
+        let told = run(folder.path(), &["match", &left, &right, "e.pfm", "--also", word]);
+        told.failed(2, &["--also", word, "points"], word);
+        assert!(listing(folder.path()) == before, "{word}");
     }
 }
 

@@ -138,7 +138,8 @@ struct Batch<'a> {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    args.maps.also.check()?;
+    // A batch takes rectified pairs.
+    args.maps.also.check(false)?;
     let method = args.maps.also.made_by(args.method.method()?)?;
     let execution = args.execution.execution();
     let List { base, mut pairs } = List::read(&args.list)?;
@@ -330,7 +331,15 @@ impl Batch<'_> {
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign) = (&matched.maps, Sign::default());
-        let outcome = Outcome { maps, range, sign, left: pair.as_ref().map(Pair::left), rig, georeferences };
+        let outcome = Outcome {
+            maps,
+            range,
+            sign,
+            left: pair.as_ref().map(Pair::left),
+            rig,
+            rectifying: None,
+            georeferences,
+        };
         let staged = |file: &str| claim.folder().join(file);
         // The user knows the file by its place in the output folder.
         let at = |file: &str, result: Result<()>| result.map_err(|e| e.at(&self.args.folder.join(file)));

@@ -35,7 +35,9 @@ Examples:
   # Range and cameras from the calib.txt beside im0.png:
   mrfgs match im0.png im1.png d.pfm --also depth,points
   # Images as the cameras took them:
-  mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth";
+  mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
+  # Points as LAZ, in the frame of the left camera as it took the image:
+  mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
 
 /// Match a rectified pair and write its disparity map
 ///
@@ -104,6 +106,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let reason = "is of a rectification; add --rectify, or leave --alpha out";
         return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
     }
+    args.also.check(args.rectify)?;
     let options = args.rectification.options();
     let input = args.pair.read(args.sign, cameras.is_some(), args.rectify.then_some(&options))?;
     let range = input.range;
@@ -134,9 +137,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let files = args.pair.files(&input, Some(&args.output));
     let unit = input.calibration().map(|(file, _)| file.display().to_string());
     let georeferences = input.pair.georeferences();
+    let rectifying = input.rectifying;
     let pair = Some(input.pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
-    let outcome = Outcome { maps: &matched.maps, range, sign: args.sign, left, rig, georeferences };
+    let outcome =
+        Outcome { maps: &matched.maps, range, sign: args.sign, left, rig, rectifying, georeferences };
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
     let said = write_outputs(args, &also, &outcome, &record)?;
@@ -149,7 +154,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 /// Finds out before any computing whether all outputs can be written. Returns the files of `--also`.
 fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathBuf)>> {
     let (output, range) = (args.output.as_path(), args.sign.range(input.range));
-    args.also.check()?;
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {
             let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
@@ -189,6 +193,8 @@ fn write_outputs(
     for (word, path) in also {
         said.extend(written.note(path, args.also.write(word, path, outcome))?);
     }
+    // The same points may be written in several formats.
+    said.dedup();
     let json =
         args.json.as_deref().map(|path: &Path| Ok::<_, Failure>((path, files::json_text(path, record)?)));
     let json = json.transpose()?;

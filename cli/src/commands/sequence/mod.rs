@@ -111,7 +111,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if film {
         args.also.check_film()?;
     } else {
-        args.also.check()?;
+        args.also.check(args.rectify)?;
     }
     let method = args.also.made_by(args.method.method()?)?;
     if args.rectification.alpha.is_some() && !args.rectify {
@@ -140,7 +140,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let rig = args.also.take_cameras();
     let remedy = "give one with --calib";
     let rig = rig.map(|word| cameras::rig(word, known, &args.left, first.pair.size(), remedy)).transpose()?;
-    let writer = Writer { output: &args.output, format: args.format, also: &args.also, range, rig };
+    let rectifying = rectification.as_ref().map(|by| by.rotations()[0]);
+    let writer =
+        Writer { output: &args.output, format: args.format, also: &args.also, range, rig, rectifying };
     let matcher = Matcher::builder().method(method).execution(args.execution.execution()).build()?;
     if let Some(by) = rectification.as_mut() {
         by.keep_places()?;

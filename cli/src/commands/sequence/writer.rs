@@ -5,6 +5,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
+use mrfgs::calibration::matrix::Matrix;
 use mrfgs::depth::Rig;
 use mrfgs::image::{Pair, write};
 use mrfgs::maps::Maps;
@@ -25,6 +26,8 @@ pub(super) struct Writer<'a> {
     pub(super) also: &'a AlsoArgs,
     pub(super) range: DisparityRange,
     pub(super) rig: Option<Rig>,
+    /// The rotation from the frame of the left camera to the rectified one, where frames are rectified.
+    pub(super) rectifying: Option<Matrix>,
 }
 
 /// A frame that has been matched.
@@ -91,9 +94,9 @@ impl Sink<'_> {
     pub(super) fn add(&mut self, found: &Found) -> Result<()> {
         let Writer { also, range, .. } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
-        let rig = self.writer.rig;
+        let Writer { rig, rectifying, .. } = self.writer;
         let georeferences = found.pair.as_ref().map(Pair::georeferences).unwrap_or_default();
-        let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, georeferences };
+        let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, rectifying, georeferences };
         if let Some(film) = &mut self.film {
             return Ok(film.add(&also.film_picture(&outcome))?);
         }

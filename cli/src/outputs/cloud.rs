@@ -1,0 +1,134 @@
+//! Formats of point clouds.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use las::point::{Classification, Format};
+use las::{Color, Header, Transform, Vector};
+use mrfgs::image::cloud::{Cloud, Point};
+use mrfgs::image::write;
+use mrfgs::{Error, Result};
+
+/// The format of a point cloud.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum CloudFormat {
+    Ply,
+    Pcd,
+    Las,
+    Laz,
+}
+
+impl CloudFormat {
+    /// The extension of its files.
+    pub(crate) fn extension(self) -> &'static str {
+        match self {
+            Self::Ply => "ply",
+            Self::Pcd => "pcd",
+            Self::Las => "las",
+            Self::Laz => "laz",
+        }
+    }
+
+    /// Writes `cloud` to `path`, completely or not at all.
+    pub(crate) fn write(self, path: &Path, cloud: &Cloud) -> Result<()> {
+        match self {
+            Self::Ply | Self::Pcd => write::cloud(path, cloud),
+            Self::Las | Self::Laz => {
+                // A writer that cannot write so many panics when it is dropped.
+                if u32::try_from(cloud.points.len()).is_err() {
+                    return Err(Error::write(path, "LAS 1.2 holds at most 4294967295 points; write PLY"));
+                }
+                let bytes = encode_las(cloud, self == Self::Laz).map_err(|e| Error::write(path, e))?;
+                write::save(path, &bytes)
+            }
+        }
+    }
+}
+
+/// LAS 1.2, the oldest version with colours, which readers of all ages take.
+fn encode_las(cloud: &Cloud, compressed: bool) -> las::Result<Vec<u8>> {
+    let transform = Transform { scale: scale(&cloud.points), offset: 0.0 };
+    let mut header = las::Builder::from((1, 2));
+    header.point_format = Format { is_compressed: compressed, ..Format::new(2)? };
+    header.transforms = Vector { x: transform, y: transform, z: transform };
+    header.system_identifier = "OTHER".into();
+    header.generating_software = concat!("mrfgs ", env!("CARGO_PKG_VERSION")).into();
+    // The record that the standard has for words.
+    header.vlrs.push(las::Vlr {
+        user_id: "LASF_Spec".into(),
+        record_id: 3,
+        description: "Text Area Description".into(),
+        data: format!("{}; intensity is the confidence times 257\0", cloud.about()).into_bytes(),
+    });
+    let header: Header = header.into_header()?;
+    let mut writer = las::Writer::new(Cursor::new(Vec::new()), header)?;
+    for &Point { position, colour, confidence } in &cloud.points {
+        let [x, y, z] = position.map(f64::from);
+        // All 16 bits, as the standard wants levels of 8.
+        let [red, green, blue] = colour.map(|level| u16::from(level) * 257);
+        writer.write_point(las::Point {
+            x,
+            y,
+            z,
+            intensity: u16::from(confidence) * 257,
+            return_number: 1,
+            number_of_returns: 1,
+            classification: Classification::Unclassified,
+            color: Some(Color { red, green, blue }),
+            ..las::Point::default()
+        })?;
+    }
+    Ok(writer.into_inner()?.into_inner())
+}
+
+/// The step of coordinates: the largest power of ten of at most a millionth of the distance of the nearest point, or the smallest
+/// one that lets 32 bits reach the farthest point. A millionth is far below what a match can tell: the depth differs by
+/// 1/d of itself for each pixel of disparity d.
+fn scale(points: &[Point]) -> f64 {
+    let powers = || (-60..=60).map(|n| if n < 0 { 1.0 / 10_f64.powi(-n) } else { 10_f64.powi(n) });
+    let far = points.iter().flat_map(|p| p.position).fold(0.0, |far: f64, v| far.max(f64::from(v).abs()));
+    let squared = |p: &Point| p.position.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+    let near = points.iter().map(squared).fold(f64::INFINITY, f64::min).sqrt();
+    let fine = powers().take_while(|step| *step <= 1e-6 * near).last();
+    let coarse = powers().find(|step| step * f64::from(i32::MAX) >= far);
+    match (fine, coarse) {
+        (Some(fine), Some(coarse)) if !points.is_empty() => fine.max(coarse),
+        // Nothing to place, or nowhere that can be told.
+        _ => 0.001,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(positions: &[[f32; 3]]) -> Vec<Point> {
+        positions.iter().map(|&position| Point { position, colour: [0; 3], confidence: 0 }).collect()
+    }
+
+    #[test]
+    fn steps_are_fine_and_reach_all_points() {
+        let same = |positions: &[[f32; 3]], step: f64| {
+            let found = scale(&cloud(positions));
+            assert!((found / step - 1.0).abs() < 1e-12, "{found} and not {step}");
+        };
+        same(&[], 0.001);
+        // A millionth of 3 m, and of 3000 mm.
+        same(&[[0.0, 0.0, 3.0], [-9.0, 2.0, 40.0]], 1e-6);
+        same(&[[0.0, 0.0, 3000.0]], 1e-3);
+        // What is nearly infinitely far makes the steps coarser.
+        same(&[[0.0, 0.0, 3.0], [0.0, -1e6, 2.0]], 1e-3);
+        same(&[[0.0, 0.0, 3.0], [0.0, 0.0, 2.1e3]], 1e-6);
+        same(&[[0.0, 0.0, 3.0], [0.0, 0.0, 2.2e3]], 1e-5);
+    }
+
+    #[test]
+    fn points_that_are_nowhere_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.las");
+        let points = cloud(&[[0.0, 0.0, f32::INFINITY]]);
+        let error = CloudFormat::Las.write(&path, &Cloud { points, ..Cloud::default() }).unwrap_err();
+        assert!(error.to_string().contains("a.las"), "{error}");
+        assert!(!path.exists());
+    }
+}
