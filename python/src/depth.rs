@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use mrfgs::depth::Rig;
 use mrfgs::image::Plane;
 use mrfgs::image::calib::{Calibration, Camera};
-use mrfgs::image::ply::{self, Point};
-use mrfgs::image::raster;
+use mrfgs::image::cloud::{Cloud, Point};
+use mrfgs::image::{raster, write};
 use mrfgs::maps::{FRACTION, Maps, flag};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -144,8 +144,8 @@ impl PyRig {
         let disparity = disparity.map(|d| (d * FRACTION as f32) as i32);
         let maps =
             Maps { disparity, raw: Plane::filled(width, height, 0), confidence, validity, right: None };
-        let points = py.detach(|| self.rig.points(&maps, pair.left()));
-        PyPoints::of(py, &points)
+        let cloud = py.detach(|| self.rig.cloud(&maps, pair.left()));
+        PyPoints::of(py, &cloud.points)
     }
 
     /// The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera: two float64 arrays (3, 3), in pixels.
@@ -254,10 +254,10 @@ impl PyPoints {
         Self::of(py, &points.collect::<Vec<_>>())
     }
 
-    /// Writes the points as binary PLY, completely or not at all: the file that `mrfgs match --also points` writes. The confidence is
-    /// called `quality`, as MeshLab has it.
+    /// Writes the points as binary PLY or PCD, completely or not at all: the file that `mrfgs match --also points` or `points.pcd`
+    /// writes. In PLY the confidence is called `quality`, as MeshLab has it.
     ///
-    /// path: a name that ends in .ply.
+    /// path: a name that ends in .ply or .pcd.
     ///
     /// Raises OSError where it cannot be written.
     fn save(&self, py: Python, path: PathBuf) -> PyResult<()> {
@@ -270,8 +270,8 @@ impl PyPoints {
         let (colours, _) = colours.as_chunks::<3>();
         let points = positions.iter().zip(colours).zip(confidence);
         let points = points.map(|((&position, &colour), confidence)| Point { position, colour, confidence });
-        let points: Vec<Point> = points.collect();
-        py.detach(|| ply::write(&path, &points)).map_err(exception)
+        let cloud = Cloud { points: points.collect(), ..Cloud::default() };
+        py.detach(|| write::cloud(&path, &cloud)).map_err(exception)
     }
 
     fn __len__(&self, py: Python) -> usize {

@@ -56,8 +56,9 @@ impl PyRectification {
                 ))
             })?,
         };
-        let by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
+        let mut by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
             .map_err(|error| known.wrong(error))?;
+        py.detach(|| by.keep_places()).map_err(exception)?;
         let calibration = by.calibration().map_err(|error| known.wrong(error))?;
         let rig = Py::new(py, PyRig::of(&calibration, &known)?)?;
         Ok(Self { by, raw_size: size, calibration, rig })
