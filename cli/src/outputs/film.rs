@@ -37,20 +37,19 @@ impl Film {
     /// [`Error::Write`] when it cannot be written, or its reader has left.
     pub(crate) fn add(&mut self, picture: &Plane<[u8; 3]>) -> Result<()> {
         let mut bytes = Vec::with_capacity(3 * picture.data().len() + 100);
-        let sink = match &mut self.sink {
-            Some(sink) => sink,
-            None => {
-                let ((width, height), (frames, seconds)) = (picture.size(), self.rate);
-                let header = format!(
-                    "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED\n"
-                );
-                bytes.extend_from_slice(header.as_bytes());
-                self.sink.insert(if is_printed(&self.path) {
-                    Sink::Printed(io::stdout())
-                } else {
-                    Sink::File(Growing::new(&self.path)?)
-                })
-            }
+        let sink = if let Some(sink) = &mut self.sink {
+            sink
+        } else {
+            let ((width, height), (frames, seconds)) = (picture.size(), self.rate);
+            let header = format!(
+                "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED\n"
+            );
+            bytes.extend_from_slice(header.as_bytes());
+            self.sink.insert(if is_printed(&self.path) {
+                Sink::Printed(io::stdout())
+            } else {
+                Sink::File(Growing::new(&self.path)?)
+            })
         };
         bytes.extend_from_slice(b"FRAME\n");
         let yuv: Vec<[u8; 3]> = picture.data().iter().map(|rgb| to_yuv(*rgb)).collect();

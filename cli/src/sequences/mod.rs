@@ -90,18 +90,16 @@ pub(crate) struct Frame {
 
 /// The frames of a sequence, in order.
 pub(crate) struct Frames {
-    views: Views,
+    left: Source,
+    /// `None` where the frames of `left` hold both views.
+    right: Option<Source>,
+    layout: Layout,
     /// How many came so far.
     count: usize,
     /// (width, height) of the first pair.
     size: Option<(usize, usize)>,
     /// The names of both sources.
     names: [String; 2],
-}
-
-enum Views {
-    Two(Source, Source),
-    One(Source, Layout),
 }
 
 /// Both views of one time, and the name of the left one.
@@ -119,17 +117,13 @@ impl Frames {
         raw: Option<RawFrames>,
         reader: Reader,
     ) -> Result<Self> {
-        let shown = |path: &Path| match path == Path::new("-") {
-            true => "standard input".into(),
-            false => path.display().to_string(),
+        let shown = |path: &Path| {
+            if path == Path::new("-") { "standard input".into() } else { path.display().to_string() }
         };
         let names = [shown(left), shown(right.unwrap_or(left))];
-        let first = Source::open(left, raw, reader)?;
-        let Some(right) = right else {
-            return Ok(Self { views: Views::One(first, layout), count: 0, size: None, names });
-        };
-        let second = Source::open(right, raw, reader)?;
-        if let (Source::Files { left: l, .. }, Source::Files { left: r, .. }) = (&first, &second)
+        let left = Source::open(left, raw, reader)?;
+        let right = right.map(|right| Source::open(right, raw, reader)).transpose()?;
+        if let (Source::Files { left: l, .. }, Some(Source::Files { left: r, .. })) = (&left, &right)
             && l.len() != r.len()
         {
             return Err(Error::Mismatch(format!(
@@ -140,57 +134,49 @@ impl Frames {
                 r.len()
             )));
         }
-        Ok(Self { views: Views::Two(first, second), count: 0, size: None, names })
+        Ok(Self { left, right, layout, count: 0, size: None, names })
     }
 
     /// How many there are, where that is known.
     pub(crate) fn len(&self) -> Option<usize> {
-        match &self.views {
-            Views::Two(Source::Files { left, .. }, _) | Views::One(Source::Files { left, .. }, _) => {
-                Some(left.len() + self.count)
-            }
-            Views::Two(..) | Views::One(..) => None,
+        match &self.left {
+            Source::Files { left, .. } => Some(left.len() + self.count),
+            Source::Stream(_) => None,
         }
     }
 
     /// How many frames a second the left source has, where it says so.
     pub(crate) fn rate(&self) -> Option<FrameRate> {
-        match &self.views {
-            Views::Two(Source::Stream(stream), _) | Views::One(Source::Stream(stream), _) => stream.rate(),
-            Views::Two(..) | Views::One(..) => None,
+        match &self.left {
+            Source::Files { .. } => None,
+            Source::Stream(stream) => stream.rate(),
         }
     }
 
     /// The files that are read, none of which an output may overwrite.
     pub(crate) fn files(&self) -> Vec<&Path> {
-        let sources = match &self.views {
-            Views::Two(left, right) => vec![left, right],
-            Views::One(both, _) => vec![both],
-        };
-        sources.into_iter().flat_map(Source::files).collect()
+        std::iter::once(&self.left).chain(&self.right).flat_map(Source::files).collect()
     }
 
     fn rasters(&mut self) -> Option<Result<Rasters>> {
-        match &mut self.views {
-            Views::One(source, layout) => Some(source.next()?.and_then(|(name, frame)| {
-                let at = self.names[0].as_str();
-                let views = layout.split(&frame).map_err(|e| named(e, &name.clone().unwrap_or(at.into())))?;
+        let Some(right) = &mut self.right else {
+            return Some(self.left.next()?.and_then(|(name, frame)| {
+                let split = self.layout.split(&frame);
+                let views = split.map_err(|e| named(e, name.as_ref().unwrap_or(&self.names[0])))?;
                 Ok((name, views))
-            })),
-            Views::Two(left, right) => {
-                let (l, r) = rayon::join(|| left.next(), || right.next());
-                let ended = |which: usize| {
-                    let (one, other) = (&self.names[which], &self.names[1 - which]);
-                    Error::Mismatch(format!("{one} ends here and {other} goes on"))
-                };
-                match (l, r) {
-                    (None, None) => None,
-                    (Some(Err(e)), _) | (_, Some(Err(e))) => Some(Err(e)),
-                    (None, Some(_)) => Some(Err(ended(0))),
-                    (Some(_), None) => Some(Err(ended(1))),
-                    (Some(Ok((name, l))), Some(Ok((_, r)))) => Some(Ok((name, [l, r]))),
-                }
-            }
+            }));
+        };
+        let (l, r) = rayon::join(|| self.left.next(), || right.next());
+        let ended = |which: usize| {
+            let (one, other) = (&self.names[which], &self.names[1 - which]);
+            Error::Mismatch(format!("{one} ends here and {other} goes on"))
+        };
+        match (l, r) {
+            (None, None) => None,
+            (Some(Err(e)), _) | (_, Some(Err(e))) => Some(Err(e)),
+            (None, Some(_)) => Some(Err(ended(0))),
+            (Some(_), None) => Some(Err(ended(1))),
+            (Some(Ok((name, l))), Some(Ok((_, r)))) => Some(Ok((name, [l, r]))),
         }
     }
 

@@ -147,7 +147,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if let Some(by) = rectification.as_mut() {
         by.keep_places()?;
     }
-    let mut sink = writer.begin(film.then_some(rate))?;
+    let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
     let pipeline = Pipeline { matcher, range, all, quiet: args.quiet };
     pipeline.run(first, frames, rectification, &mut sink)
 }

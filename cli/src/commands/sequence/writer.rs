@@ -15,7 +15,7 @@ use crate::args::format::Format;
 use crate::args::sign::Sign;
 use crate::failure::Result;
 use crate::outputs::also::{AlsoArgs, Outcome, View};
-use crate::outputs::files::Written;
+use crate::outputs::files::{Written, is_printed};
 use crate::outputs::film::Film;
 use crate::sequences::FrameRate;
 
@@ -45,18 +45,23 @@ pub(super) struct Sink<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Begins a film with the frame rate of the input, or a folder.
+    /// Begins a film of `rate` frames a second.
     ///
     /// # Errors
-    /// Where the folder cannot be made, or a map cannot be stored in its format.
-    pub(super) fn begin(self, film: Option<Option<FrameRate>>) -> Result<Sink<'a>> {
-        if let Some(rate) = film {
-            if self.output != Path::new("-") {
-                write::check_path(self.output)?;
-            }
-            let film = Some(Film::new(self.output, rate));
-            return Ok(Sink { writer: self, film });
+    /// Where it cannot be written.
+    pub(super) fn begin_film(self, rate: Option<FrameRate>) -> Result<Sink<'a>> {
+        if !is_printed(self.output) {
+            write::check_path(self.output)?;
         }
+        let film = Some(Film::new(self.output, rate));
+        Ok(Sink { writer: self, film })
+    }
+
+    /// Begins a folder, which may be there.
+    ///
+    /// # Errors
+    /// Where it cannot be made, or a map cannot be stored in its format.
+    pub(super) fn begin_folder(self) -> Result<Sink<'a>> {
         match fs::create_dir(self.output) {
             Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(self.output, e).into()),
             made => {
