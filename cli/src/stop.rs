@@ -20,6 +20,11 @@ pub(crate) fn listen() {
     });
 }
 
+/// What becomes true with the first signal.
+pub(crate) fn flag() -> &'static AtomicBool {
+    &STOP
+}
+
 /// Whether there is a reason to go on.
 pub(crate) fn go_on() -> ControlFlow<()> {
     if STOP.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -106,7 +106,6 @@ fn is_film(output: &Path) -> bool {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    stop::listen();
     let film = is_film(&args.output);
     if film {
         args.also.check_film()?;
@@ -124,32 +123,36 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     // The first frame decides on the range and, for all that follow, on the size.
     let Some(first) = frames.next() else { return Err(empty(&args.left).into()) };
     let mut first = first?;
-    let mut rectification = None;
-    let mut calibration = None;
-    if args.rectify {
-        let options = args.rectification.options();
-        let (by, pair) = raw::rectify(&calibration::read(&args.calib)?, &args.calib, &first.pair, &options)?;
-        calibration = Some(by.calibration()?);
-        first.pair = pair;
-        rectification = Some(by);
-    } else if !args.calib.is_empty() {
-        calibration = Some(input::of_rectified_images(&args.calib)?);
-    }
+    let (by, calibration) = calibrated(args, &mut first.pair)?;
     let known = calibration.as_ref().map(|calibration| (args.calib[0].as_path(), calibration));
     let range = range(args, &first.pair, known)?;
     let rig = args.also.take_cameras();
     let remedy = "give one with --calib";
     let rig = rig.map(|word| cameras::rig(word, known, &args.left, first.pair.size(), remedy)).transpose()?;
-    let rectifying = rectification.as_ref().map(|by| by.rotations()[0]);
+    let rectifying = by.as_ref().map(|by| by.rotations()[0]);
     let writer =
         Writer { output: &args.output, format: args.format, also: &args.also, range, rig, rectifying };
     let matcher = Matcher::builder().method(method).execution(args.execution.execution()).build()?;
-    if let Some(by) = rectification.as_mut() {
-        by.keep_places()?;
-    }
+    // Before this nothing is written, and a first frame may never come: a signal ends the program there and then.
+    stop::listen();
     let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
     let pipeline = Pipeline { matcher, range, all, quiet: args.quiet };
-    pipeline.run(first, frames, rectification, &mut sink)
+    pipeline.run(first, frames, by, &mut sink)
+}
+
+/// Rectifies the first pair where that is wanted. Returns what rectifies all others, and the calibration of rectified pairs.
+fn calibrated(args: &Args, first: &mut Pair) -> Result<(By, Option<Calibration>)> {
+    if !args.rectify {
+        let known = !args.calib.is_empty();
+        let calibration = known.then(|| input::of_rectified_images(&args.calib)).transpose()?;
+        return Ok((None, calibration));
+    }
+    let (read, options) = (calibration::read(&args.calib)?, args.rectification.options());
+    let (mut by, pair) = raw::rectify(&read, &args.calib, first, &options)?;
+    by.keep_places()?;
+    *first = pair;
+    let calibration = by.calibration()?;
+    Ok((Some(by), Some(calibration)))
 }
 
 fn empty(left: &Path) -> Error {

@@ -105,7 +105,7 @@ impl Pipeline {
             Some((frame.pair, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
-        let ended = self.matcher.run_all(pairs, |matched| {
+        let ended = self.matcher.run_all_until(pairs, stop::flag(), |matched| {
             let Ok((name, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
             ran.note =
                 matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)).or(ran.note.take());
