@@ -175,7 +175,7 @@ mod tests {
         let caps = [
             ("match", 19),
             ("rectify", 7),
-            ("sequence", 17),
+            ("sequence", 18),
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),

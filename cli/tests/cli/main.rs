@@ -209,10 +209,11 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and theirs.
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 16] = [
     "",
     "match",
     "rectify",
+    "sequence",
     "batch",
     "evaluate",
     "evaluate map",

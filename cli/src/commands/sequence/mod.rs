@@ -35,12 +35,10 @@ Examples:
   mrfgs sequence 'cam/*_L.png' 'cam/*_R.png' maps --method fast
   # Frames with both views, to a film:
   mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
-  # A video with the left view on the left, matched and played:
-  ffmpeg -i stereo.mkv -f yuv4mpegpipe - |
-    mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
+  # What ffmpeg -i stereo.mkv -f yuv4mpegpipe - sends, matched and played:
+  mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
   # Images as the cameras took them, to depth in millimetres:
-  mrfgs sequence left right maps --rectify --calib stereo.yml \\
-    --also depth-mm";
+  mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
 /// Match the frames of a video, one after the other
 ///
