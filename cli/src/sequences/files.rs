@@ -98,8 +98,8 @@ mod tests {
 
     #[test]
     fn numbers_count() {
-        let mut names = ["f10.png", "f9.png", "f009.png", "e11b2.png", "f.png", "f1.png", "e11b10.png"];
+        let mut names = ["f10.png", "f9.png", "f009.png", "e11b2.png", "f1.png", "e11b10.png"];
         names.sort_by(|a, b| by_number(a, b));
-        assert_eq!(names, ["e11b2.png", "e11b10.png", "f.png", "f1.png", "f009.png", "f9.png", "f10.png"]);
+        assert_eq!(names, ["e11b2.png", "e11b10.png", "f1.png", "f009.png", "f9.png", "f10.png"]);
     }
 }

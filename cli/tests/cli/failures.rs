@@ -11,7 +11,7 @@ type Failure = (&'static str, i32, &'static [&'static str]);
 /// `M` stands for a `match` that would succeed, up to its output, and `I` for such an `inspect`.
 const FAILURES: &[Failure] = &[
     // The command line itself.
-    ("", 2, &["subcommand", "match, rectify, batch", "--help"]),
+    ("", 2, &["subcommand", "match, rectify, sequence, batch", "--help"]),
     ("frobnicate", 2, &["frobnicate", "--help"]),
     ("match left.png", 2, &["<RIGHT> <OUTPUT>", "mrfgs match --help"]),
     ("completions", 2, &["<SHELL>", "mrfgs completions --help"]),
