@@ -139,7 +139,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Rectifies the first pair where that is wanted. Returns what rectifies all others, and the calibration of rectified pairs.
-fn calibrated(args: &Args, first: &mut Pair) -> Result<(By, Option<Calibration>)> {
+fn calibrated(args: &Args, first: &mut Pair) -> Result<(Option<Rectification>, Option<Calibration>)> {
     if !args.rectify {
         let known = !args.calib.is_empty();
         let calibration = known.then(|| input::of_rectified_images(&args.calib)).transpose()?;
@@ -202,6 +202,3 @@ fn range(args: &Args, pair: &Pair, known: Option<(&Path, &Calibration)>) -> Resu
     }
     Ok(range)
 }
-
-/// What rectifies the frames that follow.
-type By = Option<Rectification>;

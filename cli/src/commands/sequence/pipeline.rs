@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use mrfgs::Matcher;
 use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
+use mrfgs::rectification::Rectification;
 
 use crate::failure::{Failure, Result};
 use crate::progress::FrameBar;
@@ -15,7 +16,6 @@ use crate::sequences::{Frame, Frames};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
-use super::By;
 use super::writer::{Found, Sink};
 
 /// Frames that wait between two steps: enough to keep both at work.
@@ -40,7 +40,13 @@ impl Pipeline {
     ///
     /// # Errors
     /// Of reading, matching and writing, and when the user stops it. What was found before is written then.
-    pub(super) fn run(mut self, first: Frame, frames: Frames, by: By, sink: &mut Sink) -> Result<()> {
+    pub(super) fn run(
+        mut self,
+        first: Frame,
+        frames: Frames,
+        by: Option<Rectification>,
+        sink: &mut Sink,
+    ) -> Result<()> {
         let start = Instant::now();
         let (size, takes_pair) = (first.pair.size(), sink.takes_pair());
         let (sender, receiver) = sync_channel(WAITING);
@@ -149,7 +155,7 @@ fn received(frames: &Receiver<Next>) -> Option<Next> {
 }
 
 /// Reads and rectifies frames until one fails or nobody takes them.
-fn read(frames: Frames, by: By, to: &SyncSender<Next>) {
+fn read(frames: Frames, by: Option<Rectification>, to: &SyncSender<Next>) {
     for frame in frames {
         let rectified = |frame: Frame| match &by {
             Some(by) => Ok(Frame { pair: by.apply(&frame.pair)?, ..frame }),
