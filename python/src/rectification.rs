@@ -1,5 +1,7 @@
 //! Rectified pairs of what two cameras saw.
 
+use std::sync::OnceLock;
+
 use mrfgs::calibration::matrix::Matrix;
 use mrfgs::calibration::write;
 use mrfgs::image::calib::Calibration;
@@ -27,9 +29,23 @@ use crate::exception;
 #[pyclass(name = "Rectification", frozen, module = "mrfgs")]
 pub(crate) struct PyRectification {
     by: Rectification,
+    /// The same with its places, from the first pair on.
+    kept: OnceLock<Rectification>,
     raw_size: (usize, usize),
     calibration: Calibration,
     rig: Py<PyRig>,
+}
+
+impl PyRectification {
+    /// Many pairs may follow the first, so it finds out once where pixels come from.
+    fn with_places(&self) -> mrfgs::Result<&Rectification> {
+        if let Some(kept) = self.kept.get() {
+            return Ok(kept);
+        }
+        let mut by = self.by.clone();
+        by.keep_places()?;
+        Ok(self.kept.get_or_init(|| by))
+    }
 }
 
 #[pymethods]
@@ -56,12 +72,11 @@ impl PyRectification {
                 ))
             })?,
         };
-        let mut by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
+        let by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
             .map_err(|error| known.wrong(error))?;
-        py.detach(|| by.keep_places()).map_err(exception)?;
         let calibration = by.calibration().map_err(|error| known.wrong(error))?;
         let rig = Py::new(py, PyRig::of(&calibration, &known)?)?;
-        Ok(Self { by, raw_size: size, calibration, rig })
+        Ok(Self { by, kept: OnceLock::new(), raw_size: size, calibration, rig })
     }
 
     /// Rectifies a pair, and returns the left and the right view as masked arrays: masked where there is no source, or where the
@@ -86,7 +101,7 @@ impl PyRectification {
         let (left, right) = (Image::of("left", left)?, Image::of("right", right)?);
         let stored = [left.stored(&right), right.stored(&left)];
         let pair = arrays::pair(&left, &right, mask, no_data)?;
-        let pair = py.detach(|| self.by.apply(&pair)).map_err(exception)?;
+        let pair = py.detach(|| self.with_places()?.apply(&pair)).map_err(exception)?;
         let [left, right] = arrays::images(py, &pair, stored)?;
         Ok((left, right))
     }

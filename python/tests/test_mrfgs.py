@@ -534,7 +534,7 @@ class Rectification(Folder):
     def test_from_raw_frames_to_depth_and_points(self):
         left, right = raw_pair()
         program(self.folder, "match", RAW / "left.png", RAW / "right.png", "d.pfm", "--rectify", "--calib", CAMERAS,
-                "--max-disparity", 31, "--also", "depth,depth-mm,points", "--device", "cpu", "--quiet")
+                "--max-disparity", 31, "--also", "depth,depth-mm,points,points.pcd", "--device", "cpu", "--quiet")
         rectification = mrfgs.Rectification(CAMERAS)
         views = rectification.apply(left, right)
         found = mrfgs.match(*views, 31, device="cpu")
@@ -550,6 +550,8 @@ class Rectification(Folder):
         points = rig.points(found, views[0])
         points.save(self.folder / "python.ply")
         self.assertEqual((self.folder / "python.ply").read_bytes(), (self.folder / "d.points.ply").read_bytes())
+        points.save(self.folder / "python.pcd")
+        self.assertEqual((self.folder / "python.pcd").read_bytes(), (self.folder / "d.points.pcd").read_bytes())
         self.assertEqual((rig.unit, rig.size), ("m", (240, 180)))
         self.assertAlmostEqual(rig.baseline, 0.16361, 5)
         # Control: of another map, other depths and points.
@@ -773,7 +775,7 @@ class Depth(Folder):
             (ValueError, "positions: give an array of shape (N, 3)", lambda: mrfgs.Points(positions[:, :2], colours, confidence)),
             (TypeError, "colours: give an array of shape (N, 3), uint8", lambda: mrfgs.Points(positions, colours / 255, confidence)),
             (ValueError, "4 positions, 3 colours and 4 values", lambda: mrfgs.Points(positions, colours[1:], confidence)),
-            (OSError, "python.pcd", lambda: points.save(self.folder / "python.pcd")),
+            (OSError, "python.xyz", lambda: points.save(self.folder / "python.xyz")),
             (OSError, "there is no folder", lambda: points.save(self.folder / "nowhere" / "python.ply")),
         ):
             with self.subTest(words):
