@@ -60,6 +60,11 @@ impl PixelFormat {
     }
 }
 
+/// Most bytes of a header; the decoder takes no more either.
+const MAX_HEADER: u64 = 1024;
+/// Bytes that a pixel takes at most while its frame is read: three samples of 16 bits, and what becomes of them.
+const BYTES: u64 = 12;
+
 /// Bytes that are counted as they are read.
 struct Counted {
     bytes: Box<dyn BufRead + Send>,
@@ -114,8 +119,12 @@ impl Stream {
         if let Some(raw) = raw {
             check_size(raw.size, max_pixels).map_err(error)?;
         } else {
-            let header = bytes.fill_buf().map_err(|e| Error::read(&name, e))?;
-            check_header(header, max_pixels).map_err(error)?;
+            // A pipe may hand it on in pieces.
+            let mut header = Vec::new();
+            let read = bytes.by_ref().take(MAX_HEADER).read_until(b'\n', &mut header);
+            read.map_err(|e| Error::read(&name, e))?;
+            check_header(&header, max_pixels).map_err(error)?;
+            bytes = Box::new(io::Cursor::new(header).chain(bytes));
         }
         let read = Arc::new(AtomicU64::new(0));
         let counted = Counted { bytes, count: read.clone() };
@@ -175,22 +184,24 @@ impl Stream {
 fn check_size((width, height): (usize, usize), max_pixels: u64) -> Result<(), String> {
     let pixels = (width as u64).checked_mul(height as u64).filter(|pixels| *pixels <= max_pixels);
     let many = format!("frames of {width} x {height} pixels are more than the limit of {max_pixels}");
-    pixels.map(drop).ok_or(many)
+    let bytes = pixels.ok_or(many)?.saturating_mul(BYTES);
+    let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
+    room.map_err(|_| format!("there is not enough memory for frames of {width} x {height} pixels"))
 }
 
 /// Refuses what is no YUV4MPEG2, and frames that are too large.
-fn check_header(start: &[u8], max_pixels: u64) -> Result<(), String> {
-    if start.is_empty() {
+fn check_header(line: &[u8], max_pixels: u64) -> Result<(), String> {
+    if line.is_empty() {
         return Err("is empty".into());
     }
-    let line = start.split(|b| *b == b'\n').next().unwrap_or_default();
     if !line.starts_with(b"YUV4MPEG2") {
         return Err("is neither a folder, nor a pattern such as 'left/*.png', nor a stream in YUV4MPEG2 \
                     (ffmpeg: -f yuv4mpegpipe)"
             .into());
     }
     let number = |letter: u8| {
-        let word = line.split(|b| *b == b' ').skip(1).find(|word| word.first() == Some(&letter))?;
+        let word =
+            line.trim_ascii_end().split(|b| *b == b' ').skip(1).find(|word| word.first() == Some(&letter))?;
         std::str::from_utf8(&word[1..]).ok()?.parse::<usize>().ok().filter(|number| *number > 0)
     };
     let size = number(b'W').zip(number(b'H')).ok_or("its header does not say the size of frames")?;

@@ -54,6 +54,13 @@ fn maps_lie_where_their_views_lie() {
             assert!((east(&path) - expected).abs() < 1e-9, "{}", path.display());
         }
     }
+    // As a frame of a sequence.
+    let line = ["sequence", "lef*.tif", "righ*.tif", "frames", "--format", "tif", "--calib", "calib.txt"];
+    run(folder.path(), &[&line, &more[..]].concat()).succeeded();
+    for name in ["tif", "raw.tif", "right.tif", "depth.tif"] {
+        let [frame, map] = [at(&format!("frames/left.{name}")), at(&format!("d.{name}"))];
+        assert!(fs::read(&frame).unwrap() == fs::read(map).unwrap(), "{}", frame.display());
+    }
     // The same in tiles.
     let tiled = [
         "match",

@@ -143,6 +143,17 @@ fn streams_give_the_maps_of_their_pixels() {
     fs::write(at.join("both.y4m"), &grey).unwrap();
     let output = fed(at, &[&["sequence", "-", "piped"], &RANGE[..]].concat(), &grey);
     assert!(output.status.success(), "{output:?}");
+    // A pipe may hand its header on in pieces.
+    let mut child = started(at, &[&["sequence", "-", "pieces"], &RANGE[..]].concat());
+    let mut stdin = child.stdin.take().unwrap();
+    for piece in [&grey[..5], &grey[5..30], &grey[30..]] {
+        stdin.write_all(piece).unwrap();
+        stdin.flush().unwrap();
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{output:?}");
     run(at, &[&["sequence", "both.y4m", "filed", "--quiet"], &RANGE[..]].concat()).succeeded();
     for (name, scene) in SCENES {
         for (view, path) in [format!("left/{name}.png"), format!("right/{name}.ppm")].iter().enumerate() {
@@ -153,6 +164,7 @@ fn streams_give_the_maps_of_their_pixels() {
     }
     let of_grey = wanted(at, &[]);
     assert_eq!(maps(&at.join("piped"), numbers), of_grey);
+    assert_eq!(maps(&at.join("pieces"), numbers), of_grey);
     assert_eq!(maps(&at.join("filed"), numbers), of_grey);
 }
 
@@ -373,30 +385,35 @@ fn what_was_done_before_a_failure_stays() {
 fn what_was_done_before_a_signal_stays() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
+    // Two frames, and a third that never ends.
     let stream = grey_stream(GREY);
-    for (output, signal) in [("maps", "-INT"), ("film.y4m", "-TERM")] {
+    let stopped = |output: &str, signal: &str, ready: &dyn Fn() -> bool| {
         let mut child = started(at, &[&["sequence", "-", output], &RANGE[..]].concat());
-        // Two frames, and a third that never ends.
         let mut stdin = child.stdin.take().unwrap();
         stdin.write_all(&stream[..stream.len() - 100]).unwrap();
         stdin.flush().unwrap();
         let start = Instant::now();
-        while output == "maps" && !at.join("maps/000001.pfm").exists() {
-            assert!(start.elapsed() < Duration::from_secs(60), "no second map");
+        while !ready() {
+            assert!(start.elapsed() < Duration::from_secs(60), "{output} is not ready");
             std::thread::sleep(Duration::from_millis(20));
-        }
-        if output != "maps" {
-            // It has no name before its end.
-            std::thread::sleep(Duration::from_secs(3));
         }
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
         let mut said = String::new();
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-        assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
-        assert!(said.ends_with("mrfgs: stopped after 2 frames\n"), "{said}");
-        drop(stdin);
-    }
+        (child.wait().unwrap().code(), said)
+    };
+    let end = "mrfgs: stopped after 2 frames\n";
+    let (code, said) = stopped("maps", "-INT", &|| at.join("maps/000001.pfm").exists());
+    assert!(code == Some(130) && said.ends_with(end), "{code:?}: {said}");
     assert_eq!(listing(&at.join("maps")).len(), 2);
+    // A film has no name before its end, so nobody sees how far it is.
+    let done = [1, 4, 16].into_iter().any(|seconds| {
+        let start = Instant::now();
+        let patience = Duration::from_secs(seconds);
+        let (code, said) = stopped("film.y4m", "-TERM", &|| start.elapsed() > patience);
+        code == Some(130) && said.ends_with(end)
+    });
+    assert!(done, "no film of two frames");
     let film = fs::read(at.join("film.y4m")).unwrap();
     assert_eq!(film.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
 }

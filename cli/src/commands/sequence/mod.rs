@@ -117,10 +117,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let mut frames = open(args)?;
     check_output(args, &frames)?;
-    let (all, rate) = (frames.len(), frames.rate());
+    let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
-    let Some(first) = frames.next() else { return Err(empty(&args.left).into()) };
-    let mut first = first?;
+    let mut first = frames.next().ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let (by, calibration) = calibrated(args, &mut first.pair)?;
     let known = calibration.as_ref().map(|calibration| (args.calib[0].as_path(), calibration));
     let range = range(args, &first.pair, known)?;
@@ -134,7 +133,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     // Before this nothing is written, and a first frame may never come: a signal ends the program there and then.
     stop::listen();
     let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
-    let pipeline = Pipeline { matcher, range, all, quiet: args.quiet };
+    let pipeline = Pipeline { matcher, range, quiet: args.quiet };
     pipeline.run(first, frames, by, &mut sink)
 }
 
@@ -151,10 +150,6 @@ fn calibrated(args: &Args, first: &mut Pair) -> Result<(Option<Rectification>, O
     *first = pair;
     let calibration = by.calibration()?;
     Ok((Some(by), Some(calibration)))
-}
-
-fn empty(left: &Path) -> Error {
-    Error::read(left, "holds no frame")
 }
 
 /// The frames that the arguments name.

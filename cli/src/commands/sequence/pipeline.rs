@@ -1,12 +1,11 @@
 //! Reading, matching and writing at once.
 
 use std::ops::ControlFlow;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use mrfgs::Matcher;
-use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::Rectification;
 
@@ -27,8 +26,6 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub(super) struct Pipeline {
     pub(super) matcher: Matcher,
     pub(super) range: DisparityRange,
-    /// How many frames there are, where that is known.
-    pub(super) all: Option<usize>,
     pub(super) quiet: bool,
 }
 
@@ -49,11 +46,11 @@ impl Pipeline {
     ) -> Result<()> {
         let start = Instant::now();
         let (size, takes_pair) = (first.pair.size(), sink.takes_pair());
+        let mut bar = FrameBar::new(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         // It may wait for standard input for ever, so nobody waits for it.
         thread::spawn(move || read(frames, by, &sender));
         let (found, to_write) = sync_channel::<Found>(WAITING);
-        let mut bar = FrameBar::new(self.all, self.quiet);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
             let matched = self.matched(first, &receiver, takes_pair, found);
@@ -94,8 +91,8 @@ impl Pipeline {
         found: SyncSender<Found>,
     ) -> Ran {
         let range = self.range;
-        // Names and pairs of the frames that are being matched.
-        let (started, under_way) = std::sync::mpsc::channel::<(String, Option<Pair>)>();
+        // The frames that are being matched.
+        let (started, under_way) = channel();
         let mut failure = None;
         let mut next = Some(Ok(first));
         let pairs = std::iter::from_fn(|| {
@@ -107,16 +104,17 @@ impl Pipeline {
                 }
             };
             // The receiver lives as long as this.
-            let _ = started.send((frame.name, takes_pair.then(|| frame.pair.clone())));
+            let pair = takes_pair.then(|| frame.pair.clone());
+            let _ = started.send((frame.name, frame.pair.georeferences(), pair));
             Some((frame.pair, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
         let ended = self.matcher.run_all_until(pairs, stop::flag(), |matched| {
-            let Ok((name, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
+            let Ok((name, georeferences, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
             ran.note =
                 matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)).or(ran.note.take());
             ran.on = Some(matched.ran_on);
-            match found.send(Found { name, maps: matched.maps, pair }) {
+            match found.send(Found { name, georeferences, maps: matched.maps, pair }) {
                 Ok(()) => ControlFlow::Continue(()),
                 // It tells why.
                 Err(_) => ControlFlow::Break(()),

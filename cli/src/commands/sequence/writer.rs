@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use mrfgs::Error;
 use mrfgs::calibration::matrix::Matrix;
 use mrfgs::depth::Rig;
-use mrfgs::image::{Pair, write};
+use mrfgs::image::{Georeference, Pair, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
@@ -34,6 +34,8 @@ pub(super) struct Writer<'a> {
 pub(super) struct Found {
     pub(super) name: String,
     pub(super) maps: Maps,
+    /// Those of both views.
+    pub(super) georeferences: [Option<Georeference>; 2],
     /// The pair, where an output shows it.
     pub(super) pair: Option<Pair>,
 }
@@ -97,10 +99,9 @@ impl Sink<'_> {
 
     /// Writes a frame.
     pub(super) fn add(&mut self, found: &Found) -> Result<()> {
-        let Writer { also, range, .. } = self.writer;
+        let Writer { also, range, rig, rectifying, .. } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
-        let Writer { rig, rectifying, .. } = self.writer;
-        let georeferences = found.pair.as_ref().map(Pair::georeferences).unwrap_or_default();
+        let georeferences = found.georeferences.clone();
         let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, rectifying, georeferences };
         if let Some(film) = &mut self.film {
             return Ok(film.add(&also.film_picture(&outcome))?);
