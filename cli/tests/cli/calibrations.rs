@@ -169,7 +169,7 @@ fn points_of_the_original_camera_are_seen_at_their_pixels() {
     let [k, d] =
         ["K1", "D1"].map(|name| numbers(name).iter().map(|v| v.parse().unwrap()).collect::<Vec<f64>>());
     let misses = |name: &str| -> Vec<f64> {
-        let points = outputs::cloud(&at(name));
+        let points = points::cloud(&at(name));
         let pixels = (0..180).flat_map(|y| (0..240).map(move |x| (x, y))).filter(|at| validity[*at] == 0);
         let pixels: Vec<_> = pixels.collect();
         assert_eq!(points.len(), pixels.len());

@@ -14,6 +14,7 @@ mod hostile;
 mod matching;
 mod outputs;
 mod plugin;
+mod points;
 #[path = "../../../testdata/render-cloud.rs"]
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;
