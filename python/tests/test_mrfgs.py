@@ -114,6 +114,25 @@ def raw_pair():
     return read_png(RAW / "left.png"), read_png(RAW / "right.png")
 
 
+def ticks_during(call):
+    """How often another thread gets to run while `call` does."""
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.002)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    start = time.monotonic()
+    call()
+    end = time.monotonic()
+    done.set()
+    thread.join()
+    return sum(start < t < end for t in ticks)
+
+
 class Match(unittest.TestCase):
     def same(self, left, right, *arguments, **keywords):
         expected = by_program(left, right, "--max-disparity", "15", *arguments)
@@ -360,21 +379,7 @@ class Match(unittest.TestCase):
 
     def test_other_threads_run_meanwhile(self):
         images = pair(400, 600)
-        ticks, done = [], threading.Event()
-
-        def tick():
-            while not done.is_set():
-                ticks.append(time.monotonic())
-                time.sleep(0.002)
-
-        thread = threading.Thread(target=tick)
-        thread.start()
-        start = time.monotonic()
-        mrfgs.match(*images, 63, device="cpu")
-        end = time.monotonic()
-        done.set()
-        thread.join()
-        self.assertGreater(sum(start < t < end for t in ticks), 5)
+        self.assertGreater(ticks_during(lambda: mrfgs.match(*images, 63, device="cpu")), 5)
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_match(self):
@@ -1057,21 +1062,8 @@ class Sequences(Folder):
             list(self.matcher.match_all([(right, left)], 15, warn=False))
 
     def test_other_threads_run_meanwhile(self):
-        ticks, done = [], threading.Event()
-
-        def tick():
-            while not done.is_set():
-                ticks.append(time.monotonic())
-                time.sleep(0.002)
-
-        thread = threading.Thread(target=tick)
-        thread.start()
-        start = time.monotonic()
-        list(self.matcher.match_all([pair(400, 600)] * 2, 63))
-        end = time.monotonic()
-        done.set()
-        thread.join()
-        self.assertGreater(sum(start < t < end for t in ticks), 5)
+        views = [pair(400, 600)] * 2
+        self.assertGreater(ticks_during(lambda: list(self.matcher.match_all(views, 63))), 5)
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_ctrl_c_ends_a_sequence(self):

@@ -1,7 +1,6 @@
 //! Groups of flags that several commands share.
 
 pub(crate) mod execution;
-pub(crate) mod format;
 pub(crate) mod method;
 pub(crate) mod reading;
 pub(crate) mod rectification;

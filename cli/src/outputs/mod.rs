@@ -5,5 +5,6 @@ pub(crate) mod claim;
 pub(crate) mod cloud;
 pub(crate) mod files;
 pub(crate) mod film;
+pub(crate) mod maps;
 pub(crate) mod record;
 pub(crate) mod staged;

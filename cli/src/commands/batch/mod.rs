@@ -19,14 +19,14 @@ use mrfgs::options::Method;
 use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::execution::ExecutionArgs;
-use crate::args::format::Format;
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
 use crate::args::sign::Sign;
 use crate::failure::{self, Failure, Result};
-use crate::outputs::also::{self, Also, AlsoArgs, Outcome, View};
+use crate::outputs::also::{self, Outcome, View};
 use crate::outputs::claim::Claim;
 use crate::outputs::files;
+use crate::outputs::maps::{Format, MapArgs};
 use crate::outputs::record::MatchRecord;
 use crate::progress::PairBar;
 use crate::{console, remedy, stop};
@@ -97,29 +97,6 @@ pub(crate) struct Args {
     method: MethodArgs,
     #[command(flatten)]
     pub(crate) execution: ExecutionArgs,
-}
-
-/// The maps to write of each pair.
-#[derive(clap::Args)]
-struct MapArgs {
-    /// Format of the disparity maps, as the extensions of `mrfgs match`
-    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
-    format: Format,
-    #[command(flatten)]
-    also: AlsoArgs,
-}
-
-impl MapArgs {
-    /// The name of the disparity map of a pair.
-    fn map(&self, name: &str) -> String {
-        format!("{name}.{}", self.format.extension())
-    }
-
-    /// The wanted outputs beside it, with their names.
-    fn also(&self, name: &str) -> impl Iterator<Item = (&'static Also, String)> {
-        let map = self.map(name);
-        self.also.wanted().map(move |word| (word, shown(&word.beside(Path::new(&map)))))
-    }
 }
 
 fn shown(path: &Path) -> String {

@@ -13,15 +13,14 @@ use mrfgs::rectification::Rectification;
 use mrfgs::{Error, Matcher};
 
 use crate::args::execution::ExecutionArgs;
-use crate::args::format::Format;
 use crate::args::method::MethodArgs;
 use crate::args::reading::ReadingArgs;
 use crate::args::rectification::RectificationArgs;
 use crate::args::search::{Found, Search};
 use crate::args::sign::Sign;
 use crate::failure::{Failure, Result};
-use crate::outputs::also::AlsoArgs;
 use crate::outputs::files::{self, is_printed};
+use crate::outputs::maps::MapArgs;
 use crate::pairs::{cameras, input, raw};
 use crate::sequences::{Frames, Layout, RawFrames, raw_frames};
 use crate::{console, stop};
@@ -81,11 +80,8 @@ pub(crate) struct Args {
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
-    /// Format of the disparity maps in a folder, as the extensions of `mrfgs match`
-    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
-    format: Format,
     #[command(flatten)]
-    also: AlsoArgs,
+    maps: MapArgs,
     #[command(flatten)]
     reading: ReadingArgs,
     /// Prints nothing but failures
@@ -106,11 +102,11 @@ fn is_film(output: &Path) -> bool {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let film = is_film(&args.output);
     if film {
-        args.also.check_film()?;
+        args.maps.also.check_film()?;
     } else {
-        args.also.check(args.rectify)?;
+        args.maps.also.check(args.rectify)?;
     }
-    let method = args.also.made_by(args.method.method()?)?;
+    let method = args.maps.also.made_by(args.method.method()?)?;
     if args.rectification.alpha.is_some() && !args.rectify {
         let reason = "is of a rectification; add --rectify, or leave --alpha out";
         return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
@@ -123,12 +119,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let (by, calibration) = calibrated(args, &mut first.pair)?;
     let known = calibration.as_ref().map(|calibration| (args.calib[0].as_path(), calibration));
     let range = range(args, &first.pair, known)?;
-    let rig = args.also.take_cameras();
+    let rig = args.maps.also.take_cameras();
     let remedy = "give one with --calib";
     let rig = rig.map(|word| cameras::rig(word, known, &args.left, first.pair.size(), remedy)).transpose()?;
     let rectifying = by.as_ref().map(|by| by.rotations()[0]);
-    let writer =
-        Writer { output: &args.output, format: args.format, also: &args.also, range, rig, rectifying };
+    let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying };
     let matcher = Matcher::builder().method(method).execution(args.execution.execution()).build()?;
     // Before this nothing is written, and a first frame may never come: a signal ends the program there and then.
     stop::listen();

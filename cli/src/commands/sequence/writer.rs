@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mrfgs::Error;
 use mrfgs::calibration::matrix::Matrix;
@@ -11,19 +11,18 @@ use mrfgs::image::{Georeference, Pair, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
-use crate::args::format::Format;
 use crate::args::sign::Sign;
 use crate::failure::Result;
-use crate::outputs::also::{AlsoArgs, Outcome, View};
+use crate::outputs::also::{Outcome, View};
 use crate::outputs::files::{Written, is_printed};
 use crate::outputs::film::Film;
+use crate::outputs::maps::MapArgs;
 use crate::sequences::FrameRate;
 
 /// What is written of every frame.
 pub(super) struct Writer<'a> {
     pub(super) output: &'a Path,
-    pub(super) format: Format,
-    pub(super) also: &'a AlsoArgs,
+    pub(super) wanted: &'a MapArgs,
     pub(super) range: DisparityRange,
     pub(super) rig: Option<Rig>,
     /// The rotation from the frame of the left camera to the rectified one, where frames are rectified.
@@ -67,10 +66,12 @@ impl<'a> Writer<'a> {
         match fs::create_dir(self.output) {
             Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(self.output, e).into()),
             made => {
-                let map = self.map("000000");
+                let name = "000000";
+                let map = self.output.join(self.wanted.map(name));
                 let checked =
                     write::check_disparity_path(&map, self.range.min, self.range.max).and_then(|()| {
-                        self.also.wanted().try_for_each(|word| word.check(&word.beside(&map), self.range))
+                        let mut also = self.wanted.also(name);
+                        also.try_for_each(|(word, file)| word.check(&self.output.join(file), self.range))
                     });
                 if checked.is_err() && made.is_ok() {
                     // It is empty.
@@ -81,37 +82,29 @@ impl<'a> Writer<'a> {
         }
         Ok(Sink { writer: self, film: None })
     }
-
-    /// Whether it takes the pair, too.
-    pub(super) fn takes_pair(&self) -> bool {
-        self.also.show_left()
-    }
-
-    fn map(&self, name: &str) -> PathBuf {
-        self.output.join(format!("{name}.{}", self.format.extension()))
-    }
 }
 
 impl Sink<'_> {
+    /// Whether it takes the pair, too.
     pub(super) fn takes_pair(&self) -> bool {
-        self.writer.takes_pair()
+        self.writer.wanted.also.show_left()
     }
 
     /// Writes a frame.
     pub(super) fn add(&mut self, found: &Found) -> Result<()> {
-        let Writer { also, range, rig, rectifying, .. } = self.writer;
+        let Writer { output, wanted, range, rig, rectifying } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
         let georeferences = found.georeferences.clone();
         let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, rectifying, georeferences };
         if let Some(film) = &mut self.film {
-            return Ok(film.add(&also.film_picture(&outcome))?);
+            return Ok(film.add(&wanted.also.film_picture(&outcome))?);
         }
-        let map = self.writer.map(&found.name);
+        let map = output.join(wanted.map(&found.name));
         let mut written = Written::default();
         written.note(&map, outcome.writer(View::Left).disparity(&map, &maps.final_map()))?;
-        for word in also.wanted() {
-            let path = word.beside(&map);
-            written.note(&path, also.write(word, &path, &outcome))?;
+        for (word, file) in wanted.also(&found.name) {
+            let path = output.join(file);
+            written.note(&path, wanted.also.write(word, &path, &outcome))?;
         }
         written.keep();
         Ok(())
