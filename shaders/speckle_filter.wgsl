@@ -1,4 +1,4 @@
-// Flags the pixels of small regions: `runs`, then `join` and `flatten` alternately, then `count` and `flag`.
+// Flags pixels whose runner-up is as good as the optimum, and those of small regions of the others: `runs`, then `join` and `flatten` alternately, then `count` and `flag`.
 //
 // Regions are found by union-find (after Playne and Hawick 2018). Every pixel of a region points at a smaller
 // position in it, down to the root, which points at itself. First the segments of each row get their runs.
@@ -38,6 +38,11 @@ struct Params {
 // A pixel that is in no region.
 const NOWHERE: u32 = 0xffffffffu;
 
+// Whether nothing tells the best label from the runner-up.
+fn tie(at: u32) -> bool {
+    return optima[at].x >> 16u == optima[at].y;
+}
+
 // Runs of connected pixels within segments of a row. One invocation per segment.
 @compute @workgroup_size(GROUP)
 fn runs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -53,7 +58,7 @@ fn runs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var x = start; x < min(start + SEGMENT, params.level.width); x++) {
         let here = row + x;
         atomicStore(&sizes[here], 0u);
-        if (flags[here] & VALIDITY) != 0u {
+        if (flags[here] & VALIDITY) != 0u || tie(here) {
             run = NOWHERE;
         } else {
             let label = i32(optima[here].x & 0xffffu);
@@ -162,7 +167,7 @@ fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
 }
 
-// Flags the pixels of small regions. One invocation per pixel of the band.
+// Flags ties and the pixels of small regions. One invocation per pixel of the band.
 @compute @workgroup_size(GROUP)
 fn flag(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -171,8 +176,15 @@ fn flag(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let pitch = params.level.pixel_pitch;
     let seen = params.band.first_row + id.y - halo_start(params.halo);
+    let here = id.y * pitch + id.x;
     let at = atomicLoad(&parents[seen * pitch + id.x]);
-    if at != NOWHERE && atomicLoad(&sizes[at]) < params.size {
-        flags[id.y * pitch + id.x] |= SPECKLE;
+    var speckle = false;
+    if at != NOWHERE {
+        speckle = atomicLoad(&sizes[at]) < params.size;
+    } else {
+        speckle = (flags[here] & VALIDITY) == 0u && tie(here);
+    }
+    if speckle {
+        flags[here] |= SPECKLE;
     }
 }

@@ -33,8 +33,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let labels = vec2(optima[a].x, optima[b].x);
     let right_a = right_labels[a];
     let right_b = right_labels[b];
-    optima[a] = vec2(right_b, right_b >> 16u);
-    optima[b] = vec2(right_a, right_a >> 16u);
+    optima[a] = vec2(right_b, NO_RUNNER_UP);
+    optima[b] = vec2(right_a, NO_RUNNER_UP);
     right_labels[a] = labels.y;
     right_labels[b] = labels.x;
 }

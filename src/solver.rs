@@ -218,7 +218,7 @@ fn read_out(plan: &Plan) -> Vec<Stage> {
 #[must_use]
 pub fn post_processing(method: &Method) -> Vec<Stage> {
     let mut stages = vec![Stage::LeftRightCheck];
-    if method.refinement.speckle_size > 1 {
+    if method.refinement.speckle_size > 0 {
         stages.push(Stage::SpeckleFilter);
     }
     stages.push(Stage::Confidence);

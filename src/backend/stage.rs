@@ -115,7 +115,7 @@ macro_rules! for_every_stage {
                 /// left again. Each image takes the place of the other, and with x counted from the other side
                 /// [`Map::Label`](super::Map::Label) and [`Map::Best`](super::Map::Best) those of
                 /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest).
-                /// [`Map::RunnerUp`](super::Map::RunnerUp) becomes the new best, since no runner-up of the right view is known.
+                /// [`Map::RunnerUp`](super::Map::RunnerUp) becomes that of a pixel without one, since none of the right view is known.
                 /// [`Stage::Cost`], [`Stage::SubPixel`] and the stages of maps then work on the right view.
                 SwapViews swap_views;
                 /// [`Map::RightLabel`](super::Map::RightLabel) and [`Map::RightBest`](super::Map::RightBest) become
@@ -133,9 +133,11 @@ macro_rules! for_every_stage {
                 /// [`flag::OUTSIDE`]: crate::maps::flag::OUTSIDE
                 /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
                 LeftRightCheck left_right_check;
-                /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE) on every pixel of each region of fewer than
-                /// [`crate::options::RefinementOptions::speckle_size`] pixels. Regions are of the pixels that [`Stage::LeftRightCheck`] left without a
-                /// flag, 4-connected; labels that differ by at most one connect.
+                /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE), among the pixels that [`Stage::LeftRightCheck`] left without a flag, on
+                /// those whose runner-up has the belief of the best label, and on every pixel of each region of fewer than
+                /// [`crate::options::RefinementOptions::speckle_size`] pixels. Regions are of the others, 4-connected; labels that
+                /// differ by at most one connect. (A tie says that nothing tells the labels apart: where an image is overexposed, say. Its
+                /// label is the lowest by chance of order, in regions that may be large.)
                 SpeckleFilter speckle_filter;
                 /// [`Map::Confidence`](super::Map::Confidence): how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
                 /// 255 where there is no runner-up, 0 for invalid pixels. Sets

@@ -5,6 +5,9 @@ use crate::plan::Plan;
 /// Stands for "no label", in the right view where no left pixel projects.
 pub const NO_LABEL: u16 = u16::MAX;
 
+/// The belief that stands for "no runner-up".
+pub const NO_RUNNER_UP: u16 = u16::MAX;
+
 /// A volume, in the layout \[y\]\[x\]\[slot\]\[label\] (slot only
 /// for dependency messages), unpadded, one value an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -45,7 +48,7 @@ pub enum Map {
     Label,
     /// Its belief, in units.
     Best,
-    /// The smallest belief of the labels more than one away, [`u16::MAX`] if there is none.
+    /// The smallest belief of the labels more than one away, [`NO_RUNNER_UP`] if there is none.
     RunnerUp,
     /// Label index of each pixel of the right view; [`NO_LABEL`] where no left pixel projects.
     RightLabel,

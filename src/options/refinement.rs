@@ -57,7 +57,7 @@ options! {
         /// Compare with the disparities of the right view: a pixel that differs by more than one pixel is occluded.
         left_right_check: LeftRightCheck = LeftRightCheck::RightView, takes one_of(LeftRightCheck::WORDS),
             source "section 2.5: off";
-        /// Regions with fewer pixels than this become invalid; 0 keeps all regions.
+        /// Regions with fewer pixels than this become invalid, and so do pixels at which two labels tie; 0 keeps all of them.
         speckle_size: u32 = 200, takes whole(0..=u32::MAX), unit "pixels", source "open";
         /// Place the disparity between the labels, by the matching cost around the optimum.
         sub_pixel: bool = true, takes Takes::Switch, source "open";

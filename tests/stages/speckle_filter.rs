@@ -6,11 +6,12 @@ use crate::common::random::{self, Random};
 use crate::common::twin::{self, Finest};
 use crate::maps::{on_maps, small_plan};
 use mrfgs::image::Plane;
-use mrfgs::low_level::backend::Stage;
+use mrfgs::low_level::backend::{Map, Stage};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 use mrfgs::options::Method;
+use pollster::block_on;
 
 #[test]
 fn speckle_filter() {
@@ -28,6 +29,29 @@ fn speckle_filter() {
     on_maps(Stage::SpeckleFilter, 40, change, input, |plan, _, maps| {
         twin::speckle_filter::speckle_filter(plan, maps);
     });
+}
+
+/// A tie is flagged in a region of any size, and only there.
+#[test]
+fn ties() {
+    let (width, height) = (70, 33);
+    let mut random = Random::new(4);
+    let pair = random::pair(&mut random, width, height);
+    let plan = small_plan(&mut random, (width, height), |m| m.refinement.speckle_size = 2);
+    let tie = |x: usize, y: usize| x > 20 && (y == 7 || x + y == 64);
+    for lead in [0, 1] {
+        let mut maps = Finest::zero((width, height));
+        maps.best = Plane::filled(width, height, 9);
+        maps.runner_up = Plane::from_fn(width, height, |x, y| if tie(x, y) { 9 + lead } else { 900 });
+        for (name, mut backend) in backends() {
+            backend.prepare(&plan, Prepared::new(&pair)).unwrap();
+            maps.write(backend.as_mut());
+            backend.run(Stage::SpeckleFilter).unwrap();
+            let flags = block_on(backend.map(Map::Validity)).unwrap();
+            let speckle = |x, y| i32::from(lead == 0 && tie(x, y)) * i32::from(flag::SPECKLE);
+            assert_eq!(flags, Plane::from_fn(width, height, speckle), "{name}");
+        }
+    }
 }
 
 /// Which pixels belong to a region.
@@ -56,6 +80,8 @@ fn regions_that_wind() {
             let labels = plan.levels[0].labels as i32;
             let mut maps = Finest::zero((width, height));
             maps.validity = Plane::from_fn(width, height, |x, y| i32::from(!inside(x, y)) * 2);
+            // No ties.
+            maps.runner_up = Plane::from_fn(width, height, |x, y| 1 + (x + y) as i32);
             maps.label = Plane::from_fn(width, height, |x, _| (x as i32 / 50).min(labels - 1));
             let mut expected = maps.clone();
             twin::speckle_filter::speckle_filter(&plan, &mut expected);

@@ -16,11 +16,14 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
     let mut seen = vec![true; labels.len()];
     for y in 0..height {
         let inside = (y + 1) * pitch + 1..(y + 2) * pitch - 1;
-        let pixels = optima.row(y).iter().zip(&flags[y * width..]);
-        for ((label, seen), (optimum, &flags)) in
+        let pixels = optima.row(y).iter().zip(&mut flags[y * width..]);
+        for ((label, seen), (optimum, flags)) in
             labels[inside.clone()].iter_mut().zip(&mut seen[inside]).zip(pixels)
         {
-            (*label, *seen) = (optimum.label, flags != 0);
+            if *flags == 0 && optimum.runner_up == optimum.best {
+                *flags = flag::SPECKLE;
+            }
+            (*label, *seen) = (optimum.label, *flags != 0);
         }
     }
     let mut region = Vec::new();

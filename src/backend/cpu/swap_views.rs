@@ -3,6 +3,7 @@
 use super::finest::{Finest, Optimum};
 use super::units::Units;
 use super::volumes::Volumes;
+use crate::backend::volume::NO_RUNNER_UP;
 use std::mem;
 
 pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
@@ -18,7 +19,7 @@ impl Finest {
         let rows = optima.data_mut().chunks_exact_mut(width).zip(right.data_mut().chunks_exact_mut(width));
         for ((optima, labels), best) in rows.zip(right_best.data_mut().chunks_exact_mut(width)) {
             for ((optimum, label), best) in optima.iter_mut().zip(labels.iter_mut()).zip(best.iter_mut()) {
-                let right = Optimum { label: *label, best: *best, runner_up: *best };
+                let right = Optimum { label: *label, best: *best, runner_up: NO_RUNNER_UP };
                 let left = mem::replace(optimum, right);
                 (*label, *best) = (left.label, left.best);
             }

@@ -4,6 +4,7 @@ use super::finest::Optimum;
 use super::units::{Units, argmin, smallest};
 use super::volumes::{Level, Volumes};
 use super::windows::Windows;
+use crate::backend::volume::NO_RUNNER_UP;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -44,7 +45,7 @@ fn optimum_of<U: Units>(belief: &[U], labels: usize) -> Optimum {
     let below = &belief[..label.saturating_sub(1)];
     let above = belief.get(label + 2..).unwrap_or_default();
     let runner_up = if below.is_empty() && above.is_empty() {
-        u16::MAX
+        NO_RUNNER_UP
     } else {
         smallest(below).min(smallest(above)).into()
     };

@@ -1,4 +1,4 @@
-//! Regions too small to be trusted: see [`Stage::SpeckleFilter`](crate::backend::Stage::SpeckleFilter).
+//! Ties, and regions too small to be trusted: see [`Stage::SpeckleFilter`](crate::backend::Stage::SpeckleFilter).
 //!
 //! Regions are found anew in every band, among its rows and so many around it that a region which leaves them is large enough.
 
@@ -87,7 +87,12 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         }
         let sized = [(3, found(parents, &seen)), (4, found(sizes, &seen))];
         r.dispatch(count, &base, seen.clone(), (l.width, height), &sized)?;
-        let bindings = [(2, b.flags.bind(&rows)), (3, found(parents, &seen)), (4, found(sizes, &seen))];
+        let bindings = [
+            (1, b.optima.bind(&rows)),
+            (2, b.flags.bind(&rows)),
+            (3, found(parents, &seen)),
+            (4, found(sizes, &seen)),
+        ];
         let size = (l.width, rows.end - rows.start);
         r.dispatch(flag, &base, rows, size, &bindings)?;
     }

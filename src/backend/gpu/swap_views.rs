@@ -4,13 +4,15 @@
 
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
+use crate::backend::volume::NO_RUNNER_UP;
 use crate::error::Result;
 use crate::plan::Plan;
 
 const SHADER: &str = include_str!("../../../shaders/swap_views.wgsl");
 
 pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
-    vec![Job::new::<()>(Kernel::new("swap_views", "main", SHADER), 0)]
+    let kernel = Kernel::new("swap_views", "main", SHADER).with("NO_RUNNER_UP", u32::from(NO_RUNNER_UP));
+    vec![Job::new::<()>(kernel, 0)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {

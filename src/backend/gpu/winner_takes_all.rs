@@ -4,6 +4,7 @@
 
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
+use crate::backend::volume::NO_RUNNER_UP;
 use crate::error::Result;
 use crate::plan::Plan;
 
@@ -12,7 +13,7 @@ const SHADER: &str = include_str!("../../../shaders/winner_takes_all.wgsl");
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
     let kernel = Kernel::new("winner_takes_all", "main", SHADER)
         .of_width(plan.volume_width)
-        .with("NO_RUNNER_UP", u32::from(u16::MAX));
+        .with("NO_RUNNER_UP", u32::from(NO_RUNNER_UP));
     vec![Job::new::<()>(kernel, 2 * plan.levels[0].quads())]
 }
 

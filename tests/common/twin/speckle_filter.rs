@@ -3,10 +3,18 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 
-/// Flags small regions. Every pixel starts as its own region; regions that touch take the smaller number,
+/// Flags pixels whose runner-up is as good as the optimum, and small regions of the others. Every pixel starts as its own region; regions that touch take the smaller number,
 /// until nothing changes.
 pub fn speckle_filter(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
+    for y in 0..height {
+        for x in 0..width {
+            let at = (x, y);
+            if maps.validity[at] == 0 && maps.runner_up[at] - maps.best[at] == 0 {
+                maps.validity[at] = i32::from(flag::SPECKLE);
+            }
+        }
+    }
     let mut region = Plane::from_fn(width, height, |x, y| y * width + x);
     let connected = |a: (usize, usize), b: (usize, usize)| {
         maps.validity[a] == 0 && maps.validity[b] == 0 && (maps.label[a] - maps.label[b]).abs() <= 1
