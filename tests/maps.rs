@@ -143,12 +143,12 @@ fn the_stages_run_in_order() {
     assert!(rights > 10, "{rights} maps of the right view");
 }
 
-/// By a second matching, the map of the right view is the map of the mirrored pair, bit for bit.
+/// By a second matching and without the speckle filter, the map of the right view is the map of the mirrored pair, bit for bit.
 #[test]
 fn the_right_map_is_the_map_of_the_mirrored_pair() {
     let mut method = Method::default();
     method.refinement.left_right_check = LeftRightCheck::SecondMatch;
-    // The speckle filter would tell them apart: in the right view no ties are known.
+    // The speckle filter gives up ties, and those of the right view are not known.
     (method.refinement.right_map, method.refinement.speckle_size) = (true, 0);
     method.front = random::as_it_is();
     let mut random = Random::new(12);

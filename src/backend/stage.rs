@@ -136,8 +136,8 @@ macro_rules! for_every_stage {
                 /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE), among the pixels that [`Stage::LeftRightCheck`] left without a flag, on
                 /// those whose runner-up has the belief of the best label, and on every pixel of each region of fewer than
                 /// [`crate::options::RefinementOptions::speckle_size`] pixels. Regions are of the others, 4-connected; labels that
-                /// differ by at most one connect. (A tie says that nothing tells the labels apart: where an image is overexposed, say. Its
-                /// label is the lowest by chance of order, in regions that may be large.)
+                /// differ by at most one connect. (A tie says that nothing tells the labels apart, as where an image is overexposed. The
+                /// best label is then merely the lowest, in regions that may be large.)
                 SpeckleFilter speckle_filter;
                 /// [`Map::Confidence`](super::Map::Confidence): how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
                 /// 255 where there is no runner-up, 0 for invalid pixels. Sets
