@@ -1,4 +1,6 @@
-//! A pair through a backend: in one piece, or tile by tile.
+//! A pair through a backend: in one piece, or tile by tile; and at twice its size too, where the method says so.
+
+mod double_size;
 
 use crate::backend::{Backend, Stage, Ticket, Traffic};
 use crate::error::{Error, Purpose, Result};
@@ -12,7 +14,8 @@ use crate::plan::Plan;
 use crate::solver::{self, Inspector, Run};
 use crate::tiles::Tiles;
 use crate::tiles::mosaic::Mosaic;
-use crate::watch::{Observer, Watch};
+use crate::watch::{Observer, Progress, Watch};
+use std::ops::ControlFlow;
 use std::time::Duration;
 use web_time::Instant;
 
@@ -31,7 +34,7 @@ pub struct Solution {
     pub mosaic_times: Vec<(Stage, Duration)>,
     /// What went through the device.
     pub traffic: Traffic,
-    /// [`Backend::cells`] of each level; those of all tiles together.
+    /// [`Backend::cells`] of each level, at the pair's own size; those of all tiles together.
     pub cells: Vec<u64>,
 }
 
@@ -60,6 +63,67 @@ pub async fn inspect(
     observer: Observer<'_>,
     inspector: Option<Inspector<'_>>,
 ) -> Result<Solution> {
+    let Some(double) = Double::of(plan)? else {
+        return in_one_piece(backend, plan, pair, observer, inspector).await;
+    };
+    let own = in_one_piece(backend, plan, pair, &mut double.first(observer), inspector).await?;
+    double.solve(backend, pair, own, observer).await
+}
+
+/// A match at twice the size of the pair, which follows that at its own size.
+struct Double {
+    tiles: Tiles,
+    /// The share of the work that is done before.
+    before: f64,
+}
+
+impl Double {
+    /// That which the method of `plan` asks for.
+    fn of(plan: &Plan) -> Result<Option<Self>> {
+        let Some(double) = plan.doubled()? else { return Ok(None) };
+        let [own, work] = [plan, &double].map(|plan| matchings(plan) as f64 * solver::work(plan));
+        Ok(Some(Self { tiles: Tiles::new(&double)?, before: own / (own + work) }))
+    }
+
+    /// What observes the match at the own size, where `observer` observes both.
+    fn first<'a>(&self, observer: Observer<'a>) -> impl FnMut(Progress) -> ControlFlow<()> + Send + use<'a> {
+        let before = self.before;
+        move |progress| observer(Progress { done: before * progress.done, ..progress })
+    }
+
+    /// Takes what is found at twice the size into `own`.
+    async fn solve(
+        &self,
+        backend: &mut dyn Backend,
+        pair: &Pair,
+        mut own: Solution,
+        observer: Observer<'_>,
+    ) -> Result<Solution> {
+        let pair = front::doubled(pair, &own.conditioning)?;
+        let then = |done: f64| self.before + (1.0 - self.before) * done;
+        let mut observer = |progress: Progress| observer(Progress { done: then(progress.done), ..progress });
+        let double = if self.tiles.count() == 1 {
+            in_one_piece(backend, self.tiles.whole(), &pair, &mut observer, None).await?
+        } else {
+            in_tiles(backend, &self.tiles, &pair, &mut observer).await?
+        };
+        double_size::take_in(&mut own.maps, &double.maps);
+        own.iterations += double.iterations;
+        own.host_times.extend(double.host_times);
+        own.mosaic_times.extend(double.mosaic_times);
+        own.traffic += double.traffic;
+        Ok(own)
+    }
+}
+
+/// Matches `pair` at its own size, in one piece.
+async fn in_one_piece(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer<'_>,
+    inspector: Option<Inspector<'_>>,
+) -> Result<Solution> {
     let mut run = Run::new(watch(plan, observer), inspector);
     let (pair, conditioning) = front::condition(pair, plan, &mut run.watch)?;
     let (iterations, tickets) = whole(backend, plan, pair, &mut run).await?;
@@ -80,7 +144,8 @@ pub struct Started {
     cells: Vec<u64>,
 }
 
-/// As [`solve`], but does not wait for a device: the next match may be started on it before [`finish`] ends this one.
+/// As [`solve`], at the pair's own size alone, but does not wait for a device: the next match may be started on it before [`finish`]
+/// ends this one.
 ///
 /// # Errors
 /// Those of [`solve`].
@@ -194,6 +259,20 @@ async fn whole(
 /// # Errors
 /// Those of [`solve`].
 pub async fn solve_tiles(
+    backend: &mut dyn Backend,
+    tiles: &Tiles,
+    pair: &Pair,
+    observer: Observer<'_>,
+) -> Result<Solution> {
+    let Some(double) = Double::of(tiles.whole())? else {
+        return in_tiles(backend, tiles, pair, observer).await;
+    };
+    let own = in_tiles(backend, tiles, pair, &mut double.first(observer)).await?;
+    double.solve(backend, pair, own, observer).await
+}
+
+/// Matches `pair` at its own size, tile by tile.
+async fn in_tiles(
     backend: &mut dyn Backend,
     tiles: &Tiles,
     pair: &Pair,

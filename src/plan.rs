@@ -238,6 +238,16 @@ impl Plan {
         })
     }
 
+    /// The plan for the same pair at twice its size, where the method asks for a match there, too.
+    ///
+    /// # Errors
+    /// [`crate::Error::Range`] when so many labels do not fit.
+    pub fn doubled(&self) -> Result<Option<Self>> {
+        let Some(method) = self.method.at_double_size() else { return Ok(None) };
+        let (width, height) = self.size();
+        Self::new(2 * width, 2 * height, self.range.doubled()?, &method).map(Some)
+    }
+
     /// This plan for another image size: same range, method and number of levels.
     pub(crate) fn resized(&self, width: usize, height: usize) -> Self {
         let mut plan = Self { core: 0..width, held: height, ..self.clone() };

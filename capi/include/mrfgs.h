@@ -171,7 +171,7 @@ struct mrfgs_options *mrfgs_options_new(void);
 // Frees options; they may be null.
 void mrfgs_options_free(struct mrfgs_options *options);
 
-// Takes all options of a preset: "default", "fast", "paper" or "fgs".
+// Takes all options of a preset: "default", "accurate", "fast", "paper" or "fgs".
 enum mrfgs_status mrfgs_options_preset(struct mrfgs_options *options, const char *name);
 
 // Sets an option: "fill" or "refinement.fill" to "none", "memory" (in MiB) to "2048". `mrfgs presets` lists all, with their values.

@@ -42,7 +42,7 @@ pub unsafe extern "C" fn mrfgs_options_free(options: *mut Options) {
     }
 }
 
-/// Takes all options of a preset: "default", "fast", "paper" or "fgs".
+/// Takes all options of a preset: "default", "accurate", "fast", "paper" or "fgs".
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_options_preset(options: *mut Options, name: *const c_char) -> Status {
     let set = |options: &mut Options| {

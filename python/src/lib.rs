@@ -221,7 +221,7 @@ impl PyMatcher {
     ///     find the range; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
-    /// preset: "default", "fast", "paper" or "fgs".
+    /// preset: "default", "accurate", "fast", "paper" or "fgs".
     /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
     ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
     /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of
@@ -337,7 +337,7 @@ fn match_(
 /// takes: the unit and the range of its values,
 /// words: the words that it takes, with what each means; empty where it takes no words,
 /// source: the section of the paper that it comes from, or other work; "open" where the paper leaves the choice open,
-/// default, fast, paper, fgs: its value in each preset.
+/// default, accurate, fast, paper, fgs: its value in each preset.
 #[pyfunction]
 fn options(py: Python) -> PyResult<Bound<PyDict>> {
     let groups = PyDict::new(py);

@@ -4,15 +4,14 @@
 //! part of a row apart, one is blurred more than the other, or both are noisy. They are measured on the whole image, and corrected by
 //! filters. A pair without them stays as it is, bit for bit.
 
-mod filter;
 mod noise;
 mod rows;
 mod sharpness;
 
+use super::filter::{moved, smoothed};
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use crate::options::{DisparityRange, FrontOptions};
-use filter::{moved, smoothed};
 use std::fmt;
 
 /// What is corrected in a pair.
@@ -60,7 +59,7 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
 
 impl Conditioning {
     /// The pair without what was found in it.
-    fn apply(&self, pair: &Pair) -> Pair {
+    pub(super) fn apply(&self, pair: &Pair) -> Pair {
         let level =
             if self.offset == 0 { pair.clone() } else { pair.with_right(moved(pair.right(), self.offset)) };
         let [left, right] = self.smoothing;

@@ -3,6 +3,7 @@
 
 pub mod check;
 pub mod conditioning;
+mod filter;
 pub mod illumination;
 pub mod label_range;
 pub mod matches;
@@ -54,6 +55,17 @@ pub fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, C
     }
     memory::check(3 * plan.conditioning_bytes(), Purpose::Match)?;
     watch.host("conditioning", || Ok(conditioning::condition(pair, plan.range, &plan.method.front)))
+}
+
+/// `pair` as it is matched, after `conditioning`, at twice its size: a disparity there is twice what it is here.
+///
+/// # Errors
+/// [`Error::Memory`] when the machine cannot hold it.
+pub fn doubled(pair: &Pair, conditioning: &Conditioning) -> Result<Pair> {
+    let (width, height) = pair.size();
+    // A pixel of the conditioned pair, of the pair at twice its size, and what the filters of one view work on.
+    memory::check((18 + 2 * 36 + 84) * (width * height) as u64, Purpose::Match)?;
+    Ok(conditioning.apply(pair).map(filter::doubled))
 }
 
 /// Prepares a match of `pair` by `plan`.

@@ -250,6 +250,12 @@ impl Image {
         self.pixels.map(|&[r, g, b, _]| [r, g, b].map(|v| (v >> 8) as u8))
     }
 
+    /// Whether all colours are whole 8-bit levels.
+    #[must_use]
+    pub(crate) fn holds_bytes(&self) -> bool {
+        self.pixels.data().iter().all(|pixel| pixel[..3].iter().all(|v| v % 256 == 0))
+    }
+
     /// The image with left and right exchanged.
     #[must_use]
     pub fn mirrored(&self) -> Self {

@@ -22,7 +22,7 @@ pub struct Matched {
     pub iterations: u32,
     /// What was corrected in the pair before it was matched.
     pub conditioning: Conditioning,
-    /// The plan that was followed, for the whole image.
+    /// The plan that was followed, for the whole image; [`Plan::doubled`] says by which it was matched at twice its size.
     pub plan: Plan,
     /// How the image was cut for it: one tile where it was not.
     pub tiles: Tiles,

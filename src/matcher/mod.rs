@@ -202,7 +202,7 @@ impl Matcher {
 
     /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks. While a
     /// device is at one pair, the next one's graphs are built and go up, and the maps of the one before come down. (Not when
-    /// the stages are timed, nor where a pair is cut into tiles.)
+    /// the stages are timed, nor where a pair is cut into tiles or matched at twice its size.)
     ///
     /// # Errors
     /// Those of [`Job::run`]; the results of all pairs before have been handed out then.
@@ -287,7 +287,7 @@ impl Matcher {
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
-        if tiles.count() > 1 {
+        if tiles.count() > 1 || method.refinement.double_size {
             return Ok(None);
         }
         let started = async || {

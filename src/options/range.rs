@@ -53,6 +53,23 @@ impl DisparityRange {
         }
     }
 
+    /// The range that the same surfaces have in a pair of twice the size.
+    ///
+    /// # Errors
+    /// [`Error::Range`] when it is beyond [`MAX_LABELS`] or [`MAX_DISPARITY`], with what may be doubled.
+    pub fn doubled(self) -> Result<Self> {
+        let Self { min, max } = self;
+        Self::new(2 * min, 2 * max).map_err(|error| match error {
+            Error::Range(RangeError::TooManyLabels { .. }) => {
+                RangeError::TooManyLabels { min, max, limit: MAX_LABELS / 2 }.into()
+            }
+            Error::Range(RangeError::TooFar { disparity, .. }) => {
+                RangeError::TooFar { disparity: disparity / 2, limit: MAX_DISPARITY / 2 }.into()
+            }
+            error => error,
+        })
+    }
+
     /// Number of labels.
     #[must_use]
     pub fn labels(self) -> usize {

@@ -162,7 +162,7 @@ impl Rectification {
             )));
         }
         let images = [pair.left(), pair.right()];
-        let bytes = sampling::hold_bytes(images);
+        let bytes = images.iter().all(|image| image.holds_bytes());
         let view = |view: usize| match &self.places {
             Some(places) => {
                 sampling::resample(images[view], rectified, bytes, |x, y| places[view][y * rectified.0 + x])

@@ -44,11 +44,6 @@ pub(super) fn resample(
     Ok(Image { pixels: Plane::new(width, height, pixels), masked: Plane::new(width, height, masked) })
 }
 
-/// Whether both images hold 8-bit levels.
-pub(super) fn hold_bytes(images: [&Image; 2]) -> bool {
-    images.iter().all(|image| image.pixels.data().iter().all(|pixel| pixel[..3].iter().all(|v| v % 256 == 0)))
-}
-
 fn pixel(value: [i64; 3], bytes: bool) -> Pixel {
     let [r, g, b] = value.map(|v| {
         let half = 1 << (2 * BITS - 1);
@@ -193,8 +188,8 @@ mod tests {
     fn bytes_stay_bytes() {
         let image = noise(16, 16);
         let image = Image { pixels: image.pixels.map(|p| p.map(|v| v & 0xff00)), ..image };
-        assert!(hold_bytes([&image, &image]) && !hold_bytes([&image, &noise(4, 4)]));
+        assert!(image.holds_bytes() && !noise(4, 4).holds_bytes());
         let moved = resample(&image, (16, 16), true, |x, y| place([x as f64 + 0.3, y as f64 + 0.3])).unwrap();
-        assert!(hold_bytes([&moved, &moved]));
+        assert!(moved.holds_bytes());
     }
 }

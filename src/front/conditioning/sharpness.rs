@@ -1,6 +1,6 @@
 //! Views of different sharpness: one camera is out of focus, or its lens is worse.
 
-use super::filter::{smooth, smoothed};
+use crate::front::filter::{smooth, smoothed};
 use crate::image::{Image, Pair};
 
 /// The standard deviations by which a view may be smoothed, in pixels.

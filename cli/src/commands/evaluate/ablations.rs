@@ -137,6 +137,7 @@ const ROWS: &[Row] = &[
     ("no planes", &[("plane", "false")]),
     ("no median", &[("median", "off")]),
     ("median on filled only", &[("median", "filled")]),
+    ("at twice the size, too", &[("double-size", "true")]),
 ];
 
 /// Another reading of the paper, or another choice where it leaves one open. `docs/paper.md` tells what the text says.

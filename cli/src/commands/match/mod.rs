@@ -8,7 +8,6 @@ use mrfgs::Matcher;
 use mrfgs::check;
 use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::tiles::Tiles;
 
 use crate::args::execution::ExecutionArgs;
 use crate::args::method::MethodArgs;
@@ -123,7 +122,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let plan = Plan::new(input.pair.size().0, input.pair.size().1, range, &method)?;
     if args.dry_run {
-        return Ok(console::print(&plan::describe(&Tiles::new(&plan)?))?);
+        return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let mut matcher = Matcher::builder().execution(execution).build()?;
     let (matched, time) = matching::run(&mut matcher, &input.pair, range, &method, None, args.quiet, None)?;

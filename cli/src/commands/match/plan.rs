@@ -6,11 +6,18 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::tiles::Tiles;
 use mrfgs::options::Order;
 
+use crate::failure::Result;
 use crate::table::Table;
 use crate::text::{bytes, plural};
 
-/// The plan in words and tables.
-pub(super) fn describe(tiles: &Tiles) -> String {
+/// The plan in words and tables, with that for twice the size, if there is one.
+pub(super) fn describe(plan: &Plan) -> Result<String> {
+    let own = at_one_size(&Tiles::new(plan)?);
+    let Some(double) = plan.doubled()? else { return Ok(own) };
+    Ok(format!("{own}\nThen at twice the size:\n\n{}", at_one_size(&Tiles::new(&double)?)))
+}
+
+fn at_one_size(tiles: &Tiles) -> String {
     let mut out = String::new();
     let plan = &tiles.largest();
     let ((width, height), range) = (tiles.whole().size(), plan.range);

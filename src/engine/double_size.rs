@@ -1,0 +1,64 @@
+//! A pair matched at its own size and at twice its size, and the maps of both made one.
+//!
+//! The errors of the two maps within a pixel are hardly related, so their mean is nearer to the truth than either. Where they are further
+//! apart than that, the larger pair is wrong more often: its windows see less of the scene. But it finds matches in thin things, for which
+//! a pair of its own size has too few pixels.
+
+use crate::image::Plane;
+use crate::maps::{FRACTION, Maps, flag, has_disparity};
+use std::array::from_fn;
+
+/// Makes `maps` those of both sizes; `double` are the maps at twice the size.
+///
+/// With the disparities of the four pixels that a pixel becomes, each halved, m is the mean of the second and the third smallest. The
+/// pixel has, rounded to the nearest unit, a half up:
+///
+/// - where it is given up, and all four are measured: m, and the least confidence and all bits of the four;
+/// - else, where it has a disparity d and all four have one, and |d - m| is at most a pixel: (d + m) / 2;
+/// - else what it has.
+///
+/// The right view's map is made in the same way.
+pub(super) fn take_in(maps: &mut Maps, double: &Maps) {
+    let taken = join(&mut maps.disparity, &mut maps.validity, &double.disparity, &double.validity);
+    for at in taken {
+        maps.confidence[at] = four(at).map(|at| double.confidence[at]).into_iter().fold(u8::MAX, u8::min);
+    }
+    if let (Some(right), Some(double)) = (&mut maps.right, &double.right) {
+        join(&mut right.disparity, &mut right.validity, &double.disparity, &double.validity);
+    }
+}
+
+/// The same for one view; returns the pixels that are measured at twice the size alone.
+fn join(
+    disparity: &mut Plane<i32>,
+    validity: &mut Plane<u8>,
+    double_disparity: &Plane<i32>,
+    double_validity: &Plane<u8>,
+) -> Vec<(usize, usize)> {
+    let (width, height) = disparity.size();
+    let mut taken = Vec::new();
+    for at in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let mut values = four(at).map(|at| double_disparity[at]);
+        values.sort_unstable();
+        // Four times m.
+        let (own, there) = (disparity[at], values[1] + values[2]);
+        let bits = four(at).map(|at| double_validity[at]);
+        let measured = |bits: u8| bits & flag::INVALID == 0;
+        if !measured(validity[at]) && bits.into_iter().all(measured) {
+            disparity[at] = (there + 2) >> 2;
+            validity[at] = bits.into_iter().fold(0, |all, bits| all | bits);
+            taken.push(at);
+        } else if has_disparity(validity[at])
+            && bits.into_iter().all(has_disparity)
+            && (there - 4 * own).abs() <= 4 * FRACTION
+        {
+            disparity[at] = (4 * own + there + 4) >> 3;
+        }
+    }
+    taken
+}
+
+/// What a pixel becomes at twice the size.
+fn four((x, y): (usize, usize)) -> [(usize, usize); 4] {
+    from_fn(|i| (2 * x + i % 2, 2 * y + i / 2))
+}
