@@ -49,6 +49,12 @@ fn differences(a: &Solution, b: &Solution) -> Vec<&'static str> {
     all
 }
 
+/// Presets whose matches are at the pair's own size alone. At twice the size a match needs more of a device.
+fn presets_at_one_size() -> impl Iterator<Item = &'static str> {
+    let all = PRESETS.iter().map(|(name, _)| *name);
+    all.filter(|name| !Method::preset(name).unwrap().refinement.double_size)
+}
+
 /// The part of an image in these columns and rows.
 fn cut(image: &Image, width: usize, height: usize) -> Image {
     Image {
@@ -104,7 +110,7 @@ fn small_devices() {
     let (pair, range) = load(Path::new("testdata/mixed"));
     let binding = |bytes| FaultInjection { max_binding: Some(bytes), ..FaultInjection::default() };
     let buffer = |bytes| FaultInjection { max_buffer: Some(bytes), ..FaultInjection::default() };
-    for &(preset, _) in PRESETS {
+    for preset in presets_at_one_size() {
         let method = Method::preset(preset).unwrap();
         let expected = matched(&mut Cpu::default(), &pair, range, &method);
         let handicaps = [
@@ -143,7 +149,7 @@ fn small_devices() {
 /// All buffers are filled with garbage first: everything that is read was written before.
 #[test]
 fn poisoned_buffers() {
-    for (preset, _) in PRESETS {
+    for preset in presets_at_one_size() {
         let mut method = Method::preset(preset).unwrap();
         method.schedule.tolerance = 0.5;
         let (pair, range) = load(Path::new("testdata/thin"));
@@ -241,7 +247,7 @@ fn the_largest_label_counts() {
     let (pair, _) = load(Path::new("testdata/slanted"));
     let small = Pair::new(cut(pair.left(), 9, 5), cut(pair.right(), 9, 5)).unwrap();
     let mut served = 0;
-    for (preset, _) in PRESETS {
+    for preset in presets_at_one_size() {
         let method = Method::preset(preset).unwrap();
         for labels in [4_000, 5_900, 9_000, 16_384] {
             let range = DisparityRange::new(-labels / 2, labels - labels / 2 - 1).unwrap();

@@ -179,7 +179,8 @@ fn difference(a: &Maps, b: &Maps) -> f64 {
 fn every_backend_leaves_the_same_maps() {
     let Some(mut gpu) = devices::gpu() else { return };
     let (pair, range) = load(Path::new("testdata/thin"));
-    for (preset, _) in PRESETS {
+    // At twice the size there are other tiles; `double_size.rs` has a test of these.
+    for (preset, _) in PRESETS.iter().filter(|(name, _)| *name != "accurate") {
         let method = Method::preset(preset).unwrap();
         let whole = plan(pair.size(), range, &method, 4096);
         let plan = plan(pair.size(), range, &method, (streamed(&whole).bytes() >> 20) as u32 * 3 / 4);

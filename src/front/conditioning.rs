@@ -1,9 +1,10 @@
 //! Conditioning of a pair: what rigs, lenses and noise made unlike in the two views is made alike before they are matched.
 //!
 //! Three faults are common in pairs that count as rectified, and each costs more than any part of a matcher gains: the views are a
-//! part of a row apart, one is blurred more than the other, or both are noisy. They are measured on the whole image, and corrected by
+//! part of a row apart, one is blurred more than the other, or both are noisy or strongly compressed. They are measured on the whole image, and corrected by
 //! filters. A pair without them stays as it is, bit for bit.
 
+mod compression;
 mod noise;
 mod rows;
 mod sharpness;
@@ -49,7 +50,11 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
         }
     }
     let level = found.apply(pair);
-    let sigma = if options.denoise { noise::smoothing(&level, &matches) } else { 0.0 };
+    let sigma = if options.denoise {
+        f64::max(noise::smoothing(&level, &matches), compression::smoothing(pair))
+    } else {
+        0.0
+    };
     if sigma == 0.0 {
         return (level, found);
     }

@@ -36,7 +36,8 @@ options! {
         level_rows: bool = true, takes Takes::Switch, source "not in the paper";
         /// Smooths the sharper view until both are equally sharp, where one has markedly less detail.
         equal_sharpness: bool = true, takes Takes::Switch, source "not in the paper";
-        /// Smooths both views where they share little of their finest detail, as noise and compression cause it.
+        /// Smooths both views where they share little of their finest detail, as noise causes it, and where JPEG has left steps between
+        /// its blocks of 8 x 8 pixels.
         denoise: bool = true, takes Takes::Switch, source "not in the paper";
         /// Number of clusters into which K-means sorts the Gabor responses of the reference image, for texture zones. Used
         /// where zone-sigmas is above 0.

@@ -1,0 +1,123 @@
+//! Compression: JPEG cuts an image into blocks of 8 x 8 pixels, and the lower the quality, the higher the steps between them.
+
+use crate::image::{Image, Pair};
+use rayon::prelude::*;
+use std::array::from_fn;
+
+/// By how much both views are smoothed (a standard deviation in pixels), where the steps between blocks are at least this many times as
+/// high as elsewhere (open). Of 49 real pairs none reaches 1.05, of the rendered scenes none 1.13. Of eight pairs, qualities of 75, 50, 20
+/// and 5 give 1.12 to 1.31, 1.27 to 1.53, 1.55 to 2.1 and 2.4 to 4.6; with each of these, the standard deviation stated here is the best
+/// or next to it.
+const SMOOTHING: [(f64, f64); 4] = [(2.3, 1.6), (1.55, 1.0), (1.25, 0.7), (1.15, 0.5)];
+/// Side of a block, in pixels.
+const BLOCK: usize = 8;
+/// Steps count up to this many 8-bit levels, so that contours of the scene do not decide.
+const MOST: u16 = 20;
+
+/// The standard deviation of the Gaussian by which both views are to be smoothed; 0 where at least one of them shows no blocks.
+pub(super) fn smoothing(pair: &Pair) -> f64 {
+    let steps = f64::min(steps(pair.left()), steps(pair.right()));
+    SMOOTHING.iter().find(|(least, _)| steps >= *least).map_or(0.0, |(_, sigma)| *sigma)
+}
+
+/// The mean step of grey between blocks, relative to that between other pixels; 1 where there is none. Blocks may begin anywhere, since an
+/// image may be a part of another.
+fn steps(image: &Image) -> f64 {
+    let (width, height) = image.pixels.size();
+    let rows: Vec<[Steps; 2]> = (0..height)
+        .into_par_iter()
+        .map(|y| {
+            let (mut across, mut down) = (Steps::default(), Steps::default());
+            let (row, masked) = (image.pixels.row(y), image.masked.row(y));
+            for x in 1..width {
+                if !masked[x - 1] && !masked[x] {
+                    across.add(x, row[x - 1][3].abs_diff(row[x][3]));
+                }
+            }
+            if y > 0 {
+                let (above, masked_above) = (image.pixels.row(y - 1), image.masked.row(y - 1));
+                for x in 0..width {
+                    if !masked_above[x] && !masked[x] {
+                        down.add(y, above[x][3].abs_diff(row[x][3]));
+                    }
+                }
+            }
+            [across, down]
+        })
+        .collect();
+    let [across, down] = [0, 1].map(|way| rows.iter().fold(Steps::default(), |all, row| all.and(&row[way])));
+    let [(between, within), (also_between, also_within)] = [across, down].map(|steps| steps.means());
+    let (between, within) = (between + also_between, within + also_within);
+    if within > 0.0 { between / within } else { 1.0 }
+}
+
+/// Sums of steps and their number, by the place of the second pixel in a block.
+#[derive(Clone, Copy, Default)]
+struct Steps {
+    sums: [u64; BLOCK],
+    counts: [u64; BLOCK],
+}
+
+impl Steps {
+    fn add(&mut self, place: usize, step: u16) {
+        self.sums[place % BLOCK] += u64::from(step.min(MOST << 8));
+        self.counts[place % BLOCK] += 1;
+    }
+
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            sums: from_fn(|i| self.sums[i] + other.sums[i]),
+            counts: from_fn(|i| self.counts[i] + other.counts[i]),
+        }
+    }
+
+    /// The largest mean of any place, and the mean of those of all other places.
+    fn means(&self) -> (f64, f64) {
+        let means: [f64; BLOCK] = from_fn(|i| self.sums[i] as f64 / self.counts[i].max(1) as f64);
+        let most = means.into_iter().fold(0.0, f64::max);
+        (most, (means.iter().sum::<f64>() - most) / (BLOCK - 1) as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Plane;
+
+    /// A slope in blocks of this side that begin at this place, each of one grey.
+    fn blocks(side: usize, begin: usize) -> Image {
+        let grey =
+            |x: usize, y: usize| (64 * ((x + side - begin) / side + (y + side - begin) / side) % 256) as u8;
+        Image::from_rgb8(&Plane::from_fn(64, 48, |x, y| {
+            let noise = (x as u32 * 73 + y as u32 * 179 + 1).wrapping_mul(0x9e37_79b9) >> 30;
+            [grey(x, y) / 2 + noise as u8; 3]
+        }))
+    }
+
+    #[test]
+    fn blocks_of_eight_pixels_are_found_wherever_they_begin() {
+        for begin in [0, 3] {
+            let found = steps(&blocks(8, begin));
+            assert!(found > 4.0, "{found}");
+        }
+        // Controls: blocks of another size, and none.
+        for side in [7, 9, 1] {
+            let found = steps(&blocks(side, 0));
+            assert!(found < 2.5, "{found} in blocks of {side}");
+        }
+        assert_eq!(steps(&Image::from_rgb8(&Plane::filled(3, 2, [7; 3]))).to_bits(), 1.0_f64.to_bits());
+    }
+
+    #[test]
+    fn masked_pixels_do_not_count() {
+        let mut image = blocks(1, 0);
+        let before = steps(&image);
+        for x in (0..64).step_by(8) {
+            for y in 0..48 {
+                image.pixels[(x, y)] = [0xffff; 4];
+                image.masked[(x, y)] = true;
+            }
+        }
+        assert!((steps(&image) - before).abs() < 0.5);
+    }
+}
