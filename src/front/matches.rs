@@ -153,16 +153,24 @@ impl View {
     fn new(image: &Image) -> Self {
         let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
         let (width, height) = grey.size();
+        let any_masked = image.masked.data().contains(&true);
         // One allocation each: rows of a large image that are freed one by one may stay with the process.
         let (mut sums, mut norms) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0.0));
         let rows = sums.data_mut().par_chunks_mut(width).zip(norms.data_mut().par_chunks_mut(width));
         rows.enumerate().for_each(|(y, (sums, norms))| {
             let sum = sums_of(&grey, y, |&v| i32::from(v));
             let squares = sums_of(&grey, y, |&v| i32::from(v).pow(2));
-            let masked = sums_of(&image.masked, y, |&v| i32::from(v));
-            for (x, norm) in norms.iter_mut().enumerate() {
-                let variance = WINDOW_PIXELS * squares[x] as i64 - (sum[x] as i64).pow(2);
-                *norm = if masked[x] == 0 { (variance as f64).sqrt() } else { 0.0 };
+            for (norm, (sum, squares)) in norms.iter_mut().zip(sum.iter().zip(&squares)) {
+                let variance = WINDOW_PIXELS * i64::from(*squares) - i64::from(*sum).pow(2);
+                *norm = (variance as f64).sqrt();
+            }
+            if any_masked {
+                let masked = sums_of(&image.masked, y, |&v| i32::from(v));
+                norms
+                    .iter_mut()
+                    .zip(masked)
+                    .filter(|(_, masked)| *masked > 0)
+                    .for_each(|(norm, _)| *norm = 0.0);
             }
             sums.copy_from_slice(&sum);
         });
@@ -315,14 +323,24 @@ fn peak(
     let scores: Vec<Vec<f64>> =
         (top..=bottom).map(|v| correlation(of, (x, y), within, v, first..=last)).collect();
 
-    let places = || (0..scores.len()).flat_map(|v| (0..scores[v].len()).map(move |u| (u, v)));
     // Of equal scores the last one; the runner-up test then rejects it.
-    let (u, v) = places().max_by(|a, b| scores[a.1][a.0].total_cmp(&scores[b.1][b.0]))?;
-    let score = scores[v][u];
-    let runner_up = places()
-        .filter(|p| p.0.abs_diff(u) > PEAK_REACH || p.1.abs_diff(v) > PEAK_REACH)
-        .map(|p| scores[p.1][p.0])
-        .fold(-1.0, f64::max);
+    let (mut score, mut at) = (f64::NEG_INFINITY, None);
+    for (v, row) in scores.iter().enumerate() {
+        let most = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if most >= score {
+            (score, at) = (most, row.iter().rposition(|other| *other >= most).map(|u| (u, v)));
+        }
+    }
+    let (u, v) = at?;
+    let mut runner_up = -1.0;
+    for (row, scores) in scores.iter().enumerate() {
+        let [before, after] = if row.abs_diff(v) > PEAK_REACH {
+            [scores.len(), scores.len()]
+        } else {
+            [u.saturating_sub(PEAK_REACH), (u + PEAK_REACH + 1).min(scores.len())]
+        };
+        runner_up = scores[..before].iter().chain(&scores[after..]).copied().fold(runner_up, f64::max);
+    }
     let sure = score >= MIN_SCORE && 1.0 - score <= RATIO * (1.0 - runner_up);
     let is_peak = u > 0 && u + 1 < scores[v].len();
     if !sure || !is_peak || !columns.contains(&((first + u) as i32)) {
@@ -348,13 +366,29 @@ fn correlation(
     let lines = from_fn(|row| &within.grey.row(v + row - RADIUS)[first - RADIUS..]);
     let mut products = vec![0; count];
     products_along(&template, &lines, &mut products);
-    let (sum, norm) = (of.sum[(x, y)] as i64, of.norm[(x, y)]);
-    (0..count)
-        .map(|i| {
-            let (there, norms) = (within.sum[(first + i, v)] as i64, norm * within.norm[(first + i, v)]);
-            if norms > 0.0 { (WINDOW_PIXELS * products[i] as i64 - sum * there) as f64 / norms } else { 0.0 }
-        })
-        .collect()
+    let mut scores = vec![0.0; count];
+    let there = (&within.sum.row(v)[first..first + count], &within.norm.row(v)[first..first + count]);
+    scores_along(&products, (of.sum[(x, y)], of.norm[(x, y)]), there, &mut scores);
+    scores
+}
+
+/// The scores of windows with these products, by the sum and the norm of the one and of each of the others. All but the last division is
+/// exact, since nothing reaches 2^53.
+#[pulp::with_simd(scores_along = pulp::Arch::new())]
+#[inline(always)]
+fn scores_along_on<'a, S: pulp::Simd>(
+    _: S,
+    products: &'a [i32],
+    (sum, norm): (i32, f64),
+    (sums, norms): (&'a [i32], &'a [f64]),
+    out: &'a mut [f64],
+) {
+    let there = sums.iter().zip(norms);
+    for (out, (product, (there, of_there))) in out.iter_mut().zip(products.iter().zip(there)) {
+        let norms = norm * of_there;
+        let covariance = WINDOW_PIXELS as f64 * f64::from(*product) - f64::from(sum) * f64::from(*there);
+        *out = if norms > 0.0 { covariance / norms } else { 0.0 };
+    }
 }
 
 /// The sum of the products of `template` with the window that begins at each position of `lines`.

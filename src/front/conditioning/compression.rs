@@ -24,26 +24,30 @@ pub(super) fn smoothing(pair: &Pair) -> f64 {
 /// image may be a part of another.
 fn steps(image: &Image) -> f64 {
     let (width, height) = image.pixels.size();
+    let any_masked = image.masked.data().contains(&true);
+    let masked = |y: usize| any_masked.then(|| image.masked.row(y));
     let rows: Vec<[Steps; 2]> = (0..height)
         .into_par_iter()
-        .map(|y| {
-            let (mut across, mut down) = (Steps::default(), Steps::default());
-            let (row, masked) = (image.pixels.row(y), image.masked.row(y));
-            for x in 1..width {
-                if !masked[x - 1] && !masked[x] {
-                    across.add(x, row[x - 1][3].abs_diff(row[x][3]));
+        .map_init(
+            || [vec![0; width], vec![0; width]],
+            |[grey, above], y| {
+                let read = |y: usize, grey: &mut [u16]| {
+                    grey.iter_mut().zip(image.pixels.row(y)).for_each(|(grey, pixel)| *grey = pixel[3]);
+                };
+                read(y, grey);
+                let (mut across, mut down) = (Steps::default(), Steps::default());
+                across.add_row(
+                    &grey[1..],
+                    &grey[..width - 1],
+                    masked(y).map(|masked| [&masked[1..], masked]),
+                );
+                if y > 0 {
+                    read(y - 1, above);
+                    down.add_row(grey, above, masked(y).zip(masked(y - 1)).map(<[_; 2]>::from));
                 }
-            }
-            if y > 0 {
-                let (above, masked_above) = (image.pixels.row(y - 1), image.masked.row(y - 1));
-                for x in 0..width {
-                    if !masked_above[x] && !masked[x] {
-                        down.add(y, above[x][3].abs_diff(row[x][3]));
-                    }
-                }
-            }
-            [across, down]
-        })
+                [across, down.all_at(y)]
+            },
+        )
         .collect();
     let [across, down] = [0, 1].map(|way| rows.iter().fold(Steps::default(), |all, row| all.and(&row[way])));
     let [(between, within), (also_between, also_within)] = [across, down].map(|steps| steps.means());
@@ -51,7 +55,7 @@ fn steps(image: &Image) -> f64 {
     if within > 0.0 { between / within } else { 1.0 }
 }
 
-/// Sums of steps and their number, by the place of the second pixel in a block.
+/// Sums of steps and their number, by place in a block.
 #[derive(Clone, Copy, Default)]
 struct Steps {
     sums: [u64; BLOCK],
@@ -59,9 +63,42 @@ struct Steps {
 }
 
 impl Steps {
-    fn add(&mut self, place: usize, step: u16) {
-        self.sums[place % BLOCK] += u64::from(step.min(MOST << 8));
-        self.counts[place % BLOCK] += 1;
+    /// Adds the steps between `others` and `row`, but those of masked pixels.
+    fn add_row(&mut self, row: &[u16], others: &[u16], masked: Option<[&[bool]; 2]>) {
+        if let Some([masked, others_masked]) = masked {
+            let pixels = row.iter().zip(others).zip(masked.iter().zip(others_masked)).enumerate();
+            for (i, ((a, b), _)) in pixels.filter(|(_, (_, (a, b)))| !**a && !**b) {
+                self.sums[i % BLOCK] += u64::from(step(*a, *b));
+                self.counts[i % BLOCK] += 1;
+            }
+            return;
+        }
+        // So many steps fit in 32 bits.
+        for (row, others) in row.chunks(BLOCK << 16).zip(others.chunks(BLOCK << 16)) {
+            let mut sums = [0_u32; BLOCK];
+            let ((row, rest), (others, others_rest)) =
+                (row.as_chunks::<BLOCK>(), others.as_chunks::<BLOCK>());
+            for (row, others) in row.iter().zip(others) {
+                for (sum, (a, b)) in sums.iter_mut().zip(row.iter().zip(others)) {
+                    *sum += u32::from(step(*a, *b));
+                }
+            }
+            for (sum, (a, b)) in sums.iter_mut().zip(rest.iter().zip(others_rest)) {
+                *sum += u32::from(step(*a, *b));
+            }
+            for (i, sum) in sums.into_iter().enumerate() {
+                self.sums[i] += u64::from(sum);
+                self.counts[i] += (row.len() + usize::from(i < rest.len())) as u64;
+            }
+        }
+    }
+
+    /// The same steps, all at `place`.
+    fn all_at(&self, place: usize) -> Self {
+        let mut all = Self::default();
+        (all.sums[place % BLOCK], all.counts[place % BLOCK]) =
+            (self.sums.iter().sum(), self.counts.iter().sum());
+        all
     }
 
     fn and(&self, other: &Self) -> Self {
@@ -77,6 +114,11 @@ impl Steps {
         let most = means.into_iter().fold(0.0, f64::max);
         (most, (means.iter().sum::<f64>() - most) / (BLOCK - 1) as f64)
     }
+}
+
+/// The step between two values of grey, in 1/256 of a level.
+fn step(a: u16, b: u16) -> u16 {
+    a.abs_diff(b).min(MOST << 8)
 }
 
 #[cfg(test)]
