@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mrfgs::image::{Image, Pair};
+use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::low_level::front::conditioning::condition;
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
@@ -44,6 +44,35 @@ fn each_fault_is_found_in_its_scene() {
     let grain = found(&scene("grain").unwrap());
     assert_eq!(grain.offset, 0, "{grain:?}");
     assert!(grain.to_string().starts_with("both views are smoothed by"), "{grain}");
+}
+
+/// The view as JPEG of this quality keeps it.
+fn compressed(view: &Image, quality: u8) -> Image {
+    let (width, height) = view.pixels.size();
+    let colours: Vec<u8> = view.to_rgb8().data().iter().flatten().copied().collect();
+    let mut file = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, quality)
+        .encode(&colours, width as u32, height as u32, image::ExtendedColorType::Rgb8)
+        .unwrap();
+    let seen = image::load_from_memory(&file).unwrap().to_rgb8();
+    Image::from_rgb8(&Plane::from_fn(width, height, |x, y| seen.get_pixel(x as u32, y as u32).0))
+}
+
+/// The lower the quality of JPEG, the more is smoothed, wherever the image is cut.
+#[test]
+fn blocks_of_jpeg_are_smoothed() {
+    let pair = scene("mixed").unwrap();
+    let with = |quality: u8| Pair::new(compressed(pair.left(), quality), compressed(pair.right(), quality));
+    let smoothing = |pair: &Pair| {
+        let [left, right] = found(pair).smoothing;
+        assert_eq!(left.to_bits(), right.to_bits());
+        left
+    };
+    let found = [95, 50, 20, 5].map(|quality| smoothing(&with(quality).unwrap()));
+    println!("{found:?}");
+    assert!(found.is_sorted() && found[0] < 0.1 && found[1] > 0.4 && found[3] > 1.5, "{found:?}");
+    let cut = with(5).unwrap().crop(&Rect { x: 3..300, y: 5..230 });
+    assert!(smoothing(&cut) > 1.5);
 }
 
 /// With the views exchanged, the same faults have the other sign and the other side.
