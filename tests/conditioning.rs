@@ -119,9 +119,8 @@ fn the_paper_corrects_no_rig() {
 
 #[test]
 fn any_image_has_an_answer() {
-    let crop = |width: usize, height: usize| {
-        scene("grain").unwrap().crop(&mrfgs::image::Rect { x: 0..width, y: 0..height })
-    };
+    let crop =
+        |width: usize, height: usize| scene("grain").unwrap().crop(&Rect { x: 0..width, y: 0..height });
     for (width, height) in [(1, 1), (2, 1), (1, 40), (17, 9), (40, 3), (31, 33)] {
         let pair = crop(width, height);
         assert_eq!(condition(&pair, RANGE, &Method::default().front).0.size(), (width, height));

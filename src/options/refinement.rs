@@ -76,7 +76,7 @@ options! {
         /// After the median, fit a plane around each pixel that it changes, and take its value there.
         plane: bool = true, takes Takes::Switch, source "not in the paper";
         /// Also match the pair at twice its size. Where both maps agree within a pixel, their mean is taken, and where only the larger
-        /// pair measures a pixel, what it measures. Takes 6 times the time.
+        /// pair measures a pixel, what it measures. Takes 8 times the time.
         double_size: bool = false, takes Takes::Switch, source "not in the paper";
         /// Also make the disparity map of the right view, refined like that of the left one.
         right_map: bool = false, takes Takes::Switch, source "not in the paper";

@@ -22,7 +22,7 @@ options! {
         iterations: u32 = 3, takes whole(1..=1000), unit "iterations", source "section 3: 20 to 30";
         /// Iterations after the finest level joins: every second one with the messages between levels, the others with
         /// those of the coarser levels. Only coarse-first uses it.
-        final_iterations: u32 = 3, takes whole(0..=1000), unit "iterations", source "not in the paper";
+        final_iterations: u32 = 1, takes whole(0..=1000), unit "iterations", source "not in the paper";
         /// Stop when the RMS change of the finest map from one iteration to the next is at most this; 0 runs all iterations.
         tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1";
     }

@@ -42,12 +42,7 @@ fn file(name: &str) -> Result<String> {
     for group in GROUPS {
         let _ = writeln!(out, "\n{}\n[{}]", wrapped(group.meaning, WIDTH, "# "), group.name);
         for key in group.keys {
-            let _ = match key.takes {
-                Takes::Words(_) => {
-                    writeln!(out, "\n{}{}", wrapped(&meaning(key), WIDTH, "# "), words(key, "#   "))
-                }
-                _ => writeln!(out, "\n{}", wrapped(&format!("{} [{key}]", meaning(key)), WIDTH, "# ")),
-            };
+            let _ = writeln!(out, "\n{}{}", wrapped(&meaning(key), WIDTH, "# "), words(key, "#   "));
             let _ = writeln!(out, "{} = {}", key.name(), table[group.name][key.name()]);
         }
     }
@@ -63,28 +58,27 @@ fn listing() -> Result<String> {
     let values =
         PRESETS.iter().map(|(name, _)| Ok(Method::preset(name)?.table())).collect::<Result<Vec<_>>>()?;
     // One column for each preset.
-    let mut table = Table::new(&format!("l{}l", "l".repeat(PRESETS.len())));
-    let cells = |key: &str, values: Vec<String>, takes: &str| {
-        let cells = std::iter::once(key.to_owned()).chain(values);
-        cells.chain([format!("[{takes}]")]).collect::<Vec<_>>()
-    };
-    table.row(cells("key", PRESETS.iter().map(|p| p.0.to_owned()).collect(), "unit and range"));
+    let mut table = Table::new(&"l".repeat(1 + PRESETS.len()));
+    let cells =
+        |key: &str, values: Vec<String>| std::iter::once(key.to_owned()).chain(values).collect::<Vec<_>>();
+    table.row(cells("key", PRESETS.iter().map(|p| p.0.to_owned()).collect()));
     for group in GROUPS {
         table.text(format!("\n[{}] {}", group.name, group.meaning));
         for key in group.keys {
             let name = key.name();
             let values = values.iter().map(|values| values[group.name][&name].to_string().replace('"', ""));
             table.text("");
-            table.row(cells(&name, values.collect(), &key.to_string()));
+            table.row(cells(&name, values.collect()));
             table.text(format!("{}{}", wrapped(&meaning(key), WIDTH, "    "), words(key, "      ")));
         }
     }
     Ok(format!("{presets}\n{table}"))
 }
 
-/// What a key does, and where it comes from.
+/// What a key does, where it comes from, and which numbers it takes; words have lines of their own.
 fn meaning(key: &Key) -> String {
-    format!("{} ({}).", key.meaning.trim_end_matches('.'), key.source)
+    let text = format!("{} ({}).", key.meaning.trim_end_matches('.'), key.source);
+    if matches!(key.takes, Takes::Words(_)) { text } else { format!("{text} [{key}]") }
 }
 
 /// The words that a key takes, each with its meaning on lines of its own behind `lead`.

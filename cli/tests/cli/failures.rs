@@ -203,7 +203,7 @@ const FAILURES: &[Failure] = &[
     ("evaluate without-calib.txt", 1, &["without-calib.txt/calib.txt", "a folder to evaluate holds"]),
     ("evaluate misfit without-calib.txt", 1, &["without-calib.txt/calib.txt"]),
     ("evaluate misfit", 1, &["disp0GT.pfm is 240 x 180", "im0.png is 60 x 40"]),
-    ("evaluate misfit --method best", 2, &["--method", "default, fast, paper"]),
+    ("evaluate misfit --method best", 2, &["--method", "default, accurate, fast"]),
     ("evaluate misfit --json none/a.json", 1, &["none/a.json", "create it"]),
     ("evaluate misfit --json folder", 1, &["folder", "is a folder"]),
     ("evaluate misfit --json misfit/calib.txt", 2, &["--json", "misfit/calib.txt", "another name"]),
@@ -257,7 +257,7 @@ const FAILURES: &[Failure] = &[
     ("batch pairs.csv out --shard 4/3", 2, &["--shard", "K from 1 to N"]),
     ("batch pairs.csv out --shard 2", 2, &["--shard", "2/8"]),
     ("batch pairs.csv out --format jpg", 2, &["--format", "pfm, tif, png"]),
-    ("batch pairs.csv out --method best", 2, &["--method", "default, fast, paper"]),
+    ("batch pairs.csv out --method best", 2, &["--method", "default, accurate, fast"]),
     ("batch pairs.csv out --set levels=17", 2, &["--set levels", "17 is outside 1 to 16"]),
     ("batch pairs.csv out --device cpu --device 0", 2, &["--device", "multiple times"]),
     ("batch pairs.csv out --also raw,row", 2, &["--also", "'row'", "raw, right, depth, depth-mm, points"]),
@@ -274,13 +274,13 @@ const FAILURES: &[Failure] = &[
     ("bench misfit --large", 2, &["--large", "DIR"]),
     ("bench misfit --device", 2, &["--device", "value"]),
     ("bench misfit --device cpu --threads 0", 2, &["--threads", "1..=1024"]),
-    ("bench misfit --method best", 2, &["--method", "default, fast, paper"]),
+    ("bench misfit --method best", 2, &["--method", "default, accurate, fast"]),
     ("bench misfit --set levels=17", 2, &["--set levels", "17 is outside 1 to 16"]),
     ("bench misfit --method key.toml", 1, &["key.toml", "line 2", "mrfgs presets"]),
     ("bench misfit --json none/a.json", 1, &["none/a.json", "create it"]),
     ("bench misfit --json folder", 1, &["folder", "is a folder"]),
     ("bench misfit --json misfit/im1.png", 2, &["--json", "misfit/im1.png", "another name"]),
-    ("presets best", 2, &["`best`", "default, fast, paper"]),
+    ("presets best", 2, &["`best`", "default, accurate, fast"]),
 ];
 
 #[test]

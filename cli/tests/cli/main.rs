@@ -30,7 +30,7 @@ use std::process::Command;
 
 use mrfgs::low_level::backend::gpu;
 use mrfgs::maps::flag;
-use mrfgs::options::{self, Method};
+use mrfgs::options::{self, Method, Takes};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -291,8 +291,15 @@ fn presets_can_be_pasted_into_a_file() {
     for group in options::GROUPS {
         assert!(listing.lines().any(|l| l.starts_with(&format!("[{}] ", group.name))), "{}", group.name);
         for key in group.keys {
-            let line = listing.lines().find(|l| l.split(' ').next() == Some(&key.name())).unwrap();
-            assert!(line.contains(&key.to_string()), "{line}");
+            let mut lines = listing.lines().skip_while(|l| l.split(' ').next() != Some(&key.name()));
+            let line = lines.next().unwrap();
+            let about: Vec<_> = lines.take_while(|l| !l.is_empty()).flat_map(str::split_whitespace).collect();
+            let range = if let Takes::Words(words) = key.takes {
+                words.iter().all(|word| about.contains(&format!("{}:", word.word).as_str()))
+            } else {
+                about.join(" ").ends_with(&format!("[{key}]"))
+            };
+            assert!(range, "{about:?}");
             for (name, _) in options::PRESETS {
                 let table = Method::preset(name).unwrap().table();
                 let value = table[group.name][key.name()].to_string().replace('"', "");

@@ -68,7 +68,10 @@ fn schedule(plan: &Plan) -> Table {
     for (i, phase) in plan.phases.iter().enumerate() {
         let levels = match phase.finest {
             z if z == last => format!("level {last}"),
-            0 if plan.method.schedule.order == Order::CoarseFirst => "level 0, the others in between".into(),
+            0 if plan.method.schedule.order == Order::CoarseFirst && phase.iterations > 1 => {
+                "level 0, the others in between".into()
+            }
+            0 if plan.method.schedule.order == Order::CoarseFirst => "level 0".into(),
             z => format!("levels {z} to {last}"),
         };
         let (n, head) = (phase.iterations, if i == 0 { "schedule" } else { "" });
