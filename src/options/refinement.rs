@@ -58,7 +58,7 @@ options! {
         left_right_check: LeftRightCheck = LeftRightCheck::RightView, takes one_of(LeftRightCheck::WORDS),
             source "section 2.5: off";
         /// Regions with fewer pixels than this become invalid, and so do pixels at which two labels tie; 0 keeps all of them.
-        speckle_size: u32 = 200, takes whole(0..=u32::MAX), unit "pixels", source "open";
+        speckle_size: u32 = 100, takes whole(0..=u32::MAX), unit "pixels", source "open";
         /// Place the disparity between the labels, by the matching cost around the optimum.
         sub_pixel: bool = true, takes Takes::Switch, source "open";
         /// What happens to invalid pixels.
@@ -68,9 +68,9 @@ options! {
         /// Which pixels the weighted median changes.
         median: Median = Median::All, takes one_of(Median::WORDS), source "section 2.5: all";
         /// Side of the median's window; it uses every second row of the window.
-        median_window: u32 = 15, takes odd(3..=31), unit "pixels", source "open";
+        median_window: u32 = 19, takes odd(3..=31), unit "pixels", source "open";
         /// Spatial parameter of the median's weights.
-        median_sigma_space: f64 = 5.0, takes real(0.1..=100.0), unit "pixels", source "open";
+        median_sigma_space: f64 = 6.5, takes real(0.1..=100.0), unit "pixels", source "open";
         /// Range parameter of the median's weights, for intensities from 0 to 1.
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
         /// After the median, fit a plane around each pixel that it changes, and take its value there.
