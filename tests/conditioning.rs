@@ -53,8 +53,8 @@ fn compressed(view: &Image, quality: u8) -> Image {
     let mut file = Vec::new();
     image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, quality)
         .encode(&colours, width as u32, height as u32, image::ExtendedColorType::Rgb8)
-        .unwrap();
-    let seen = image::load_from_memory(&file).unwrap().to_rgb8();
+        .expect("JPEG takes any colours");
+    let seen = image::load_from_memory(&file).expect("what was encoded").to_rgb8();
     Image::from_rgb8(&Plane::from_fn(width, height, |x, y| seen.get_pixel(x as u32, y as u32).0))
 }
 
