@@ -99,17 +99,21 @@ impl Double {
         mut own: Solution,
         observer: Observer<'_>,
     ) -> Result<Solution> {
-        let pair = front::doubled(pair, &own.conditioning)?;
         let then = |done: f64| self.before + (1.0 - self.before) * done;
         let mut observer = |progress: Progress| observer(Progress { done: then(progress.done), ..progress });
+        let mut watch = Watch::new(&mut observer, 1.0);
+        let pair = watch.host("double_size", || front::doubled(pair, &own.conditioning))?;
+        own.host_times.extend(watch.into_times());
         let double = if self.tiles.count() == 1 {
             in_one_piece(backend, self.tiles.whole(), &pair, &mut observer, None).await?
         } else {
             in_tiles(backend, &self.tiles, &pair, &mut observer).await?
         };
+        let clock = Instant::now();
         double_size::take_in(&mut own.maps, &double.maps);
-        own.iterations += double.iterations;
+        own.host_times.push(("double_size", clock.elapsed()));
         own.host_times.extend(double.host_times);
+        own.iterations += double.iterations;
         own.mosaic_times.extend(double.mosaic_times);
         own.traffic += double.traffic;
         Ok(own)

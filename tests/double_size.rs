@@ -21,7 +21,7 @@ fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name)
 }
 
-/// A part of a rendered scene, `odd` in both sizes.
+/// A part of a rendered scene whose width and height are odd.
 fn scene(name: &str) -> Pair {
     let pair = Pair::open(folder(name).join("im0.png"), folder(name).join("im1.png")).unwrap();
     pair.crop(&mrfgs::image::Rect { x: 20..187, y: 30..121 })

@@ -1,8 +1,9 @@
 //! A pair matched at its own size and at twice its size, and the maps of both made one.
 //!
-//! The errors of the two maps within a pixel are hardly related, so their mean is nearer to the truth than either. Where they are further
-//! apart than that, the larger pair is wrong more often: its windows see less of the scene. But it finds matches in thin things, for which
-//! a pair of its own size has too few pixels.
+//! Bad0.5 of the pair's own map, of the larger pair's and of their mean, all pixels: 15.6, 13.6 and 14.2 % on the paper's five pairs, 22.8,
+//! 21.8 and 21.7 on five harder ones of Middlebury, 26.8, 23.1 and 23.0 on ETH3D, 32.4, 36.0 and 33.1 on KITTI 2012. So the mean is never
+//! far behind the better one. Where the maps are further apart than a pixel, it is the larger pair that is wrong more often: its windows
+//! see less of the scene. But what it alone measures is right more often than a fill: bad2.0 of the five falls from 5.52 to 5.43 %.
 
 use crate::image::Plane;
 use crate::maps::{FRACTION, Maps, flag, has_disparity};
