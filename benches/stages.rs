@@ -41,7 +41,7 @@ fn groups(plan: &Plan) -> Vec<(&'static str, Vec<Stage>)> {
         ("flood", vec![Stage::Flood(0)]),
         ("winner_takes_all", vec![Stage::WinnerTakesAll, Stage::RightView, Stage::SubPixel]),
         ("speckle_filter", vec![Stage::LeftRightCheck, Stage::SpeckleFilter]),
-        ("fill", vec![Stage::Fill, Stage::VoteFill, Stage::FillMedian]),
+        ("fill", vec![Stage::Fill, Stage::VoteFill, Stage::FillPlane]),
         ("median", vec![Stage::Median]),
         ("plane", vec![Stage::Plane]),
     ]

@@ -21,10 +21,10 @@ fn fit(w: Window, median: i32, plane: Plane, bits: u32) -> Plane {
     for (var v = w.first.y; v < w.last.y; v += w.step.y) {
         for (var u = w.first.x; u < w.last.x; u += w.step.x) {
             let at = (v - w.top) * params.level.pixel_pitch + u;
-            let away = vec2<i32>(vec2(u, v)) - vec2<i32>(w.middle);
+            let away = (vec2<i32>(vec2(u, v)) - vec2<i32>(w.middle)) >> step_bits();
             if ((away.x + away.y / 2) & 1) == 0 && has_disparity(flags[at]) {
                 let e = (disparity[at] - base - dot(plane.slopes, away)) >> bits;
-                let own = i32(weight(w.centre, at, places(vec2(u, v), w.middle, 0u)));
+                let own = i32(weight(w.centre, at, places(vec2(u, v), w.middle)));
                 let m = (own * max(256 - abs(e), 0)) >> 8u;
                 if m > 0 {
                     let g = (m * e) >> 3u;

@@ -1,4 +1,4 @@
-// Votes of valid pixels on what filled ones show, over half-size pixels and every second label. `show` and `halve` prepare.
+// Votes of valid pixels on what filled and doubtful ones show, over half-size pixels and every second label. `show` and `halve` prepare.
 // Then, for one band of half-size rows after the other, `own_votes`, `sum_rows`, `sum_columns` and `elect`. At the end `take`.
 
 #import band image maps
@@ -22,13 +22,13 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
-@group(0) @binding(2) var<storage, read> flags: array<u32>;
+@group(0) @binding(2) var<storage, read_write> flags: array<u32>;
 // label | best << 16, runner-up.
 @group(0) @binding(3) var<storage, read> optima: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> disparity: array<i32>;
 // What the right view sees: how near it is, from 1 on; 0 where nothing is known.
 @group(0) @binding(5) var<storage, read_write> shown: array<atomic<u32>>;
-// Half-size pixels: red | green << 8 | blue << 16, and ASKED where a filled pixel may take the vote.
+// Half-size pixels: red | green << 8 | blue << 16, and ASKED where a pixel may take the vote.
 @group(0) @binding(6) var<storage, read_write> colours: array<u32>;
 // By row, half-size pixel and label: own votes, then their sums along the row.
 @group(0) @binding(7) var<storage, read_write> sums: array<u32>;
@@ -41,6 +41,16 @@ struct Params {
 
 const ASKED: u32 = 0x1000000u;
 const NONE: i32 = -0x7fffffff;
+
+// Whether a pixel with such flags shows something for sure.
+fn is_sure(flags: u32) -> bool {
+    return is_valid(flags) && ((flags >> 8u) & 0xffu) >= VOTE_SURE;
+}
+
+// Whether such a pixel may be outvoted.
+fn may_be_outvoted(flags: u32) -> bool {
+    return is_valid(flags) && !is_sure(flags);
+}
 
 // How near the surface of a label is.
 fn near(label: u32) -> u32 {
@@ -71,7 +81,7 @@ fn weighted(weight: u32, sum: u32) -> u32 {
     return (sum >> 16u) * weight + (((sum & 0xffffu) * weight) >> 16u);
 }
 
-// What the right view sees by the valid pixels, in maps of 0. One invocation per pixel.
+// What the right view sees by the sure pixels, in maps of 0. One invocation per pixel.
 @compute @workgroup_size(GROUP)
 fn show(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -79,7 +89,7 @@ fn show(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let row = id.y * params.level.pixel_pitch;
-    if is_valid(flags[row + id.x]) {
+    if is_sure(flags[row + id.x]) {
         let label = optima[row + id.x].x & 0xffffu;
         let to = column(id.x, label);
         if is_inside(to) {
@@ -102,6 +112,7 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     let last = vec2(params.level.width, params.level.height) - vec2(1u);
     var sum = vec3(0u);
     var count = 0u;
+    var asked = 0u;
     for (var v = y; v <= min(y + 1u, last.y); v++) {
         for (var u = x; u <= min(x + 1u, last.x); u++) {
             let at = (v - top) * params.level.pixel_pitch + u;
@@ -109,18 +120,20 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
                 sum += colour(at);
                 count++;
             }
-        }
-    }
-    let mean = select(vec3(0u), (2u * sum + vec3(count)) / vec3(2u * max(count, 1u)), count > 0u);
-    var word = mean.x | (mean.y << 8u) | (mean.z << 16u);
-    for (var v = max(y, 2u) - 2u; v <= min(y + 3u, last.y); v++) {
-        for (var u = max(x, 2u) - 2u; u <= min(x + 3u, last.x); u++) {
-            if (flags[(v - top) * params.level.pixel_pitch + u] & FILLED) != 0u {
-                word |= ASKED;
+            if may_be_outvoted(flags[at]) {
+                asked = ASKED;
             }
         }
     }
-    colours[id.y * params.half_pitch + id.x] = word;
+    let mean = select(vec3(0u), (2u * sum + vec3(count)) / vec3(2u * max(count, 1u)), count > 0u);
+    for (var v = max(y, 2u) - 2u; v <= min(y + 3u, last.y); v++) {
+        for (var u = max(x, 2u) - 2u; u <= min(x + 3u, last.x); u++) {
+            if (flags[(v - top) * params.level.pixel_pitch + u] & FILLED) != 0u {
+                asked = ASKED;
+            }
+        }
+    }
+    colours[id.y * params.half_pitch + id.x] = mean.x | (mean.y << 8u) | (mean.z << 16u) | asked;
 }
 
 // Own votes. One invocation per half-size pixel and label.
@@ -261,7 +274,8 @@ fn elect(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     votes[here] = FRACTION * (params.level.low + 2 * i32(best)) + offset;
 }
 
-// Filled pixels take the vote of the half-size pixel around that looks most alike. One invocation per pixel.
+// Filled pixels take the vote of the half-size pixel around that looks most alike, and outvoted ones that of their own. One invocation
+// per pixel.
 @compute @workgroup_size(GROUP)
 fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -269,11 +283,16 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let at = id.y * params.level.pixel_pitch + id.x;
+    let middle = vec2(id.x, params.band.first_row + id.y) >> vec2(1u);
     if (flags[at] & FILLED) == 0u {
+        let vote = votes[(middle.y - params.first_voted) * params.half_pitch + middle.x];
+        if may_be_outvoted(flags[at]) && vote != NONE && abs(vote - disparity[at]) > VOTE_OUTVOTES {
+            disparity[at] = vote;
+            flags[at] = SPECKLE | FILLED;
+        }
         return;
     }
     let own = colour(at);
-    let middle = vec2(id.x, params.band.first_row + id.y) >> vec2(1u);
     var least = 0xffffffffu;
     for (var y = max(middle.y, 1u) - 1u; y <= min(middle.y + 1u, params.half_height - 1u); y++) {
         for (var x = max(middle.x, 1u) - 1u; x <= min(middle.x + 1u, params.half_width - 1u); x++) {

@@ -225,7 +225,7 @@ pub fn post_processing(method: &Method) -> Vec<Stage> {
     match method.refinement.fill {
         Fill::None => {}
         Fill::Row => stages.push(Stage::Fill),
-        Fill::Votes => stages.extend([Stage::Fill, Stage::VoteFill, Stage::FillMedian]),
+        Fill::Votes => stages.extend([Stage::Fill, Stage::VoteFill, Stage::FillPlane]),
     }
     if method.refinement.median != Median::Off {
         stages.push(if method.refinement.plane { Stage::Plane } else { Stage::Median });

@@ -6,13 +6,14 @@ use crate::options::Method;
 pub const MEDIAN_WEIGHT: u8 = 127;
 /// The largest part of the centre's weight that distance alone subtracts.
 const MEDIAN_SPACE: f64 = 96.0;
-/// Distance between the rows of the window, as a power of two: every second row is used, with all of its
-/// columns.
-const SPARSE_ROW_BITS: u32 = 1;
-/// Spacing of the samples of the stretched window in pixels, as a power of two.
-const STRETCH_BITS: u32 = 2;
-/// The range sigma of the stretched window is smaller by this factor.
-const STRETCH_SIGMA: f64 = 4.0;
+/// Every second row of a window is used, with all of its columns: 2 to this many.
+pub const WINDOW_ROW_BITS: u32 = 1;
+/// By how much the windows of the filled pixels are stretched, one after the other, along rows and along columns: their places are 2 to
+/// so many pixels apart. The first sees far in all directions. The second sees along rows, since that is how roads and floors stay at
+/// one disparity.
+pub const FILL_STEP_BITS: [[u32; 2]; 2] = [[2, 2], [3, 0]];
+/// The range sigma of the stretched windows is smaller by this factor.
+const STRETCH_SIGMA: f64 = 3.0;
 
 /// Number of differences in colour: the sum over three channels of 8 bits.
 pub const COLOUR_DIFFERENCES: usize = 3 * 255 + 1;
@@ -44,8 +45,7 @@ pub fn vote_weights() -> [Vec<u32>; 2] {
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
     radius: usize,
-    step_bits: u32,
-    row_bits: u32,
+    step_bits: [u32; 2],
     /// By |dy| and by dx from -radius to radius, in steps of the window, \[dy\]\[dx\].
     space: Vec<u8>,
     scale: u32,
@@ -53,26 +53,22 @@ pub struct MedianWeights {
 }
 
 impl MedianWeights {
-    /// The weights of `method`, with every second row of the window.
+    /// The weights of `method`.
     #[must_use]
     pub fn of(method: &Method) -> Self {
-        let window = method.refinement.median_window as usize;
-        let weights =
-            Self::new(window, method.refinement.median_sigma_space, method.refinement.median_sigma_range);
-        Self { row_bits: SPARSE_ROW_BITS, ..weights }
+        let refinement = &method.refinement;
+        let window = refinement.median_window as usize;
+        Self::new(window, refinement.median_sigma_space, refinement.median_sigma_range)
     }
 
-    /// The weights of the stretched window: all of its samples, four pixels apart. Each loses weight by its
-    /// distance in steps, and the range sigma is a quarter.
+    /// The weights of a window whose places are 2 to `step_bits` pixels apart, along rows and along columns. Each loses weight by its
+    /// distance in steps, and the range sigma is a third.
     #[must_use]
-    pub fn stretched(method: &Method) -> Self {
-        let window = method.refinement.median_window as usize;
-        let weights = Self::new(
-            window,
-            method.refinement.median_sigma_space,
-            method.refinement.median_sigma_range / STRETCH_SIGMA,
-        );
-        Self { step_bits: STRETCH_BITS, ..weights }
+    pub fn stretched(method: &Method, step_bits: [u32; 2]) -> Self {
+        let refinement = &method.refinement;
+        let window = refinement.median_window as usize;
+        let range = refinement.median_sigma_range / STRETCH_SIGMA;
+        Self { step_bits, ..Self::new(window, refinement.median_sigma_space, range) }
     }
 
     /// Weights for a window of `window` pixels, sigmas in pixels and in the intensity range 0 to 1.
@@ -92,7 +88,7 @@ impl MedianWeights {
             doublings += 1;
         }
         let scale = (256.0 * slope + 0.5).floor().clamp(1.0, 256.0) as u32;
-        Self { radius, step_bits: 0, row_bits: 0, space, scale, doublings }
+        Self { radius, step_bits: [0; 2], space, scale, doublings }
     }
 
     /// Radius of the window, in steps.
@@ -101,16 +97,10 @@ impl MedianWeights {
         self.radius
     }
 
-    /// Spacing of the window's samples: 2 to this many pixels.
+    /// Spacing of the window's places along rows and along columns: 2 to this many pixels.
     #[must_use]
-    pub fn step_bits(&self) -> u32 {
+    pub fn step_bits(&self) -> [u32; 2] {
         self.step_bits
-    }
-
-    /// Spacing of the window's rows: 2 to this many steps, with the centre's row among them.
-    #[must_use]
-    pub fn row_bits(&self) -> u32 {
-        self.row_bits
     }
 
     /// Factor of a 16-bit channel, 1 ..= 256; the upper 16 bits of the product are its guide.

@@ -63,7 +63,7 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     }
     if plan.method.refinement.fill == Fill::Votes {
         twin::vote_fill::vote_fill(plan, pair, maps);
-        twin::fill_median::fill_median(plan, pair, maps);
+        twin::fill_plane::fill_plane(plan, pair, maps);
     }
     let last = if plan.method.refinement.plane { twin::plane::plane } else { twin::median::median };
     last(plan, pair, maps);

@@ -9,10 +9,9 @@
 struct Params {
     level: Level,
     @align(16) band: Band,
-    // In steps of 2 to `step_bits` pixels.
+    // In steps: a step along a row is 2 to `column_bits` pixels long, one along a column 2 to `row_bits`.
     radius: u32,
-    step_bits: u32,
-    // Rows of samples are 2 to this many steps apart.
+    column_bits: u32,
     row_bits: u32,
     scale: u32,
     doublings: u32,
@@ -42,9 +41,14 @@ fn weight(centre: vec3<u32>, at: u32, away: vec2<u32>) -> u32 {
     return MEDIAN_WEIGHT - min(colour + space[away.y * (params.radius + 1u) + away.x], MEDIAN_WEIGHT);
 }
 
+// How many bits make pixels steps.
+fn step_bits() -> vec2<u32> {
+    return vec2(params.column_bits, params.row_bits);
+}
+
 // Distance between pixels `a` and `b`, in steps.
-fn places(a: vec2<u32>, b: vec2<u32>, step_bits: u32) -> vec2<u32> {
-    return (max(a, b) - min(a, b)) >> vec2(step_bits);
+fn places(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
+    return (max(a, b) - min(a, b)) >> step_bits();
 }
 
 // The window of a pixel.
@@ -53,7 +57,7 @@ struct Window {
     middle: vec2<u32>,
     here: u32,
     centre: vec3<u32>,
-    // The first place, and the end of all places, in steps of `step`.
+    // The first place, and the end of all places, which are `step` pixels apart.
     first: vec2<u32>,
     last: vec2<u32>,
     step: vec2<u32>,
@@ -63,11 +67,10 @@ struct Window {
 
 // The window of the pixel in column id.x and row id.y of the band.
 fn window(id: vec2<u32>) -> Window {
-    let bits = params.step_bits;
     // The first place lies in the image and on the raster of places.
-    let raster = vec2(bits, bits + params.row_bits);
-    let reach = vec2(params.radius << bits, (params.radius >> params.row_bits) << raster.y);
-    let top = halo_start(params.radius << bits);
+    let raster = step_bits() + vec2(0u, WINDOW_ROW_BITS);
+    let reach = vec2(params.radius << raster.x, (params.radius >> WINDOW_ROW_BITS) << raster.y);
+    let top = halo_start(params.radius << params.row_bits);
     let middle = vec2(id.x, params.band.first_row + id.y);
     let here = (middle.y - top) * params.level.pixel_pitch + middle.x;
     let first = middle - min(reach, (middle >> raster) << raster);
@@ -83,7 +86,6 @@ fn touched(flags: u32) -> bool {
 // The median in window `w`; where it changes nothing, the disparity as it is.
 fn median(w: Window) -> i32 {
     let pitch = params.level.pixel_pitch;
-    let bits = params.step_bits;
     var low = disparity[w.here];
     if touched(flags[w.here]) {
         var high = low;
@@ -95,7 +97,7 @@ fn median(w: Window) -> i32 {
                     let value = disparity[at];
                     low = min(low, value);
                     high = max(high, value);
-                    total += weight(w.centre, at, places(vec2(u, v), w.middle, bits));
+                    total += weight(w.centre, at, places(vec2(u, v), w.middle));
                 }
             }
         }
@@ -110,7 +112,7 @@ fn median(w: Window) -> i32 {
                     let at = (v - w.top) * pitch + u;
                     let value = disparity[at];
                     if has_disparity(flags[at]) && value < low + i32(8u * share) {
-                        let own = vec4(weight(w.centre, at, places(vec2(u, v), w.middle, bits)));
+                        let own = vec4(weight(w.centre, at, places(vec2(u, v), w.middle)));
                         let offset = vec4(value - low);
                         below_first += select(vec4(0u), own, offset < vec4<i32>(FIRST * share));
                         below_second += select(vec4(0u), own, offset < vec4<i32>(SECOND * share));

@@ -149,7 +149,7 @@ macro_rules! for_every_stage {
                 /// farther surface. The smaller of two is farther, or the larger where [`crate::options::RefinementOptions::nearer`] says so. A row without any valid pixel takes the nearest row that has one, the upper on ties. Sets
                 /// [`flag::FILLED`](crate::maps::flag::FILLED). Where no pixel at all is valid, nothing is filled.
                 Fill fill;
-                /// A disparity by votes on every filled pixel that gets one, where [`crate::options::RefinementOptions::fill`] asks for
+                /// A disparity by votes on every filled pixel that gets one, and on valid ones that are outvoted, where [`crate::options::RefinementOptions::fill`] asks for
                 /// votes; constants are those of [`crate::plan::votes`].
                 ///
                 /// Half-size pixel (X, Y) stands for the pixels (2 X, 2 Y) to (2 X + 1, 2 Y + 1), as far as they are inside. Its colour is, channel by
@@ -158,8 +158,8 @@ macro_rules! for_every_stage {
                 ///
                 /// 1. Own votes v(k), of its pixels: of a valid pixel with disparity D, min(|D - 256 l|, [`VOTE_MOST`](crate::plan::votes::VOTE_MOST)) >>
                 ///    [`VOTE_BITS`](crate::plan::votes::VOTE_BITS) with l the disparity of label k in pixels; of a pixel (x, y) that is neither valid nor masked,
-                ///    [`VOTE_HIDING`](crate::plan::votes::VOTE_HIDING) where k hides what the right view sees. It sees at (x', y) the nearest label j of those of the valid
-                ///    pixels (x' + j, y) (j as a disparity); k hides it if x' = x - k is inside and k is nearer by [`HIDING_LABELS`](crate::plan::votes::HIDING_LABELS) or more. Nearer
+                ///    [`VOTE_HIDING`](crate::plan::votes::VOTE_HIDING) where k hides what the right view sees. It sees at (x', y) the nearest label j of those of the sure
+                ///    pixels (x' + j, y) (j as a disparity), valid ones with a confidence of at least [`VOTE_SURE`](crate::plan::votes::VOTE_SURE); k hides it if x' = x - k is inside and k is nearer by [`HIDING_LABELS`](crate::plan::votes::HIDING_LABELS) or more. Nearer
                 ///    is as [`crate::options::RefinementOptions::nearer`] says. Their sum counts 2 ^ [`VOTE_FRACTION_BITS`](crate::plan::votes::VOTE_FRACTION_BITS) times.
                 /// 2. Along the row, with w(X) / 65536 the weight ([`vote_weights`](crate::weights::vote_weights)) of the difference between X - 1 and X: f(X) = v(X) + w(X) f(X - 1), and
                 ///    b(X) = w(X + 1) (v(X + 1) + b(X + 1)), each product rounded down; r = (f + b) >> [`VOTE_SHIFT`](crate::plan::votes::VOTE_SHIFT).
@@ -171,11 +171,14 @@ macro_rules! for_every_stage {
                 ///    rounded down, and t the larger one, its offset is floor((512 (p - q) + t) / (2 t)), in 1/256 px; 0 where t = 0 or at either end.
                 /// 5. A filled pixel (x, y) takes the vote of that half-size pixel with a vote, among the 3 x 3 around (x >> 1, y >> 1) that are inside, whose colour
                 ///    differs least from its own (c >> 8), [`VOTE_AWAY`](crate::plan::votes::VOTE_AWAY) added for each column and row away, the first in reading order on ties. Without any it
-                ///    keeps what it has.
+                ///    keeps what it has. A valid pixel that is not sure is outvoted where half-size pixel (x >> 1, y >> 1) has a vote that is more than
+                ///    [`VOTE_OUTVOTES`](crate::plan::votes::VOTE_OUTVOTES) from its disparity. It takes this vote, its flags are [`flag::SPECKLE`](crate::maps::flag::SPECKLE) and
+                ///    [`flag::FILLED`](crate::maps::flag::FILLED), and its confidence is 0.
                 VoteFill vote_fill;
-                /// [`Stage::Median`] on filled pixels alone, over all rows of its window, and that stretched: its places are 4 pixels
-                /// apart, distance counts in places, and the range parameter is a quarter.
-                FillMedian fill_median;
+                /// [`Stage::Plane`] on filled pixels alone, or [`Stage::Median`] where [`crate::options::RefinementOptions::plane`] is off,
+                /// twice: over each of the stretched windows of [`FILL_STEP_BITS`](crate::weights::FILL_STEP_BITS). x and y count in places there,
+                /// for the weights as well as for the plane, and the range parameter is a third.
+                FillPlane fill_plane;
                 /// Weighted median of [`Map::Disparity`](super::Map::Disparity), on the pixels that [`crate::options::RefinementOptions::median`] names and that have a
                 /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the
                 /// smallest value at which half of the weight is reached. Weights are [`crate::weights::MedianWeights`] of the left image.

@@ -10,6 +10,11 @@ pub const VOTE_BITS: u32 = 4;
 pub const VOTE_HIDING: u32 = 24;
 /// Labels by which a surface must be nearer than what the right view sees, to hide it.
 pub const HIDING_LABELS: u32 = 2;
+/// The least confidence of a sure pixel, in eighths of a nat. Others hide nothing by what they show, and may be outvoted.
+pub const VOTE_SURE: u32 = 32;
+/// A pixel that is not sure is outvoted by a vote that is further from its disparity than this, in 1/256 px: 2 px. Votes are fronto-parallel,
+/// and on slanted surfaces nearer ones say little.
+pub const VOTE_OUTVOTES: i32 = 512;
 /// Fractional bits of the sums along a row, so that faint votes from behind an edge still count.
 pub const VOTE_FRACTION_BITS: u32 = 16;
 /// Bits that a sum along a row loses before it is summed along its column.

@@ -79,7 +79,7 @@ fn nothing_valid() {
                     Stage::SpeckleFilter,
                     Stage::Fill,
                     Stage::VoteFill,
-                    Stage::FillMedian,
+                    Stage::FillPlane,
                     Stage::Median,
                     Stage::Plane,
                     Stage::Confidence,
@@ -130,11 +130,12 @@ fn control_changes_are_found() {
             p.method.refinement.nearer = Nearer::Smaller;
         }),
         (Stage::VoteFill, false, twin::vote_fill::vote_fill, |p| p.range.min += 1),
-        (Stage::FillMedian, false, twin::fill_median::fill_median, |p| p.method.refinement.median_window = 7),
-        (Stage::FillMedian, false, twin::fill_median::fill_median, |p| {
+        (Stage::FillPlane, false, twin::fill_plane::fill_plane, |p| p.method.refinement.median_window = 7),
+        (Stage::FillPlane, false, twin::fill_plane::fill_plane, |p| {
             p.method.refinement.median_sigma_range = 0.02;
         }),
-        (Stage::FillMedian, false, twin::median::median, |p| p.method.refinement.median = Median::Filled),
+        (Stage::FillPlane, false, twin::fill_plane::fill_plane, |p| p.method.refinement.plane = false),
+        (Stage::FillPlane, false, twin::plane::plane, |p| p.method.refinement.median = Median::Filled),
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_window = 7),
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_space = 1.0),
         (Stage::Median, false, twin::median::median, |p| p.method.refinement.median_sigma_range = 0.02),

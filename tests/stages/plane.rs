@@ -12,7 +12,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{Median, Method};
 
 /// Random maps, often with disparities that planes reach: slanted, with some noise and a few steps.
-fn slanted(random: &mut Random, plan: &Plan) -> Finest {
+pub(crate) fn slanted(random: &mut Random, plan: &Plan) -> Finest {
     let mut maps = any_maps(random, plan);
     if !random.one_in(3) {
         let [across, down] = [0; 2].map(|_: i32| random.within(0, 800) as i32 - 400);

@@ -12,7 +12,7 @@ use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
 use crate::plan::Plan;
-use crate::weights::{MEDIAN_WEIGHT, MedianWeights};
+use crate::weights::{MEDIAN_WEIGHT, MedianWeights, WINDOW_ROW_BITS};
 use rayon::prelude::*;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
@@ -92,7 +92,7 @@ struct Seen {
 impl Seen {
     fn new(weights: &MedianWeights, guide: &Image, disparity: &Plane<i32>, flags: &Plane<u8>) -> Self {
         let (width, height) = disparity.size();
-        let margin = weights.radius() << weights.step_bits();
+        let margin = weights.radius() << weights.step_bits()[0];
         let pitch = width + 2 * margin + LANES;
         let bytes = || vec![0; pitch * height];
         let [mut r, mut g, mut b, mut known] = [bytes(), bytes(), bytes(), bytes()];
@@ -163,19 +163,19 @@ struct Bounds {
 impl Window {
     /// Moves to row `y`, whose windows leave out what is above and below the image.
     fn open(&mut self, weights: &MedianWeights, seen: &Seen, y: usize) {
-        let step = 1 << weights.step_bits();
+        let [column_step, row_step] = weights.step_bits().map(|bits| 1 << bits);
         // The rows of the window, without those that it skips.
-        let (apart, reach) = (step << weights.row_bits(), weights.radius() >> weights.row_bits());
+        let (apart, reach) = (row_step << WINDOW_ROW_BITS, weights.radius() >> WINDOW_ROW_BITS);
         let first = y - reach.min(y / apart) * apart;
         self.offsets.clear();
         for ny in (first..(y + reach * apart + 1).min(seen.height)).step_by(apart) {
-            for (column, &taken) in weights.space_row(ny.abs_diff(y) / step).iter().enumerate() {
+            for (column, &taken) in weights.space_row(ny.abs_diff(y) / row_step).iter().enumerate() {
                 let steps = [
                     column as i16 - weights.radius() as i16,
-                    (ny as i32 - y as i32) as i16 >> weights.step_bits(),
+                    ((ny as i32 - y as i32) >> weights.step_bits()[1]) as i16,
                 ];
                 let near = MEDIAN_WEIGHT.saturating_sub(taken);
-                self.offsets.push((ny * seen.pitch + column * step, steps, near));
+                self.offsets.push((ny * seen.pitch + column * column_step, steps, near));
             }
         }
         self.radius = weights.radius();

@@ -8,6 +8,10 @@ use crate::plan::Plan;
 use crate::weights::MedianWeights;
 
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
-    let limits = (plan.range.min * FRACTION, plan.range.max * FRACTION);
-    smooth(&MedianWeights::of(&plan.method), touched(plan), Some(limits), guide, maps);
+    smooth(&MedianWeights::of(&plan.method), touched(plan), Some(limits(plan)), guide, maps);
+}
+
+/// What the values of planes stay within.
+pub(super) fn limits(plan: &Plan) -> (i32, i32) {
+    (plan.range.min * FRACTION, plan.range.max * FRACTION)
 }

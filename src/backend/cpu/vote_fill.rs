@@ -7,8 +7,8 @@ use crate::maps::{FRACTION, flag};
 use crate::options::{Fill, Nearer};
 use crate::plan::Plan;
 use crate::plan::votes::{
-    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_REACH, VOTE_SHIFT,
-    Votes,
+    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES, VOTE_REACH,
+    VOTE_SHIFT, VOTE_SURE, Votes,
 };
 use crate::weights::vote_weights;
 use rayon::prelude::*;
@@ -19,6 +19,16 @@ pub(super) fn run(maps: &mut Finest, plan: &Plan, left: &Image) {
         let elected = elect(maps, plan, &colours, Votes::of(plan));
         take(maps, left, &colours, &elected);
     }
+}
+
+/// Whether a pixel with such flags and such a confidence shows something for sure.
+fn is_sure(flags: u8, confidence: u8) -> bool {
+    flags & flag::INVALID == 0 && u32::from(confidence) >= VOTE_SURE
+}
+
+/// Whether such a pixel may be outvoted.
+fn may_be_outvoted(flags: u8, confidence: u8) -> bool {
+    flags & flag::INVALID == 0 && !is_sure(flags, confidence)
 }
 
 /// Channels of a pixel in 8 bits.
@@ -60,13 +70,19 @@ fn halved(left: &Image) -> Plane<[u8; 3]> {
     halved
 }
 
-/// The half-size pixels that a filled pixel may take its vote from.
-fn asked(flags: &Plane<u8>, votes: Votes) -> Plane<bool> {
+/// The half-size pixels that a filled pixel may take its vote from, and those whose vote may outvote a pixel.
+fn asked(maps: &Finest, votes: Votes) -> Plane<bool> {
+    let Finest { validity, confidence, .. } = maps;
     let mut asked = Plane::filled(votes.width, votes.height, false);
     asked.data_mut().par_chunks_mut(votes.width).enumerate().for_each(|(y, asked)| {
-        for row in (2 * y).saturating_sub(2)..(2 * y + 4).min(flags.height()) {
-            for (x, _) in flags.row(row).iter().enumerate().filter(|&(_, f)| f & flag::FILLED != 0) {
+        for row in (2 * y).saturating_sub(2)..(2 * y + 4).min(validity.height()) {
+            for (x, _) in validity.row(row).iter().enumerate().filter(|&(_, f)| f & flag::FILLED != 0) {
                 asked[around(x, votes.width)].fill(true);
+            }
+        }
+        for row in 2 * y..(2 * y + 2).min(validity.height()) {
+            for (x, (&flags, &confidence)) in validity.row(row).iter().zip(confidence.row(row)).enumerate() {
+                asked[x / 2] |= may_be_outvoted(flags, confidence);
             }
         }
     });
@@ -80,7 +96,7 @@ fn around(at: usize, count: usize) -> std::ops::Range<usize> {
 
 /// The votes of the half-size pixels that are asked, in 1/256 px, where there is one.
 fn elect(maps: &Finest, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<Option<i32>> {
-    let asked = asked(&maps.validity, votes);
+    let asked = asked(maps, votes);
     let [along, across] = vote_weights();
     let mut elected = Plane::filled(votes.width, votes.height, None);
     // With padding, which nobody votes for.
@@ -160,12 +176,12 @@ fn own_votes(maps: &Finest, plan: &Plan, y: usize, out: &mut [u32], scratch: &mu
     };
     out.fill(0);
     for y in 2 * y..height.min(2 * y + 2) {
-        let (flags, optima) = (maps.validity.row(y), maps.optima.row(y));
+        let (flags, optima, confidence) = (maps.validity.row(y), maps.optima.row(y), maps.confidence.row(y));
         for hiding in &mut scratch.hiding {
             hiding.clear();
             hiding.resize(width.midpoint(labels) + stride + 1, i32::MAX);
         }
-        for (x, optimum) in optima.iter().enumerate().filter(|&(x, _)| flags[x] & flag::INVALID == 0) {
+        for (x, optimum) in optima.iter().enumerate().filter(|&(x, _)| is_sure(flags[x], confidence[x])) {
             let column = x as i32 - min - i32::from(optimum.label);
             if (0..width as i32).contains(&column) {
                 let at = width - x + usize::from(optimum.label);
@@ -286,25 +302,32 @@ fn extremes_on<S: pulp::Simd>(_: S, sums: &[u32]) -> (u32, u32) {
     sums.iter().fold((u32::MAX, 0), |(least, most), &sum| (least.min(sum), most.max(sum)))
 }
 
-/// Every filled pixel takes the vote of the half-size pixel around it that looks most alike.
+/// Every filled pixel takes the vote of the half-size pixel around it that looks most alike, and an outvoted one that of its own.
 fn take(maps: &mut Finest, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<Option<i32>>) {
-    let (width, flags) = (maps.disparity.width(), &maps.validity);
-    let rows = maps.disparity.data_mut().par_chunks_mut(width).enumerate();
-    rows.for_each(|(y, row)| {
-        for (x, disparity) in row.iter_mut().enumerate() {
-            if flags[(x, y)] & flag::FILLED == 0 {
-                continue;
-            }
-            let own = channels(left.pixels[(x, y)]);
-            let places = around(y, elected.height())
-                .flat_map(|row| around(x, elected.width()).map(move |column| (column, row)));
-            let candidates = places.filter_map(|at| {
-                let away = at.0.abs_diff(x / 2) + at.1.abs_diff(y / 2);
-                let unlike = difference(own, colours[at]) + VOTE_AWAY as usize * away;
-                elected[at].map(|vote| (unlike, vote))
-            });
-            if let Some((_, vote)) = candidates.min_by_key(|candidate| candidate.0) {
-                *disparity = vote;
+    let width = maps.disparity.width();
+    let rows = maps.disparity.data_mut().par_chunks_mut(width).zip(maps.validity.data_mut().par_chunks_mut(width));
+    let rows = rows.zip(maps.confidence.data_mut().par_chunks_mut(width)).enumerate();
+    rows.for_each(|(y, ((disparity, flags), confidence))| {
+        for (x, ((disparity, flags), confidence)) in
+            disparity.iter_mut().zip(flags).zip(confidence).enumerate()
+        {
+            if *flags & flag::FILLED != 0 {
+                let own = channels(left.pixels[(x, y)]);
+                let places = around(y, elected.height())
+                    .flat_map(|row| around(x, elected.width()).map(move |column| (column, row)));
+                let candidates = places.filter_map(|at| {
+                    let away = at.0.abs_diff(x / 2) + at.1.abs_diff(y / 2);
+                    let unlike = difference(own, colours[at]) + VOTE_AWAY as usize * away;
+                    elected[at].map(|vote| (unlike, vote))
+                });
+                if let Some((_, vote)) = candidates.min_by_key(|candidate| candidate.0) {
+                    *disparity = vote;
+                }
+            } else if let Some(vote) = elected[(x / 2, y / 2)]
+                && may_be_outvoted(*flags, *confidence)
+                && (vote - *disparity).abs() > VOTE_OUTVOTES
+            {
+                (*disparity, *flags, *confidence) = (vote, flag::SPECKLE | flag::FILLED, 0);
             }
         }
     });

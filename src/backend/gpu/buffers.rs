@@ -45,7 +45,6 @@ pub(super) struct Buffers {
     /// Weight of colour in the matching cost.
     pub(super) contrast: Rows,
     pub(super) median_weights: wgpu::Buffer,
-    pub(super) stretched_weights: wgpu::Buffer,
     /// Label map of the last change, and its squared differences.
     pub(super) labels: Rows,
     pub(super) squares: Rows,
@@ -289,8 +288,6 @@ impl Buffers {
         let rows = u64::from(fine.height);
         Ok(Self {
             median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
-            stretched_weights: a
-                .constant("stretched weights", &MedianWeights::stretched(&plan.method).words())?,
             votes,
             change_sums: a.buffer("change", 2 * rows)?,
             convergence: a.buffer("convergence", size_of::<Convergence>() as u64 / 4)?,

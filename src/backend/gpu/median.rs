@@ -13,7 +13,7 @@ use crate::weights::MedianWeights;
 
 const SHADER: &str = include_str!("../../../shaders/median.wgsl");
 
-uniform! { radius: u32, step_bits: u32, row_bits: u32, scale: u32, doublings: u32, all: u32 }
+uniform! { radius: u32, column_bits: u32, row_bits: u32, scale: u32, doublings: u32, all: u32 }
 
 /// A job for `kernel`, which imports the weighted median and goes over the window so many times `more`.
 pub(super) fn job(plan: &Plan, kernel: Kernel, more: usize) -> Job {
@@ -38,35 +38,29 @@ pub(super) fn record_as(r: &mut Recorder, job: &Job) -> Result<()> {
     if median == Median::Off {
         return Ok(());
     }
-    let (weights, table) = (MedianWeights::of(&r.plan.method), &r.buffers.median_weights);
-    smooth(r, job, &weights, table, median == Median::All)
+    smooth(r, job, &MedianWeights::of(&r.plan.method), median == Median::All)
 }
 
-/// The median with `weights`, which `table` holds, of `all` pixels or of the filled ones.
-pub(super) fn smooth(
-    r: &mut Recorder,
-    job: &Job,
-    weights: &MedianWeights,
-    table: &wgpu::Buffer,
-    all: bool,
-) -> Result<()> {
+/// Records `job` with `weights`, on `all` pixels or on the filled ones. What distance subtracts is the same for all steps.
+pub(super) fn smooth(r: &mut Recorder, job: &Job, weights: &MedianWeights, all: bool) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
+    let [column_bits, row_bits] = weights.step_bits();
     let own = Uniform {
         radius: weights.radius() as u32,
-        step_bits: weights.step_bits(),
-        row_bits: weights.row_bits(),
+        column_bits,
+        row_bits,
         scale: weights.scale(),
         doublings: weights.doublings(),
         all: all.into(),
     };
-    let reach = own.radius << own.step_bits;
+    let reach = own.radius << own.row_bits;
     r.rows(job, &own, l.width, |rows| {
         let seen = with_halo(rows, reach, l.height);
         vec![
             (1, b.left.bind(&seen)),
             (2, b.disparity.bind(&seen)),
             (3, b.flags.bind(&seen)),
-            (4, Binding::whole(table)),
+            (4, Binding::whole(&b.median_weights)),
             (5, b.spare_disparity.bind(rows)),
         ]
     })?;

@@ -3,7 +3,7 @@
 
 use crate::maps::{FRACTION, flag};
 use crate::plan::{VolumeWidth, WINDOW_RUN};
-use crate::weights::MEDIAN_WEIGHT;
+use crate::weights::{MEDIAN_WEIGHT, WINDOW_ROW_BITS};
 use std::fmt::Write;
 
 /// Invocations per workgroup.
@@ -72,7 +72,10 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
             flags.into_iter().chain([("FRACTION", FRACTION.into())]).collect()
         }
         "windows" => vec![("WINDOW_RUN", (WINDOW_RUN as u32).into())],
-        "weighted_median" => vec![("MEDIAN_WEIGHT", u32::from(MEDIAN_WEIGHT).into())],
+        "weighted_median" => vec![
+            ("MEDIAN_WEIGHT", u32::from(MEDIAN_WEIGHT).into()),
+            ("WINDOW_ROW_BITS", WINDOW_ROW_BITS.into()),
+        ],
         _ => Vec::new(),
     }
 }

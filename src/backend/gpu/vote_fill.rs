@@ -10,8 +10,8 @@ use crate::error::Result;
 use crate::options::Nearer;
 use crate::plan::Plan;
 use crate::plan::votes::{
-    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_REACH, VOTE_SHIFT,
-    Votes,
+    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES, VOTE_REACH,
+    VOTE_SHIFT, VOTE_SURE, Votes,
 };
 use crate::weights::COLOUR_DIFFERENCES;
 use std::ops::Range;
@@ -37,6 +37,8 @@ pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
             .with("VOTE_BITS", VOTE_BITS)
             .with("VOTE_HIDING", VOTE_HIDING)
             .with("HIDING_LABELS", HIDING_LABELS)
+            .with("VOTE_SURE", VOTE_SURE)
+            .with("VOTE_OUTVOTES", VOTE_OUTVOTES)
             .with("VOTE_FRACTION_BITS", VOTE_FRACTION_BITS)
             .with("VOTE_SHIFT", VOTE_SHIFT)
             .with("VOTE_REACH", VOTE_REACH as u32)

@@ -8,7 +8,11 @@ use std::collections::BTreeMap;
 
 /// Corners of `view` in raster order: the best of each zone in each cell of the image, one per `spacing`
 /// pixels.
-pub(super) fn corners(view: &View, zones: Option<(&Plane<u32>, usize)>, spacing: usize) -> Vec<(usize, usize)> {
+pub(super) fn corners(
+    view: &View,
+    zones: Option<(&Plane<u32>, usize)>,
+    spacing: usize,
+) -> Vec<(usize, usize)> {
     let (width, height) = view.grey.size();
     if let Some((map, _)) = zones {
         assert_eq!(map.size(), (width, height), "the map of zones has the size of the images");

@@ -7,16 +7,16 @@ use rayon::prelude::*;
 /// A view, and the statistics of the window around each pixel.
 pub(super) struct View {
     /// In 1/16 of an 8-bit level.
-    pub grey: Plane<i16>,
+    pub(super) grey: Plane<i16>,
     /// The sum over the window around each pixel.
-    pub sum: Plane<i32>,
+    pub(super) sum: Plane<i32>,
     /// n sigma of the n values of each window; 0 where it is uniform, contains a masked pixel, or leaves the
     /// image.
-    pub norm: Plane<f64>,
+    pub(super) norm: Plane<f64>,
 }
 
 impl View {
-    pub fn new(image: &Image) -> Self {
+    pub(super) fn new(image: &Image) -> Self {
         let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
         let (width, height) = grey.size();
         let any_masked = image.masked.data().contains(&true);
@@ -45,7 +45,7 @@ impl View {
 
     /// The smaller eigenvalue of the structure tensor at each pixel of row `y`; 0 where the window does not
     /// fit.
-    pub fn eigenvalues(&self, y: usize) -> Vec<f64> {
+    pub(super) fn eigenvalues(&self, y: usize) -> Vec<f64> {
         let g = &self.grey;
         if y < RADIUS || y + RADIUS >= g.height() {
             return vec![0.0; g.width()];

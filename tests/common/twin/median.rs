@@ -24,7 +24,7 @@ pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let sigma_range = plan.method.refinement.median_sigma_range;
-    smooth(plan, pair, maps, (1, 2), sigma_range, |validity| changes(plan, validity));
+    smooth(plan, pair, maps, (1, 1), sigma_range, |validity| changes(plan, validity));
 }
 
 /// Whether the median changes a pixel.
@@ -53,12 +53,12 @@ pub struct Place {
     pub weight: i64,
 }
 
-/// The places of the window of pixel (x, y), in samples `step` apart and every `every`-th row of them.
+/// The places of the window of pixel (x, y), in columns and rows `step` apart and every second one of those rows.
 pub fn places(
     plan: &Plan,
     pair: &Pair,
     maps: &Finest,
-    (step, every): (i64, i64),
+    step: (i64, i64),
     sigma_range: f64,
     (x, y): (usize, usize),
 ) -> Vec<Place> {
@@ -68,9 +68,9 @@ pub fn places(
     let radius = i64::from(method.refinement.median_window / 2);
     let guide = &pair.left().pixels;
     let mut places = Vec::new();
-    for j in (-radius..=radius).filter(|j| j % every == 0) {
+    for j in (-radius..=radius).filter(|j| j % 2 == 0) {
         for i in -radius..=radius {
-            let (nx, ny) = (x as i64 + step * i, y as i64 + step * j);
+            let (nx, ny) = (x as i64 + step.0 * i, y as i64 + step.1 * j);
             if nx < 0 || ny < 0 || nx >= width as i64 || ny >= height as i64 {
                 continue;
             }
@@ -85,12 +85,12 @@ pub fn places(
     places
 }
 
-/// The median over samples `step` apart, in every `every`-th row of them.
+/// The median over places with columns and rows `step` apart.
 pub fn smooth(
     plan: &Plan,
     pair: &Pair,
     maps: &mut Finest,
-    raster: (i64, i64),
+    step: (i64, i64),
     sigma_range: f64,
     touched: impl Fn(i32) -> bool,
 ) {
@@ -100,7 +100,7 @@ pub fn smooth(
         if !touched(before.validity[(x, y)]) {
             return before.disparity[(x, y)];
         }
-        let mut places = places(plan, pair, &before, raster, sigma_range, (x, y));
+        let mut places = places(plan, pair, &before, step, sigma_range, (x, y));
         places.sort_unstable_by_key(|place| place.disparity);
         let total: i64 = places.iter().map(|place| place.weight).sum();
         let mut cumulated = 0;

@@ -3,7 +3,8 @@ use super::fill::invalid;
 use mrfgs::image::Pair;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::plan::votes::{
-    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_REACH, VOTE_SHIFT,
+    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES, VOTE_REACH,
+    VOTE_SHIFT, VOTE_SURE,
 };
 use mrfgs::maps::flag;
 use mrfgs::options::{Fill, Nearer};
@@ -20,7 +21,12 @@ struct Votes<'a> {
     shown: Vec<Vec<Option<usize>>>,
 }
 
-/// Filled pixels take the vote of the half-size pixel that looks like them.
+/// Whether a pixel is valid and confident.
+fn sure(maps: &Finest, at: (usize, usize)) -> bool {
+    !invalid(maps.validity[at]) && maps.confidence[at] >= VOTE_SURE as i32
+}
+
+/// Filled pixels take the vote of the half-size pixel that looks like them, and outvoted ones their own.
 pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     if plan.method.refinement.fill != Fill::Votes {
         return;
@@ -34,7 +40,14 @@ pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
         (0..rows.len()).map(|y| (0..rows[y].len()).map(|x| votes.vote(&rows, (x, y))).collect()).collect();
     for y in 0..height {
         for x in 0..width {
-            if before.validity[(x, y)] & i32::from(flag::FILLED) == 0 {
+            let at = (x, y);
+            if before.validity[at] & i32::from(flag::FILLED) == 0 {
+                let vote = elected[y / 2][x / 2].filter(|_| !invalid(before.validity[at]) && !sure(&before, at));
+                if let Some(vote) = vote.filter(|vote| (vote - i64::from(before.disparity[at])).abs() > VOTE_OUTVOTES.into()) {
+                    maps.disparity[at] = vote as i32;
+                    maps.validity[at] = i32::from(flag::SPECKLE | flag::FILLED);
+                    maps.confidence[at] = 0;
+                }
                 continue;
             }
             let own = votes.colour(x, y);
@@ -99,10 +112,10 @@ impl Votes<'_> {
         column.ok().filter(|&column| column < self.pair.size().0)
     }
 
-    /// The nearest label that valid pixels of row `y` show in each column of the right view.
+    /// The nearest label that sure pixels of row `y` show in each column of the right view.
     fn shown(&self, y: usize) -> Vec<Option<usize>> {
         let mut shown: Vec<Option<usize>> = vec![None; self.pair.size().0];
-        for x in (0..shown.len()).filter(|&x| !invalid(self.maps.validity[(x, y)])) {
+        for x in (0..shown.len()).filter(|&x| sure(self.maps, (x, y))) {
             let label = self.maps.label[(x, y)] as usize;
             let Some(column) = self.column(label, x) else { continue };
             if shown[column].is_none_or(|other| self.nearer(label, other, 0)) {

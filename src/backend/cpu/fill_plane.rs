@@ -1,0 +1,17 @@
+//! Planes through the disparities of filled pixels: see [`crate::backend::Stage::FillPlane`].
+
+use super::finest::Finest;
+use super::median::smooth;
+use super::plane::limits;
+use crate::image::Image;
+use crate::maps::flag;
+use crate::plan::Plan;
+use crate::weights::{FILL_STEP_BITS, MedianWeights};
+
+pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
+    let limits = plan.method.refinement.plane.then(|| limits(plan));
+    for step_bits in FILL_STEP_BITS {
+        let weights = MedianWeights::stretched(&plan.method, step_bits);
+        smooth(&weights, |f| f & flag::FILLED != 0, limits, guide, maps);
+    }
+}
