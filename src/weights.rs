@@ -8,12 +8,15 @@ pub const MEDIAN_WEIGHT: u8 = 127;
 const MEDIAN_SPACE: f64 = 96.0;
 /// Every second row of a window is used, with all of its columns: 2 to this many.
 pub const WINDOW_ROW_BITS: u32 = 1;
-/// By how much the windows of the filled pixels are stretched, one after the other, along rows and along columns: their places are 2 to
-/// so many pixels apart. The first sees far in all directions. The second sees along rows, since that is how roads and floors stay at
-/// one disparity.
-pub const FILL_STEP_BITS: [[u32; 2]; 2] = [[2, 2], [3, 0]];
-/// The range sigma of the stretched windows is smaller by this factor.
-const STRETCH_SIGMA: f64 = 3.0;
+/// How far apart the places of the windows of filled pixels are, one window after the other, along rows and along columns: 2 to so many
+/// pixels. The first sees far in all directions. The second sees along rows, since there roads and floors stay at one disparity.
+pub const FILL_STEP_BITS: [[u32; 2]; 2] = [[3, 3], [4, 0]];
+/// Side of these windows, in places.
+const FILL_WINDOW: usize = 13;
+/// Their spatial parameter, in places.
+const FILL_SIGMA_SPACE: f64 = 4.3;
+/// Their range sigma is smaller than the median's by this factor.
+const FILL_SIGMA_RANGE: f64 = 3.0;
 
 /// Number of differences in colour: the sum over three channels of 8 bits.
 pub const COLOUR_DIFFERENCES: usize = 3 * 255 + 1;
@@ -61,14 +64,12 @@ impl MedianWeights {
         Self::new(window, refinement.median_sigma_space, refinement.median_sigma_range)
     }
 
-    /// The weights of a window whose places are 2 to `step_bits` pixels apart, along rows and along columns. Each loses weight by its
-    /// distance in steps, and the range sigma is a third.
+    /// The weights of filled pixels, in a window of 13 x 13 places that are 2 to `step_bits` pixels apart, along rows and along columns:
+    /// with a spatial parameter of 4.3 places, and a third of the range parameter.
     #[must_use]
-    pub fn stretched(method: &Method, step_bits: [u32; 2]) -> Self {
-        let refinement = &method.refinement;
-        let window = refinement.median_window as usize;
-        let range = refinement.median_sigma_range / STRETCH_SIGMA;
-        Self { step_bits, ..Self::new(window, refinement.median_sigma_space, range) }
+    pub fn of_filled(method: &Method, step_bits: [u32; 2]) -> Self {
+        let range = method.refinement.median_sigma_range / FILL_SIGMA_RANGE;
+        Self { step_bits, ..Self::new(FILL_WINDOW, FILL_SIGMA_SPACE, range) }
     }
 
     /// Weights for a window of `window` pixels, sigmas in pixels and in the intensity range 0 to 1.

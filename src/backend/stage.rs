@@ -176,8 +176,9 @@ macro_rules! for_every_stage {
                 ///    [`flag::FILLED`](crate::maps::flag::FILLED), and its confidence is 0.
                 VoteFill vote_fill;
                 /// [`Stage::Plane`] on filled pixels alone, or [`Stage::Median`] where [`crate::options::RefinementOptions::plane`] is off,
-                /// twice: over each of the stretched windows of [`FILL_STEP_BITS`](crate::weights::FILL_STEP_BITS). x and y count in places there,
-                /// for the weights as well as for the plane, and the range parameter is a third.
+                /// twice: with places as far apart as either of [`FILL_STEP_BITS`](crate::weights::FILL_STEP_BITS) says. x and y count in places
+                /// there, for the weights as well as for the plane. Weights are
+                /// [`MedianWeights::of_filled`](crate::weights::MedianWeights::of_filled).
                 FillPlane fill_plane;
                 /// Weighted median of [`Map::Disparity`](super::Map::Disparity), on the pixels that [`crate::options::RefinementOptions::median`] names and that have a
                 /// disparity, over the pixels that have one in the centre's row of the window and in every second row from there: the

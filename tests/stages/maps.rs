@@ -130,7 +130,6 @@ fn control_changes_are_found() {
             p.method.refinement.nearer = Nearer::Smaller;
         }),
         (Stage::VoteFill, false, twin::vote_fill::vote_fill, |p| p.range.min += 1),
-        (Stage::FillPlane, false, twin::fill_plane::fill_plane, |p| p.method.refinement.median_window = 7),
         (Stage::FillPlane, false, twin::fill_plane::fill_plane, |p| {
             p.method.refinement.median_sigma_range = 0.02;
         }),

@@ -11,7 +11,7 @@ use crate::weights::{FILL_STEP_BITS, MedianWeights};
 pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
     let limits = plan.method.refinement.plane.then(|| limits(plan));
     for step_bits in FILL_STEP_BITS {
-        let weights = MedianWeights::stretched(&plan.method, step_bits);
+        let weights = MedianWeights::of_filled(&plan.method, step_bits);
         smooth(&weights, |f| f & flag::FILLED != 0, limits, guide, maps);
     }
 }

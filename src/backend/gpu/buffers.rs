@@ -45,6 +45,7 @@ pub(super) struct Buffers {
     /// Weight of colour in the matching cost.
     pub(super) contrast: Rows,
     pub(super) median_weights: wgpu::Buffer,
+    pub(super) fill_weights: wgpu::Buffer,
     /// Label map of the last change, and its squared differences.
     pub(super) labels: Rows,
     pub(super) squares: Rows,
@@ -288,6 +289,9 @@ impl Buffers {
         let rows = u64::from(fine.height);
         Ok(Self {
             median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
+            // What distance subtracts is the same for all steps.
+            fill_weights: a
+                .constant("fill weights", &MedianWeights::of_filled(&plan.method, [0; 2]).words())?,
             votes,
             change_sums: a.buffer("change", 2 * rows)?,
             convergence: a.buffer("convergence", size_of::<Convergence>() as u64 / 4)?,

@@ -4,16 +4,23 @@ use super::steps::{Job, Recorder};
 use super::{median, plane};
 use crate::error::Result;
 use crate::plan::Plan;
+use crate::plan::planes::PLANE_BITS;
 use crate::weights::{FILL_STEP_BITS, MedianWeights};
 
-pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
-    if plan.method.refinement.plane { plane::jobs(plan, level) } else { median::jobs(plan, level) }
+fn weights(plan: &Plan) -> [MedianWeights; 2] {
+    FILL_STEP_BITS.map(|step_bits| MedianWeights::of_filled(&plan.method, step_bits))
+}
+
+pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
+    let (kernel, rounds) =
+        if plan.method.refinement.plane { (plane::kernel(), PLANE_BITS.len()) } else { (median::kernel(), 0) };
+    vec![median::job(&weights(plan)[0], kernel, rounds)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let job = &jobs(r.plan, 0)[0];
-    for step_bits in FILL_STEP_BITS {
-        median::smooth(r, job, &MedianWeights::stretched(&r.plan.method, step_bits), false)?;
+    for weights in weights(r.plan) {
+        median::smooth(r, job, &weights, &r.buffers.fill_weights, false)?;
     }
     Ok(())
 }

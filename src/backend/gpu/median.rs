@@ -15,16 +15,20 @@ const SHADER: &str = include_str!("../../../shaders/median.wgsl");
 
 uniform! { radius: u32, column_bits: u32, row_bits: u32, scale: u32, doublings: u32, all: u32 }
 
-/// A job for `kernel`, which imports the weighted median and goes over the window so many times `more`.
-pub(super) fn job(plan: &Plan, kernel: Kernel, more: usize) -> Job {
+pub(super) fn kernel() -> Kernel {
+    Kernel::new("median", "main", SHADER)
+}
+
+/// A job for `kernel`, which imports the weighted median and goes over a window with `weights` so many times `more`.
+pub(super) fn job(weights: &MedianWeights, kernel: Kernel, more: usize) -> Job {
     // One pass, and one for every three bits of what the disparities of a window may span.
     let passes = 1 + 8 + more;
-    let window = plan.method.refinement.median_window as usize;
+    let window = 2 * weights.radius() + 1;
     Job::new::<Uniform>(kernel, passes * (window + 1) * window + 8 + more)
 }
 
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    vec![job(plan, Kernel::new("median", "main", SHADER), 0)]
+    vec![job(&MedianWeights::of(&plan.method), kernel(), 0)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
@@ -38,11 +42,11 @@ pub(super) fn record_as(r: &mut Recorder, job: &Job) -> Result<()> {
     if median == Median::Off {
         return Ok(());
     }
-    smooth(r, job, &MedianWeights::of(&r.plan.method), median == Median::All)
+    smooth(r, job, &MedianWeights::of(&r.plan.method), &r.buffers.median_weights, median == Median::All)
 }
 
-/// Records `job` with `weights`, on `all` pixels or on the filled ones. What distance subtracts is the same for all steps.
-pub(super) fn smooth(r: &mut Recorder, job: &Job, weights: &MedianWeights, all: bool) -> Result<()> {
+/// Records `job` with `weights`, whose spatial part `table` holds, on `all` pixels or on the filled ones.
+pub(super) fn smooth(r: &mut Recorder, job: &Job, weights: &MedianWeights, table: &wgpu::Buffer, all: bool) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
     let [column_bits, row_bits] = weights.step_bits();
     let own = Uniform {
@@ -60,7 +64,7 @@ pub(super) fn smooth(r: &mut Recorder, job: &Job, weights: &MedianWeights, all: 
             (1, b.left.bind(&seen)),
             (2, b.disparity.bind(&seen)),
             (3, b.flags.bind(&seen)),
-            (4, Binding::whole(&b.median_weights)),
+            (4, Binding::whole(table)),
             (5, b.spare_disparity.bind(rows)),
         ]
     })?;

@@ -23,8 +23,7 @@ pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
 
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    let sigma_range = plan.method.refinement.median_sigma_range;
-    smooth(plan, pair, maps, (1, 1), sigma_range, |validity| changes(plan, validity));
+    smooth(plan, pair, maps, &Window::of(plan), |validity| changes(plan, validity));
 }
 
 /// Whether the median changes a pixel.
@@ -45,6 +44,28 @@ fn known(validity: i32) -> bool {
     !invalid(validity) || filled(validity)
 }
 
+/// A window of places that are so many columns and rows apart.
+pub struct Window {
+    pub radius: i64,
+    pub step: (i64, i64),
+    /// In places.
+    pub sigma_space: f64,
+    pub sigma_range: f64,
+}
+
+impl Window {
+    /// That of the median.
+    pub fn of(plan: &Plan) -> Self {
+        let refinement = &plan.method.refinement;
+        Self {
+            radius: i64::from(refinement.median_window / 2),
+            step: (1, 1),
+            sigma_space: refinement.median_sigma_space,
+            sigma_range: refinement.median_sigma_range,
+        }
+    }
+}
+
 /// A place of a window that has a disparity.
 pub struct Place {
     /// Where it is, in samples from the middle.
@@ -53,19 +74,16 @@ pub struct Place {
     pub weight: i64,
 }
 
-/// The places of the window of pixel (x, y), in columns and rows `step` apart and every second one of those rows.
+/// The places of the window of pixel (x, y): every second row of it.
 pub fn places(
     plan: &Plan,
     pair: &Pair,
     maps: &Finest,
-    step: (i64, i64),
-    sigma_range: f64,
+    window: &Window,
     (x, y): (usize, usize),
 ) -> Vec<Place> {
     let (width, height) = plan.size();
-    let method = &plan.method;
-    let sigma_space = method.refinement.median_sigma_space;
-    let radius = i64::from(method.refinement.median_window / 2);
+    let Window { radius, step, sigma_space, sigma_range } = *window;
     let guide = &pair.left().pixels;
     let mut places = Vec::new();
     for j in (-radius..=radius).filter(|j| j % 2 == 0) {
@@ -85,13 +103,12 @@ pub fn places(
     places
 }
 
-/// The median over places with columns and rows `step` apart.
+/// The median of a window.
 pub fn smooth(
     plan: &Plan,
     pair: &Pair,
     maps: &mut Finest,
-    step: (i64, i64),
-    sigma_range: f64,
+    window: &Window,
     touched: impl Fn(i32) -> bool,
 ) {
     let (width, height) = plan.size();
@@ -100,7 +117,7 @@ pub fn smooth(
         if !touched(before.validity[(x, y)]) {
             return before.disparity[(x, y)];
         }
-        let mut places = places(plan, pair, &before, step, sigma_range, (x, y));
+        let mut places = places(plan, pair, &before, window, (x, y));
         places.sort_unstable_by_key(|place| place.disparity);
         let total: i64 = places.iter().map(|place| place.weight).sum();
         let mut cumulated = 0;

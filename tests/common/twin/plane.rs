@@ -1,5 +1,5 @@
 use super::Finest;
-use super::median::{changes, places, smooth};
+use super::median::{Window, changes, places, smooth};
 use mrfgs::image::{Pair, Plane};
 use mrfgs::low_level::plan::Plan;
 
@@ -10,21 +10,19 @@ fn fits(value: i64) -> i64 {
 
 /// The median, and then the value of a plane through the disparities that it was taken of.
 pub fn plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    let sigma_range = plan.method.refinement.median_sigma_range;
-    through(plan, pair, maps, (1, 1), sigma_range, |validity| changes(plan, validity));
+    through(plan, pair, maps, &Window::of(plan), |validity| changes(plan, validity));
 }
 
-/// The same for `touched` pixels, over places with columns and rows `step` apart.
+/// The same for `touched` pixels, in another window.
 pub fn through(
     plan: &Plan,
     pair: &Pair,
     maps: &mut Finest,
-    step: (i64, i64),
-    sigma_range: f64,
+    window: &Window,
     touched: impl Fn(i32) -> bool + Copy,
 ) {
     let before = maps.clone();
-    smooth(plan, pair, maps, step, sigma_range, touched);
+    smooth(plan, pair, maps, window, touched);
     let medians = &maps.disparity;
     let (low, high) = (i64::from(plan.range.min) * 256, i64::from(plan.range.max) * 256);
     let (width, height) = plan.size();
@@ -33,7 +31,7 @@ pub fn through(
             return medians[(x, y)];
         }
         let median = i64::from(medians[(x, y)]);
-        let places = places(plan, pair, &before, step, sigma_range, (x, y));
+        let places = places(plan, pair, &before, window, (x, y));
         let (mut a, mut b, mut c) = (0, 0, 0);
         for k in [2, 0] {
             let weighed: Vec<[i64; 4]> = places
