@@ -11,7 +11,7 @@ pub mod flag {
     pub const OUTSIDE: u8 = 1;
     /// The right view disagrees: occluded, or mistaken.
     pub const OCCLUDED: u8 = 2;
-    /// The pixel is in a region too small to be trusted, or two labels tie there.
+    /// The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
     pub const SPECKLE: u8 = 4;
     /// The confidence is below the floor; the disparity stays.
     pub const LOW_CONFIDENCE: u8 = 8;

@@ -148,8 +148,9 @@ fn the_stages_run_in_order() {
 fn the_right_map_is_the_map_of_the_mirrored_pair() {
     let mut method = Method::default();
     method.refinement.left_right_check = LeftRightCheck::SecondMatch;
-    // The speckle filter gives up ties, and those of the right view are not known.
+    // The speckle filter gives up ties, and votes ask for confidence: that of the right view is not known.
     (method.refinement.right_map, method.refinement.speckle_size) = (true, 0);
+    method.refinement.fill = Fill::Row;
     method.front = random::as_it_is();
     let mut random = Random::new(12);
     let plan = random::plan((41, 30), -3, 17, &method);

@@ -80,7 +80,7 @@ enum mrfgs_flag
   MRFGS_FLAG_OUTSIDE = 1,
   // The right view disagrees: occluded, or mistaken.
   MRFGS_FLAG_OCCLUDED = 2,
-  // The pixel is in a region too small to be trusted, or two labels tie there.
+  // The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
   MRFGS_FLAG_SPECKLE = 4,
   // The confidence is low; the disparity stays.
   MRFGS_FLAG_LOW_CONFIDENCE = 8,

@@ -14,7 +14,7 @@ pub enum Flag {
     Outside = 1,
     /// The right view disagrees: occluded, or mistaken.
     Occluded = 2,
-    /// The pixel is in a region too small to be trusted, or two labels tie there.
+    /// The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
     Speckle = 4,
     /// The confidence is low; the disparity stays.
     LowConfidence = 8,

@@ -18,30 +18,18 @@ use crate::image::{Pair, Plane};
 use crate::maps::FRACTION;
 use crate::memory;
 use crate::options::DisparityRange;
-use corners::corners;
+use corners::{SPACING, cell, corners};
 use correlation::correlation;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use view::View;
+use view::{RADIUS, View};
 
-/// Smallest number of pixels per corner: dense enough for the statistics of a small zone.
-const SPACING: usize = 64;
-/// Side of the cells over which corners are spread evenly, in pixels, at a spacing of [`SPACING`].
-const CELL: usize = 32;
 /// Approximate maximum of corners where no range is given: they only serve an overview then, and each is
 /// searched in a whole row.
 const OVERVIEW: usize = 8192;
 /// Without a range, the search covers disparities up to 1 / `REACH` of the width, of either sign.
 const REACH: usize = 2;
-/// The structure tensor is a sum over 5 x 5 pixels.
-const TENSOR_RADIUS: usize = 2;
-/// A corner is the maximum of 5 x 5 pixels.
-const PEAK_RADIUS: usize = 2;
-/// The correlation window is 7 x 7 pixels: exactly the pixels that a corner's tensor depends on, gradients
-/// included. (9 x 9 gave a fifth fewer matches on five real pairs; the share of false ones rose on three and
-/// fell on two.)
-const RADIUS: usize = TENSOR_RADIUS + 1;
 /// Smallest ZNCC of a match.
 const MIN_SCORE: f64 = 0.8;
 /// Ratio test: a match's distance from a perfect score is at most this fraction of its runner-up's.
@@ -56,12 +44,6 @@ const AGREEING: usize = 4;
 /// Matches agree where they differ by at most one pixel, plus one pixel for every this many pixels between
 /// them, because surfaces slant.
 const SLOPE: i64 = 8;
-
-const WINDOW: usize = 2 * RADIUS + 1;
-const WINDOW_PIXELS: i64 = (WINDOW * WINDOW) as i64;
-/// Grey is in 1/16 of an 8-bit level: the finest unit for which the sums over a window fit in 32 bits.
-const GREY_SHIFT: u32 = 4;
-const _: () = assert!(WINDOW_PIXELS * (0xffff >> GREY_SHIFT) * (0xffff >> GREY_SHIFT) <= i32::MAX as i64);
 
 /// A pixel of the left view with its disparity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,11 +119,6 @@ pub(super) fn search(
         })
         .collect();
     consistent(matches, cell(spacing))
-}
-
-/// Side of a cell in pixels, such that a cell holds about the same number of corners at any spacing.
-fn cell(spacing: usize) -> usize {
-    CELL * (spacing / SPACING).isqrt().max(1)
 }
 
 /// The position where a window is found again.

@@ -22,8 +22,8 @@ words! {
         /// They take the farther of the nearest valid disparities to the left and to the right on the row.
         Row = "row",
         /// Valid pixels vote for their own disparities, above all along rows. A vote loses weight with distance and at edges.
-        /// Disparities that would hide what the right view sees get votes against them. A weighted median over a wide window
-        /// follows.
+        /// Disparities that would hide what the right view sees get votes against them. Valid pixels of little confidence may be
+        /// outvoted. Planes through wide surroundings of what is filled follow.
         Votes = "votes",
     }
 }
@@ -73,7 +73,7 @@ options! {
         median_sigma_space: f64 = 6.5, takes real(0.1..=100.0), unit "pixels", source "open";
         /// Range parameter of the median's weights, for intensities from 0 to 1.
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
-        /// After the median, fit a plane around each pixel that it changes, and take its value there.
+        /// After a median, fit a plane around each pixel that it changes, and take its value there.
         plane: bool = true, takes Takes::Switch, source "not in the paper";
         /// Also match the pair at twice its size. Where both maps agree within a pixel, their mean is taken, and where only the larger
         /// pair measures a pixel, what it measures. Takes 8 times the time.

@@ -35,7 +35,11 @@ pub fn reasons() -> Array {
         (0, "measured", "found in both views and trusted"),
         (flag::OUTSIDE, "outside", "the match is outside the right image"),
         (flag::OCCLUDED, "occluded", "the right view disagrees: hidden there, or mistaken"),
-        (flag::SPECKLE, "small region", "in a region too small to be trusted, or two disparities tie"),
+        (
+            flag::SPECKLE,
+            "small region",
+            "in a region too small to be trusted, tied between two disparities, or outvoted by the pixels around it",
+        ),
         (flag::LOW_CONFIDENCE, "low confidence", "another disparity is nearly as good"),
         (flag::FILLED, "filled", "taken from pixels around it"),
         (flag::MASKED, "masked", "the image holds no data here"),

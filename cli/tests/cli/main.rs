@@ -323,7 +323,7 @@ fn help_teaches() {
     for (bit, what) in [
         (flag::OUTSIDE, "match outside the right image"),
         (flag::OCCLUDED, "occluded"),
-        (flag::SPECKLE, "in a small region or a tie"),
+        (flag::SPECKLE, "in a small region, a tie or outvoted"),
         (flag::LOW_CONFIDENCE, "low confidence"),
         (flag::FILLED, "filled"),
         (flag::MASKED, "masked"),

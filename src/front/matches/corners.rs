@@ -1,10 +1,21 @@
 //! Corners of a view (Shi and Tomasi 1994), spread evenly over the image and over its zones.
 
 use super::view::View;
-use super::{PEAK_RADIUS, cell};
 use crate::image::Plane;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+
+/// Smallest number of pixels per corner: dense enough for the statistics of a small zone.
+pub(super) const SPACING: usize = 64;
+/// Side of the cells over which corners are spread evenly, in pixels, at a spacing of [`SPACING`].
+const CELL: usize = 32;
+/// A corner is the maximum of 5 x 5 pixels.
+const PEAK_RADIUS: usize = 2;
+
+/// Side of a cell in pixels, such that a cell holds about the same number of corners at any spacing.
+pub(super) fn cell(spacing: usize) -> usize {
+    CELL * (spacing / SPACING).isqrt().max(1)
+}
 
 /// Corners of `view` in raster order: the best of each zone in each cell of the image, one per `spacing`
 /// pixels.

@@ -1,7 +1,6 @@
 //! Zero-mean normalised cross-correlation (ZNCC) of a window with those along a row.
 
-use super::view::View;
-use super::{RADIUS, WINDOW, WINDOW_PIXELS};
+use super::view::{RADIUS, View, WINDOW, WINDOW_PIXELS};
 use std::array::from_fn;
 use std::ops::RangeInclusive;
 

@@ -160,7 +160,7 @@ fn validity_legend() -> String {
         0 => "measured and trusted",
         1 => "match outside the right image",
         2 => "occluded",
-        4 => "in a small region or a tie",
+        4 => "in a small region, a tie or outvoted",
         8 => "low confidence",
         _ => "masked",
     };
