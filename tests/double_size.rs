@@ -47,7 +47,7 @@ fn both(method: &Method) -> [Method; 2] {
         double.set(key, "false").unwrap();
     }
     double.set("median-window", "31").unwrap();
-    double.set("median-sigma-space", "13").unwrap();
+    double.set("median-sigma-space", "11.5").unwrap();
     [own, double]
 }
 

@@ -12,9 +12,9 @@ pub const PRESETS: &[(&str, &str)] = &[
     ("default", "few errors in little time: for most pairs"),
     (
         "accurate",
-        "nearest to the truth, in 8 times the default's time: matches the pair at twice its size, too",
+        "nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too",
     ),
-    ("fast", "four fifths of the default's time for a few more errors: for video and robots"),
+    ("fast", "nine tenths of the default's time for a few more errors: for video and robots"),
     ("paper", "the paper's whole method, with its choices wherever it states them"),
     ("fgs", "the paper's predecessor: one resolution, and a left-right check by a second matching"),
 ];
@@ -38,7 +38,7 @@ impl Method {
         }
     }
 
-    /// Nearest to the truth, in 8 times the default's time: matches the pair at twice its size, too.
+    /// Nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too.
     #[must_use]
     pub fn accurate() -> Self {
         let default = Self::default();
@@ -66,7 +66,7 @@ impl Method {
         })
     }
 
-    /// Four fifths of the default's time for a few more errors: for video and robots. The finest level only listens to the
+    /// Nine tenths of the default's time for a few more errors: for video and robots. The finest level only listens to the
     /// coarser ones, and the median is smaller.
     #[must_use]
     pub fn fast() -> Self {

@@ -68,15 +68,15 @@ options! {
         /// Which pixels the weighted median changes.
         median: Median = Median::All, takes one_of(Median::WORDS), source "section 2.5: all";
         /// Side of the median's window; it uses every second row of the window.
-        median_window: u32 = 19, takes odd(3..=31), unit "pixels", source "open";
+        median_window: u32 = 17, takes odd(3..=31), unit "pixels", source "open";
         /// Spatial parameter of the median's weights.
-        median_sigma_space: f64 = 6.5, takes real(0.1..=100.0), unit "pixels", source "open";
+        median_sigma_space: f64 = 5.75, takes real(0.1..=100.0), unit "pixels", source "open";
         /// Range parameter of the median's weights, for intensities from 0 to 1.
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
         /// After a median, fit a plane around each pixel that it changes, and take its value there.
         plane: bool = true, takes Takes::Switch, source "not in the paper";
         /// Also match the pair at twice its size. Where both maps agree within a pixel, their mean is taken, and where only the larger
-        /// pair measures a pixel, what it measures. Takes 8 times the time.
+        /// pair measures a pixel, what it measures. Takes 7 times the time.
         double_size: bool = false, takes Takes::Switch, source "not in the paper";
         /// Also make the disparity map of the right view, refined like that of the left one.
         right_map: bool = false, takes Takes::Switch, source "not in the paper";

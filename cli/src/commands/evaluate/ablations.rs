@@ -166,7 +166,7 @@ const READINGS: &[Row] = &[
     ("10 iterations", &[("iterations", "10")]),
     ("60 iterations", &[("iterations", "60"), ("tolerance", "0")]),
     ("no median", &[("median", "off")]),
-    ("median of the default", &[("median-window", "19"), ("median-sigma-space", "6.5")]),
+    ("median of the default", &[("median-window", "17"), ("median-sigma-space", "5.75")]),
     ("median where occluded", &[("left-right-check", "right-view"), ("median", "filled")]),
     ("left-right check", &[("left-right-check", "right-view")]),
     ("sub-pixel", &[("sub-pixel", "true")]),
