@@ -7,8 +7,8 @@ use crate::maps::{FRACTION, flag};
 use crate::options::{Fill, Nearer};
 use crate::plan::Plan;
 use crate::plan::votes::{
-    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES, VOTE_REACH,
-    VOTE_SHIFT, VOTE_SURE, Votes,
+    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES,
+    VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes,
 };
 use crate::weights::vote_weights;
 use rayon::prelude::*;
@@ -305,7 +305,8 @@ fn extremes_on<S: pulp::Simd>(_: S, sums: &[u32]) -> (u32, u32) {
 /// Every filled pixel takes the vote of the half-size pixel around it that looks most alike, and an outvoted one that of its own.
 fn take(maps: &mut Finest, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<Option<i32>>) {
     let width = maps.disparity.width();
-    let rows = maps.disparity.data_mut().par_chunks_mut(width).zip(maps.validity.data_mut().par_chunks_mut(width));
+    let rows =
+        maps.disparity.data_mut().par_chunks_mut(width).zip(maps.validity.data_mut().par_chunks_mut(width));
     let rows = rows.zip(maps.confidence.data_mut().par_chunks_mut(width)).enumerate();
     rows.for_each(|(y, ((disparity, flags), confidence))| {
         for (x, ((disparity, flags), confidence)) in

@@ -12,8 +12,11 @@ fn weights(plan: &Plan) -> [MedianWeights; 2] {
 }
 
 pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    let (kernel, rounds) =
-        if plan.method.refinement.plane { (plane::kernel(), PLANE_BITS.len()) } else { (median::kernel(), 0) };
+    let (kernel, rounds) = if plan.method.refinement.plane {
+        (plane::kernel(), PLANE_BITS.len())
+    } else {
+        (median::kernel(), 0)
+    };
     vec![median::job(&weights(plan)[0], kernel, rounds)]
 }
 

@@ -46,7 +46,13 @@ pub(super) fn record_as(r: &mut Recorder, job: &Job) -> Result<()> {
 }
 
 /// Records `job` with `weights`, whose spatial part `table` holds, on `all` pixels or on the filled ones.
-pub(super) fn smooth(r: &mut Recorder, job: &Job, weights: &MedianWeights, table: &wgpu::Buffer, all: bool) -> Result<()> {
+pub(super) fn smooth(
+    r: &mut Recorder,
+    job: &Job,
+    weights: &MedianWeights,
+    table: &wgpu::Buffer,
+    all: bool,
+) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
     let [column_bits, row_bits] = weights.step_bits();
     let own = Uniform {

@@ -10,8 +10,8 @@ use crate::error::Result;
 use crate::options::Nearer;
 use crate::plan::Plan;
 use crate::plan::votes::{
-    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES, VOTE_REACH,
-    VOTE_SHIFT, VOTE_SURE, Votes,
+    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES,
+    VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes,
 };
 use crate::weights::COLOUR_DIFFERENCES;
 use std::ops::Range;

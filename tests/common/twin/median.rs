@@ -104,13 +104,7 @@ pub fn places(
 }
 
 /// The median of a window.
-pub fn smooth(
-    plan: &Plan,
-    pair: &Pair,
-    maps: &mut Finest,
-    window: &Window,
-    touched: impl Fn(i32) -> bool,
-) {
+pub fn smooth(plan: &Plan, pair: &Pair, maps: &mut Finest, window: &Window, touched: impl Fn(i32) -> bool) {
     let (width, height) = plan.size();
     let before = maps.clone();
     maps.disparity = Plane::from_fn(width, height, |x, y| {

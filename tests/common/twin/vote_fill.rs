@@ -3,8 +3,8 @@ use super::fill::invalid;
 use mrfgs::image::Pair;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::plan::votes::{
-    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES, VOTE_REACH,
-    VOTE_SHIFT, VOTE_SURE,
+    HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES,
+    VOTE_REACH, VOTE_SHIFT, VOTE_SURE,
 };
 use mrfgs::maps::flag;
 use mrfgs::options::{Fill, Nearer};
@@ -42,8 +42,11 @@ pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
         for x in 0..width {
             let at = (x, y);
             if before.validity[at] & i32::from(flag::FILLED) == 0 {
-                let vote = elected[y / 2][x / 2].filter(|_| !invalid(before.validity[at]) && !sure(&before, at));
-                if let Some(vote) = vote.filter(|vote| (vote - i64::from(before.disparity[at])).abs() > VOTE_OUTVOTES.into()) {
+                let vote =
+                    elected[y / 2][x / 2].filter(|_| !invalid(before.validity[at]) && !sure(&before, at));
+                if let Some(vote) =
+                    vote.filter(|vote| (vote - i64::from(before.disparity[at])).abs() > VOTE_OUTVOTES.into())
+                {
                     maps.disparity[at] = vote as i32;
                     maps.validity[at] = i32::from(flag::SPECKLE | flag::FILLED);
                     maps.confidence[at] = 0;
