@@ -13,6 +13,8 @@ use mrfgs::low_level::backend::gpu::Gpu;
 use mrfgs::low_level::backend::{Backend, Stage};
 use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::program::Program;
+use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::options::Method;
 use pollster::block_on;
 use std::ops::ControlFlow;
@@ -53,6 +55,7 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
         for preset in presets {
             let method = Method::preset(preset).expect("a preset");
             let plan = Plan::new(case.width, case.height, range, &method).expect("a plan");
+            let program = Program::new(&Tiles::in_one_piece(&plan)).expect("one size");
             let mut group = criterion.benchmark_group(format!("{}/{preset}", case.name));
             group
                 .sample_size(10)
@@ -60,7 +63,7 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
                 .warm_up_time(Duration::from_millis(500));
 
             // Whatever a stage needs is there, and the device is warm.
-            block_on(engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())))
+            block_on(engine::solve(backend, &program, &pair, &mut |_| ControlFlow::Continue(()), None))
                 .expect("a match");
             for (stage, stages) in groups(&plan) {
                 group.bench_function(format!("{stage}/{name}"), |b| {
@@ -74,8 +77,14 @@ fn bench_backend(criterion: &mut Criterion, name: &str, backend: &mut dyn Backen
             }
             group.bench_function(format!("match/{name}"), |b| {
                 b.iter(|| {
-                    block_on(engine::solve(backend, &plan, &pair, &mut |_| ControlFlow::Continue(())))
-                        .expect("a match")
+                    block_on(engine::solve(
+                        backend,
+                        &program,
+                        &pair,
+                        &mut |_| ControlFlow::Continue(()),
+                        None,
+                    ))
+                    .expect("a match")
                 });
             });
             group.finish();

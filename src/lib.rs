@@ -104,11 +104,11 @@ pub mod options;
 #[cfg_attr(target_arch = "wasm32", path = "pause_in_browser.rs")]
 mod pause;
 mod plan;
+mod program;
 pub mod rectification;
 mod roofline;
-mod solver;
+mod stage;
 mod text;
-mod tiles;
 mod watch;
 mod weights;
 
@@ -129,9 +129,9 @@ pub mod low_level {
     }
 
     parts! {
-        /// The stages, exactly defined, and what runs them: the CPU path and devices.
+        /// What runs the stages: the CPU path and devices.
         backend;
-        /// A pair through a backend, in one piece or tile by tile.
+        /// What runs a list on a backend.
         engine;
         /// What a match needs of a pair: illumination, texture zones, sparse matches, label ranges.
         front;
@@ -141,12 +141,12 @@ pub mod low_level {
         plan;
         /// What the messages cost at least, to hold a machine against.
         roofline;
-        /// The schedule: levels, iterations, convergence, and the order of what follows.
-        solver;
+        /// A match as a list of steps: the schedule, and how a pair is cut that is too large for its memory.
+        program;
+        /// The stages, exactly defined.
+        stage;
         /// Small text files, and what messages quote of them.
         text;
-        /// How a pair is cut that is too large for its memory.
-        tiles;
         /// Progress and time of a match.
         watch;
         /// Weights in integers, and the functions that they come from.

@@ -148,12 +148,14 @@ pub struct Plan {
     pub volume_width: VolumeWidth,
     /// The phases of message passing, in order.
     pub phases: Vec<Phase>,
-    /// Columns of the left view from which [`Stage::RightView`](crate::backend::Stage::RightView) is
+    /// Columns of the left view from which the right view is
     /// computed: all of them, or in a tile those of its core.
     pub core: Range<usize>,
     /// Rows of level 0 that are held at the same time: all of them, or as many as the stages that go down the image
-    /// [together](crate::backend::wavefront) need.
+    /// together need.
     pub held: usize,
+    /// Memory that the match may take, in MiB: that of the method, or for a tile what is left of it.
+    pub memory: u32,
 }
 
 impl Plan {
@@ -234,6 +236,7 @@ impl Plan {
             phases,
             core: 0..width,
             held: height,
+            memory: method.tiles.memory,
             method,
         })
     }
@@ -345,6 +348,12 @@ impl Plan {
     pub fn colour_variance(&self) -> u32 {
         let contrast = self.method.cost.colour_contrast;
         (f64::from(CENSUS_PLACES * CENSUS_PLACES) * (contrast * contrast) + 0.5).floor() as u32
+    }
+
+    /// Whether the matching cost goes row by row, so that costs can be computed where they are read.
+    #[must_use]
+    pub fn costs_go_by_rows(&self) -> bool {
+        self.method.cost.matching != MatchingCost::Sad
     }
 
     /// Whether the pyramid takes the minimum over d instead of a low-pass.

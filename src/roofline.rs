@@ -8,18 +8,13 @@
 //! time that the stage can take. Where the volumes of a level fit in a cache, the stage can be faster.
 
 use crate::backend::Stage;
-use crate::backend::volume::{Volume, volume_shape};
 use crate::plan::Plan;
+use crate::stage::{Data, Volume, volume_shape};
 
 /// The message stages of `plan`, level by level. A backend records the time either of [`Stage::Flood`] or of
 /// the two stages that it consists of.
 pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
-    let levels = 0..plan.levels.len();
-    levels.flat_map(|z| {
-        let resolution = (z > 0).then_some(Stage::Resolution(z));
-        let level = [Stage::Dependency(z), Stage::Belief(z), Stage::Flood(z)];
-        resolution.into_iter().chain(level)
-    })
+    Stage::all(plan).into_iter().filter(|stage| stage.passes_messages())
 }
 
 /// Label updates of one run of `stage`: the number of dependency message values that it computes, which is
@@ -27,9 +22,11 @@ pub fn message_stages(plan: &Plan) -> impl Iterator<Item = Stage> + use<> {
 /// all other stages.
 #[must_use]
 pub fn label_updates(plan: &Plan, stage: Stage) -> u64 {
-    let (Stage::Dependency(z) | Stage::Flood(z)) = stage else { return 0 };
-    let (rows, labels, _) = volume_shape(plan, Volume::Dependency(z));
-    rows as u64 * labels as u64
+    let messages = stage.writes().filter_map(Data::volume).find(|v| matches!(v, Volume::Dependency(_)));
+    messages.map_or(0, |volume| {
+        let (rows, labels, _) = volume_shape(plan, volume);
+        rows as u64 * labels as u64
+    })
 }
 
 /// The smallest number of bytes that one run of `stage` moves, where the volumes of each level hold so many `cells`
@@ -47,25 +44,7 @@ pub fn bytes(plan: &Plan, stage: Stage, cells: &[u64]) -> u64 {
         };
         cells[volume.level()] * (rows * width) as u64
     };
-    match stage {
-        Stage::Dependency(z) => stored(Volume::Belief(z)) + 2 * stored(Volume::Dependency(z)),
-        Stage::Resolution(z) => {
-            let beliefs = stored(Volume::Belief(z - 1)) + stored(Volume::Belief(z));
-            beliefs + 2 * (stored(Volume::Down(z - 1)) + stored(Volume::Up(z)))
-        }
-        Stage::Belief(z) => {
-            let down = if z + 1 < plan.levels.len() { stored(Volume::Down(z)) } else { 0 };
-            let up = if z > 0 { stored(Volume::Up(z)) } else { 0 };
-            let summands = stored(Volume::Evidence(z)) + stored(Volume::Dependency(z)) + down + up;
-            summands + stored(Volume::Belief(z))
-        }
-        // The messages that are written are the same ones that are summed.
-        Stage::Flood(z) => {
-            bytes(plan, Stage::Dependency(z), cells) + bytes(plan, Stage::Belief(z), cells)
-                - stored(Volume::Dependency(z))
-        }
-        _ => 0,
-    }
+    if stage.passes_messages() { stage.volumes(plan).map(stored).sum() } else { 0 }
 }
 
 #[cfg(test)]

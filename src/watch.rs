@@ -20,36 +20,36 @@ pub struct Progress {
 /// Receives the progress of a match, and decides whether it continues.
 pub type Observer<'a> = &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send);
 
-/// Follows one match: its progress, and the time of the host's steps between stages.
-pub struct Watch<'a> {
-    observer: Observer<'a>,
+/// How far a match has come.
+#[derive(Clone, Debug, Default)]
+pub struct Followed {
     done: f64,
     total: f64,
     /// The current tile, and the number of tiles.
-    tile: Option<(usize, usize)>,
-    times: Vec<(&'static str, Duration)>,
+    pub tile: Option<(usize, usize)>,
+    /// The steps of the host so far, and the time of each.
+    pub times: Vec<(&'static str, Duration)>,
+}
+
+impl Followed {
+    /// The start of a match whose total work is `total`, in any unit.
+    #[must_use]
+    pub fn new(total: f64) -> Self {
+        Self { total, ..Self::default() }
+    }
+}
+
+/// Follows a match: its progress, and the time of the host's steps between stages.
+pub struct Watch<'a> {
+    observer: Observer<'a>,
+    /// How far it has come.
+    pub followed: Followed,
 }
 
 impl<'a> Watch<'a> {
-    /// Follows a match whose total work is `total`, in any unit.
-    pub fn new(observer: Observer<'a>, total: f64) -> Self {
-        Self { observer, done: 0.0, total, tile: None, times: Vec::new() }
-    }
-
-    /// The same for a match in this many tiles.
-    #[must_use]
-    pub fn in_tiles(self, count: usize) -> Self {
-        Self { tile: Some((0, count)), ..self }
-    }
-
-    /// Starts the next tile.
-    pub fn next_tile(&mut self) {
-        self.tile = self.tile.map(|(tile, all)| (tile + 1, all));
-    }
-
-    /// All tiles are done.
-    pub fn end_tiles(&mut self) {
-        self.tile = None;
+    /// Follows a match from here on.
+    pub fn new(observer: Observer<'a>, followed: Followed) -> Self {
+        Self { observer, followed }
     }
 
     /// Starts `stage`, whose share of the work is `work`, in the unit of the total.
@@ -57,8 +57,9 @@ impl<'a> Watch<'a> {
     /// # Errors
     /// [`Error::Interrupted`] when the observer breaks.
     pub fn begin(&mut self, stage: &'static str, work: f64) -> Result<()> {
-        let progress = Progress { stage, done: (self.done / self.total).min(1.0), tile: self.tile };
-        self.done += work;
+        let Followed { done, total, tile, .. } = &mut self.followed;
+        let progress = Progress { stage, done: (*done / *total).min(1.0), tile: *tile };
+        *done += work;
         match (self.observer)(progress) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Interrupted),
@@ -73,7 +74,7 @@ impl<'a> Watch<'a> {
         self.begin(name, 0.0)?;
         let clock = Instant::now();
         let done = job()?;
-        self.times.push((name, clock.elapsed()));
+        self.followed.times.push((name, clock.elapsed()));
         Ok(done)
     }
 
@@ -89,13 +90,7 @@ impl<'a> Watch<'a> {
         self.begin(name, 0.0)?;
         let clock = Instant::now();
         let done = job.await?;
-        self.times.push((name, clock.elapsed()));
+        self.followed.times.push((name, clock.elapsed()));
         Ok(done)
-    }
-
-    /// The steps of the host so far, and the time of each.
-    #[must_use]
-    pub fn into_times(self) -> Vec<(&'static str, Duration)> {
-        self.times
     }
 }

@@ -8,7 +8,6 @@ use common::devices;
 use mrfgs::image::{Image, Pair, Plane, grey, read};
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::FaultInjection;
-use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::{Maps, flag, has_disparity};
 use mrfgs::options::{DisparityRange, Fill, LeftRightCheck};
@@ -261,7 +260,7 @@ fn ranges_that_cannot_be_doubled_are_refused_before_anything_runs() {
         std::ops::ControlFlow::Continue(())
     };
     let (mut cpu, pair) = (Cpu::default(), pair.unwrap());
-    let solved = pollster::block_on(engine::solve(&mut cpu, &plan, &pair, observer));
+    let solved = common::solve(&mut cpu, &plan, &pair, observer);
     let Err(Error::Range(error)) = solved else { panic!("it is refused") };
     assert_eq!(error.to_string(), "-4000 to 5000 are 9001 labels and at most 8192 fit");
     assert_eq!(begun, 0);

@@ -12,12 +12,11 @@ use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::low_level::engine::{Solution, solve};
+use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Execution, Method};
 use mrfgs::{Error, Matched, Matcher, Result};
-use pollster::block_on;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
@@ -41,7 +40,7 @@ fn corner(pair: &Pair) -> Pair {
 fn on(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange) -> Result<Solution> {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
-    block_on(solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())))
+    common::solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(()))
 }
 
 fn expected(pair: &Pair, range: DisparityRange) -> Maps {

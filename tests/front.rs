@@ -9,7 +9,7 @@ use mrfgs::low_level::front::zones::regions::connected;
 use mrfgs::low_level::front::zones::{MASKED, Options, Zones, segment};
 use mrfgs::low_level::front::{label_range, matches, prepare};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::watch::Watch;
+use mrfgs::low_level::watch::{Followed, Watch};
 use mrfgs::options::{DisparityRange, Illumination, Method, ZoneExtent};
 
 const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"];
@@ -359,7 +359,8 @@ fn the_method_says_what_is_corrected_and_what_a_zone_is() {
             (method.front.illumination, method.front.zone_extent) = (illumination, extent);
             let plan = Plan::new(pair.size().0, pair.size().1, range, &method).unwrap();
             let mut go_on = |_| ControlFlow::Continue(());
-            let found = prepare(pair.clone(), &plan, &mut Watch::new(&mut go_on, 1.0)).unwrap();
+            let found =
+                prepare(pair.clone(), &plan, &mut Watch::new(&mut go_on, Followed::new(1.0))).unwrap();
             let matched = if illumination == Illumination::None { &pair } else { &corrected };
             assert!(found.pair.left() == matched.left() && found.pair.right() == matched.right());
             let source = if illumination == Illumination::HomomorphicFirst { &corrected } else { &pair };

@@ -13,10 +13,10 @@ use mrfgs::Matcher;
 use mrfgs::image::{Image, Pair, Plane, Rect};
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::{Backend, Map, NO_LABEL, Stage};
-use mrfgs::low_level::engine::{self, Solution};
+use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::tiles::Tiles;
+use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::maps::{Maps, RightMap, flag};
 use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchingCost, Median, Method, Order, Potential};
 use pollster::block_on;
@@ -91,8 +91,7 @@ fn solve(pair: &Pair, plan: &Plan) -> Vec<(String, Solution)> {
         .into_iter()
         .map(|(name, mut backend)| {
             let solution =
-                block_on(engine::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())))
-                    .unwrap();
+                common::solve(backend.as_mut(), plan, pair, &mut |_| ControlFlow::Continue(())).unwrap();
             (name, solution)
         })
         .collect()
@@ -243,7 +242,7 @@ fn tiles_are_matched_by_themselves_and_finished_together() {
         }
         for (name, mut backend) in backends() {
             let observer = &mut |_| ControlFlow::Continue(());
-            let actual = block_on(engine::solve_tiles(backend.as_mut(), &tiles, &pair, observer)).unwrap();
+            let actual = common::solve_tiles(backend.as_mut(), &tiles, &pair, observer).unwrap();
             if let Err(e) = compare_all(&actual.maps, &expected) {
                 panic!("{name}, seed {seed}: {e}\n{:?}", plan.method);
             }
@@ -267,7 +266,7 @@ fn places(part: &Rect) -> impl Iterator<Item = (usize, usize)> {
 
 fn matched_whole(pair: &Pair, plan: &Plan) -> Maps {
     let observer = &mut |_| ControlFlow::Continue(());
-    block_on(engine::solve(&mut Cpu::default(), plan, pair, observer)).unwrap().maps
+    common::solve(&mut Cpu::default(), plan, pair, observer).unwrap().maps
 }
 
 /// Runs all stages up to [`Stage::SubPixel`]; returns the number of iterations.
@@ -531,6 +530,6 @@ fn a_plan_of_another_size_is_refused() {
     let plan = Plan::new(8, 9, range, &Method::default()).unwrap();
     for (_, mut backend) in backends() {
         let observer = &mut |_| ControlFlow::Continue(());
-        assert!(block_on(engine::solve(backend.as_mut(), &plan, &pair, observer)).is_err());
+        assert!(common::solve(backend.as_mut(), &plan, &pair, observer).is_err());
     }
 }

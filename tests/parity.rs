@@ -11,7 +11,7 @@ use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
-use mrfgs::low_level::engine::{Solution, solve};
+use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method, PRESETS};
@@ -30,7 +30,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
 fn matched(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, method).unwrap();
-    block_on(solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(()))).unwrap()
+    common::solve(backend, &plan, pair, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
 /// The outputs in which two matches differ.
@@ -228,7 +228,7 @@ fn a_device_that_shows_too_little_says_so() {
     let (pair, range) = load(Path::new("testdata/mixed"));
     let (width, height) = pair.size();
     let plan = Plan::new(width, height, range, &Method::default()).unwrap();
-    let result = block_on(solve(&mut gpu, &plan, &pair, &mut |_| ControlFlow::Continue(())));
+    let result = common::solve(&mut gpu, &plan, &pair, &mut |_| ControlFlow::Continue(()));
     assert!(matches!(&result, Err(Error::Memory(MemoryError::Buffer { .. }))), "{result:?}");
     // The device still serves what fits.
     let small = Pair::new(cut(pair.left(), 20, 15), cut(pair.right(), 20, 15)).unwrap();
@@ -253,7 +253,7 @@ fn the_largest_label_counts() {
             let range = DisparityRange::new(-labels / 2, labels - labels / 2 - 1).unwrap();
             let plan = Plan::new(9, 5, range, &method).unwrap();
             let expected = matched(&mut Cpu::default(), &small, range, &method);
-            match block_on(solve(&mut gpu, &plan, &small, &mut |_| ControlFlow::Continue(()))) {
+            match common::solve(&mut gpu, &plan, &small, &mut |_| ControlFlow::Continue(())) {
                 Ok(actual) => {
                     served += 1;
                     assert!(differences(&actual, &expected).is_empty(), "{preset}, {labels} labels");

@@ -14,13 +14,11 @@ use common::random::{self, Random};
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
-use mrfgs::low_level::engine;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::tiles::Tiles;
+use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::maps::{FRACTION, Maps, flag, has_disparity};
 use mrfgs::options::{DisparityRange, Illumination, Method, ZoneExtent};
 use mrfgs::{Error, Matcher};
-use pollster::block_on;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use std::cell::RefCell;
@@ -128,8 +126,8 @@ fn tiles(case: &Case) -> mrfgs::Result<Tiles> {
 fn maps_on(backend: &mut dyn Backend, case: &Case, tiles: &Tiles) -> mrfgs::Result<Maps> {
     let go_on = &mut |_| ControlFlow::Continue(());
     let solution = match tiles.count() {
-        1 => block_on(engine::solve(backend, tiles.whole(), &case.pair(), go_on))?,
-        _ => block_on(engine::solve_tiles(backend, tiles, &case.pair(), go_on))?,
+        1 => common::solve(backend, tiles.whole(), &case.pair(), go_on)?,
+        _ => common::solve_tiles(backend, tiles, &case.pair(), go_on)?,
     };
     Ok(solution.maps)
 }

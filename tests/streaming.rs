@@ -12,25 +12,24 @@ use mrfgs::image::Pair;
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::FaultInjection;
-use mrfgs::low_level::engine;
+use mrfgs::low_level::engine::{Inspection, Inspector};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::solver;
+use mrfgs::low_level::program::together::streamed;
 use mrfgs::maps::Maps;
 use mrfgs::options::{MatchingCost, Method, Order};
 use mrfgs::{Error, Matcher};
-use pollster::block_on;
 use std::ops::ControlFlow;
 
 /// The maps of a match; `whole` holds all rows, because somebody looks in.
 fn maps(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, whole: bool) -> Maps {
     let observer = &mut |_| ControlFlow::Continue(());
     let mut looks = 0;
-    let mut look = |_: &mut solver::Inspection| {
+    let mut look = |_: &mut Inspection| {
         looks += 1;
         Ok(())
     };
-    let inspector: Option<solver::Inspector> = if whole { Some(&mut look) } else { None };
-    let maps = block_on(engine::inspect(backend, plan, pair, observer, inspector)).unwrap().maps;
+    let inspector: Option<Inspector> = if whole { Some(&mut look) } else { None };
+    let maps = common::inspect(backend, plan, pair, observer, inspector).unwrap().maps;
     assert_eq!(looks > 0, whole);
     maps
 }
@@ -57,7 +56,7 @@ fn method(random: &mut Random) -> Method {
 #[test]
 fn streamed_maps_are_those_of_whole_levels() {
     let mut random = Random::new(17);
-    let (mut streamed, mut differ) = (0, 0);
+    let (mut held_less, mut differ) = (0, 0);
     for i in 0..50 {
         let size = (random.within(1, 70) as usize, random.within(120, 420) as usize);
         let labels = random.pick(&[1, 16, 17, 40, 40, 70]);
@@ -65,8 +64,8 @@ fn streamed_maps_are_those_of_whole_levels() {
         let plan = plan(size, random.within(0, 20).cast_signed() - 10, labels, &method);
         let pair = random::pair(&mut random, size.0, size.1);
         let expected = maps(&mut Cpu::default(), &plan, &pair, true);
-        let held = solver::streamed(&plan);
-        streamed += usize::from(!held.holds_all_rows());
+        let held = streamed(&plan);
+        held_less += usize::from(!held.holds_all_rows());
         assert!(held.bytes() <= plan.bytes());
         // A device takes longer.
         for (name, mut backend) in devices::backends().into_iter().take(if i % 3 == 0 { 2 } else { 1 }) {
@@ -84,7 +83,7 @@ fn streamed_maps_are_those_of_whole_levels() {
         let other = random::pair(&mut random, size.0, size.1);
         differ += usize::from(expected != maps(&mut Cpu::default(), &plan, &other, false));
     }
-    assert!(streamed >= 20, "only {streamed} matches were streamed");
+    assert!(held_less >= 20, "only {held_less} matches were streamed");
     assert!(differ >= 30, "only {differ} pairs have maps of their own");
 }
 
@@ -96,7 +95,7 @@ fn a_device_streams_images_of_any_height() {
         let mut method = Method::default();
         (method.refinement.right_map, method.schedule.final_iterations) = (true, random.pick(&[0, 3]));
         let plan = plan((40, height), 0, 24, &method);
-        assert!(!solver::streamed(&plan).holds_all_rows());
+        assert!(!streamed(&plan).holds_all_rows());
         let pair = random::pair(&mut random, 40, height);
         let expected = maps(&mut Cpu::default(), &plan, &pair, true);
         assert!(expected == maps(&mut gpu, &plan, &pair, false), "height {height}");
@@ -108,7 +107,7 @@ fn a_device_streams_images_of_any_height() {
 fn a_device_streams_in_small_buffers() {
     let mut random = Random::new(21);
     let plan = plan((40, 300), 0, 300, &Method::default());
-    assert!(!solver::streamed(&plan).holds_all_rows());
+    assert!(!streamed(&plan).holds_all_rows());
     let pair = random::pair(&mut random, 40, 300);
     let expected = maps(&mut Cpu::default(), &plan, &pair, true);
     // 14 rows of dependency messages in a buffer; 57, of which 7 can be bound.
@@ -138,7 +137,7 @@ fn a_device_that_may_take_enough_holds_all_rows() {
 fn nothing_is_left_over_from_the_pair_before() {
     let mut random = Random::new(18);
     let plan = plan((60, 330), -3, 40, &Method::default());
-    assert!(!solver::streamed(&plan).holds_all_rows());
+    assert!(!streamed(&plan).holds_all_rows());
     for (name, mut backend) in devices::backends() {
         for byte in [0xff, 0, 0x7f] {
             let pair = random::pair(&mut random, 60, 330);
@@ -156,7 +155,7 @@ fn steps_are_declined_where_not_all_rows_fit() {
     let pair = random::pair(&mut random, 64, 400);
     let mib = |plan: &Plan| plan.bytes().div_ceil(1 << 20) as u32;
     let whole = random::plan((64, 400), 0, 64, &Method::default());
-    let (least, enough) = (mib(&solver::streamed(&whole)), mib(&whole));
+    let (least, enough) = (mib(&streamed(&whole)), mib(&whole));
     assert!(least < enough);
     for (memory, fits) in [(least, false), (enough - 1, false), (enough, true)] {
         let mut method = Method::default();
@@ -178,14 +177,14 @@ fn steps_are_declined_where_not_all_rows_fit() {
 fn methods_that_look_at_the_whole_level_hold_all_rows() {
     for preset in ["paper", "fgs"] {
         let plan = random::plan((60, 300), 0, 16, &Method::preset(preset).unwrap());
-        assert!(solver::streamed(&plan).holds_all_rows(), "{preset}");
+        assert!(streamed(&plan).holds_all_rows(), "{preset}");
     }
     for (name, value) in
         [("matching", "sad"), ("tolerance", "0.1"), ("order", "together"), ("zone-sigmas", "1")]
     {
         let mut method = Method::default();
-        assert!(!solver::streamed(&random::plan((60, 300), 0, 16, &method)).holds_all_rows());
+        assert!(!streamed(&random::plan((60, 300), 0, 16, &method)).holds_all_rows());
         method.set(name, value).unwrap();
-        assert!(solver::streamed(&random::plan((60, 300), 0, 16, &method)).holds_all_rows(), "{name}");
+        assert!(streamed(&random::plan((60, 300), 0, 16, &method)).holds_all_rows(), "{name}");
     }
 }

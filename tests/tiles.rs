@@ -10,15 +10,14 @@ use mrfgs::error::BudgetError;
 use mrfgs::image::{Pair, Plane, calib::Calibration, read};
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
-use mrfgs::low_level::engine::{Solution, solve, solve_tiles};
+use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::solver::streamed;
-use mrfgs::low_level::tiles::{OVERLAP, Tiles};
+use mrfgs::low_level::program::tiles::{OVERLAP, Tiles};
+use mrfgs::low_level::program::together::streamed;
 use mrfgs::low_level::watch::Progress;
 use mrfgs::maps::{Maps, has_disparity};
 use mrfgs::options::{DisparityRange, LeftRightCheck, Method, PRESETS};
 use mrfgs::{Error, Matcher};
-use pollster::block_on;
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
 
@@ -69,11 +68,8 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         if tiles.count() > 1 {
             let pairs = whole.pair_bytes() + whole.conditioning_bytes();
             let beside = (pairs + whole.mosaic_bytes()).div_ceil(1 << 20);
-            expected.method.tiles.memory -= beside as u32;
-            ensure(
-                bytes(&tile.plan) <= u64::from(expected.method.tiles.memory + 1) << 20,
-                "what is left of it",
-            )?;
+            expected.memory -= beside as u32;
+            ensure(bytes(&tile.plan) <= u64::from(expected.memory + 1) << 20, "what is left of it")?;
         }
         // Without an overlap a crop may be too small for all levels.
         ensure(overlap == 0 || tile.plan == expected, "the plan of the crop")?;
@@ -161,7 +157,7 @@ fn load(folder: &Path) -> (Pair, DisparityRange) {
 }
 
 fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {
-    block_on(solve_tiles(backend, tiles, pair, &mut quiet)).unwrap()
+    common::solve_tiles(backend, tiles, pair, &mut quiet).unwrap()
 }
 
 /// Percentage of pixels that have a disparity in only one of the maps, or disparities more than one pixel
@@ -215,7 +211,7 @@ fn hardly_anything_differs_from_one_piece() {
         let (pair, range) = load(&folder);
         let mut cpu = Cpu::default();
         let whole = plan(pair.size(), range, &Method::default(), 4096);
-        let expected = block_on(solve(&mut cpu, &whole, &pair, &mut quiet)).unwrap();
+        let expected = common::solve(&mut cpu, &whole, &pair, &mut quiet).unwrap();
         for (quarters, overlap) in [(3, OVERLAP), (2, OVERLAP), (2, 0)] {
             // A plain wall is estimated from its borders, however far they are.
             let most = match quarters {
@@ -254,7 +250,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
             seen.push(progress);
             ControlFlow::Continue(())
         };
-        block_on(solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut observer)).unwrap();
+        common::solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut observer).unwrap();
         assert!(seen.is_sorted_by(|a, b| a.done <= b.done) && seen.iter().all(|p| p.done <= 1.0));
         let (first, last) = (seen[0], seen[seen.len() - 1]);
         assert!(first.done == 0.0 && last.done > 0.999 && last.tile.is_none(), "{last:?}");
@@ -263,7 +259,7 @@ fn progress_names_the_tiles_and_goes_over_all_of_them() {
         assert_eq!(named, (1..=count).map(|tile| (tile, count)).collect::<Vec<_>>());
         // It stops wherever the observer breaks.
         let stop = |p: Progress| if p.tile == Some((2, count)) { ControlFlow::Break(()) } else { quiet(p) };
-        let stopped = block_on(solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop }));
+        let stopped = common::solve_tiles(&mut Cpu::default(), &tiles, &pair, &mut { stop });
         assert!(matches!(stopped, Err(Error::Interrupted)));
     }
 }

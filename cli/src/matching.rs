@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use mrfgs::image::Pair;
-use mrfgs::low_level::solver::Inspector;
+use mrfgs::low_level::engine::Inspector;
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Matched, Matcher};
 

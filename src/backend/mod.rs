@@ -1,26 +1,22 @@
 //! The seam: what every backend can do, stage by stage.
 //!
-//! A backend knows stages, not their order; [`crate::solver`] alone knows that. Everything from the matching cost on is integer
+//! A backend knows stages, not their order; [`crate::program`] alone knows that. Everything from the matching cost on is integer
 //! arithmetic, so all backends give the same bits. The documentation of each [`Stage`] is its definition.
 
 pub mod cpu;
 pub mod gpu;
 pub mod probe;
-pub mod stage;
-pub mod volume;
-pub mod wavefront;
 
 use crate::error::Result;
 use crate::front::Prepared;
 use crate::image::Plane;
 use crate::maps::Maps;
 use crate::plan::Plan;
+use crate::program::{Program, Run};
+pub use crate::stage::{Map, NO_LABEL, Stage, Volume, volume_shape};
 use probe::Probe;
-pub use stage::Stage;
 use std::pin::Pin;
 use std::time::Duration;
-pub use volume::{Map, NO_LABEL, Volume, volume_shape};
-use wavefront::Wavefront;
 
 /// What a match asked of a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,23 +75,21 @@ pub trait Backend {
     /// [`crate::Error::Memory`] and [`crate::Error::Device`] when the buffers cannot be had.
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()>;
 
-    /// Runs a stage. Devices may still be at it when this returns.
-    fn run(&mut self, stage: Stage) -> Result<()>;
+    /// The same match as this backend runs it: which rows of level 0 it holds, and which stages go together.
+    fn fit(&mut self, program: Program) -> Program;
+
+    /// Runs a stage, as a list says. Devices may still be at it when this returns. What the rows of a part leave of level 0 beside
+    /// maps may be gone afterwards.
+    fn perform(&mut self, run: &Run) -> Result<()>;
+
+    /// Runs a stage on all rows of its level.
+    fn run(&mut self, stage: Stage) -> Result<()> {
+        self.perform(&stage.into())
+    }
 
     /// To be awaited between stages: until a device is no more than a few submissions behind, and in a browser until the other work
     /// of the thread has had its turn.
     fn keep_up(&mut self) -> Promise<'_, ()>;
-
-    /// Runs the stages of a wavefront, the first that follow on the windows of level 0. What they leave of level 0 beside maps
-    /// may be gone afterwards. `before` hears of each stage that is about to run, with the share of it that is.
-    ///
-    /// # Errors
-    /// Those of `before`, beside the device's.
-    fn run_wavefront<'a>(
-        &'a mut self,
-        wavefront: &'a Wavefront,
-        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Promise<'a, ()>;
 
     /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
     /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.

@@ -1,9 +1,9 @@
 //! What only tests and diagnosis need of a backend: its volumes and maps value by value.
 
-use super::volume::{Map, Volume};
 use crate::error::Result;
 use crate::graph::LevelGraph;
 use crate::image::Plane;
+use crate::stage::{Map, Volume};
 
 /// A look into a backend between two stages, at the price of time. The methods fail with [`crate::Error::Device`] when the
 /// device does.

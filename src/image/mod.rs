@@ -332,14 +332,9 @@ impl Pair {
         &self.left
     }
 
-    /// The reference view, shared.
-    pub(crate) fn shared_left(&self) -> Arc<Image> {
-        Arc::clone(&self.left)
-    }
-
-    /// The other view, to share.
-    pub(crate) fn shared_right(&self) -> Arc<Image> {
-        Arc::clone(&self.right)
+    /// Both views, to change; what other pairs share is copied.
+    pub(crate) fn views_mut(&mut self) -> [&mut Image; 2] {
+        [Arc::make_mut(&mut self.left), Arc::make_mut(&mut self.right)]
     }
 
     /// The other view.

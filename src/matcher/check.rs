@@ -8,6 +8,8 @@ use crate::error::{DeviceError, Result};
 use crate::image::{Image, Pair, Plane};
 use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
+use crate::program::Program;
+use crate::program::tiles::Tiles;
 use std::ops::ControlFlow;
 
 /// Sees that a device computes a small pair by `method` as the CPU path does, before it matches a large one: a driver that gets
@@ -28,8 +30,9 @@ pub(super) async fn check(gpu: &mut Gpu, method: &Method, checked: &mut Option<M
     let pair = Pair::new(left, right)?;
     let plan = Plan::new(width, height, DisparityRange::new(-1, 16)?, method)?;
     let quiet = &mut |_| ControlFlow::Continue(());
-    let expected = engine::solve(&mut Cpu::default(), &plan, &pair, quiet).await?;
-    let found = engine::solve(gpu, &plan, &pair, quiet).await?;
+    let program = Program::new(&Tiles::in_one_piece(&plan))?;
+    let expected = engine::solve(&mut Cpu::default(), &program, &pair, quiet, None).await?;
+    let found = engine::solve(gpu, &program, &pair, quiet, None).await?;
     if found.maps != expected.maps {
         return Err(DeviceError::WrongMaps { name: gpu.describe() }.into());
     }

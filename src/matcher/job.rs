@@ -2,10 +2,10 @@
 
 use super::search::Search;
 use super::{Matched, Matcher};
+use crate::engine::Inspection;
 use crate::error::{Error, Result};
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
-use crate::solver::Inspection;
 use crate::watch::Progress;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};

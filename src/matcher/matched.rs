@@ -9,7 +9,7 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::options::DisparityRange;
 use crate::plan::Plan;
-use crate::tiles::Tiles;
+use crate::program::tiles::Tiles;
 use std::time::Duration;
 
 /// The maps of a pair, and what made them.

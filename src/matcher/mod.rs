@@ -9,13 +9,13 @@ mod threads;
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, FaultInjection, Gpu};
-use crate::engine::{self, Started};
+use crate::engine::{self, Inspector, Match};
 use crate::error::{BudgetError, Error, Result};
 use crate::image::Pair;
 use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
-use crate::solver::Inspector;
-use crate::tiles::Tiles;
+use crate::program::Program;
+use crate::program::tiles::Tiles;
 use crate::watch::Observer;
 use check::check;
 pub use job::{Answer, Job};
@@ -282,18 +282,19 @@ impl Matcher {
         range: DisparityRange,
         method: &Method,
         observer: Observer<'_>,
-    ) -> Result<Option<(Tiles, Started)>> {
+    ) -> Result<Option<(Tiles, Match)>> {
         let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
         let (width, height) = pair.size();
         let plan = Plan::new(width, height, range, method)?;
         let tiles = Tiles::new(&plan)?;
-        if tiles.count() > 1 || method.refinement.double_size {
+        let program = Program::new(&tiles)?;
+        if !program.waits_once() {
             return Ok(None);
         }
         let started = async || {
             check(device, &plan.method, checked).await?;
             device.keep_time(false)?;
-            engine::start(device, &plan, pair, observer).await
+            engine::start(device, &program, pair, observer).await
         };
         match threads.run(started).await {
             Ok(started) => Ok(Some((tiles, started))),
@@ -305,7 +306,7 @@ impl Matcher {
     async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
         let Flight { pair, range, tiles, started } = flight;
         if let Some(device) = &mut self.gpu {
-            match self.threads.run(async || engine::finish(device, started).await).await {
+            match self.threads.run(async || engine::finish(device, started, &pair).await).await {
                 Ok(solution) => return Ok(Matched::new(device, &tiles, solution, Vec::new())),
                 Err(e) => self.without_device(e)?,
             };
@@ -335,7 +336,7 @@ struct Flight {
     pair: Pair,
     range: DisparityRange,
     tiles: Tiles,
-    started: Started,
+    started: Match,
 }
 
 async fn timed(
@@ -347,11 +348,8 @@ async fn timed(
     inspector: Option<Inspector<'_>>,
 ) -> Result<Matched> {
     backend.keep_time(timings)?;
-    let solution = if tiles.count() == 1 {
-        engine::inspect(backend, tiles.whole(), pair, observer, inspector).await?
-    } else {
-        engine::solve_tiles(backend, tiles, pair, observer).await?
-    };
+    let program = Program::new(tiles)?;
+    let solution = engine::solve(backend, &program, pair, observer, inspector).await?;
     let timings = if timings { summed(&solution, &backend.times().await?) } else { Vec::new() };
     Ok(Matched::new(backend, tiles, solution, timings))
 }

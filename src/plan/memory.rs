@@ -17,7 +17,7 @@ impl Plan {
     #[must_use]
     pub fn on_device(&self) -> Self {
         let whole = self.whole();
-        let fits = whole.bytes() <= u64::from(self.method.tiles.memory) << 20;
+        let fits = whole.bytes() <= u64::from(self.memory) << 20;
         if fits { whole } else { self.clone() }
     }
 

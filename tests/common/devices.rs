@@ -5,10 +5,10 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
 use mrfgs::low_level::backend::probe::Probe;
-use mrfgs::low_level::backend::wavefront::Wavefront;
 use mrfgs::low_level::backend::{Backend, Map, Promise, Stage, Ticket, Traffic};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::program::{Program, Run};
 use mrfgs::maps::Maps;
 use std::io::Write;
 use std::sync::{Mutex, PoisonError};
@@ -77,20 +77,16 @@ impl Backend for Pooled {
         self.gpu().prepare(plan, prepared)
     }
 
-    fn run(&mut self, stage: Stage) -> Result<()> {
-        self.gpu().run(stage)
+    fn fit(&mut self, program: Program) -> Program {
+        self.gpu().fit(program)
+    }
+
+    fn perform(&mut self, run: &Run) -> Result<()> {
+        self.gpu().perform(run)
     }
 
     fn keep_up(&mut self) -> Promise<'_, ()> {
         self.gpu().keep_up()
-    }
-
-    fn run_wavefront<'a>(
-        &'a mut self,
-        wavefront: &'a Wavefront,
-        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Promise<'a, ()> {
-        self.gpu().run_wavefront(wavefront, before)
     }
 
     fn settled(&mut self, wait: bool) -> Promise<'_, bool> {

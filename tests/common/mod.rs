@@ -12,13 +12,14 @@ pub mod twin;
 
 use mrfgs::image::{Image, Pair};
 use mrfgs::low_level::backend::Backend;
+use mrfgs::low_level::engine::{self, Inspector, Solution};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::{self, LevelGraph};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::solver::{self, Run};
-use mrfgs::low_level::watch::Watch;
+use mrfgs::low_level::program::tiles::Tiles;
+use mrfgs::low_level::program::{Program, Step, schedule};
+use mrfgs::low_level::watch::Observer;
 use pollster::block_on;
-use std::ops::ControlFlow;
 
 /// The graphs of all levels of `plan`, chosen by `image`.
 pub fn graphs(image: &Image, plan: &Plan) -> Vec<LevelGraph> {
@@ -41,17 +42,61 @@ pub fn prepare(backend: &mut dyn Backend, plan: &Plan, pair: &Pair, graphs: &[Le
 
 /// Runs the message passing of `plan` on the evidence that `backend` holds; returns the number of iterations.
 pub fn flood(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
-    let mut go_on = |_| ControlFlow::Continue(());
-    let watch = Watch::new(&mut go_on, 1.0);
-    let nothing = async |_: &mut dyn Backend, _: &mut Run<'_, '_>, _| Ok(());
-    block_on(solver::flood(backend, plan, &mut Run::new(watch, None), nothing))
+    run(backend, &schedule::flood(plan, |_| Vec::new()))
 }
 
 /// The same on the costs that `backend` holds.
 pub fn flood_on_costs(backend: &mut dyn Backend, plan: &Plan) -> mrfgs::Result<u32> {
-    let mut go_on = |_| ControlFlow::Continue(());
-    let watch = Watch::new(&mut go_on, 1.0);
-    let join =
-        async |backend: &mut dyn Backend, run: &mut Run<'_, '_>, z| solver::join(backend, plan, run, z).await;
-    block_on(solver::flood(backend, plan, &mut Run::new(watch, None), join))
+    run(backend, &schedule::flood(plan, schedule::join))
+}
+
+/// Runs steps that pass messages; returns the number of iterations.
+fn run(backend: &mut dyn Backend, steps: &[Step]) -> mrfgs::Result<u32> {
+    let (mut iterations, mut steps) = (0, steps.iter());
+    while let Some(step) = steps.next() {
+        match step {
+            Step::Run(run) => {
+                backend.perform(run)?;
+                block_on(backend.keep_up())?;
+            }
+            Step::Iteration => iterations += 1,
+            Step::Settled if block_on(backend.settled(false))? => {
+                steps.find(|step| **step == Step::EndOfPhase);
+            }
+            _ => {}
+        }
+    }
+    Ok(iterations)
+}
+
+/// Matches `pair` by `plan` in one piece, whatever memory that takes.
+pub fn solve(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer<'_>,
+) -> mrfgs::Result<Solution> {
+    inspect(backend, plan, pair, observer, None)
+}
+
+/// The same, and `inspector` looks in.
+pub fn inspect(
+    backend: &mut dyn Backend,
+    plan: &Plan,
+    pair: &Pair,
+    observer: Observer<'_>,
+    inspector: Option<Inspector<'_>>,
+) -> mrfgs::Result<Solution> {
+    let program = Program::new(&Tiles::in_one_piece(plan))?;
+    block_on(engine::solve(backend, &program, pair, observer, inspector))
+}
+
+/// Matches `pair` in `tiles`.
+pub fn solve_tiles(
+    backend: &mut dyn Backend,
+    tiles: &Tiles,
+    pair: &Pair,
+    observer: Observer<'_>,
+) -> mrfgs::Result<Solution> {
+    block_on(engine::solve(backend, &Program::new(tiles)?, pair, observer, None))
 }

@@ -14,11 +14,9 @@ mod saturation;
 
 macro_rules! declare {
     (
-        levels { $( $(#[$_of_level:meta])* $_level:ident $level_name:ident; )* }
-        finest { $( $(#[$_of_finest:meta])* $_finest:ident $finest_name:ident; )* }
-        maps { $( $(#[$_of_map:meta])* $_map:ident $map_name:ident; )* }
+        $( $group:ident { $( $stage:ident $name:ident; )* } )*
     ) => {
-        $( mod $level_name; )* $( mod $finest_name; )* $( mod $map_name; )*
+        $( $( mod $name; )* )*
     };
 }
 

@@ -2,11 +2,11 @@
 
 use super::dependency::{REACH, touch};
 use super::units::{Blocks, Units, block, block_mut, each_lane, padding};
-use super::volumes::{Level, Sent, Volumes};
+use super::volumes::{Level, Volumes};
 use super::windows::{Seen, Window, Windows};
-use crate::backend::Stage;
 use crate::graph::{Incoming, LevelGraph};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
+use crate::program::Sent;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -111,11 +111,6 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
             }
         }
     }
-}
-
-pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
-    let sent = v.begin(Stage::Belief(level));
-    rows(v, level, sent, 0..v.plan.levels[level].height);
 }
 
 /// The beliefs of these rows.

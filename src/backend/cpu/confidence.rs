@@ -1,13 +1,13 @@
 //! The confidence of each pixel: see [`crate::backend::Stage::Confidence`].
 
-use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::plan::Plan;
+use crate::stage::MapSet;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
     let floor = plan.method.refinement.confidence_floor;
-    let Finest { optima, validity, confidence, .. } = maps;
+    let MapSet { optima, validity, confidence, .. } = maps;
     let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(optima.data());
     for ((confidence, flags), optimum) in pixels {
         let lead = (2 * u32::from(optimum.runner_up - optimum.best)).min(255);

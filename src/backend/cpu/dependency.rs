@@ -5,11 +5,11 @@
 //! belief is infinite, and the message is tau.
 
 use super::units::{Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate};
-use super::volumes::{Level, Sent, Volumes};
+use super::volumes::{Level, Volumes};
 use super::windows::{Seen, Window, Windows};
-use crate::backend::Stage;
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Truncation, TruncationRule};
+use crate::program::Sent;
 use rayon::prelude::*;
 use std::array::from_fn;
 use std::ops::Range;
@@ -54,11 +54,6 @@ pub(super) struct Factors<'a> {
     pub(super) graph: &'a LevelGraph,
     pub(super) windows: &'a Windows,
     pub(super) cut: Truncation,
-}
-
-pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
-    let sent = v.begin(Stage::Dependency(level));
-    rows(v, level, sent, 0..v.plan.levels[level].height);
 }
 
 /// The messages of the factors of these rows.

@@ -5,15 +5,12 @@ use super::units::Units;
 use super::volumes::Volumes;
 use super::windows::{Window, Windows};
 use crate::plan::LevelPlan;
+use crate::program::Sent;
 use rayon::prelude::*;
 use std::ops::Range;
 
-pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
-    rows(v, level, 0..v.plan.levels[level].height);
-}
-
 /// The evidence of these rows.
-pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, rows: Range<usize>) {
+pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, _: Sent, rows: Range<usize>) {
     let (plan, l) = (&v.plan.levels[level], &mut v.levels[level]);
     let windows = &l.windows;
     let evidence = windows.rows_mut(&mut l.evidence, 1, 1, rows.clone()).into_par_iter();

@@ -1,6 +1,5 @@
 //! What the costs of the census and of colour are computed from, row by row, and the costs themselves.
 
-use super::finest::Optimum;
 use super::units::{Blocks, block, block_mut, each_lane};
 use super::windows::{Window, Windows};
 use crate::image::{Image, Pair};
@@ -8,6 +7,7 @@ use crate::plan::{
     CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, CENSUS_RADIUS_X, CENSUS_RADIUS_Y, COLOUR_MOST, LABEL_BLOCK,
     Plan,
 };
+use crate::stage::Optimum;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -1,18 +1,18 @@
 //! Fills invalid pixels from the farther of two neighbours: see [`crate::backend::Stage::Fill`].
 
-use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::options::Nearer;
 use crate::plan::Plan;
+use crate::stage::MapSet;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
     let farther = match plan.method.refinement.nearer {
         Nearer::Larger => i32::min,
         Nearer::Smaller => i32::max,
     };
-    let Finest { disparity, validity: flags, .. } = maps;
+    let MapSet { disparity, validity: flags, .. } = maps;
     let (width, height) = disparity.size();
     let valid_rows: Vec<usize> =
         (0..height).filter(|&y| flags.row(y).iter().any(|f| f & flag::INVALID == 0)).collect();

@@ -1,14 +1,14 @@
 //! Planes through the disparities of filled pixels: see [`crate::backend::Stage::FillPlane`].
 
-use super::finest::Finest;
 use super::median::smooth;
 use super::plane::limits;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::plan::Plan;
+use crate::stage::MapSet;
 use crate::weights::{FILL_STEP_BITS, MedianWeights};
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, guide: &Image) {
     let limits = plan.method.refinement.plane.then(|| limits(plan));
     for step_bits in FILL_STEP_BITS {
         let weights = MedianWeights::of_filled(&plan.method, step_bits);

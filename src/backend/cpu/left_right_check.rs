@@ -1,16 +1,16 @@
 //! The left-right check: see [`crate::backend::Stage::LeftRightCheck`].
 
-use super::finest::Finest;
-use crate::backend::volume::NO_LABEL;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
+use crate::stage::MapSet;
+use crate::stage::NO_LABEL;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, left: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, left: &Image) {
     let (width, min) = (plan.levels[0].width, i64::from(plan.range.min));
-    let Finest { optima, right, validity, .. } = maps;
+    let MapSet { optima, right, validity, .. } = maps;
     validity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, flags) in row.iter_mut().enumerate() {
             let label = optima[(x, y)].label;

@@ -4,7 +4,6 @@
 //! crosses lanes. Each lane bisects an interval of its own, from the smallest to the largest value in its window that has
 //! weight. Every step sums the weights of the values below the middle. This needs no sort.
 
-use super::finest::Finest;
 use super::least_squares::Planes;
 use super::places::{LANES, Place, Weighed};
 use super::units::{block, block_mut, each_lane};
@@ -12,10 +11,11 @@ use crate::image::{Image, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
 use crate::plan::Plan;
+use crate::stage::MapSet;
 use crate::weights::{MEDIAN_WEIGHT, MedianWeights, WINDOW_ROW_BITS};
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, guide: &Image) {
     smooth(&MedianWeights::of(&plan.method), touched(plan), None, guide, maps);
 }
 
@@ -36,9 +36,9 @@ pub(super) fn smooth(
     touched: impl Fn(u8) -> bool + Sync,
     limits: Option<(i32, i32)>,
     guide: &Image,
-    maps: &mut Finest,
+    maps: &mut MapSet,
 ) {
-    let Finest { disparity, validity: flags, .. } = maps;
+    let MapSet { disparity, validity: flags, .. } = maps;
     let width = disparity.width();
     let seen = Seen::new(weights, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();

@@ -1,7 +1,6 @@
 //! The CPU path: every stage, parallel over rows, with inner loops over labels.
 
 mod features;
-mod finest;
 mod least_squares;
 #[cfg_attr(target_arch = "wasm32", path = "pages_in_browser.rs")]
 mod pages;
@@ -13,21 +12,21 @@ mod volumes;
 mod windows;
 
 use super::probe::Probe;
-use super::wavefront::Wavefront;
 use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
-use crate::image::{Image, Plane};
+use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
 use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
-pub(crate) use finest::Finest;
+use crate::program::{Part, Program, Run, Sent, together};
+use crate::stage::MapSet;
 use std::future::ready;
 use std::ops::Range;
 use std::time::Duration;
 use units::Units;
-use volumes::{Sent, Volumes};
+use volumes::Volumes;
 use web_time::Instant;
 
 /// The CPU path.
@@ -47,12 +46,16 @@ enum State {
 
 macro_rules! declare {
     (
-        levels { $( $(#[$_of_level:meta])* $level:ident $level_name:ident; )* }
-        finest { $( $(#[$_of_finest:meta])* $finest:ident $finest_name:ident; )* }
-        maps { $( $(#[$_of_map:meta])* $map:ident $map_name:ident; )* }
+        levels { $( $level:ident $level_name:ident; )* }
+        level_rows { $( $level_row:ident $level_row_name:ident; )* }
+        finest { $( $finest:ident $finest_name:ident; )* }
+        finest_rows { $( $finest_row:ident $finest_row_name:ident; )* }
+        maps { $( $map:ident $map_name:ident; )* }
     ) => {
         $( mod $level_name; )*
+        $( mod $level_row_name; )*
         $( mod $finest_name; )*
+        $( mod $finest_row_name; )*
         $( mod $map_name; )*
 
         impl<U: Units> Volumes<U> {
@@ -60,17 +63,21 @@ macro_rules! declare {
                 match stage {
                     $( Stage::$level(z) => $level_name::run(self, z), )*
                     $( Stage::$finest => $finest_name::run(self), )*
-                    $( Stage::$map )|* => self.maps.run(stage, &self.plan, self.pair.left()),
+                    $( Stage::$map => $map_name::run(&mut self.maps, &self.plan, self.pair.left()), )*
+                    by_rows => {
+                        let sent = self.begin(stage);
+                        let height = self.plan.levels[stage.level().unwrap_or(0)].height;
+                        self.run_rows(by_rows, sent, 0..height);
+                    }
                 }
             }
-        }
 
-        impl Finest {
-            /// Runs a stage that needs only maps; `left` is the left view of the pair that was matched.
-            pub(crate) fn run(&mut self, stage: Stage, plan: &Plan, left: &Image) {
+            /// Runs rows of a stage that goes row by row.
+            fn run_rows(&mut self, stage: Stage, sent: Sent, rows: Range<usize>) {
                 match stage {
-                    $( Stage::$map => $map_name::run(self, plan, left), )*
-                    _ => unreachable!("{stage:?} needs volumes"),
+                    $( Stage::$level_row(z) => $level_row_name::rows(self, z, sent, rows), )*
+                    $( Stage::$finest_row => $finest_row_name::rows(self, rows), )*
+                    _ => unreachable!("{stage:?} does not go row by row"),
                 }
             }
         }
@@ -78,22 +85,6 @@ macro_rules! declare {
 }
 
 crate::for_every_stage!(declare);
-
-impl<U: Units> Volumes<U> {
-    /// Runs rows of a stage that goes row by row.
-    fn run_rows(&mut self, stage: Stage, sent: Sent, rows: Range<usize>) {
-        match stage {
-            Stage::Evidence(z) => evidence::rows(self, z, rows),
-            Stage::Dependency(z) => dependency::rows(self, z, sent, rows),
-            Stage::Resolution(z) => resolution::rows(self, z, sent, rows),
-            Stage::Belief(z) => belief::rows(self, z, sent, rows),
-            Stage::WinnerTakesAll => winner_takes_all::rows(self, rows),
-            Stage::RightView => right_view::rows(self, rows),
-            Stage::SubPixel => sub_pixel::rows(self, rows),
-            _ => unreachable!("{stage:?} does not go row by row"),
-        }
-    }
-}
 
 /// Runs an expression on the volumes, whatever their width.
 macro_rules! on_volumes {
@@ -106,6 +97,13 @@ macro_rules! on_volumes {
 }
 
 use on_volumes;
+
+impl Cpu {
+    /// The CPU path on the maps of a match of `pair`, for the stages that look at maps alone.
+    pub(crate) fn of_maps(plan: &Plan, pair: Pair, maps: MapSet) -> Self {
+        Self { state: Some(State::Narrow(Volumes::of_maps(plan, pair, maps))), ..Self::default() }
+    }
+}
 
 impl Backend for Cpu {
     fn describe(&self) -> String {
@@ -136,11 +134,26 @@ impl Backend for Cpu {
         Ok(())
     }
 
-    fn run(&mut self, stage: Stage) -> Result<()> {
-        let start = Instant::now();
-        on_volumes!(self, v => v.run(stage));
-        if let Some(times) = &mut self.times {
-            times.push((stage, start.elapsed()));
+    fn fit(&mut self, program: Program) -> Program {
+        program.each_frame(together::pass)
+    }
+
+    fn perform(&mut self, run: &Run) -> Result<()> {
+        for stage in run.stages() {
+            let start = Instant::now();
+            on_volumes!(self, v => match &run.part {
+                None => v.run(stage),
+                Some(Part { rows, sent }) => {
+                    v.begin(stage);
+                    v.run_rows(stage, *sent, rows.clone());
+                }
+            });
+            let begins = run.part.as_ref().is_none_or(|part| part.rows.start == 0);
+            let Some(times) = &mut self.times else { continue };
+            match times.iter_mut().rev().find(|time| time.0 == stage && !begins) {
+                Some(time) => time.1 += start.elapsed(),
+                None => times.push((stage, start.elapsed())),
+            }
         }
         Ok(())
     }
@@ -148,30 +161,6 @@ impl Backend for Cpu {
     fn keep_up(&mut self) -> Promise<'_, ()> {
         Box::pin(async {
             self.pause.now_and_then().await;
-            Ok(())
-        })
-    }
-
-    fn run_wavefront<'a>(
-        &'a mut self,
-        wavefront: &'a Wavefront,
-        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Promise<'a, ()> {
-        Box::pin(async {
-            let sent = on_volumes!(self, v => wavefront.stages().iter().map(|&stage| v.begin(stage)).collect::<Vec<_>>());
-            let mut times = vec![Duration::ZERO; sent.len()];
-            for (i, rows) in wavefront.parts() {
-                let stage = wavefront.stages()[i];
-                let height = on_volumes!(self, v => v.plan.levels[stage.level().unwrap_or(0)].height);
-                before(stage, rows.len() as f64 / height as f64)?;
-                let start = Instant::now();
-                on_volumes!(self, v => v.run_rows(stage, sent[i], rows));
-                times[i] += start.elapsed();
-                self.pause.now_and_then().await;
-            }
-            if let Some(all) = &mut self.times {
-                all.extend(wavefront.stages().iter().copied().zip(times));
-            }
             Ok(())
         })
     }
@@ -193,7 +182,7 @@ impl Backend for Cpu {
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
-        let Finest { raw, disparity, validity, confidence, .. } = on_volumes!(self, v => &v.maps);
+        let MapSet { raw, disparity, validity, confidence, .. } = on_volumes!(self, v => &v.maps);
         let maps = Maps {
             disparity: disparity.clone(),
             raw: raw.clone(),

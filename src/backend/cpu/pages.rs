@@ -36,6 +36,12 @@ impl<T: Pod> Pages<T> {
     }
 }
 
+impl<T> Default for Pages<T> {
+    fn default() -> Self {
+        Self { bytes: None, values: PhantomData }
+    }
+}
+
 impl<T: Pod> Deref for Pages<T> {
     type Target = [T];
 

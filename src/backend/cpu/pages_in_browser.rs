@@ -22,6 +22,12 @@ impl<T: Pod> Pages<T> {
     }
 }
 
+impl<T> Default for Pages<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
 impl<T> Deref for Pages<T> {
     type Target = [T];
 

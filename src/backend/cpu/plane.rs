@@ -1,13 +1,13 @@
 //! Planes through the disparities, from the median on: see [`crate::backend::Stage::Plane`].
 
-use super::finest::Finest;
 use super::median::{smooth, touched};
 use crate::image::Image;
 use crate::maps::FRACTION;
 use crate::plan::Plan;
+use crate::stage::MapSet;
 use crate::weights::MedianWeights;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, guide: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, guide: &Image) {
     smooth(&MedianWeights::of(&plan.method), touched(plan), Some(limits(plan)), guide, maps);
 }
 

@@ -3,10 +3,10 @@
 //! Rows of labels are processed with their padding; values that belong to no label count as infinite.
 
 use super::units::{Units, block, block_mut, each_lane, keep_least, padding, smallest, truncate};
-use super::volumes::{Level, Sent, Volumes};
+use super::volumes::{Level, Volumes};
 use super::windows::{Window, Windows};
-use crate::backend::Stage;
 use crate::plan::{LABEL_BLOCK, Truncation, TruncationRule};
+use crate::program::Sent;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -36,11 +36,6 @@ struct Between<U> {
     margin: usize,
     fine_padding: Vec<U>,
     coarse_padding: Vec<U>,
-}
-
-pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
-    let sent = v.begin(Stage::Resolution(level));
-    rows(v, level, sent, 0..v.plan.levels[level].height);
 }
 
 /// The messages of the factors of these coarse rows.

@@ -7,10 +7,6 @@ use crate::plan::Plan;
 use rayon::prelude::*;
 use std::ops::Range;
 
-pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
-    rows(v, 0..v.plan.levels[0].height);
-}
-
 /// These rows of the right view.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let (plan, maps, Level { belief, windows, .. }) = (&v.plan, &mut v.maps, &v.levels[0]);

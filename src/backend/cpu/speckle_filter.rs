@@ -1,13 +1,13 @@
 //! The speckle filter: see [`crate::backend::Stage::SpeckleFilter`].
 
-use super::finest::Finest;
 use crate::image::Image;
 use crate::maps::flag;
 use crate::plan::Plan;
+use crate::stage::MapSet;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
     let size = plan.method.refinement.speckle_size as usize;
-    let Finest { optima, validity, .. } = maps;
+    let MapSet { optima, validity, .. } = maps;
     let (width, height) = optima.size();
     let flags = validity.data_mut();
     // With a border of pixels that belong to no region, so that every pixel has four neighbours.

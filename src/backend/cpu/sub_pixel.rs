@@ -5,24 +5,20 @@
 //! plane of a neighbour a pixel takes depends on how far their labels are apart.
 
 use super::features::FAR;
-use super::finest::{Finest, Optimum};
 use super::units::{Units, block, each_lane};
 use super::volumes::Volumes;
-use crate::backend::volume::NO_LABEL;
 use crate::maps::FRACTION;
 use crate::plan::LevelPlan;
+use crate::stage::NO_LABEL;
+use crate::stage::{MapSet, Optimum};
 use rayon::prelude::*;
 use std::ops::Range;
-
-pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
-    rows(v, 0..v.plan.levels[0].height);
-}
 
 /// The disparities of these rows.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     let Volumes { plan, features, fine_cost, maps, .. } = v;
     let level = &plan.levels[0];
-    let Finest { optima, raw, disparity, .. } = maps;
+    let MapSet { optima, raw, disparity, .. } = maps;
     let cells = BAND * level.width;
     let raw = raw.rows_mut(rows.clone()).par_chunks_mut(cells);
     let bands = raw.zip(disparity.rows_mut(rows.clone()).par_chunks_mut(cells));

@@ -1,7 +1,6 @@
 //! The volumes of a match, in the width that its plan needs.
 
 use super::features::Features;
-use super::finest::Finest;
 use super::pages::Pages;
 use super::units::Units;
 use super::windows::Windows;
@@ -11,6 +10,8 @@ use crate::front::Prepared;
 use crate::graph::LevelGraph;
 use crate::image::{Image, Pair, Plane};
 use crate::plan::Plan;
+use crate::program::Sent;
+use crate::stage::{Data, MapSet, Volume};
 
 /// All volumes of a match.
 pub(super) struct Volumes<U> {
@@ -28,18 +29,7 @@ pub(super) struct Volumes<U> {
     pub(super) labels: Vec<u16>,
     pub(super) change: Option<u64>,
     pub(super) settled: bool,
-    pub(super) maps: Finest,
-}
-
-/// Which messages there are when a stage starts. Those that have not been sent count as 0, whatever is stored.
-#[derive(Clone, Copy)]
-pub(super) struct Sent {
-    /// Those of the level's dependency factors.
-    pub(super) dependency: bool,
-    /// Those between the level and the next coarser one.
-    pub(super) above: bool,
-    /// Those between the level and the next finer one.
-    pub(super) below: bool,
+    pub(super) maps: MapSet,
 }
 
 /// Volumes of one level. Cost is \[y\]\[x\]\[label\] with padded labels; the others hold the labels of the `windows` alone,
@@ -94,18 +84,26 @@ impl<U: Units> Volumes<U> {
             })
             .collect::<Result<_>>()?;
         let fine = &plan.levels[0];
-        Ok(Self {
+        let fine_cost = Pages::new(if plan.holds_all_rows() { fine.pixels() * fine.stride } else { 0 })?;
+        let maps = MapSet::new(plan.size());
+        let of_maps = Self::of_maps(plan, pair, maps);
+        Ok(Self { fine_cost, levels, label_ranges, labels: vec![0; fine.pixels()], ..of_maps })
+    }
+
+    /// Maps, and no volumes.
+    pub(super) fn of_maps(plan: &Plan, pair: Pair, maps: MapSet) -> Self {
+        Self {
             plan: plan.clone(),
             pair,
             features: Features::default(),
-            fine_cost: Pages::new(if plan.holds_all_rows() { fine.pixels() * fine.stride } else { 0 })?,
-            levels,
-            label_ranges,
-            labels: vec![0; fine.pixels()],
+            fine_cost: Pages::default(),
+            levels: Vec::new(),
+            label_ranges: Vec::new(),
+            labels: Vec::new(),
             change: None,
             settled: false,
-            maps: Finest::new(plan.size()),
-        })
+            maps,
+        }
     }
 
     /// Frees the graphs with their guides, and the label ranges.
@@ -124,10 +122,12 @@ impl<U: Units> Volumes<U> {
             above: self.levels.get(z + 1).is_some_and(|above| above.resolution_sent),
             below: self.levels[z].resolution_sent,
         };
-        match stage {
-            Stage::Dependency(_) | Stage::Flood(_) => self.levels[z].dependency_sent = true,
-            Stage::Resolution(_) => self.levels[z].resolution_sent = true,
-            _ => {}
+        for volume in stage.writes().filter_map(Data::volume) {
+            match volume {
+                Volume::Dependency(z) => self.levels[z].dependency_sent = true,
+                Volume::Up(z) => self.levels[z].resolution_sent = true,
+                _ => {}
+            }
         }
         sent
     }

@@ -1,6 +1,5 @@
 //! Votes on what was filled: see [`crate::backend::Stage::VoteFill`].
 
-use super::finest::Finest;
 use super::units::{block, each_lane};
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, flag};
@@ -10,10 +9,11 @@ use crate::plan::votes::{
     HIDING_LABELS, VOTE_AWAY, VOTE_BITS, VOTE_FRACTION_BITS, VOTE_HIDING, VOTE_MOST, VOTE_OUTVOTES,
     VOTE_REACH, VOTE_SHIFT, VOTE_SURE, Votes,
 };
+use crate::stage::MapSet;
 use crate::weights::vote_weights;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut Finest, plan: &Plan, left: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, left: &Image) {
     if plan.method.refinement.fill == Fill::Votes {
         let colours = halved(left);
         let elected = elect(maps, plan, &colours, Votes::of(plan));
@@ -71,8 +71,8 @@ fn halved(left: &Image) -> Plane<[u8; 3]> {
 }
 
 /// The half-size pixels that a filled pixel may take its vote from, and those whose vote may outvote a pixel.
-fn asked(maps: &Finest, votes: Votes) -> Plane<bool> {
-    let Finest { validity, confidence, .. } = maps;
+fn asked(maps: &MapSet, votes: Votes) -> Plane<bool> {
+    let MapSet { validity, confidence, .. } = maps;
     let mut asked = Plane::filled(votes.width, votes.height, false);
     asked.data_mut().par_chunks_mut(votes.width).enumerate().for_each(|(y, asked)| {
         for row in (2 * y).saturating_sub(2)..(2 * y + 4).min(validity.height()) {
@@ -95,7 +95,7 @@ fn around(at: usize, count: usize) -> std::ops::Range<usize> {
 }
 
 /// The votes of the half-size pixels that are asked, in 1/256 px, where there is one.
-fn elect(maps: &Finest, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<Option<i32>> {
+fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<Option<i32>> {
     let asked = asked(maps, votes);
     let [along, across] = vote_weights();
     let mut elected = Plane::filled(votes.width, votes.height, None);
@@ -165,7 +165,7 @@ struct Scratch {
 }
 
 /// Own votes of the half-size pixels of row `y`, \[x\]\[label\].
-fn own_votes(maps: &Finest, plan: &Plan, y: usize, out: &mut [u32], scratch: &mut Scratch) {
+fn own_votes(maps: &MapSet, plan: &Plan, y: usize, out: &mut [u32], scratch: &mut Scratch) {
     let (width, height) = maps.disparity.size();
     let (min, labels) = (plan.range.min, plan.levels[0].labels);
     let stride = labels.div_ceil(2).next_multiple_of(BLOCK);
@@ -303,7 +303,7 @@ fn extremes_on<S: pulp::Simd>(_: S, sums: &[u32]) -> (u32, u32) {
 }
 
 /// Every filled pixel takes the vote of the half-size pixel around it that looks most alike, and an outvoted one that of its own.
-fn take(maps: &mut Finest, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<Option<i32>>) {
+fn take(maps: &mut MapSet, left: &Image, colours: &Plane<[u8; 3]>, elected: &Plane<Option<i32>>) {
     let width = maps.disparity.width();
     let rows =
         maps.disparity.data_mut().par_chunks_mut(width).zip(maps.validity.data_mut().par_chunks_mut(width));
@@ -337,8 +337,8 @@ fn take(maps: &mut Finest, left: &Image, colours: &Plane<[u8; 3]>, elected: &Pla
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::cpu::finest::Optimum;
     use crate::options::{DisparityRange, Method};
+    use crate::stage::Optimum;
 
     #[test]
     fn bands_change_nothing() {
@@ -349,7 +349,7 @@ mod tests {
         let colours =
             Plane::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| [noise(x, y, 3) as u8 / 8; 3]);
         let label = |x, y| (noise(x, y, 5) % 12) as u16;
-        let mut maps = Finest::new((width, height));
+        let mut maps = MapSet::new((width, height));
         maps.optima =
             Plane::from_fn(width, height, |x, y| Optimum { label: label(x, y), ..Optimum::default() });
         maps.disparity = Plane::from_fn(width, height, |x, y| FRACTION * i32::from(label(x, y)));

@@ -1,16 +1,12 @@
 //! Winner takes all: the optimum of the beliefs. See [`crate::backend::Stage::WinnerTakesAll`].
 
-use super::finest::Optimum;
 use super::units::{Units, argmin, smallest};
 use super::volumes::{Level, Volumes};
 use super::windows::Windows;
-use crate::backend::volume::NO_RUNNER_UP;
+use crate::stage::NO_RUNNER_UP;
+use crate::stage::Optimum;
 use rayon::prelude::*;
 use std::ops::Range;
-
-pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
-    rows(v, 0..v.plan.levels[0].height);
-}
 
 /// The optima of these rows.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {

@@ -327,21 +327,30 @@ impl Buffers {
         })
     }
 
-    /// The finest level that shares buffers, and these: as many levels as fit in what a shader may see at once.
-    fn shared(a: &mut Allocator, plan: &Plan) -> Result<(usize, Option<[Pool; SHARED.len()]>)> {
-        let most = a.device.max_binding.min(a.device.max_buffer) / 4;
-        let mut sizes = [0; SHARED.len()];
-        let mut finest = plan.levels.len();
+    /// The finest level that shares buffers with all coarser ones: as many as fit in what a shader may see at once.
+    pub(super) fn finest_shared(device: &Device, plan: &Plan) -> usize {
+        let most = device.max_binding.min(device.max_buffer) / 4;
         // A level of which some rows are held at a time keeps them for itself.
         let first = usize::from(!plan.holds_all_rows());
+        let mut sizes = [0; SHARED.len()];
+        let mut finest = plan.levels.len();
         while finest > first {
             let words = Words::of(plan, finest - 1);
-            let more: [u64; SHARED.len()] = array::from_fn(|kind| sizes[kind] + words.all(kind));
-            if more.iter().any(|&words| words > most) {
+            sizes = array::from_fn(|kind| sizes[kind] + words.all(kind));
+            if sizes.iter().any(|&words| words > most) {
                 break;
             }
-            (sizes, finest) = (more, finest - 1);
+            finest -= 1;
         }
+        finest
+    }
+
+    /// The finest level that shares buffers, and these: as many levels as fit in what a shader may see at once.
+    fn shared(a: &mut Allocator, plan: &Plan) -> Result<(usize, Option<[Pool; SHARED.len()]>)> {
+        let finest = Self::finest_shared(a.device, plan);
+        let words = |z: usize| Words::of(plan, z);
+        let mut sizes: [u64; SHARED.len()] =
+            array::from_fn(|kind| (finest..plan.levels.len()).map(|z| words(z).all(kind)).sum());
         if finest == plan.levels.len() {
             return Ok((finest, None));
         }

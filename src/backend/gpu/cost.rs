@@ -7,13 +7,13 @@ use super::rows::with_halo;
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
-use crate::backend::wavefront::BAND;
 use crate::error::Result;
 use crate::options::MatchingCost;
 use crate::plan::{
     CENSUS_BIT_COST, CENSUS_BITS, CENSUS_PLACES, CENSUS_RADIUS_X, CENSUS_RADIUS_Y, COLOUR_MOST, COST_MAX,
     Plan,
 };
+use crate::program::together::BAND;
 use std::ops::Range;
 
 const SHADER: &str = include_str!("../../../shaders/cost.wgsl");

@@ -1,17 +1,11 @@
-//! One sweep of a level: see [`Stage::Flood`].
+//! One sweep of a level: see [`Stage::Flood`](crate::backend::Stage::Flood).
 //!
 //! A device goes over all pixels at once, so it gains nothing by going over messages and beliefs together: the stage has no
 //! shader of its own.
 
 use super::steps::{Job, Recorder};
-use crate::backend::Stage;
 use crate::error::Result;
 use crate::plan::Plan;
-
-/// The stages that it consists of.
-pub(super) fn parts(level: usize) -> [Stage; 2] {
-    [Stage::Dependency(level), Stage::Belief(level)]
-}
 
 pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
     Vec::new()

@@ -3,10 +3,10 @@
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
 use super::uniform::uniform;
-use crate::backend::volume::NO_LABEL;
 use crate::error::Result;
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
+use crate::stage::NO_LABEL;
 
 const SHADER: &str = include_str!("../../../shaders/left_right_check.wgsl");
 

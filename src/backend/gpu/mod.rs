@@ -13,7 +13,6 @@ mod allocator;
 mod buffers;
 mod convergence;
 mod device;
-mod gather;
 mod levels;
 mod probe;
 mod queue;
@@ -28,7 +27,6 @@ mod vote_buffers;
 mod words;
 
 use super::probe::Probe;
-use super::wavefront::{Wavefront, needs_level_0};
 use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
@@ -36,6 +34,8 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
+use crate::program::schedule::split;
+use crate::program::{Program, Run, joined, together};
 pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
@@ -43,7 +43,7 @@ use buffers::{Buffers, LevelBuffers};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
-use levels::{can_share, next_level, record_levels};
+use levels::record_levels;
 use rows::Rows;
 pub use shader::{Constant, Kernel};
 use std::collections::HashMap;
@@ -58,12 +58,16 @@ use words::{image_words, label_range_words, narrow_words};
 
 macro_rules! declare {
     (
-        levels { $( $(#[$_of_level:meta])* $level:ident $level_name:ident; )* }
-        finest { $( $(#[$_of_finest:meta])* $finest:ident $finest_name:ident; )* }
-        maps { $( $(#[$_of_map:meta])* $map:ident $map_name:ident; )* }
+        levels { $( $level:ident $level_name:ident; )* }
+        level_rows { $( $level_row:ident $level_row_name:ident; )* }
+        finest { $( $finest:ident $finest_name:ident; )* }
+        finest_rows { $( $finest_row:ident $finest_row_name:ident; )* }
+        maps { $( $map:ident $map_name:ident; )* }
     ) => {
         $( mod $level_name; )*
+        $( mod $level_row_name; )*
         $( mod $finest_name; )*
+        $( mod $finest_row_name; )*
         $( mod $map_name; )*
 
         /// What `stage` runs of its shader, for `plan`, without a device.
@@ -71,7 +75,9 @@ macro_rules! declare {
         pub fn jobs(stage: Stage, plan: &Plan) -> Vec<Job> {
             match stage {
                 $( Stage::$level(z) => $level_name::jobs(plan, z), )*
+                $( Stage::$level_row(z) => $level_row_name::jobs(plan, z), )*
                 $( Stage::$finest => $finest_name::jobs(plan, 0), )*
+                $( Stage::$finest_row => $finest_row_name::jobs(plan, 0), )*
                 $( Stage::$map => $map_name::jobs(plan, 0), )*
             }
         }
@@ -79,7 +85,9 @@ macro_rules! declare {
         fn record(recorder: &mut Recorder, stage: Stage) -> Result<()> {
             match stage {
                 $( Stage::$level(_) => $level_name::record(recorder), )*
+                $( Stage::$level_row(_) => $level_row_name::record(recorder), )*
                 $( Stage::$finest => $finest_name::record(recorder), )*
+                $( Stage::$finest_row => $finest_row_name::record(recorder), )*
                 $( Stage::$map => $map_name::record(recorder), )*
             }
         }
@@ -102,25 +110,18 @@ pub struct Gpu {
     passes: usize,
     work: u64,
     timer: Option<Timer>,
-    /// The same stage at one level after the other, which can run together.
-    waiting: Vec<Stage>,
     state: Option<State>,
     requests: Requests<RequestedMaps>,
 }
 
-/// The steps of a stage at its level and the next ones, so many together.
-type Steps = HashMap<(Stage, usize), Arc<[Step]>>;
-
-/// The steps of a stage for some rows of its level.
-type PartSteps = HashMap<(Stage, Range<u32>), Arc<[Step]>>;
+/// The steps of each run.
+type Steps = HashMap<Run, Arc<[Step]>>;
 
 /// Everything that belongs to one plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
     steps: Steps,
-    /// Those of some rows.
-    part_steps: PartSteps,
     /// Those of [`upload`].
     upload: Arc<[Step]>,
     /// Words of an image on their way up.
@@ -160,49 +161,59 @@ impl Gpu {
             passes: 0,
             work: 0,
             timer: None,
-            waiting: Vec::new(),
             state: None,
             requests: Requests::default(),
         })
-    }
-
-    /// The steps of `stage` for `plan` on these buffers.
-    fn steps(&mut self, stage: Stage, plan: &Plan, buffers: &Buffers) -> Result<Arc<[Step]>> {
-        self.recorded(stage.level().unwrap_or(0), plan, buffers, None, |recorder| record(recorder, stage))
     }
 
     /// The steps of all stages, at single levels and where these share buffers at several together.
     fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Steps> {
         let mut steps = HashMap::new();
         let mut endings = Vec::new();
-        let runs_whole = |stage: &Stage| plan.holds_all_rows() || !needs_level_0(*stage);
+        let runs_whole = |stage: &Stage| plan.holds_all_rows() || !stage.needs_level_0(plan);
         for stage in Stage::all(plan).into_iter().filter(|s| *s != Stage::Change).filter(runs_whole) {
-            let is_message = matches!(stage, Stage::Dependency(_) | Stage::Resolution(_) | Stage::Belief(_));
-            let ends = is_message && plan.settled_change().is_some();
-            let ending = ends.then_some(&mut endings);
-            let level = stage.level().unwrap_or(0);
-            let recorded = self.recorded(level, plan, buffers, ending, |recorder| record(recorder, stage))?;
-            steps.insert((stage, 1), recorded);
-            let Some(shared) = &buffers.shared else { continue };
-            for end in level + 2..=plan.levels.len() {
-                let Some(record) = record_levels(stage).filter(|_| can_share(stage, shared)) else { break };
-                let ending = ends.then_some(&mut endings);
-                let recorded = self.recorded(level, plan, buffers, ending, |recorder| {
-                    record(recorder, shared, level..end)
-                })?;
-                steps.insert((stage, end - level), recorded);
+            let ends = stage.passes_messages() && plan.settled_change().is_some();
+            let most = match &buffers.shared {
+                Some(shared)
+                    if stage.finest_level(plan) >= shared.finest && record_levels(stage).is_some() =>
+                {
+                    plan.levels.len() - stage.level().unwrap_or(0)
+                }
+                _ => 1,
+            };
+            for levels in 1..=most {
+                let run = Run { levels, ..stage.into() };
+                let recorded = self.recorded(&run, plan, buffers, ends.then_some(&mut endings))?;
+                steps.insert(run, recorded);
             }
         }
         // This stage makes the dispatches of messages empty: it comes when these are known.
         buffers.end_when_settled(&mut self.device, &endings)?;
-        if runs_whole(&Stage::Change) {
-            steps.insert((Stage::Change, 1), self.steps(Stage::Change, plan, buffers)?);
-        }
         Ok(steps)
     }
 
+    /// The steps of `run`.
+    fn recorded(
+        &mut self,
+        run: &Run,
+        plan: &Plan,
+        buffers: &Buffers,
+        endings: Option<&mut Vec<[u32; 3]>>,
+    ) -> Result<Arc<[Step]>> {
+        let level = run.stage.level().unwrap_or(0);
+        self.recorded_at(level, plan, buffers, endings, |recorder| {
+            recorder.only = run.part.as_ref().map(|part| part.rows.start as u32..part.rows.end as u32);
+            match (&buffers.shared, record_levels(run.stage)) {
+                (Some(shared), Some(record)) if run.levels > 1 => {
+                    record(recorder, shared, level..level + run.levels)
+                }
+                _ => record(recorder, run.stage),
+            }
+        })
+    }
+
     /// The steps that `record` records at `level`.
-    fn recorded<'a>(
+    fn recorded_at<'a>(
         &'a mut self,
         level: usize,
         plan: &'a Plan,
@@ -318,23 +329,17 @@ impl Backend for Gpu {
     }
 
     fn prepare(&mut self, plan: &Plan, prepared: Prepared) -> Result<()> {
-        let plan = &self.held(plan);
         if self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
             // The maps stay, as all that was asked for leaves them.
             self.submit()?;
         }
         (self.encoder, self.passes, self.work) = (None, 0, 0);
-        self.waiting.clear();
         self.device.traffic = Traffic::default();
         let mut state = match self.state.take() {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
-                    if plan.holds_all_rows() {
-                        let steps = self.steps(Stage::RightView, plan, &state.buffers)?;
-                        state.steps.insert((Stage::RightView, 1), steps);
-                    }
-                    state.part_steps.retain(|(stage, _), _| *stage != Stage::RightView);
+                    state.steps.retain(|run, _| run.stage != Stage::RightView);
                 }
                 state
             }
@@ -346,16 +351,10 @@ impl Backend for Gpu {
                 }
                 let mut buffers = Buffers::new(&mut self.device, plan)?;
                 let steps = self.all_steps(plan, &mut buffers)?;
-                let upload = self.recorded(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
+                let upload =
+                    self.recorded_at(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
                 let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
-                State {
-                    plan: plan.clone(),
-                    buffers,
-                    steps,
-                    part_steps: HashMap::new(),
-                    upload,
-                    words: vec![0; words],
-                }
+                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
             }
         };
         self.load(&mut state, &prepared)?;
@@ -364,26 +363,29 @@ impl Backend for Gpu {
         Ok(())
     }
 
-    fn run(&mut self, stage: Stage) -> Result<()> {
-        if self.timer.is_none() && self.state().may_wait(stage) {
-            for _ in 0..if matches!(stage, Stage::Flood(_)) { 2 } else { 1 } {
-                self.device.count_stage();
-            }
-            if self.waiting.last().is_some_and(|&last| next_level(last) != Some(stage)) {
-                self.gather()?;
-            }
-            self.waiting.push(stage);
-            return self.device.check();
-        }
-        self.gather()?;
-        if let Stage::Flood(z) = stage {
+    fn fit(&mut self, program: Program) -> Program {
+        program.each_frame(|plan, steps| {
+            let steps = if self.holds_all_rows(plan) { steps } else { together::pass(plan, steps) };
+            // The time of each level is taken by itself.
+            let shared = Buffers::finest_shared(&self.device, plan);
+            if self.timer.is_none() { joined::join(plan, shared, steps) } else { steps }
+        })
+    }
+
+    fn perform(&mut self, run: &Run) -> Result<()> {
+        let parts = split(run.clone());
+        if let [_, _, ..] = parts[..] {
             if let Some(timer) = self.timer.as_mut().filter(|timer| !timer.has_clock()) {
-                timer.begin(stage);
+                timer.begin(run.stage);
             }
-            return flood::parts(z).into_iter().try_for_each(|part| self.run(part));
+            return parts.iter().try_for_each(|part| self.perform(part));
         }
-        let steps = Arc::clone(&self.state().steps[&(stage, 1)]);
-        self.perform(stage, &steps)
+        let steps = self.steps_of(run)?;
+        (0..run.levels).for_each(|_| self.device.count_stage());
+        if let Some(timer) = &mut self.timer {
+            timer.begin(run.stage);
+        }
+        self.record(&steps)
     }
 
     fn keep_up(&mut self) -> Promise<'_, ()> {
@@ -393,24 +395,6 @@ impl Backend for Gpu {
                 self.timer.iter_mut().for_each(Timer::end);
             }
             self.device.keep_up().await
-        })
-    }
-
-    fn run_wavefront<'a>(
-        &'a mut self,
-        wavefront: &'a Wavefront,
-        before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Promise<'a, ()> {
-        Box::pin(async {
-            if !self.state().plan.holds_all_rows() {
-                return self.run_parts(wavefront, before).await;
-            }
-            for &stage in wavefront.schedule() {
-                before(stage, 1.0)?;
-                self.run(stage)?;
-                self.keep_up().await?;
-            }
-            Ok(())
         })
     }
 

@@ -5,12 +5,12 @@ use super::graph;
 use super::rows::Rows;
 use super::words::window_words;
 use crate::backend::probe::Probe;
-use crate::backend::volume::{PaddedRows, Volume, volume_shape};
 use crate::backend::{Backend, Map};
 use crate::error::{Error, Result};
 use crate::graph::{LevelGraph, NO_MEMBER};
 use crate::image::Plane;
 use crate::plan::Plan;
+use crate::stage::{PaddedRows, Volume, volume_shape};
 use pollster::block_on;
 use std::time::Duration;
 use web_time::Instant;
@@ -106,8 +106,8 @@ impl Probe for Gpu {
             }
         }
         here.members.write(&mut self.device, &words)?;
-        let steps =
-            self.recorded(level, &state.plan, &state.buffers, None, |recorder| graph::transpose(recorder))?;
+        let steps = self
+            .recorded_at(level, &state.plan, &state.buffers, None, |recorder| graph::transpose(recorder))?;
         self.state = Some(state);
         self.record(&steps)
     }

@@ -4,7 +4,6 @@ use super::rows::Rows;
 use super::steps::{Groups, Step};
 use super::timer::{PASSES_PER_SUBMIT, Timer};
 use super::{Gpu, device};
-use crate::backend::Stage;
 use crate::error::Result;
 use std::ops::Range;
 
@@ -74,28 +73,14 @@ impl Gpu {
             rest = &rest[recorded..];
             let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
             if timed || self.work >= self.device.work_per_submit {
-                self.submit_recorded()?;
+                self.submit()?;
             }
         }
         Ok(())
     }
 
-    /// Records the steps of `stage`, and takes its time where that is wanted.
-    pub(super) fn perform(&mut self, stage: Stage, steps: &[Step]) -> Result<()> {
-        self.device.count_stage();
-        if let Some(timer) = &mut self.timer {
-            timer.begin(stage);
-        }
-        self.record(steps)
-    }
-
     /// Submits everything.
     pub(super) fn submit(&mut self) -> Result<()> {
-        self.gather()?;
-        self.submit_recorded()
-    }
-
-    fn submit_recorded(&mut self) -> Result<()> {
         (self.passes, self.work) = (0, 0);
         if let Some(mut encoder) = self.encoder.take() {
             if let Some(timer) = &mut self.timer {
@@ -108,7 +93,6 @@ impl Gpu {
 
     /// Asks for each range of bytes, after everything recorded so far.
     pub(super) fn request(&mut self, ranges: &[(wgpu::Buffer, Range<u64>)]) -> Result<device::Requested> {
-        self.gather()?;
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;

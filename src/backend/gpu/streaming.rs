@@ -1,63 +1,37 @@
-//! Level 0 where it is not held whole: the stages that need it run on some of its rows at a time, in a
-//! [wavefront](crate::backend::wavefront), and its volumes are rings of parts.
+//! How a list goes on a device: which rows of level 0 it holds, and the steps of each run.
 
-use super::{Gpu, Step, record};
-use crate::backend::wavefront::Wavefront;
-use crate::backend::{Backend, Stage};
+use super::{Gpu, Step};
 use crate::error::{Purpose, Result};
 use crate::memory;
 use crate::plan::Plan;
-use std::ops::Range;
+use crate::program::{Run, together};
 use std::sync::Arc;
 
 impl Gpu {
-    /// The plan by which this device matches: [`Plan::on_device`] where its own memory is enough.
-    pub(super) fn held(&self, plan: &Plan) -> Plan {
-        let known = self.state.as_ref().map(|state| &state.plan);
-        let most = plan.on_device();
+    /// Whether this device matches by `plan` with all rows of level 0 held: where the method's memory and its own are enough.
+    pub(super) fn holds_all_rows(&self, plan: &Plan) -> bool {
+        let streamed = together::streamed(plan);
         // What was settled for the last pair stays.
-        if let Some(known) = known.filter(|known| most.fits(known) || plan.fits(known)) {
-            return Plan { core: plan.core.clone(), ..known.clone() };
+        let known = self.state.as_ref().map(|state| &state.plan);
+        if let Some(known) = known.filter(|known| plan.fits(known) || streamed.fits(known)) {
+            return known.holds_all_rows();
         }
-        let bytes = most.bytes();
-        let fits = self.device.memory.is_none_or(|memory| bytes <= memory)
-            && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok());
-        if fits { most } else { plan.clone() }
+        let bytes = plan.bytes();
+        streamed.holds_all_rows()
+            || bytes <= u64::from(plan.memory) << 20
+                && self.device.memory.is_none_or(|memory| bytes <= memory)
+                && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok())
     }
 
-    /// Runs the stages of `wavefront` on the rows of its parts.
-    pub(super) async fn run_parts(
-        &mut self,
-        wavefront: &Wavefront,
-        before: &mut dyn FnMut(Stage, f64) -> Result<()>,
-    ) -> Result<()> {
-        self.gather()?;
-        for (i, rows) in wavefront.parts() {
-            let stage = wavefront.stages()[i];
-            let height = self.state().plan.levels[stage.level().unwrap_or(0)].height;
-            before(stage, rows.len() as f64 / height as f64)?;
-            let steps = self.steps_of(stage, rows.start as u32..rows.end as u32)?;
-            self.perform(stage, &steps)?;
-            self.keep_up().await?;
-        }
-        Ok(())
-    }
-
-    /// The steps of `stage` for these rows, recorded on first use.
-    fn steps_of(&mut self, stage: Stage, rows: Range<u32>) -> Result<Arc<[Step]>> {
+    /// The steps of `run`, recorded on first use.
+    pub(super) fn steps_of(&mut self, run: &Run) -> Result<Arc<[Step]>> {
         let mut state = self.state.take().expect("prepare comes before every stage");
-        let key = (stage, rows.clone());
-        let steps = match state.part_steps.get(&key) {
+        let steps = match state.steps.get(run) {
             Some(steps) => Ok(Arc::clone(steps)),
-            None => {
-                self.recorded(stage.level().unwrap_or(0), &state.plan, &state.buffers, None, |recorder| {
-                    recorder.only = Some(rows);
-                    record(recorder, stage)
-                })
-            }
+            None => self.recorded(run, &state.plan, &state.buffers, None),
         };
         if let Ok(steps) = &steps {
-            state.part_steps.insert(key, Arc::clone(steps));
+            state.steps.entry(run.clone()).or_insert_with(|| Arc::clone(steps));
         }
         self.state = Some(state);
         steps

@@ -4,9 +4,9 @@
 
 use super::shader::Kernel;
 use super::steps::{Job, Recorder};
-use crate::backend::volume::NO_RUNNER_UP;
 use crate::error::Result;
 use crate::plan::Plan;
+use crate::stage::NO_RUNNER_UP;
 
 const SHADER: &str = include_str!("../../../shaders/winner_takes_all.wgsl");
 

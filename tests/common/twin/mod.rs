@@ -8,11 +8,9 @@ pub mod census;
 
 macro_rules! declare {
     (
-        levels { $( $(#[$_of_level:meta])* $_level:ident $level_name:ident; )* }
-        finest { $( $(#[$_of_finest:meta])* $_finest:ident $finest_name:ident; )* }
-        maps { $( $(#[$_of_map:meta])* $_map:ident $map_name:ident; )* }
+        $( $group:ident { $( $stage:ident $name:ident; )* } )*
     ) => {
-        $( pub mod $level_name; )* $( pub mod $finest_name; )* $( pub mod $map_name; )*
+        $( $( pub mod $name; )* )*
     };
 }
 

@@ -4,8 +4,8 @@ mod steps;
 
 use std::path::PathBuf;
 
+use mrfgs::low_level::engine::{Inspection, Inspector};
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::solver::{Inspection, Inspector};
 use mrfgs::{Matched, Matcher};
 
 use std::time::Duration;

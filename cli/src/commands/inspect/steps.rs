@@ -7,12 +7,12 @@ use mrfgs::Result;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
+use mrfgs::low_level::engine::Inspection;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::front::matches::Match;
 use mrfgs::low_level::front::zones::Zones;
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{Plan, UNITS_PER_NAT};
-use mrfgs::low_level::solver::Inspection;
 use mrfgs::options::Illumination;
 
 use crate::outputs::staged::StagedFolder;

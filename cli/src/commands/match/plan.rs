@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use mrfgs::low_level::plan::Plan;
-use mrfgs::low_level::tiles::Tiles;
+use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::options::Order;
 
 use crate::failure::Result;

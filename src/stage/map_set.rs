@@ -1,10 +1,12 @@
-//! The maps of a match, from the labels on.
+//! All maps of a match on its way, from the labels on.
 
-use crate::backend::Map;
+use super::Map;
+use super::data::NO_RUNNER_UP;
 use crate::image::{Plane, Rect};
+use std::mem;
 
-/// The maps of the finest level.
-pub(crate) struct Finest {
+/// All maps of a match on its way.
+pub(crate) struct MapSet {
     pub(crate) optima: Plane<Optimum>,
     pub(crate) right: Plane<u16>,
     /// Belief of the right labels.
@@ -18,12 +20,12 @@ pub(crate) struct Finest {
 /// The belief of one pixel around its optimum, in units.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Optimum {
-    pub(super) label: u16,
-    pub(super) best: u16,
-    pub(super) runner_up: u16,
+    pub(crate) label: u16,
+    pub(crate) best: u16,
+    pub(crate) runner_up: u16,
 }
 
-impl Finest {
+impl MapSet {
     pub(crate) fn new((width, height): (usize, usize)) -> Self {
         Self {
             optima: Plane::filled(width, height, Optimum::default()),
@@ -50,7 +52,7 @@ impl Finest {
         }
     }
 
-    pub(super) fn write(&mut self, map: Map, values: &Plane<i32>) {
+    pub(crate) fn write(&mut self, map: Map, values: &Plane<i32>) {
         assert_eq!(self.optima.size(), values.size(), "a map of the size of the images");
         self.write_part(map, values, &Rect::whole(values.size()), (0, 0));
     }
@@ -78,6 +80,23 @@ impl Finest {
             Map::Disparity => put(&mut self.disparity, from, |old, v| *old = v),
             Map::Validity => put(&mut self.validity, from, |old, v| *old = v as u8),
             Map::Confidence => put(&mut self.confidence, from, |old, v| *old = v as u8),
+        }
+    }
+
+    /// Exchanges the labels of the two views, mirrored.
+    pub(crate) fn swap_views(&mut self) {
+        let Self { optima, right, right_best, .. } = self;
+        let width = optima.width();
+        let rows = optima.data_mut().chunks_exact_mut(width).zip(right.data_mut().chunks_exact_mut(width));
+        for ((optima, labels), best) in rows.zip(right_best.data_mut().chunks_exact_mut(width)) {
+            for ((optimum, label), best) in optima.iter_mut().zip(labels.iter_mut()).zip(best.iter_mut()) {
+                let right = Optimum { label: *label, best: *best, runner_up: NO_RUNNER_UP };
+                let left = mem::replace(optimum, right);
+                (*label, *best) = (left.label, left.best);
+            }
+            optima.reverse();
+            labels.reverse();
+            best.reverse();
         }
     }
 }

@@ -13,12 +13,11 @@
 //! matches, because the right view is cropped in the same way: it is as wide as the largest disparity, and
 //! where disparities are negative there is one on the right too. A crop ends at the borders of the image.
 
-pub mod mosaic;
-
+use super::together::streamed;
 use crate::error::{BudgetError, Result};
 use crate::image::Rect;
 use crate::plan::Plan;
-use crate::solver::streamed;
+
 use std::ops::Range;
 
 /// Width of the overlap in pixels, rounded up to whole pixels of the coarsest level (32 of them by default).
@@ -39,8 +38,8 @@ pub struct Tile {
     /// The pixels that are matched. The crop starts at a whole pixel of the coarsest level, so that the
     /// pyramid's grids are those of the whole image.
     pub crop: Rect,
-    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop, and its method what a tile may take
-    /// of the memory.
+    /// The plan for the crop; its [`Plan::core`] holds the core's columns, relative to the crop, and its [`Plan::memory`] what a tile
+    /// may take.
     pub plan: Plan,
 }
 
@@ -71,8 +70,7 @@ impl Tiles {
         let memory = u64::from(whole.method.tiles.memory) << 20;
         let all = Rect::whole((width, height));
         if streamed(whole).bytes() <= memory {
-            let tile = Tile { core: all.clone(), crop: all, plan: whole.clone() };
-            return Ok(Self { whole: whole.clone(), tiles: vec![tile] });
+            return Ok(Self::in_one_piece(whole));
         }
         let step = 1 << (whole.levels.len() - 1);
         let reach = |disparity: i32| disparity.max(0) as usize;
@@ -110,11 +108,18 @@ impl Tiles {
                 let crop = Rect { x: crop_x.clone(), y: crop_y.clone() };
                 let (width, height) = crop.size();
                 let mut plan = Plan { core: core.within(&crop).x, ..whole.resized(width, height) };
-                plan.method.tiles.memory -= beside(whole).div_ceil(1 << 20) as u32;
+                plan.memory -= beside(whole).div_ceil(1 << 20) as u32;
                 tiles.push(Tile { core, crop, plan });
             }
         }
         Ok(Self { whole: whole.clone(), tiles })
+    }
+
+    /// The whole image in one piece, whatever memory that takes.
+    #[must_use]
+    pub fn in_one_piece(whole: &Plan) -> Self {
+        let all = Rect::whole(whole.size());
+        Self { whole: whole.clone(), tiles: vec![Tile { core: all.clone(), crop: all, plan: whole.clone() }] }
     }
 
     /// The plan for the whole image.

@@ -27,6 +27,16 @@ pub enum Volume {
 }
 
 impl Volume {
+    /// Whether it is there where there are so many levels: the finest has no messages from below, the coarsest none from above.
+    #[must_use]
+    pub fn is_there(self, levels: usize) -> bool {
+        match self {
+            Self::Down(z) => z + 1 < levels,
+            Self::Up(z) => z > 0,
+            other => other.level() < levels,
+        }
+    }
+
     /// The level it belongs to.
     #[must_use]
     pub fn level(self) -> usize {
@@ -79,6 +89,28 @@ impl Map {
     ];
 }
 
+/// What stages read and write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Data {
+    /// A volume.
+    Volume(Volume),
+    /// A map.
+    Map(Map),
+    /// The sums of votes, by half-size pixel and every second label.
+    Votes,
+}
+
+impl Data {
+    /// The volume that it is, if it is one.
+    #[must_use]
+    pub fn volume(self) -> Option<Volume> {
+        match self {
+            Self::Volume(volume) => Some(volume),
+            _ => None,
+        }
+    }
+}
+
 /// Number of values in `volume` under `plan`, and labels in a row of them, without and with padding.
 #[must_use]
 pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
@@ -88,7 +120,7 @@ pub fn volume_shape(plan: &Plan, volume: Volume) -> (usize, usize, usize) {
 }
 
 /// Values for a volume, as rows of labels to be stored with padding.
-pub(super) struct PaddedRows<'a> {
+pub(crate) struct PaddedRows<'a> {
     values: &'a [u32],
     labels: usize,
     stride: usize,
@@ -97,7 +129,7 @@ pub(super) struct PaddedRows<'a> {
 }
 
 impl<'a> PaddedRows<'a> {
-    pub(super) fn new(plan: &Plan, volume: Volume, values: &'a [u32]) -> Self {
+    pub(crate) fn new(plan: &Plan, volume: Volume, values: &'a [u32]) -> Self {
         let (rows, labels, stride) = volume_shape(plan, volume);
         assert_eq!(values.len(), rows * labels, "values of {volume:?}");
         // Padding must never look better than a label, also after a message is taken off a belief.
@@ -109,7 +141,7 @@ impl<'a> PaddedRows<'a> {
     }
 
     /// Rows of `stride` values each.
-    pub(super) fn iter(&self) -> impl Iterator<Item = Vec<u32>> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Vec<u32>> {
         self.values.chunks_exact(self.labels).map(|row| {
             let padding = row.iter().copied().max().unwrap_or(0).max(self.least);
             let mut row = row.to_vec();
@@ -118,7 +150,7 @@ impl<'a> PaddedRows<'a> {
         })
     }
 
-    pub(super) fn fill<T>(&self, out: &mut [T], convert: impl Fn(u32) -> T) {
+    pub(crate) fn fill<T>(&self, out: &mut [T], convert: impl Fn(u32) -> T) {
         for (out, row) in out.chunks_exact_mut(self.stride).zip(self.iter()) {
             for (out, value) in out.iter_mut().zip(row) {
                 *out = convert(value);

@@ -5,17 +5,86 @@
 //! that what it reads is there, and that nobody needs any more what it overwrites. The results are those of one stage after
 //! the other.
 
-use super::Stage;
-use crate::plan::{GRAPH_WINDOW, Plan};
+use super::schedule::{self, split};
+use super::{Part, Run, Sent, Step};
+use crate::plan::Plan;
+use crate::stage::{Data, Stage, Volume};
 use std::ops::Range;
 
-/// Rows of level 0 that each stage of a wavefront computes in a step: enough for the threads to share.
+/// Rows of level 0 that each stage computes in a step: enough for the threads to share.
 pub const BAND: usize = 32;
+
+/// The plan by which a match goes that nobody looks into: where its steps allow it, those that need level 0 go down the image
+/// together, and only the rows between them are held.
+#[must_use]
+pub fn streamed(plan: &Plan) -> Plan {
+    going_together(plan, &schedule::estimate(plan)).map_or_else(|| plan.clone(), |(plan, ..)| plan)
+}
+
+/// The steps of a frame with those that need level 0 going down the image together, where they can; `plan` then holds fewer rows.
+#[must_use]
+pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
+    let Some((streamed, range, wavefront)) = going_together(plan, &steps) else { return steps };
+    let mut all = steps[..range.start].to_vec();
+    let sent = sent(&steps[..range.start], &wavefront.stages);
+    all.extend(wavefront.parts().map(|(i, rows)| {
+        let part = Some(Part { rows, sent: sent[i] });
+        Step::Run(Run { stage: wavefront.stages[i], levels: 1, part })
+    }));
+    let markers = steps[range.clone()].iter().filter(|step| step.stage().is_none());
+    all.extend(markers.cloned());
+    all.extend_from_slice(&steps[range.end..]);
+    *plan = streamed;
+    all
+}
+
+/// The plan with fewer rows, the steps that go together, and how; `None` where they cannot, or where that takes no less memory.
+fn going_together(plan: &Plan, steps: &[Step]) -> Option<(Plan, Range<usize>, Wavefront)> {
+    let start = steps.iter().position(|step| step.stage() == Some(Stage::Evidence(0)))?;
+    let by_rows = |step: &Step| step.stage().map_or(*step == Step::Iteration, goes_by_rows);
+    let end = start + steps[start..].iter().position(|step| !by_rows(step)).unwrap_or(steps.len() - start);
+    // Nothing else may need level 0, and its costs are computed where they are needed.
+    let cost = Data::Volume(Volume::Cost(0));
+    let needs_whole = |stage: Stage| {
+        stage.needs_level_0(plan) || (stage != Stage::Cost && stage.writes().any(|data| data == cost))
+    };
+    let outside = steps[..start].iter().chain(&steps[end..]).filter_map(Step::stage);
+    // Where all levels join at once, their many iterations would leave no row out.
+    if plan.phases.len() == 1 || !plan.costs_go_by_rows() || outside.into_iter().any(needs_whole) {
+        return None;
+    }
+    let wavefront = Wavefront::new(plan, steps[start..end].iter().filter_map(Step::stage));
+    let streamed = Plan { held: wavefront.rows(), ..plan.clone() };
+    // With few labels the costs take less than what they are computed from.
+    (streamed.bytes() < plan.bytes()).then_some((streamed, start..end, wavefront))
+}
+
+/// Whether `stage` goes row by row, or stands for stages that do.
+fn goes_by_rows(stage: Stage) -> bool {
+    split(stage.into()).iter().all(|run| run.stage.descriptor().reach.is_some())
+}
+
+/// Which messages there are when each of `stages` starts, which follow `before`.
+fn sent(before: &[Step], stages: &[Stage]) -> Vec<Sent> {
+    let mut past: Vec<Stage> =
+        before.iter().filter_map(Step::stage).flat_map(|s| split(s.into())).map(|run| run.stage).collect();
+    let mut all = Vec::new();
+    for &stage in stages {
+        let z = stage.level().unwrap_or(0);
+        let has = |sender: Stage| past.contains(&sender);
+        all.push(Sent {
+            dependency: has(Stage::Dependency(z)),
+            above: has(Stage::Resolution(z + 1)),
+            below: has(Stage::Resolution(z)),
+        });
+        past.push(stage);
+    }
+    all
+}
 
 /// Stages that go down an image together.
 #[derive(Clone, Debug)]
-pub struct Wavefront {
-    schedule: Vec<Stage>,
+struct Wavefront {
     stages: Vec<Stage>,
     /// Rows of level 0 that each stage is behind the first one.
     lags: Vec<usize>,
@@ -27,19 +96,19 @@ pub struct Wavefront {
     above: usize,
 }
 
+/// How many rows around its own, of its level, a stage reads that goes row by row.
+fn reach(stage: Stage) -> usize {
+    stage.descriptor().reach.expect("a stage that goes row by row")
+}
+
 impl Wavefront {
-    /// The wavefront of `stages`; `None` where one of them does not go row by row.
-    #[must_use]
-    pub fn new(plan: &Plan, stages: Vec<Stage>) -> Option<Self> {
-        let schedule = stages;
-        let stages: Vec<Stage> = schedule.iter().copied().flat_map(parts).collect();
+    /// The wavefront of these stages, which go row by row.
+    fn new(plan: &Plan, stages: impl Iterator<Item = Stage>) -> Self {
+        let stages: Vec<Stage> = stages.flat_map(|stage| split(stage.into())).map(|run| run.stage).collect();
         let level = |stage: &Stage| stage.level().unwrap_or(0);
         // Whole pixels of the coarsest level make whole rows of all.
         let step = 1 << stages.iter().map(level).max().unwrap_or(0);
-        let reaches: Vec<usize> = stages
-            .iter()
-            .map(|stage| reach(*stage).map(|rows| rows << level(stage)))
-            .collect::<Option<_>>()?;
+        let reaches: Vec<usize> = stages.iter().map(|stage| reach(*stage) << level(stage)).collect();
         let mut behind = 0;
         let mut lags = Vec::new();
         for (i, &own) in reaches.iter().enumerate() {
@@ -50,29 +119,16 @@ impl Wavefront {
         }
         let heights = plan.levels.iter().map(|level| level.height).collect();
         let above = reaches.last().copied().unwrap_or(0);
-        Some(Self { schedule, stages, lags, heights, band: BAND.next_multiple_of(step), above })
+        Self { stages, lags, heights, band: BAND.next_multiple_of(step), above }
     }
 
     /// Rows of level 0 that are needed at the same time, at most.
-    #[must_use]
-    pub fn rows(&self) -> usize {
+    fn rows(&self) -> usize {
         (self.band + self.lags.last().unwrap_or(&0) + self.above).min(self.heights[0])
     }
 
-    /// The stages as they were scheduled.
-    #[must_use]
-    pub fn schedule(&self) -> &[Stage] {
-        &self.schedule
-    }
-
-    /// The stages that go row by row: those that were scheduled, or what they stand for.
-    #[must_use]
-    pub fn stages(&self) -> &[Stage] {
-        &self.stages
-    }
-
     /// The stages by their index, each with the rows of its level that it computes next, in order.
-    pub fn parts(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+    fn parts(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
         let last = self.lags.last().copied().unwrap_or(0);
         let steps = (self.heights[0] + last).div_ceil(self.band);
         let order = (0..steps).flat_map(|step| (0..self.stages.len()).map(move |i| (step, i)));
@@ -89,41 +145,11 @@ impl Wavefront {
     }
 }
 
-/// The stages that a stage stands for.
-fn parts(stage: Stage) -> Vec<Stage> {
-    match stage {
-        Stage::Flood(z) => vec![Stage::Dependency(z), Stage::Belief(z)],
-        _ => vec![stage],
-    }
-}
-
-/// How many rows around its own, of its level, a stage reads; `None` where it does not go row by row. (Resolution goes by
-/// rows of the coarser level, and reads and writes those of their children.)
-fn reach(stage: Stage) -> Option<usize> {
-    match stage {
-        Stage::Dependency(_) | Stage::Belief(_) => Some(GRAPH_WINDOW / 2),
-        Stage::SubPixel => Some(1),
-        Stage::Evidence(_) | Stage::Resolution(_) | Stage::WinnerTakesAll | Stage::RightView => Some(0),
-        _ => None,
-    }
-}
-
-/// Whether `stage` needs volumes of level 0 that are not there where not all of its rows are held. (Costs alone are computed
-/// where they are needed.)
-#[must_use]
-pub fn needs_level_0(stage: Stage) -> bool {
-    match stage {
-        Stage::Evidence(z) | Stage::Dependency(z) | Stage::Belief(z) | Stage::Flood(z) => z == 0,
-        Stage::Resolution(z) => z == 1,
-        Stage::Change | Stage::WinnerTakesAll | Stage::RightView => true,
-        _ => false,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::options::{DisparityRange, Method};
+    use crate::plan::GRAPH_WINDOW;
 
     fn stages() -> Vec<Stage> {
         use Stage::{Belief, Dependency, Evidence, Resolution, RightView, SubPixel, WinnerTakesAll};
@@ -139,14 +165,14 @@ mod tests {
     /// Rows of level 0 that a row of a stage stands for, and those that it reads.
     fn seen(stage: Stage, row: usize, height: usize) -> [Range<usize>; 2] {
         let z = stage.level().unwrap_or(0);
-        let reach = reach(stage).unwrap();
+        let reach = reach(stage);
         let rows = |first: usize, end: usize| (first << z).min(height)..(end << z).min(height);
         [rows(row, row + 1), rows(row.saturating_sub(reach), row + 1 + reach)]
     }
 
     /// Goes through the parts of a wavefront; the first rule that they break, if any.
     fn broken(wavefront: &Wavefront) -> Option<String> {
-        let (stages, height) = (wavefront.stages(), wavefront.heights[0]);
+        let (stages, height) = (&wavefront.stages[..], wavefront.heights[0]);
         // Rows of level 0 that each stage has computed, from the top.
         let mut done = vec![0; stages.len()];
         for (i, rows) in wavefront.parts() {
@@ -178,9 +204,8 @@ mod tests {
         for height in [1, 2, 7, 16, 61, 300, 401] {
             let range = DisparityRange::new(0, 63).unwrap();
             let plan = Plan::new(40, height, range, &Method::default()).unwrap();
-            let stages =
-                || stages().into_iter().filter(|s| s.level().unwrap_or(0) < plan.levels.len()).collect();
-            let wavefront = Wavefront::new(&plan, stages()).unwrap();
+            let there = |stage: &Stage| stage.level().unwrap_or(0) < plan.levels.len();
+            let wavefront = Wavefront::new(&plan, stages().into_iter().filter(there));
             assert_eq!(broken(&wavefront), None, "height {height}");
             assert!(wavefront.rows() <= height);
             if height > 200 {
@@ -195,7 +220,7 @@ mod tests {
 
     /// Whether a ring of so many parts keeps each part until nobody needs it any more: a part is there from its upper halo on.
     fn fits_ring(wavefront: &Wavefront, part: usize, count: usize) -> bool {
-        let (stages, height) = (wavefront.stages(), wavefront.heights[0]);
+        let (stages, height) = (&wavefront.stages[..], wavefront.heights[0]);
         let mut there = vec![0; count];
         wavefront.parts().all(|(i, rows)| {
             rows.into_iter().all(|row| {
@@ -214,7 +239,7 @@ mod tests {
         for height in [61, 300, 401] {
             let range = DisparityRange::new(0, 63).unwrap();
             let plan = Plan::new(40, height, range, &Method::default()).unwrap();
-            let wavefront = Wavefront::new(&plan, stages()).unwrap();
+            let wavefront = Wavefront::new(&plan, stages().into_iter());
             let plan = Plan { held: wavefront.rows(), ..plan };
             for part in [2, 8, 32] {
                 let count = plan.ring_parts(part);
@@ -227,7 +252,43 @@ mod tests {
 
     #[test]
     fn stages_that_look_at_the_whole_image_are_declined() {
-        let plan = Plan::new(40, 40, DisparityRange::new(0, 9).unwrap(), &Method::default()).unwrap();
-        assert!(Wavefront::new(&plan, vec![Stage::Evidence(0), Stage::LeftRightCheck]).is_none());
+        let plan = Plan::new(40, 400, DisparityRange::new(0, 63).unwrap(), &Method::default()).unwrap();
+        let (mut held, steps) = (plan.clone(), schedule::estimate(&plan));
+        assert!(pass(&mut held, steps.clone()).len() > steps.len() && held.held < plan.held);
+        let change = Step::of(Stage::Change);
+        for at in 0..=steps.len() {
+            let steps = [&steps[..at], std::slice::from_ref(&change), &steps[at..]].concat();
+            assert_eq!(pass(&mut plan.clone(), steps.clone()), steps, "at {at}");
+        }
+    }
+
+    /// Every row of every stage runs once, with the messages that there were when the stage began.
+    #[test]
+    fn parts_are_the_stages() {
+        let plan = Plan::new(40, 400, DisparityRange::new(0, 63).unwrap(), &Method::default()).unwrap();
+        let steps = schedule::estimate(&plan);
+        let parts = pass(&mut plan.clone(), steps.clone());
+        let rows = |steps: &[Step]| {
+            let mut rows = std::collections::BTreeMap::new();
+            for step in steps {
+                let Step::Run(run) = step else { continue };
+                for run in split(run.clone()) {
+                    let height = plan.levels[run.stage.level().unwrap_or(0)].height;
+                    let count = run.part.as_ref().map_or(height, |part| part.rows.len());
+                    *rows.entry(run.stage).or_insert(0) += count;
+                }
+            }
+            rows
+        };
+        assert_eq!(rows(&parts), rows(&steps));
+        let sent = |stage: Stage, first: bool| {
+            let mut parts = parts.iter().filter_map(|step| match step {
+                Step::Run(Run { stage: s, part: Some(part), .. }) if *s == stage => Some(part.sent),
+                _ => None,
+            });
+            if first { parts.next().unwrap() } else { parts.last().unwrap() }
+        };
+        assert!(!sent(Stage::Dependency(0), true).dependency);
+        assert!(sent(Stage::Belief(1), true).dependency && sent(Stage::Belief(1), true).below);
     }
 }

@@ -1,0 +1,21 @@
+//! The map of the right view, refined like that of the left one.
+
+use super::{Step, View};
+use crate::stage::Stage;
+
+/// What makes the right view the left one, between its labels.
+pub const STAGES: [Stage; 3] = [Stage::SwapViews, Stage::Cost, Stage::SubPixel];
+
+/// `steps`, and then the same for the right view, once the left view's maps have been asked for: the disparities between its
+/// labels, and the stages of maps.
+#[must_use]
+pub fn follow(mut steps: Vec<Step>) -> Vec<Step> {
+    let is_of_maps = |step: &&Step| step.stage().is_some_and(Stage::is_of_maps);
+    let refining: Vec<Step> = steps.iter().filter(is_of_maps).cloned().collect();
+    let collect = steps.pop();
+    steps.extend(STAGES.map(Step::of));
+    steps.extend(refining);
+    steps.push(Step::Ask(View::Right));
+    steps.extend(collect);
+    steps
+}

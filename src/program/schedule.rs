@@ -1,0 +1,122 @@
+//! The schedule: the only place that knows levels, iterations, convergence and the order of what follows.
+
+use super::{Run, Step};
+use crate::options::{Fill, Median, Method, Order};
+use crate::plan::{Phase, Plan};
+use crate::program::View;
+use crate::stage::Stage;
+use std::iter;
+
+/// All steps of a match in one piece, of the left view alone.
+#[must_use]
+pub fn steps(plan: &Plan) -> Vec<Step> {
+    let mut steps = vec![Step::Condition, Step::Enter(0)];
+    steps.extend(estimate(plan));
+    steps.extend(post_processing(&plan.method));
+    steps.extend([Step::Ask(View::Left), Step::Collect]);
+    steps
+}
+
+/// From a prepared pair to the disparity of every pixel of the left view, and to the labels of the right one where these are read
+/// off the beliefs.
+#[must_use]
+pub fn estimate(plan: &Plan) -> Vec<Step> {
+    let levels = 0..plan.levels.len();
+    let graphs = levels.clone().map(Stage::Graph);
+    let costs = levels.flat_map(|z| {
+        let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
+        iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
+    });
+    let right = plan.reads_right_view().then_some(Stage::RightView);
+    let read_out = iter::once(Stage::WinnerTakesAll).chain(right).chain([Stage::SubPixel]);
+    let mut steps: Vec<Step> = graphs.chain(costs).map(Step::of).collect();
+    steps.extend(flood(plan, join));
+    steps.extend(read_out.map(Step::of));
+    steps
+}
+
+/// What happens when level `z` joins the flooding: it gets its labels and their evidence.
+#[must_use]
+pub fn join(z: usize) -> Vec<Step> {
+    vec![Step::of(Stage::LabelWindow(z)), Step::of(Stage::Evidence(z))]
+}
+
+/// The flooding of `plan`; `join` gives the steps for each level that joins, coarsest first.
+pub fn flood(plan: &Plan, join: impl Fn(usize) -> Vec<Step>) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let mut joined = plan.levels.len();
+    for phase in &plan.phases {
+        steps.extend((phase.finest..joined).rev().flat_map(&join));
+        joined = phase.finest;
+        steps.extend(joining(plan, phase).map(Step::of));
+        let may_settle = plan.settled_change().is_some() && phase.finest == 0;
+        let change = || may_settle.then_some(Step::of(Stage::Change));
+        steps.extend(change());
+        for i in 0..phase.iterations {
+            steps.extend(iteration(plan, phase, i).map(Step::of));
+            steps.push(Step::Iteration);
+            steps.extend(change());
+            steps.extend(may_settle.then_some(Step::Settled));
+        }
+        steps.extend(may_settle.then_some(Step::EndOfPhase));
+    }
+    steps
+}
+
+/// The stages by which what the coarser levels know reaches the one that joins in a phase, before its own messages start. The
+/// coarser level's beliefs take in what came up, or the next resolution would take off a message that they do not hold.
+fn joining(plan: &Plan, phase: &Phase) -> impl Iterator<Item = Stage> + use<> {
+    let (joining, above) = (phase.finest, phase.finest + 1);
+    let is_alone = above == plan.levels.len() || plan.phases.len() == 1;
+    let stages = [Stage::Resolution(above), Stage::Belief(joining), Stage::Belief(above)];
+    stages.into_iter().filter(move |_| !is_alone)
+}
+
+/// The stages of iteration `i`, from 0 on, of a phase. Every message is from old beliefs: those between levels first, then a
+/// level's own and its new beliefs.
+fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> + use<> {
+    let (finest, coarsest) = (phase.finest, plan.levels.len() - 1);
+    // The coarsest levels that exchange messages with the next finer one, and that are flooded.
+    let (exchanged, flooded) = match plan.method.schedule.order {
+        Order::Together => (coarsest, coarsest),
+        // What joining has just exchanged would give the same messages again.
+        Order::CoarseFirst if finest > 0 => (if i == 0 { finest } else { coarsest }, coarsest),
+        // The coarser levels have settled: they and level 0 speak in turns. A level that is farther away than messages
+        // between levels still go has no say any more.
+        Order::CoarseFirst => {
+            let reach = coarsest.min((phase.iterations / 2 - i / 2) as usize);
+            if i.is_multiple_of(2) { (0, reach) } else { (reach, 0) }
+        }
+    };
+    (finest + 1..=exchanged).map(Stage::Resolution).chain((finest..=flooded).map(Stage::Flood))
+}
+
+/// What follows the disparities, in order. These stages look at maps alone.
+#[must_use]
+pub fn post_processing(method: &Method) -> Vec<Step> {
+    let refinement = &method.refinement;
+    let mut stages = vec![Stage::LeftRightCheck];
+    stages.extend((refinement.speckle_size > 0).then_some(Stage::SpeckleFilter));
+    stages.push(Stage::Confidence);
+    match refinement.fill {
+        Fill::None => {}
+        Fill::Row => stages.push(Stage::Fill),
+        Fill::Votes => stages.extend([Stage::Fill, Stage::VoteFill, Stage::FillPlane]),
+    }
+    if refinement.median != Median::Off {
+        stages.push(if refinement.plane { Stage::Plane } else { Stage::Median });
+    }
+    stages.into_iter().map(Step::of).collect()
+}
+
+/// The steps that run at one level alone, each flooding as its two parts: messages, then beliefs. A backend that does not do both in
+/// one sweep runs these.
+#[must_use]
+pub fn split(run: Run) -> Vec<Run> {
+    match run.stage {
+        Stage::Flood(z) => {
+            [Stage::Dependency(z), Stage::Belief(z)].map(|stage| Run { stage, ..run.clone() }).into()
+        }
+        _ => vec![run],
+    }
+}

@@ -1,0 +1,29 @@
+//! Beliefs of a level: all that a pixel knows of its labels, as a cost.
+//!
+//! ```text
+//! b(p, k) = min(e(p, k)                                       the evidence
+//!               + sum of m(t, k) over the factors and slots t that hold p
+//!               + down(p, k)                                  from the factor with its parent
+//!               + up(p, k),                                   from the factor with its children
+//!               belief_most)
+//! ```
+//!
+//! at the labels k that p [has](super::label_window), and infinite at all others. m are the
+//! messages of the [`dependency`](super::dependency) factors, down and up those of the
+//! [`resolution`](super::resolution) factors; what has not been sent yet, or does not exist at the
+//! coarsest and at the finest level, counts as 0.
+//!
+//! ([`belief_most`](crate::plan::Plan::belief_most) is one message below infinity: a label that a
+//! pixel has stays below those it does not have, also after a message has been taken off.)
+
+use super::{Descriptor, Volume, volumes};
+use crate::plan::GRAPH_WINDOW;
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |z| volumes(&[Volume::Evidence(z), Volume::Dependency(z), Volume::Down(z), Volume::Up(z)]),
+    writes: |z| volumes(&[Volume::Belief(z)]),
+    reach: Some(GRAPH_WINDOW / 2),
+    joins: true,
+    cell: 0.45,
+    ..Descriptor::NONE
+};

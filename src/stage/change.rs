@@ -1,0 +1,16 @@
+//! How much the label map of level 0 has changed since the last time, which tells when message
+//! passing may end.
+//!
+//! ```text
+//! new(p) = the label of smallest belief (a cost), the lowest on ties
+//! change = sum of (new(p) - old(p))^2 over all pixels
+//! old    = new, for the next time                    0 everywhere before the first
+//! ```
+//!
+//! The map has settled where this is not the first time and the change is at most
+//! [`settled_change`](crate::plan::Plan::settled_change), if there is one.
+
+use super::{Descriptor, Volume, volumes};
+
+pub(super) const ROW: Descriptor =
+    Descriptor { reads: |_| volumes(&[Volume::Belief(0)]), cell: 0.2, ..Descriptor::NONE };

@@ -1,0 +1,23 @@
+//! One iteration within a level: [`dependency`](super::dependency), and then
+//! [`belief`](super::belief).
+//!
+//! (They are one stage so that a belief can be summed while its messages are at hand; the values
+//! are those of the two stages in turn.)
+
+use super::{Descriptor, Volume, volumes};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |z| {
+        volumes(&[
+            Volume::Belief(z),
+            Volume::Evidence(z),
+            Volume::Dependency(z),
+            Volume::Down(z),
+            Volume::Up(z),
+        ])
+    },
+    writes: |z| volumes(&[Volume::Dependency(z), Volume::Belief(z)]),
+    joins: true,
+    cell: 0.9,
+    ..Descriptor::NONE
+};

@@ -1,0 +1,19 @@
+//! Limits each pixel of a level to its label range, which texture zones and sparse matches give it,
+//! by making all other labels as costly as can be.
+//!
+//! ```text
+//! cost(p, k) = COST_MAX at level 0, 256 COST_MAX at coarser levels     for k < first or k > last
+//! ```
+//!
+//! first ..= last is the range of pixel p in
+//! [`label_ranges`](crate::front::Prepared::label_ranges); [`COST_MAX`](crate::plan::COST_MAX) is
+//! the highest cost there is. All other costs stay.
+
+use super::{Descriptor, Volume, volumes};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |z| volumes(&[Volume::Cost(z)]),
+    writes: |z| volumes(&[Volume::Cost(z)]),
+    cell: 0.5,
+    ..Descriptor::NONE
+};

@@ -1,0 +1,16 @@
+//! The labels that the match of the mirrored pair has found become those of the right view, for the
+//! left-right check. They stay when the pair itself is prepared.
+//!
+//! ```text
+//! RightLabel(x, y) = Label(width - 1 - x, y)
+//! RightBest(x, y)  = Best(width - 1 - x, y)
+//! ```
+
+use super::{Descriptor, Map, maps};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |_| maps(&[Map::RightLabel, Map::RightBest]),
+    writes: |_| maps(&[Map::Label, Map::Best]),
+    pixel: 4.0,
+    ..Descriptor::NONE
+};

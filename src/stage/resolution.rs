@@ -1,0 +1,56 @@
+//! Messages of the resolution factors between a level (1 or coarser) and the next finer one, in
+//! both directions: a coarse pixel and its children should be at the same depth.
+//!
+//! All messages are from the beliefs and the old messages before the stage; beliefs stay. Beliefs
+//! and messages are costs, and infinite is inf =
+//! [`VolumeWidth::most`](crate::plan::VolumeWidth::most). Each coarse pixel (x, y) has one factor:
+//! it is the parent P of its children (2 x, 2 y) to (2 x + 1, 2 y + 1), as far as they are inside.
+//! d is a disparity of the finer level and z one of the coarser. As
+//! [`Agreement`](crate::options::Agreement) says, they agree when
+//!
+//! ```text
+//! interpolating   |d - 2 z| <= 1            an odd d agrees with both of its coarse neighbours
+//! strict           d = 2 z                  an odd d agrees with none
+//! ```
+//!
+//! 1. From P and from each child c to the factor, with b the belief and m the factor's old message:
+//!
+//!    ```text
+//!    q(P, z) = b(P, z) - m(P, z),   q(c, d) = b(c, d) - m(c, d)          inf where b is
+//!    ```
+//!
+//!    Where the rule is [`Absolute`](crate::plan::TruncationRule::Absolute), each finite q is
+//!    lowered by the minimum over its pixel's labels.
+//! 2. What each child says of coarse disparities, and the sums to parent and children:
+//!
+//!    ```text
+//!    U(c, z) = min of q(c, d) over the d that agree with z               inf if none does
+//!    S(P, z) = min(sum of U(c, z) over all c, inf)
+//!    T(c, z) = min(q(P, z) + sum of U(c', z) over the other children c', inf)
+//!    S(c, d) = min of T(c, z) over the z that agree with d               inf if none does
+//!    ```
+//!
+//! 3. The messages, truncated by [`Plan::resolution`](crate::plan::Plan::resolution), whose cost of
+//!    disagreement is tau, at the labels that the pixel has:
+//!
+//!    ```text
+//!    m = min(S, high) - low                 for P (up) and for each child (down)
+//!
+//!    relative   low = min(least, inf - tau), high = low + tau
+//!               with least = the smallest S of the labels that the pixel has
+//!    absolute   low = 0, high = tau
+//!    ```
+//!
+//! Messages at labels that the pixel does not have are not defined. Before the first messages, all
+//! count as 0.
+
+use super::{Descriptor, Volume, volumes};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |z| volumes(&[Volume::Belief(z - 1), Volume::Belief(z), Volume::Down(z - 1), Volume::Up(z)]),
+    writes: |z| volumes(&[Volume::Down(z - 1), Volume::Up(z)]),
+    reach: Some(0),
+    joins: true,
+    cell: 0.5,
+    ..Descriptor::NONE
+};

@@ -1,0 +1,24 @@
+//! The labels of the right view, read from the beliefs of the left one: a right pixel takes the
+//! best of the labels that see it.
+//!
+//! With low the smallest disparity, label k matches right pixel (x, y) with left pixel
+//! (x + low + k, y), whose belief of it is b(k), a cost. Among the k whose left pixel is in the
+//! columns [`core`](crate::plan::Plan::core) and [has](super::label_window) that label:
+//!
+//! ```text
+//! RightLabel(x, y) = the k of smallest b(k), the lowest on ties         NO_LABEL without any
+//! RightBest(x, y)  = its b(k)                                           65535 without any
+//! ```
+//!
+//! These are the maps [`RightLabel`](crate::backend::Map::RightLabel) and
+//! [`RightBest`](crate::backend::Map::RightBest).
+
+use super::{Descriptor, Map, Volume, maps, volumes};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |_| volumes(&[Volume::Belief(0)]),
+    writes: |_| maps(&[Map::RightLabel, Map::RightBest]),
+    reach: Some(0),
+    cell: 0.3,
+    ..Descriptor::NONE
+};

@@ -1,0 +1,23 @@
+//! The views exchange roles, both mirrored: the right view becomes the left one, its matches lie to
+//! the left again, and [`cost`](super::cost), [`sub_pixel`](super::sub_pixel) and the stages of
+//! maps then work on it.
+//!
+//! With x' = width - 1 - x, all at once:
+//!
+//! ```text
+//! left(x, y)       = right(x', y)           right(x, y)      = left(x', y)      pixels and masks
+//! Label(x, y)      = RightLabel(x', y)      RightLabel(x, y) = Label(x', y)
+//! Best(x, y)       = RightBest(x', y)       RightBest(x, y)  = Best(x', y)
+//! RunnerUp(x, y)   = 65535, which stands for none
+//! ```
+//!
+//! (The runners-up of the right view are not known.)
+
+use super::{Descriptor, Map, maps};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |_| maps(&[Map::Label, Map::Best, Map::RightLabel, Map::RightBest]),
+    writes: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp, Map::RightLabel, Map::RightBest]),
+    pixel: 4.0,
+    ..Descriptor::NONE
+};

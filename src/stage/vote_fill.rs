@@ -1,0 +1,84 @@
+//! Gives filled pixels a disparity by the votes of the valid ones around, and replaces doubtful
+//! disparities that are outvoted. It does nothing unless
+//! [`fill`](crate::options::RefinementOptions::fill) is [`Votes`](crate::options::Fill::Votes).
+//!
+//! Constants are those of [`votes`](crate::plan::votes). A pixel is valid without a flag of
+//! [`INVALID`](crate::maps::flag::INVALID), and sure where it is valid and has a confidence of at
+//! least `VOTE_SURE`. Half-size pixel (X, Y) stands for the pixels (2 X, 2 Y) to (2 X + 1, 2 Y + 1)
+//! that are inside. Votes are costs: the smallest sum wins. All steps look at the maps before the
+//! stage.
+//!
+//! 1. Colour of a half-size pixel, in each channel c, over its n pixels that are not masked; 0 if
+//!    n = 0. The difference of two colours is the sum of the absolute ones of r, g and b.
+//!
+//!    ```text
+//!    C(X, Y) = floor((2 s + n) / (2 n)),  s = sum of c >> 8
+//!    ```
+//!
+//! 2. Own votes of a half-size pixel on each even label k = 0, 2, 4, ..., of disparity low + k (low
+//!    is the smallest disparity):
+//!
+//!    ```text
+//!    v(k) = 2^VOTE_FRACTION_BITS (sum of these over its pixels)
+//!           min(|D - 256 (low + k)|, VOTE_MOST) >> VOTE_BITS      valid: disparity D in 1/256 px
+//!           VOTE_HIDING if k hides what the right view sees       neither valid nor masked
+//!           0                                                     otherwise
+//!    ```
+//!
+//!    A sure pixel (x, y) of label j shows j to the right view at x - low - j of the row, if that
+//!    is inside; of several j there, the right view sees the nearest. Label k of pixel (x, y) hides
+//!    it where the right view sees some j at x - low - k and k is nearer than j by `HIDING_LABELS`
+//!    or more. Nearer labels are the larger or the smaller ones, as
+//!    [`nearer`](crate::options::RefinementOptions::nearer) says.
+//! 3. Sums along each row. w(X) is the weight of the step between X - 1 and X, the first of
+//!    [`vote_weights`](crate::weights::vote_weights) for their difference in colour. Products come
+//!    before `>>`.
+//!
+//!    ```text
+//!    f(X) = v(X) + (w(X) f(X - 1) >> 16)                    f(0) = v(0)
+//!    b(X) = w(X + 1) (v(X + 1) + b(X + 1)) >> 16            0 at the last X
+//!    r(X) = (f(X) + b(X)) >> VOTE_SHIFT
+//!    ```
+//!
+//! 4. Sums along each column. w(Y', Y' + 1) is the weight of the step between these rows, the
+//!    second of `vote_weights`:
+//!
+//!    ```text
+//!    s(Y)  = r(Y) + above + below
+//!    above = 0, then w(Y', Y' + 1) (r(Y') + above) >> 16    for Y' = Y - VOTE_REACH, ..., Y - 1
+//!    below = 0, then w(Y' - 1, Y') (r(Y') + below) >> 16    for Y' = Y + VOTE_REACH, ..., Y + 1
+//!    ```
+//!
+//!    Rows outside are left out.
+//! 5. The vote is for the label k of smallest s(k), the lowest on ties; there is none where s is
+//!    the same for all labels. Its disparity V, in 1/256 px:
+//!
+//!    ```text
+//!    p = s(k - 2) - s(k),  q = s(k + 2) - s(k)              both halved, rounded down, as often
+//!    t = max(p, q)                                          as brings both below 65536
+//!    V = 256 (low + k) + floor((512 (p - q) + t) / (2 t))
+//!    ```
+//!
+//!    Where t = 0, and where k is the first or the last of the even labels, V = 256 (low + k).
+//! 6. A filled pixel (x, y) takes the V of one of the 3 x 3 half-size pixels (X, Y) around
+//!    (x >> 1, y >> 1) that are inside and have a vote: of the one that is least unlike, the first
+//!    in reading order on ties. Without any it keeps what it has. Its flags stay.
+//!
+//!    ```text
+//!    unlike(X, Y) = difference of c(x, y) >> 8 and C(X, Y)
+//!                   + VOTE_AWAY (|X - (x >> 1)| + |Y - (y >> 1)|)
+//!    ```
+//!
+//! 7. A valid pixel that is not sure is outvoted where half-size pixel (x >> 1, y >> 1) has a vote
+//!    with |V - D| > `VOTE_OUTVOTES`. It takes this V, its flags become
+//!    [`OUTVOTED`](crate::maps::flag::OUTVOTED) and [`FILLED`](crate::maps::flag::FILLED) alone,
+//!    and its confidence 0.
+
+use super::{Data, Descriptor, Map, maps};
+
+pub(super) const ROW: Descriptor = Descriptor {
+    reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
+    writes: |_| [maps(&[Map::Disparity, Map::Validity, Map::Confidence]), vec![Data::Votes]].concat(),
+    pixel: 60.0,
+    ..Descriptor::NONE
+};
