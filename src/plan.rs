@@ -156,6 +156,8 @@ pub struct Plan {
     pub held: usize,
     /// Memory that the match may take, in MiB: that of the method, or for a tile what is left of it.
     pub memory: u32,
+    /// Whether a backend gives what is never needed at the same time the same memory.
+    pub shares: bool,
 }
 
 impl Plan {
@@ -237,6 +239,7 @@ impl Plan {
             core: 0..width,
             held: height,
             memory: method.tiles.memory,
+            shares: false,
             method,
         })
     }

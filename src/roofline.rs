@@ -87,13 +87,13 @@ mod tests {
     fn every_message_stage_is_named_once() {
         let stages: Vec<_> = message_stages(&plan("default")).collect();
         let expected = [
+            Stage::Flood(0),
             Stage::Dependency(0),
             Stage::Belief(0),
-            Stage::Flood(0),
-            Stage::Resolution(1),
-            Stage::Dependency(1),
-            Stage::Belief(1),
             Stage::Flood(1),
+            Stage::Dependency(1),
+            Stage::Resolution(1),
+            Stage::Belief(1),
         ];
         assert_eq!(stages, expected);
     }

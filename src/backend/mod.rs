@@ -13,6 +13,7 @@ use crate::image::Plane;
 use crate::maps::Maps;
 use crate::plan::Plan;
 use crate::program::{Program, Run};
+use crate::stage::Data;
 pub use crate::stage::{Map, NO_LABEL, Stage, Volume, volume_shape};
 use probe::Probe;
 use std::pin::Pin;
@@ -86,6 +87,9 @@ pub trait Backend {
     fn run(&mut self, stage: Stage) -> Result<()> {
         self.perform(&stage.into())
     }
+
+    /// Frees what nobody needs any more of the match, where that is memory of the host.
+    fn free(&mut self, _: Data) {}
 
     /// To be awaited between stages: until a device is no more than a few submissions behind, and in a browser until the other work
     /// of the thread has had its turn.

@@ -247,6 +247,7 @@ impl Match {
                 target.keep_up().await?;
                 inspect(&mut Inspection::Stage(target, run.stage))?;
             }
+            Step::Free(data) => self.target(backend).free(data),
             Step::Iteration => {
                 self.iterations += 1;
                 inspect(&mut Inspection::Iteration(backend, self.iterations))?;

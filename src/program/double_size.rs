@@ -18,3 +18,25 @@ pub fn follow(own: Program, double: Program) -> Program {
     steps.push(Step::Join);
     Program { frames, steps }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::LeftRightCheck;
+    use crate::program::samples;
+
+    #[test]
+    fn the_doubled_pair_follows_with_frames_of_its_own() {
+        let plan = samples::plan(LeftRightCheck::RightView);
+        let own = samples::plain(&plan);
+        let program = follow(own.clone(), own.clone());
+        assert_eq!(program.frames.len(), 2);
+        let (first, second) = program.steps.split_at(own.steps.len());
+        assert_eq!(first, own.steps);
+        assert_eq!(second[..2], [Step::Double, Step::Enter(1)]);
+        assert_eq!(second[2..second.len() - 1], own.steps[2..]);
+        assert_eq!(second.last(), Some(&Step::Join));
+        assert!(own.waits_once() && !program.waits_once());
+        assert!((program.work() - 2.0 * own.work()).abs() < 1.0);
+    }
+}

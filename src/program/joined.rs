@@ -21,3 +21,38 @@ pub fn join(plan: &Plan, shared: usize, steps: Vec<Step>) -> Vec<Step> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::LeftRightCheck;
+    use crate::program::{samples, schedule};
+
+    /// The steps with every run at its levels one by one.
+    fn apart(steps: &[Step]) -> Vec<Step> {
+        let apart = |step: &Step| match step {
+            Step::Run(run) => run.stages().map(Step::of).collect(),
+            other => vec![other.clone()],
+        };
+        steps.iter().flat_map(apart).collect()
+    }
+
+    #[test]
+    fn levels_that_share_go_together_and_no_others() {
+        let plan = samples::plan(LeftRightCheck::RightView);
+        let steps = schedule::estimate(&plan);
+        let mut fewest = steps.len();
+        for shared in (0..=plan.levels.len()).rev() {
+            let joined = join(&plan, shared, steps.clone());
+            assert_eq!(apart(&joined), steps, "levels from {shared} on");
+            for step in &joined {
+                let Step::Run(run) = step else { continue };
+                assert!(run.levels == 1 || run.stage.finest_level(&plan) >= shared);
+            }
+            assert!(joined.len() <= fewest);
+            fewest = joined.len();
+        }
+        // The graphs of all levels are one run, for example.
+        assert!(fewest < steps.len() * 3 / 4, "{fewest} of {}", steps.len());
+    }
+}

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! schedule ──> second_match ──> right_view ──> tiled ──> double_size        what is computed
-//!          ──> together | split, joined                                     how a backend computes it
+//!          ──> together, joined, sharing                                   how a backend computes it
 //! ```
 
 pub mod double_size;
@@ -13,6 +13,7 @@ pub mod joined;
 pub mod right_view;
 pub mod schedule;
 pub mod second_match;
+pub mod sharing;
 pub mod tiled;
 pub mod tiles;
 pub mod together;
@@ -21,7 +22,7 @@ use crate::error::Result;
 use crate::image::Rect;
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
-use crate::stage::Stage;
+use crate::stage::{Data, Stage};
 use std::ops::Range;
 use tiles::Tiles;
 
@@ -125,6 +126,8 @@ pub enum Step {
     Enter(usize),
     /// Runs a stage.
     Run(Run),
+    /// Nobody needs this any more.
+    Free(Data),
     /// An iteration is done.
     Iteration,
     /// Where message passing has settled, the steps up to [`Step::EndOfPhase`] are left out.
@@ -243,5 +246,27 @@ impl Program {
             }
         }
         Self { frames, steps: all }
+    }
+}
+
+/// What the tests of the passes share.
+#[cfg(test)]
+mod samples {
+    use super::{Frame, Program, schedule};
+    use crate::options::{DisparityRange, LeftRightCheck, Method};
+    use crate::plan::Plan;
+
+    /// A plan whose right view is wanted, and read off the beliefs or found by a second match.
+    pub(super) fn plan(check: LeftRightCheck) -> Plan {
+        let mut method = Method::default();
+        method.refinement.left_right_check = check;
+        method.refinement.right_map = true;
+        method.tiles.memory = 24;
+        Plan::new(300, 240, DisparityRange::new(0, 31).unwrap(), &method).unwrap()
+    }
+
+    /// The plain list of it.
+    pub(super) fn plain(plan: &Plan) -> Program {
+        Program { frames: vec![Frame::whole(plan)], steps: schedule::steps(plan) }
     }
 }

@@ -19,3 +19,23 @@ pub fn follow(mut steps: Vec<Step>) -> Vec<Step> {
     steps.extend(collect);
     steps
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::LeftRightCheck;
+    use crate::program::{samples, schedule};
+
+    #[test]
+    fn the_right_view_is_refined_like_the_left_one() {
+        let plan = samples::plan(LeftRightCheck::RightView);
+        let plain = schedule::steps(&plan);
+        let steps = follow(plain.clone());
+        let (left, right) = steps.split_at(plain.len() - 1);
+        assert_eq!(left, &plain[..plain.len() - 1]);
+        let mut expected: Vec<Step> = STAGES.map(Step::of).into();
+        expected.extend(schedule::post_processing(&plan.method));
+        expected.extend([Step::Ask(View::Right), Step::Collect]);
+        assert_eq!(right, expected);
+    }
+}

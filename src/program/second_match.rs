@@ -19,3 +19,25 @@ pub fn first(program: Program) -> Program {
     all.extend_from_slice(&steps[enter..]);
     Program { frames, steps: all }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::LeftRightCheck;
+    use crate::program::{View, samples, schedule};
+
+    #[test]
+    fn the_mirrored_pair_is_matched_first_and_in_the_same_way() {
+        let plan = samples::plan(LeftRightCheck::SecondMatch);
+        let plain = samples::plain(&plan);
+        let both = first(plain.clone());
+        let estimate = schedule::estimate(&plan);
+        let mut expected = vec![Step::Condition, Step::Enter(1)];
+        expected.extend_from_slice(&estimate);
+        expected.push(Step::of(Stage::MirrorLabels));
+        expected.extend_from_slice(&plain.steps[1..]);
+        assert_eq!(both.steps, expected);
+        assert_eq!(both.frames.iter().map(|frame| frame.mirrored).collect::<Vec<_>>(), [false, true]);
+        assert_eq!(expected[expected.len() - 2..], [Step::Ask(View::Left), Step::Collect]);
+    }
+}

@@ -61,3 +61,49 @@ fn entered(program: &Program) -> Vec<(usize, &[Step])> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::LeftRightCheck;
+    use crate::program::{samples, schedule, second_match};
+
+    /// Each tile is entered, estimated and placed, of each view once; what follows looks at maps alone.
+    #[test]
+    fn tiles_are_estimated_one_by_one_and_finished_together() {
+        for check in [LeftRightCheck::RightView, LeftRightCheck::SecondMatch] {
+            let plan = samples::plan(check);
+            let tiles = Tiles::new(&plan).unwrap();
+            let mut whole = samples::plain(&plan);
+            let twice = check == LeftRightCheck::SecondMatch;
+            if twice {
+                whole = second_match::first(whole);
+            }
+            whole.steps = right_view::follow(whole.steps);
+            let program = cut(&whole, &tiles);
+            let count = tiles.count() * if twice { 2 } else { 1 };
+            assert!(tiles.count() > 1 && program.frames.len() == 1 + count);
+
+            let mut steps = program.steps[2..].iter();
+            let estimate = schedule::estimate(&plan);
+            for (at, frame) in program.frames.iter().enumerate().skip(1) {
+                assert_eq!(steps.next(), Some(&Step::Enter(at)));
+                assert_eq!(frame.tile, Some((at, count)));
+                assert!(estimate.iter().all(|step| steps.next() == Some(step)));
+                let view = if frame.mirrored { View::Mirrored } else { View::Left };
+                assert_eq!(steps.next(), Some(&Step::Place(view)));
+                if !twice {
+                    assert!(right_view::STAGES.into_iter().all(|s| steps.next() == Some(&Step::of(s))));
+                    assert_eq!(steps.next(), Some(&Step::Place(View::Right)));
+                }
+            }
+            let post = schedule::post_processing(&plan.method);
+            let mut expected = vec![Step::Gather];
+            expected.extend_from_slice(&post);
+            expected.extend([Step::Ask(View::Left), Step::of(Stage::SwapViews), Step::PlaceRight]);
+            expected.extend(post);
+            expected.extend([Step::Ask(View::Right), Step::Collect]);
+            assert_eq!(steps.cloned().collect::<Vec<_>>(), expected);
+        }
+    }
+}

@@ -16,11 +16,17 @@
 //! ([`belief_most`](crate::plan::Plan::belief_most) is one message below infinity: a label that a
 //! pixel has stays below those it does not have, also after a message has been taken off.)
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 use crate::plan::GRAPH_WINDOW;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| volumes(&[Volume::Evidence(z), Volume::Dependency(z), Volume::Down(z), Volume::Up(z)]),
+    reads: |z| {
+        [
+            volumes(&[Volume::Evidence(z), Volume::Dependency(z), Volume::Down(z), Volume::Up(z)]),
+            vec![Data::Graph(z)],
+        ]
+        .concat()
+    },
     writes: |z| volumes(&[Volume::Belief(z)]),
     reach: Some(GRAPH_WINDOW / 2),
     joins: true,

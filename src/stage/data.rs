@@ -96,6 +96,8 @@ pub enum Data {
     Volume(Volume),
     /// A map.
     Map(Map),
+    /// The graph of a level: the members of its factors.
+    Graph(usize),
     /// The sums of votes, by half-size pixel and every second label.
     Votes,
 }

@@ -33,11 +33,11 @@
 //!
 //! [`Plan::dependency`]: crate::plan::Plan::dependency
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 use crate::plan::GRAPH_WINDOW;
 
 pub(super) const ROW: Descriptor = Descriptor {
-    reads: |z| volumes(&[Volume::Belief(z), Volume::Dependency(z)]),
+    reads: |z| [volumes(&[Volume::Belief(z), Volume::Dependency(z)]), vec![Data::Graph(z)]].concat(),
     writes: |z| volumes(&[Volume::Dependency(z)]),
     reach: Some(GRAPH_WINDOW / 2),
     joins: true,

@@ -4,17 +4,21 @@
 //! (They are one stage so that a belief can be summed while its messages are at hand; the values
 //! are those of the two stages in turn.)
 
-use super::{Descriptor, Volume, volumes};
+use super::{Data, Descriptor, Volume, volumes};
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |z| {
-        volumes(&[
-            Volume::Belief(z),
-            Volume::Evidence(z),
-            Volume::Dependency(z),
-            Volume::Down(z),
-            Volume::Up(z),
-        ])
+        [
+            volumes(&[
+                Volume::Belief(z),
+                Volume::Evidence(z),
+                Volume::Dependency(z),
+                Volume::Down(z),
+                Volume::Up(z),
+            ]),
+            vec![Data::Graph(z)],
+        ]
+        .concat()
     },
     writes: |z| volumes(&[Volume::Dependency(z), Volume::Belief(z)]),
     joins: true,

@@ -39,6 +39,7 @@
 //! 0 to 1 have 1020. The centre's own coefficient is always the largest, so the percentile is taken
 //! over the 48 others, which the paper leaves open: ceil(48 (100 - percentile) / 100) neighbours.
 
-use super::Descriptor;
+use super::{Data, Descriptor};
 
-pub(super) const ROW: Descriptor = Descriptor { joins: true, pixel: 34.0, ..Descriptor::NONE };
+pub(super) const ROW: Descriptor =
+    Descriptor { writes: |z| vec![Data::Graph(z)], joins: true, pixel: 34.0, ..Descriptor::NONE };

@@ -195,7 +195,7 @@ impl Stage {
     /// Whether it computes messages or beliefs from others: what is done again in every iteration.
     #[must_use]
     pub fn passes_messages(self) -> bool {
-        self.descriptor().joins && self.writes().next().is_some()
+        self.descriptor().joins && self.writes().any(|data| data.volume().is_some())
     }
 
     /// The finest level that it touches.

@@ -15,13 +15,14 @@ use super::probe::Probe;
 use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
 use crate::error::{Purpose, Result};
 use crate::front::Prepared;
+use crate::graph::LevelGraph;
 use crate::image::{Pair, Plane};
 use crate::maps::Maps;
 use crate::memory;
 use crate::pause::Pause;
 use crate::plan::{Plan, VolumeWidth};
-use crate::program::{Part, Program, Run, Sent, together};
-use crate::stage::MapSet;
+use crate::program::{Part, Program, Run, Sent, sharing, together};
+use crate::stage::{Data, MapSet};
 use std::future::ready;
 use std::ops::Range;
 use std::time::Duration;
@@ -60,6 +61,7 @@ macro_rules! declare {
 
         impl<U: Units> Volumes<U> {
             fn run(&mut self, stage: Stage) {
+                self.make_room(stage);
                 match stage {
                     $( Stage::$level(z) => $level_name::run(self, z), )*
                     $( Stage::$finest => $finest_name::run(self), )*
@@ -74,6 +76,7 @@ macro_rules! declare {
 
             /// Runs rows of a stage that goes row by row.
             fn run_rows(&mut self, stage: Stage, sent: Sent, rows: Range<usize>) {
+                self.make_room(stage);
                 match stage {
                     $( Stage::$level_row(z) => $level_row_name::rows(self, z, sent, rows), )*
                     $( Stage::$finest_row => $finest_row_name::rows(self, rows), )*
@@ -135,7 +138,16 @@ impl Backend for Cpu {
     }
 
     fn fit(&mut self, program: Program) -> Program {
-        program.each_frame(together::pass)
+        program.each_frame(|plan, steps| {
+            let steps = together::pass(plan, steps);
+            sharing::pass(plan, steps)
+        })
+    }
+
+    fn free(&mut self, data: Data) {
+        if let Data::Graph(z) = data {
+            on_volumes!(self, v => v.levels[z].graph = LevelGraph::default());
+        }
     }
 
     fn perform(&mut self, run: &Run) -> Result<()> {

@@ -34,6 +34,11 @@ impl<T: Pod> Pages<T> {
         let _ = bytes.advise(memmap2::Advice::HugePage);
         Ok(Self { bytes: Some(bytes), values: PhantomData })
     }
+
+    /// The same memory for values of another type, which are undefined.
+    pub(super) fn of_others<V: Pod>(self) -> Pages<V> {
+        Pages { bytes: self.bytes, values: PhantomData }
+    }
 }
 
 impl<T> Default for Pages<T> {

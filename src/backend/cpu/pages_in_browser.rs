@@ -2,10 +2,15 @@
 
 use crate::error::{MemoryError, Purpose, Result};
 use bytemuck::Pod;
+use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
 /// Values that are 0 at first.
-pub(super) struct Pages<T>(Vec<T>);
+pub(super) struct Pages<T> {
+    /// Aligned for every type of value.
+    words: Vec<u64>,
+    values: PhantomData<T>,
+}
 
 impl<T: Pod> Pages<T> {
     /// `len` values.
@@ -15,29 +20,35 @@ impl<T: Pod> Pages<T> {
     pub(super) fn new(len: usize) -> Result<Self, MemoryError> {
         let needed = len as u64 * size_of::<T>() as u64;
         let lacking = |_| MemoryError::Machine { needed, available: None, purpose: Purpose::Match };
-        let mut values = Vec::new();
-        values.try_reserve_exact(len).map_err(lacking)?;
-        values.resize(len, T::zeroed());
-        Ok(Self(values))
+        let count = needed.div_ceil(8) as usize;
+        let mut words = Vec::new();
+        words.try_reserve_exact(count).map_err(lacking)?;
+        words.resize(count, 0);
+        Ok(Self { words, values: PhantomData })
+    }
+
+    /// The same memory for values of another type, which are undefined.
+    pub(super) fn of_others<V: Pod>(self) -> Pages<V> {
+        Pages { words: self.words, values: PhantomData }
     }
 }
 
 impl<T> Default for Pages<T> {
     fn default() -> Self {
-        Self(Vec::new())
+        Self { words: Vec::new(), values: PhantomData }
     }
 }
 
-impl<T> Deref for Pages<T> {
+impl<T: Pod> Deref for Pages<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        &self.0
+        bytemuck::cast_slice(&self.words)
     }
 }
 
-impl<T> DerefMut for Pages<T> {
+impl<T: Pod> DerefMut for Pages<T> {
     fn deref_mut(&mut self) -> &mut [T] {
-        &mut self.0
+        bytemuck::cast_slice_mut(&mut self.words)
     }
 }

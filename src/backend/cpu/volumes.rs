@@ -12,6 +12,7 @@ use crate::image::{Image, Pair, Plane};
 use crate::plan::Plan;
 use crate::program::Sent;
 use crate::stage::{Data, MapSet, Volume};
+use std::mem;
 
 /// All volumes of a match.
 pub(super) struct Volumes<U> {
@@ -40,7 +41,7 @@ pub(super) struct Level<U> {
     /// What the graph was chosen by; `None` at level 0, whose guide is the left image.
     pub(super) guide: Option<Image>,
     pub(super) windows: Windows,
-    /// In 1/256 cost units; empty at level 0.
+    /// In 1/256 cost units; empty at level 0, and where it [shares](Plan::shares) the memory of the messages once these are sent.
     pub(super) cost: Pages<u16>,
     pub(super) evidence: Pages<u8>,
     pub(super) dependency: Pages<U>,
@@ -68,11 +69,14 @@ impl<U: Units> Volumes<U> {
             .map(|(z, level)| {
                 let held = plan.rows_held(z);
                 let cells = Windows::most_cells(level, held);
+                let cost = if z == 0 { 0 } else { level.pixels() * level.stride };
+                // Costs lie where the messages will.
+                let shared = if plan.shares { (2 * cost).div_ceil(size_of::<U>()) } else { 0 };
                 Ok(Level {
                     windows: Windows::full(level, held),
-                    cost: Pages::new(if z == 0 { 0 } else { level.pixels() * level.stride })?,
+                    cost: Pages::new(if plan.shares { 0 } else { cost })?,
                     evidence: Pages::new(cells)?,
-                    dependency: Pages::new(cells * plan.slots())?,
+                    dependency: Pages::new(shared.max(cells * plan.slots()))?,
                     dependency_sent: false,
                     resolution_sent: false,
                     down: Pages::new(if z == last { 0 } else { cells })?,
@@ -111,6 +115,18 @@ impl<U: Units> Volumes<U> {
         self.label_ranges = Vec::new();
         for level in &mut self.levels {
             (level.graph, level.guide) = (LevelGraph::default(), None);
+        }
+    }
+
+    /// Gives what `stage` writes its memory, where that held something else so far.
+    pub(super) fn make_room(&mut self, stage: Stage) {
+        for volume in stage.writes().filter_map(Data::volume).filter(|_| self.plan.shares) {
+            let Level { cost, dependency, .. } = &mut self.levels[volume.level()];
+            match volume {
+                Volume::Cost(1..) if cost.is_empty() => *cost = mem::take(dependency).of_others(),
+                Volume::Dependency(_) if dependency.is_empty() => *dependency = mem::take(cost).of_others(),
+                _ => {}
+            }
         }
     }
 

@@ -14,11 +14,13 @@ pub(super) struct Allocator<'a> {
     pub(super) device: &'a mut Device,
     pub(super) written: Vec<wgpu::Buffer>,
     pub(super) constant: Vec<wgpu::Buffer>,
+    /// Buffers whose data nobody needs any more when the maps are made.
+    pub(super) spare: Vec<wgpu::Buffer>,
 }
 
 impl<'a> Allocator<'a> {
     pub(super) fn new(device: &'a mut Device) -> Self {
-        Self { device, written: Vec::new(), constant: Vec::new() }
+        Self { device, written: Vec::new(), constant: Vec::new(), spare: Vec::new() }
     }
 
     /// A buffer that matches write.
@@ -26,6 +28,16 @@ impl<'a> Allocator<'a> {
         let buffer = self.allocate(label, words, USAGE)?;
         self.written.push(buffer.clone());
         Ok(buffer)
+    }
+
+    /// The smallest spare buffer that holds so many words, or else one that matches write.
+    pub(super) fn spare_or_new(&mut self, label: &str, words: u64) -> Result<wgpu::Buffer> {
+        let fits = |(_, buffer): &(usize, &wgpu::Buffer)| buffer.size() >= 4 * words;
+        let spare = self.spare.iter().enumerate().filter(fits).min_by_key(|(_, buffer)| buffer.size());
+        match spare.map(|(at, _)| at) {
+            Some(at) => Ok(self.spare.swap_remove(at)),
+            None => self.buffer(label, words),
+        }
     }
 
     /// A buffer that keeps these words from match to match.

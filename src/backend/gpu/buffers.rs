@@ -121,6 +121,12 @@ impl LevelBuffers {
         self.guide.start(16)
     }
 
+    /// The buffers of the volumes that nobody needs any more once there are labels.
+    fn dead_volumes(&self) -> impl Iterator<Item = &wgpu::Buffer> {
+        let rows = [&self.evidence, &self.belief, &self.dependency, &self.down, &self.up];
+        rows.into_iter().flat_map(Rows::buffers)
+    }
+
     /// The message volumes, which start at 0.
     pub(super) fn messages(&self) -> [&Rows; 3] {
         [&self.dependency, &self.down, &self.up]
@@ -271,6 +277,12 @@ impl Buffers {
             });
         }
         levels.reverse();
+        if plan.shares {
+            let mut volumes: Vec<_> = levels.iter().flat_map(LevelBuffers::dead_volumes).cloned().collect();
+            let mut seen = std::collections::HashSet::new();
+            volumes.retain(|buffer| seen.insert(buffer.clone()));
+            a.spare = volumes;
+        }
         let fine = levels[0].params;
         let whole = [0, fine.height];
         let next_guide = levels.get(1).map_or(0, |l| 4 * u64::from(l.params.pixel_pitch * l.params.height));

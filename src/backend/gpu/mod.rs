@@ -35,7 +35,7 @@ use crate::maps::Maps;
 use crate::memory;
 use crate::plan::{LevelPlan, Plan};
 use crate::program::schedule::split;
-use crate::program::{Program, Run, joined, together};
+use crate::program::{Program, Run, joined, sharing, together};
 pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
@@ -366,6 +366,7 @@ impl Backend for Gpu {
     fn fit(&mut self, program: Program) -> Program {
         program.each_frame(|plan, steps| {
             let steps = if self.holds_all_rows(plan) { steps } else { together::pass(plan, steps) };
+            let steps = sharing::pass(plan, steps);
             // The time of each level is taken by itself.
             let shared = Buffers::finest_shared(&self.device, plan);
             if self.timer.is_none() { joined::join(plan, shared, steps) } else { steps }

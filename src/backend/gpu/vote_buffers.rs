@@ -32,7 +32,11 @@ impl VoteBuffers {
         let (half_pitch, sum_pitch) = (pitch(votes.width), pitch(votes.width * votes.labels));
         let band = Self::band(a.device, votes, fine, sum_pitch)?;
         let votes = Votes { band: band as usize, ..votes };
-        let mut rows = |label: &str, words: u32, count: usize| a.rows(label, words, &[0, count as u32]);
+        let mut rows = |label: &str, words: u32, count: usize| {
+            Rows::in_parts(words, &[0, count as u32], |_, rows| {
+                a.spare_or_new(label, u64::from(words) * rows)
+            })
+        };
         Ok(Self {
             band,
             half_pitch,

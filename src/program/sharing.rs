@@ -1,0 +1,91 @@
+//! What is never needed at the same time shares memory, and what nobody needs any more is freed.
+
+use super::Step;
+use crate::plan::Plan;
+use crate::stage::{Data, Volume};
+use std::collections::HashMap;
+use std::ops::RangeInclusive;
+
+/// From the first to the last of `steps` that reads or writes each of their data.
+fn lives(plan: &Plan, steps: &[Step]) -> HashMap<Data, RangeInclusive<usize>> {
+    let mut lives = HashMap::new();
+    for (at, step) in steps.iter().enumerate() {
+        let Step::Run(run) = step else { continue };
+        for data in run.stages().flat_map(|stage| stage.reads(plan).chain(stage.writes())) {
+            let life = lives.entry(data).or_insert(at..=at);
+            *life = *life.start()..=at;
+        }
+    }
+    lives
+}
+
+/// The data that take the memory of volumes: of a level's messages its costs, on the CPU path, and of any volume that
+/// [`post-processing`](super::schedule::post_processing) does not read what counts votes, on a device.
+fn pairs(plan: &Plan) -> impl Iterator<Item = [Data; 2]> + use<> {
+    let levels = plan.levels.len();
+    let costs = (1..levels).map(|z| [Volume::Cost(z), Volume::Dependency(z)].map(Data::Volume));
+    let volumes = [Volume::Evidence, Volume::Dependency, Volume::Down, Volume::Up, Volume::Belief];
+    let votes = (0..levels).flat_map(move |z| volumes.map(|volume| [Data::Votes, Data::Volume(volume(z))]));
+    costs.chain(votes)
+}
+
+/// The steps of a frame, with graphs freed after the last stage that reads them; `plan` [shares](Plan::shares) memory where no two
+/// that would do so are needed at the same time.
+#[must_use]
+pub fn pass(plan: &mut Plan, steps: Vec<Step>) -> Vec<Step> {
+    let lives = lives(plan, &steps);
+    let apart = |pair: [Data; 2]| match pair.map(|data| lives.get(&data)) {
+        [Some(a), Some(b)] => a.end() < b.start() || b.end() < a.start(),
+        _ => true,
+    };
+    plan.shares = pairs(plan).all(apart);
+    let mut freed: HashMap<usize, Vec<Step>> = HashMap::new();
+    for z in 0..plan.levels.len() {
+        let graph = Data::Graph(z);
+        if let Some(life) = lives.get(&graph) {
+            freed.entry(*life.end()).or_default().push(Step::Free(graph));
+        }
+    }
+    let with_freed = |(at, step)| std::iter::once(step).chain(freed.remove(&at).unwrap_or_default());
+    steps.into_iter().enumerate().flat_map(with_freed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::{DisparityRange, Method, PRESETS};
+    use crate::program::schedule;
+    use crate::stage::Stage;
+
+    #[test]
+    fn presets_share_and_free() {
+        for (preset, _) in PRESETS {
+            let method = Method::preset(preset).unwrap();
+            let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &method).unwrap();
+            let steps = schedule::steps(&plan);
+            let shared = pass(&mut plan, steps.clone());
+            assert!(plan.shares, "{preset}");
+            for z in 0..plan.levels.len() {
+                let reads = |step: &Step| {
+                    step.stage().is_some_and(|stage| stage.reads(&plan).any(|data| data == Data::Graph(z)))
+                };
+                let freed = shared.iter().position(|step| *step == Step::Free(Data::Graph(z))).unwrap();
+                assert!(!shared[freed..].iter().any(reads), "{preset}, level {z}");
+            }
+            let kept: Vec<_> = shared.into_iter().filter(|step| !matches!(step, Step::Free(_))).collect();
+            assert_eq!(kept, steps);
+        }
+    }
+
+    /// Control: costs that are read again once messages have been sent keep memory of their own.
+    #[test]
+    fn what_lives_at_the_same_time_does_not_share() {
+        let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &Method::default()).unwrap();
+        for late in [Stage::Evidence(1), Stage::Pyramid(2)] {
+            let mut steps = schedule::steps(&plan);
+            steps.push(Step::of(late));
+            let _ = pass(&mut plan, steps);
+            assert!(!plan.shares, "{late:?}");
+        }
+    }
+}
