@@ -19,6 +19,7 @@ mod points;
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;
 mod report;
+mod results;
 mod robust;
 mod sequences;
 
@@ -210,7 +211,7 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and theirs.
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 14] = [
     "",
     "match",
     "rectify",
@@ -218,8 +219,6 @@ const COMMANDS: [&str; 16] = [
     "batch",
     "evaluate",
     "evaluate map",
-    "evaluate paper",
-    "evaluate ablations",
     "evaluate submission",
     "bench",
     "inspect",

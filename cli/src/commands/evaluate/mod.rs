@@ -1,12 +1,10 @@
 //! `mrfgs evaluate`.
 
-mod ablations;
 mod breakdown;
 mod findings;
 mod map;
 mod metrics;
 mod pairs;
-mod paper;
 mod report;
 mod scenes;
 mod submission;
@@ -24,8 +22,7 @@ Examples:
   mrfgs evaluate Teddy Cones --report report  # then open report/index.html
   mrfgs evaluate Teddy Cones --breakdown
   mrfgs evaluate HalfSize/Art --truth-scale 2
-  mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png
-  mrfgs evaluate paper Teddy Cones Dolls Rocks1 Motorcycle";
+  mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png";
 
 /// Match pairs with known truth and print their errors
 ///
@@ -51,8 +48,6 @@ pub(crate) struct Args {
 #[derive(Subcommand)]
 enum Mode {
     Map(map::Args),
-    Paper(paper::Args),
-    Ablations(ablations::Args),
     Submission(submission::Args),
 }
 
@@ -62,8 +57,6 @@ impl Args {
         let execution = match &self.mode {
             None => &self.pairs.execution,
             Some(Mode::Map(_)) => return false,
-            Some(Mode::Paper(args)) => &args.execution,
-            Some(Mode::Ablations(args)) => &args.execution,
             Some(Mode::Submission(args)) => &args.execution,
         };
         execution.device.asks_drivers()
@@ -77,8 +70,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             pairs::run(&args.pairs)
         }
         Some(Mode::Map(args)) => map::run(args),
-        Some(Mode::Paper(args)) => paper::run(args),
-        Some(Mode::Ablations(args)) => ablations::run(args),
         Some(Mode::Submission(args)) => submission::run(args),
     }
 }
