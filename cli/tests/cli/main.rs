@@ -5,6 +5,7 @@
 mod batch;
 mod bench;
 mod calibrations;
+mod documents;
 mod evaluate;
 mod failures;
 #[path = "../../../tests/common/files.rs"]
