@@ -97,8 +97,9 @@ pub trait Backend {
         before: &'a mut dyn FnMut(Stage, f64) -> Result<()>,
     ) -> Promise<'a, ()>;
 
-    /// Whether [`Stage::Change`] has found that the map has settled. A device returns false unless it is to `wait` or takes
-    /// times, since an answer takes waiting; once the map has settled, it skips the messages of further iterations.
+    /// Whether [`Stage::Change`] has found that the map has settled. A device returns false unless it is to
+    /// `wait` or takes times, since an answer takes waiting; once the map has settled, it skips the messages
+    /// of further iterations.
     fn settled(&mut self, wait: bool) -> Promise<'_, bool>;
 
     /// How many iterations found the map settled already.

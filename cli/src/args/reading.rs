@@ -5,8 +5,8 @@ use mrfgs::image::read::{MAX_PIXELS, Reader};
 /// How images, masks and maps are read.
 #[derive(clap::Args)]
 pub(crate) struct ReadingArgs {
-    /// Ignores pixels that have this value in every channel, as the file stores it [default: the no-data value that a
-    /// TIFF file names]
+    /// Ignores pixels that have this value in every channel, as the file stores it [default: the no-data
+    /// value that a TIFF file names]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     pub(crate) no_data: Option<f64>,
     /// Largest number of pixels of an image; a file that claims more is refused before it takes memory

@@ -32,9 +32,9 @@ Examples:
 /// camera chain (cam0 is the left camera), or Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes
 /// with radial and tangential distortion, or fisheyes (equidistant); OpenCV's files say `fisheye: 1`.
 ///
-/// The method is that of OpenCV's `stereoRectify`. Infinitely far points have a disparity of 0. If one camera is above the
-/// other, both images are rotated by 90 degrees, so that rows are epipolar lines: counter-clockwise if the first camera is
-/// the upper one, clockwise if it is the lower one.
+/// The method is that of OpenCV's `stereoRectify`. Infinitely far points have a disparity of 0. If one camera
+/// is above the other, both images are rotated by 90 degrees, so that rows are epipolar lines:
+/// counter-clockwise if the first camera is the upper one, clockwise if it is the lower one.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {

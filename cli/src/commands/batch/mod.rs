@@ -57,8 +57,9 @@ A list:
 /// the folder of LIST; lines that begin with # are comments. LIST may also be a folder: each folder in it that is not hidden
 /// is a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the truth.
 ///
-/// Names become names of files. They have up to 200 bytes, in letters of any script, with spaces, but without / \ : * ? " < > | and
-/// control characters, no . or - first, no . or space last. Names must differ by more than upper and lower case.
+/// Names become names of files. They have up to 200 bytes, in letters of any script, with spaces, but without
+/// / \ : * ? " < > | and control characters, no . or - first, no . or space last. Names must differ by more
+/// than upper and lower case.
 ///
 /// For each pair the map goes to OUTDIR/NAME.pfm (see --format), and then its record to OUTDIR/NAME.json: the fields of
 /// `match --json`, `status` ("done" or "failed", with a `reason`), `warnings`, the `request` (inputs with sizes in bytes and

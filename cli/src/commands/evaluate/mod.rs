@@ -26,11 +26,11 @@ Examples:
 
 /// Match pairs with known truth and print their errors
 ///
-/// A DIR has the layout of one of the Middlebury sets, recognised by its files: im0.png, im1.png, disp0GT.pfm and calib.txt
-/// with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and disp2.png (2003). The truth
-/// of the older sets has 8 bits (see --truth-scale); without a calib.txt their range is from 0 to the largest known disparity,
-/// rounded up. A mask0nocc.png, if there is one, says which pixels both views see (255). If a folder is called
-/// like a command, write ./map.
+/// A DIR has the layout of one of the Middlebury sets, recognised by its files: im0.png, im1.png, disp0GT.pfm
+/// and calib.txt with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and
+/// disp2.png (2003). The truth of the older sets has 8 bits (see --truth-scale); without a calib.txt their
+/// range is from 0 to the largest known disparity, rounded up. A mask0nocc.png, if there is one, says which
+/// pixels both views see (255). If a folder is called like a command, write ./map.
 ///
 /// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB),
 /// pixels wrong by more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with known truth and

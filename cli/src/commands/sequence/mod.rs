@@ -49,9 +49,9 @@ Examples:
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
 /// with --also side-by-side, LEFT stands beside it. ffmpeg and ffplay read it.
 ///
-/// Without --max-disparity the range is that of the first frame. While a frame is matched, the next ones are read and
-/// rectified, and the last one is written. If an error or Ctrl-C ends a sequence early, the maps of all frames before are
-/// complete.
+/// Without --max-disparity the range is that of the first frame. While a frame is matched, the next ones are
+/// read and rectified, and the last one is written. If an error or Ctrl-C ends a sequence early, the maps of
+/// all frames before are complete.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]
 pub(crate) struct Args {
@@ -66,8 +66,8 @@ pub(crate) struct Args {
     /// How both views share a frame, if RIGHT is not given
     #[arg(long, value_enum, value_name = "WHICH", default_value = "side-by-side")]
     layout: Layout,
-    /// Size and format of raw streams (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are gray, gray16le, rgb24 and
-    /// bgr24
+    /// Size and format of raw streams (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are gray,
+    /// gray16le, rgb24 and bgr24
     #[arg(long, value_name = "SIZE,FORMAT", value_parser = raw_frames)]
     raw_frames: Option<RawFrames>,
     #[command(flatten)]
