@@ -25,7 +25,8 @@ fn anchor(heading: &str) -> String {
     kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The links of a document in the folder `folder` that lead nowhere, and how many it has within the repository.
+/// The links of a document in the folder `folder` that lead nowhere, and how many it has within the
+/// repository.
 fn broken(text: &str, folder: &Path) -> (Vec<String>, usize) {
     let links =
         prose(text).flat_map(|line| line.split("](").skip(1)).filter_map(|rest| rest.split(')').next());
@@ -54,6 +55,7 @@ fn links_lead_somewhere() {
     }
     assert!(links > 40, "{links} links");
     // Control: what leads nowhere is found.
-    let text = "# C and C++\n[a](#c-and-c) [b](#c) [c](README.md#test) [d](README.md#tests) [e](none.md)\n```\n[f](#f)\n```\n";
+    let text = "# C and C++\n[a](#c-and-c) [b](#c)\n[c](README.md#test) [d](README.md#tests) [e](none.md)\n\
+                ```\n[f](#f)\n```\n";
     assert_eq!(broken(text, &root), (["#c", "README.md#tests", "none.md"].map(String::from).into(), 5));
 }

@@ -21,7 +21,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// A folder with a copy of the script and of its documents, and a pair called Teddy, a part of a scene to be quick.
+/// A folder with a copy of the script and of its documents, and a pair called Teddy, a part of a scene to be
+/// quick.
 fn workshop() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
