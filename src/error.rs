@@ -233,7 +233,7 @@ pub enum ExecutionError {
         present: Vec<String>,
     },
     /// The number of threads is 0.
-    #[error("0 threads do nothing; at least 1 is needed")]
+    #[error("the thread count must be at least 1")]
     NoThreads,
     /// The system does not start the threads.
     #[error("the threads cannot be started: {0}")]
@@ -279,7 +279,7 @@ pub enum DeviceError {
     #[error("no Vulkan or Metal driver found")]
     NoDriver,
     /// The device gets a small test pair wrong.
-    #[error("{name} computes other maps than the CPU path on a test pair")]
+    #[error("{name} disagrees with the CPU path on the self-test")]
     WrongMaps {
         /// The device.
         name: String,

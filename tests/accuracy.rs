@@ -4,7 +4,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::evaluation::paper::Figures;
 use mrfgs::evaluation::{Metrics, Report, evaluate};
 use mrfgs::image::{Pair, Plane, calib::Calibration, pfm, read};
 use mrfgs::maps::FRACTION;
@@ -178,13 +177,13 @@ fn the_papers_presets_on_real_pairs() {
         let figures = pairs.map(|pair| {
             let folder = Path::new(&folder).join(pair);
             let maps = matched(&folder, method).maps;
-            [maps.raw_map(), maps.final_map()].map(|map| Figures::from(&report(&folder, &map).all))
+            [maps.raw_map(), maps.final_map()].map(|map| report(&folder, &map).all)
         });
         [0, 1].map(|map| {
-            let mean = |value: fn(&Figures) -> f64| {
+            let mean = |value: fn(&Metrics) -> f64| {
                 figures.iter().map(|f| value(&f[map])).sum::<f64>() / pairs.len() as f64
             };
-            [mean(|f| f.avg.unwrap()), mean(|f| f.psnr.unwrap()), mean(|f| f.bad2)]
+            [mean(|m| m.avg.unwrap()), mean(|m| m.psnr.unwrap()), mean(|m| m.bad[2])]
         })
     };
     let floors = [

@@ -179,8 +179,6 @@ mod tests {
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),
-            ("evaluate paper", 6),
-            ("evaluate ablations", 7),
             ("evaluate submission", 9),
             ("bench", 10),
             ("inspect", 12),

@@ -1,5 +1,5 @@
 //! Evaluation of disparity maps against the ground truth: error metrics, the ground truth itself, the error
-//! breakdown, the quality of confidence and validity, and the figures that the paper prints.
+//! breakdown, and the quality of confidence and validity.
 //!
 //! Nothing here reads a file, prints, or depends on how the map was made.
 
@@ -7,7 +7,6 @@ pub mod breakdown;
 pub mod confidence;
 pub mod dataset;
 pub mod metrics;
-pub mod paper;
 pub mod validity;
 
 pub use breakdown::Breakdown;

@@ -43,10 +43,10 @@ options! {
         /// Matching cost.
         matching: MatchingCost = MatchingCost::AdCensus, takes one_of(MatchingCost::WORDS),
             source "section 2.4: sad";
-        /// Side of the window of sad.
+        /// Side of the window of the cost sad.
         sad_window: u32 = 7, takes odd(1..=31), unit "pixels", source "section 3.1: 7";
-        /// Standard deviation of grey around a pixel from which on ad-census weighs colour in full; below it the weight
-        /// falls with the variance.
+        /// From this standard deviation of the grey around a pixel on, ad-census weighs colour in full; below
+        /// it, the weight falls with the variance.
         colour_contrast: f64 = 5.0, takes real(0.0..=128.0), unit "8-bit levels", source "not in the paper";
         /// Cost of a label that falls outside the right image or on a masked pixel. It is the same for all such labels, so
         /// that none is preferred. It may not be larger than the largest matching cost.

@@ -7,11 +7,12 @@ words! {
     Illumination {
         /// No correction.
         None = "none",
-        /// A homomorphic filter of 21 x 21 pixels: it takes the logarithm, subtracts a low-pass, and takes the exponential.
-        /// What is matched is corrected, and so is what the graph is built from. Texture zones and sparse matches come from
-        /// the images as they are.
+        /// A homomorphic filter of 21 x 21 pixels: it takes the logarithm, subtracts a low-pass, and takes
+        /// the exponential. The matching cost and the graph take corrected images. Texture zones and sparse
+        /// matches take the images as they are.
         Homomorphic = "homomorphic",
-        /// The same filter before everything else: texture zones and sparse matches come from corrected images, too.
+        /// The same filter before everything else: texture zones and sparse matches take corrected images,
+        /// too.
         HomomorphicFirst = "homomorphic-first",
     }
 }
@@ -32,20 +33,21 @@ options! {
         /// Correction of the illumination of both images.
         illumination: Illumination = Illumination::None, takes one_of(Illumination::WORDS),
             source "sections 2.4 and 3.1: homomorphic";
-        /// Moves the right view up or down by the median offset of sparse matches, where it is a sixteenth of a row or more.
+        /// Moves the right view up or down by the median vertical offset of sparse matches, from a sixteenth
+        /// of a row on.
         level_rows: bool = true, takes Takes::Switch, source "not in the paper";
-        /// Smooths the sharper view until both are equally sharp, where one has markedly less detail.
+        /// Smooths the sharper view until both are equally sharp, if one has markedly less detail.
         equal_sharpness: bool = true, takes Takes::Switch, source "not in the paper";
-        /// Smooths both views where they share little of their finest detail, as noise causes it, and where JPEG has left steps between
-        /// its blocks of 8 x 8 pixels.
+        /// Smooths both views if they share little of their finest detail, a sign of noise, or if JPEG has
+        /// left steps between its blocks of 8 x 8 pixels.
         denoise: bool = true, takes Takes::Switch, source "not in the paper";
-        /// Number of clusters into which K-means sorts the Gabor responses of the reference image, for texture zones. Used
-        /// where zone-sigmas is above 0.
+        /// Number of clusters into which K-means sorts the Gabor responses of the reference image, for
+        /// texture zones. Used if zone-sigmas is above 0.
         clusters: u32 = 15, takes whole(1..=64), unit "clusters", source "section 3.1: 15";
         /// What a texture zone is.
         zone_extent: ZoneExtent = ZoneExtent::Region, takes one_of(ZoneExtent::WORDS), source "section 2.4: region";
-        /// Limits the labels of a pixel to the mean disparity of its zone's sparse matches and this many standard
-        /// deviations on either side; 0 keeps all labels, and so does a zone of fewer than 10 matches.
+        /// Limits the labels of a pixel to this many standard deviations around the mean disparity of its
+        /// zone's sparse matches; 0 keeps all labels, and so does a zone of fewer than 10 matches.
         zone_sigmas: f64 = 0.0, takes real(0.0..=100.0), unit "standard deviations", source "section 2.4: 1";
     }
 }

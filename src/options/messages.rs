@@ -10,7 +10,7 @@ words! {
         Soft = "soft",
         /// exp(-truncation) exactly: the robust P^n Potts model (Kohli et al. 2007).
         Exact = "exact",
-        /// 0, up to a cap that acts only on labels that have long lost.
+        /// 0. A cap on costs acts only on labels that have no chance.
         Hard = "hard",
     }
 }
@@ -33,8 +33,8 @@ options! {
             source "equation 5 read in the logarithmic domain; open";
         /// Largest evidence against a label.
         evidence_cap: f64 = 8.0, takes real(0.25..=63.75), unit "nats", source "not in the paper";
-        /// Factor by which the evidence of a level is stronger than that of the next finer one, as it is a mean over more
-        /// pixels.
+        /// How many times stronger the evidence of a level is than that of the next finer one: it is a mean
+        /// over more pixels.
         evidence_gain: f64 = 4.0, takes real(1.0..=4.0), unit "factor per level", source "open";
         /// Potential of factors whose members disagree.
         potential: Potential = Potential::Soft, takes one_of(Potential::WORDS), source "section 2.2: hard";

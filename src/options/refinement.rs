@@ -15,15 +15,16 @@ words! {
 }
 
 words! {
-    /// What happens to pixels that left-right check or speckle filter made invalid.
+    /// What happens to pixels that the left-right check or the speckle filter made invalid.
     Fill {
         /// They stay invalid.
         None = "none",
         /// They take the farther of the nearest valid disparities to the left and to the right on the row.
         Row = "row",
-        /// Valid pixels vote for their own disparities, above all along rows. A vote loses weight with distance and at edges.
-        /// Disparities that would hide what the right view sees get votes against them. Valid pixels of little confidence may be
-        /// outvoted. Planes through wide surroundings of what is filled follow.
+        /// Valid pixels vote for their own disparities, above all along rows. A vote loses weight with
+        /// distance and at edges. Disparities that would hide what the right view sees get votes against
+        /// them. Valid pixels of little confidence may be outvoted. Then planes are fitted through wide
+        /// surroundings of what is filled.
         Votes = "votes",
     }
 }
@@ -75,8 +76,9 @@ options! {
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
         /// After a median, fit a plane around each pixel that it changes, and take its value there.
         plane: bool = true, takes Takes::Switch, source "not in the paper";
-        /// Also match the pair at twice its size. Where both maps agree within a pixel, their mean is taken, and where only the larger
-        /// pair measures a pixel, what it measures. Takes 7 times the time.
+        /// Also match the pair at twice its size. Where both maps agree within a pixel, their mean is taken.
+        /// Where only the larger pair measures a pixel, its disparity is taken. A match takes 7 times as
+        /// long.
         double_size: bool = false, takes Takes::Switch, source "not in the paper";
         /// Also make the disparity map of the right view, refined like that of the left one.
         right_map: bool = false, takes Takes::Switch, source "not in the paper";

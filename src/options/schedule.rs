@@ -8,7 +8,7 @@ words! {
         /// All levels in every iteration.
         Together = "together",
         /// The coarsest level starts, and the finer ones join one after the other. Once all have joined, level 0 and the
-        /// coarser levels take turns, as far as that still changes the result.
+        /// coarser levels take turns, as long as that changes the result.
         CoarseFirst = "coarse-first",
     }
 }
@@ -18,7 +18,8 @@ options! {
     "schedule" ScheduleOptions {
         /// The order in which levels exchange messages.
         order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together";
-        /// Iterations of all levels together; with coarse-first, iterations after each level that joins but the finest.
+        /// Iterations of all levels together; with coarse-first, iterations after each level but the finest
+        /// has joined.
         iterations: u32 = 3, takes whole(1..=1000), unit "iterations", source "section 3: 20 to 30";
         /// Iterations after the finest level joins: every second one with the messages between levels, the others with
         /// those of the coarser levels. Only coarse-first uses it.

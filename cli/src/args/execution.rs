@@ -11,8 +11,8 @@ use mrfgs::options::{DeviceChoice, Execution};
 #[derive(clap::Args)]
 #[command(next_help_heading = "Where it runs (changes no bit of the result)")]
 pub(crate) struct ExecutionArgs {
-    /// auto: a GPU where there is one, else the CPU; cpu: the CPU; gpu: the fastest device, or an error where there is none;
-    /// or a device by its index in `mrfgs devices` or a part of its name
+    /// auto: a GPU if there is one, else the CPU; cpu: the CPU; gpu: the fastest device, or an error if there
+    /// is none; or a device by its index in `mrfgs devices` or a part of its name
     #[arg(long, default_value_t, value_name = "auto|cpu|gpu|NAME|INDEX")]
     pub(crate) device: Device,
     #[command(flatten)]

@@ -5,11 +5,11 @@ use mrfgs::image::read::{MAX_PIXELS, Reader};
 /// How images, masks and maps are read.
 #[derive(clap::Args)]
 pub(crate) struct ReadingArgs {
-    /// Pixels that have this value in every channel, as the file stores it, hold no data and are ignored [default: the
-    /// value that a TIFF file names itself]
+    /// Ignores pixels that have this value in every channel, as the file stores it [default: the no-data
+    /// value that a TIFF file names]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     pub(crate) no_data: Option<f64>,
-    /// Most pixels that an image may have; a file that claims more is refused before it takes memory
+    /// Largest number of pixels of an image; a file that claims more is refused before it takes memory
     #[arg(
         long,
         value_name = "N",

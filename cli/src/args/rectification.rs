@@ -7,8 +7,9 @@ use mrfgs::rectification::Options;
 /// The calibration that rectifies, and how.
 #[derive(clap::Args)]
 pub(crate) struct RectificationArgs {
-    /// From 0, where no rectified pixel lacks a source, to 1, where no pixel of the images is lost. Without it the
-    /// rectification is that of the calibration where it has one, else one that keeps the focal length (fisheyes: 0)
+    /// How much to show, from 0 (only pixels that have a source) to 1 (all pixels of the images). Without it
+    /// the rectification is that of the calibration if it has one, else one that keeps the focal length
+    /// (fisheyes: 0)
     #[arg(long, value_name = "0..1", allow_negative_numbers = true, value_parser = alpha)]
     pub(crate) alpha: Option<f64>,
 }

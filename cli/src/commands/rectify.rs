@@ -22,7 +22,7 @@ Examples:
   # All that the cameras have seen:
   mrfgs rectify l.png r.png rectified --calib camchain.yaml --alpha 1";
 
-/// Rectify a pair of images as the cameras took them
+/// Rectify a pair of raw images
 ///
 /// Rectified images have no lens distortion, and matches are on the same row. DIR gets im0.png and im1.png (transparent
 /// where there is no source), mask0.png and mask1.png (white where there is none), and the calibration of the
@@ -32,9 +32,9 @@ Examples:
 /// camera chain (cam0 is the left camera), or Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes
 /// with radial and tangential distortion, or fisheyes (equidistant); OpenCV's files say `fisheye: 1`.
 ///
-/// The method is that of OpenCV's `stereoRectify`; what is infinitely far has a disparity of 0. Where one camera is above the other, both
-/// images are turned by a quarter, so that the upper camera, turned counter-clockwise, or the lower one, turned clockwise, is
-/// the left one.
+/// The method is that of OpenCV's `stereoRectify`. Infinitely far points have a disparity of 0. If one camera
+/// is above the other, both images are rotated by 90 degrees, so that rows are epipolar lines:
+/// counter-clockwise if the first camera is the upper one, clockwise if it is the lower one.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -51,15 +51,15 @@ pub(crate) struct Args {
     calib: Vec<PathBuf>,
     #[command(flatten)]
     rectification: RectificationArgs,
-    /// Writes also where each rectified pixel comes from: map0x.pfm, map0y.pfm, map1x.pfm and map1y.pfm
+    /// Also writes where each rectified pixel comes from: map0x.pfm, map0y.pfm, map1x.pfm and map1y.pfm
     #[arg(long)]
     maps: bool,
-    /// Image of the size of LEFT: where it is not black, LEFT is ignored
+    /// Mask of the size of LEFT: where it is not black, LEFT is ignored
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
     #[command(flatten)]
     reading: ReadingArgs,
-    /// Prints nothing but failures
+    /// Prints errors only
     #[arg(long)]
     quiet: bool,
 }

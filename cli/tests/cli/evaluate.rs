@@ -1,4 +1,4 @@
-//! `mrfgs evaluate` and its modes: figures, older layouts, the paper's tables, breakdown, ablations.
+//! `mrfgs evaluate` and its modes: figures, older layouts, breakdown.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::Path;
 use image::{GrayImage, Luma};
 use mrfgs::evaluation::confidence::sparsify;
 use mrfgs::image::{Plane, read, write};
-use mrfgs::options::{self, Method};
+use mrfgs::options::Method;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -199,102 +199,6 @@ fn scales_and_incomplete_folders_are_refused() {
     refused(folder.path(), &["bare"], 1, &all);
 }
 
-#[test]
-fn tables_stand_beside_the_papers() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    copy("slanted", &at("Teddy"));
-    copy("exposure", &at("Cones"));
-    copy("thin", &at("thin"));
-    let presets: Vec<&str> = ["fgs", "paper", "default"]
-        .into_iter()
-        .filter(|name| options::PRESETS.iter().any(|preset| preset.0 == *name))
-        .collect();
-
-    let text = evaluated(folder.path(), &["paper", "Teddy", "Cones", "--json", "out.json"]);
-    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-    let cells = in_cells(&text);
-    for words in [
-        "Table 1: raw maps, before post-processing.",
-        "Table 2: final maps, after post-processing.",
-        "\nTeddy | 2.60 32.02 14.17 | 2.09 32.43 13.90 |",
-        "\nCones | 2.32 33.33 15.11 | 1.98 33.43 15.06 |",
-        "\nmean | 2.11 33.29 12.33 | 1.83 33.36 12.15 |",
-        "| paper: MR-FGS |",
-    ] {
-        assert!(cells.contains(words), "no `{words}` in:\n{text}");
-    }
-    for preset in &presets {
-        assert!(text.contains(&format!(" ours: {preset} ")) || text.contains(&format!(" ours: {preset}\n")));
-    }
-
-    let all = json(&fs::read_to_string(at("out.json")).unwrap());
-    assert!(all["source"].as_str().unwrap().contains("Tables 1 and 2"));
-    let methods = all["methods"].as_object().unwrap();
-    assert!(methods.len() == presets.len() && presets.iter().all(|p| methods.contains_key(*p)));
-    let [raw, finished] = &all["tables"].as_array().unwrap()[..] else { panic!("two tables") };
-    assert_eq!((&raw["number"], &raw["map"]), (&1.into(), &"raw".into()));
-    assert_eq!((&finished["number"], &finished["map"]), (&2.into(), &"final".into()));
-    assert_eq!(raw["pairs"][0]["name"], "Teddy");
-    assert_eq!(raw["pairs"][0]["published"]["fgs"]["avg"], 2.60);
-    assert_eq!(finished["pairs"][1]["published"]["mr-fgs"]["bad2.0"], 15.06);
-    let mean = finished["mean"]["published"]["fgs"]["psnr"].as_f64().unwrap();
-    assert!((mean - f64::midpoint(33.25, 33.33)).abs() < 1e-9);
-
-    // MR-FGS is ahead by less error, a higher PSNR and fewer bad pixels.
-    let mut ahead = [0, 0];
-    for line in [raw, finished].into_iter().flat_map(|table| table["pairs"].as_array().unwrap()) {
-        for (i, (methods, fgs, mr_fgs)) in
-            [("published", "fgs", "mr-fgs"), ("ours", "fgs", "paper")].into_iter().enumerate()
-        {
-            let value = |method: &str, key: &str| line[methods][method][key].as_f64().unwrap();
-            let lead = |key: &str| value(mr_fgs, key) - value(fgs, key);
-            ahead[i] += [lead("avg") < 0.0, lead("psnr") > 0.0, lead("bad2.0") < 0.0]
-                .map(usize::from)
-                .iter()
-                .sum::<usize>();
-        }
-    }
-    let expected = serde_json::json!({"figures": 12, "published": 12, "ours": ahead[1]});
-    assert_eq!((ahead[0], &all["ahead"]), (12, &expected));
-    let words =
-        format!("MR-FGS is ahead of FGS in {} of 12 figures; the paper prints it ahead in 12.", ahead[1]);
-    assert!(text.contains(&words), "no `{words}` in:\n{text}");
-
-    // Ours are those that the preset gives by itself.
-    for preset in presets {
-        let alone = evaluated(folder.path(), &["Teddy", "Cones", "--method", preset, "--json", "-"]);
-        let alone = json(&alone);
-        for (table, map) in [(raw, "raw"), (finished, "final")] {
-            for name in ["avg", "psnr", "bad2.0"] {
-                for i in 0..2 {
-                    let ours = &table["pairs"][i]["ours"][preset][name];
-                    assert_eq!(ours, &alone["pairs"][i][map]["all"][name], "{preset}, {map}, {name}");
-                }
-                assert_eq!(table["mean"]["ours"][preset][name], alone["mean"][map]["all"][name]);
-            }
-        }
-    }
-
-    // A pair that the paper lacks leaves its columns, and those of the mean, empty.
-    let text = evaluated(folder.path(), &["paper", "Teddy", "thin"]);
-    for line in ["thin", "mean"] {
-        let empty = format!("\n{line} | - - - | - - - | ");
-        assert!(in_cells(&text).contains(&empty), "no `{empty}` in:\n{text}");
-    }
-    assert!(text.contains(" of 12 figures.\n"), "{text}");
-    let printed = json(&evaluated(folder.path(), &["paper", "thin", "--json", "-"]));
-    assert!(printed["tables"][0]["pairs"][0]["published"].is_null());
-
-    for flags in [["--method", "paper"], ["--set", "levels=2"], ["--memory", "1GiB"], ["--report", "r"]] {
-        let args = [&["paper", "Teddy"], &flags[..]].concat();
-        let words = [flags[0], "unexpected argument", "`mrfgs evaluate paper --help`"];
-        refused(folder.path(), &args, 2, &words);
-    }
-    let words = ["paper", "right after `evaluate`", "before all flags"];
-    refused(folder.path(), &["--json", "a.json", "paper", "Teddy"], 2, &words);
-}
-
 /// What JSON holds of each entry of an object, added up.
 fn total(of: &Value, field: &str) -> f64 {
     of.as_object().unwrap().values().map(|entry| entry[field].as_f64().unwrap()).sum()
@@ -375,88 +279,4 @@ fn a_breakdown_adds_up() {
     }
     let words = ["--breakdown", "unexpected argument"];
     refused(folder.path(), &[&args[..4], &["--breakdown"]].concat(), 2, &words);
-    refused(folder.path(), &["paper", "Teddy", "--breakdown"], 2, &words);
-}
-
-#[test]
-fn ablations_are_held_against_their_preset() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    // A part of a scene, to be quick.
-    let (x, y, width, height) = (60, 40, 120, 90);
-    fs::create_dir(at("part")).unwrap();
-    for file in ["im0.png", "im1.png"] {
-        let view = image::open(scene("thin").join(file)).unwrap();
-        view.crop_imm(x, y, width, height).save(at("part").join(file)).unwrap();
-    }
-    let truth = read::read_disparity(&scene("thin").join("disp0GT.pfm")).unwrap();
-    let part =
-        Plane::from_fn(width as usize, height as usize, |i, j| truth[(i + x as usize, j + y as usize)]);
-    write::disparity(&at("part/disp0GT.pfm"), &part).unwrap();
-    fs::write(at("part/calib.txt"), "ndisp=32\n").unwrap();
-
-    let text = evaluated(folder.path(), &["ablations", "part", "--json", "out.json"]);
-    let all = json(&fs::read_to_string(at("out.json")).unwrap());
-    assert_eq!(all["pairs"], serde_json::json!(["part"]));
-    let rows = all["rows"].as_array().unwrap();
-    assert!(rows.len() > 10);
-    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-    let number = |row: &Value, key: &str| row[key].as_f64().unwrap();
-    let default = &rows[0];
-    assert_eq!((default["name"].as_str(), number(default, "time")), (Some("default"), 1.0));
-    for row in rows {
-        let change = 100.0 * (number(row, "bad2.0") / number(default, "bad2.0") - 1.0);
-        assert!((number(row, "change") - change).abs() < 1e-9 && number(row, "time") > 0.0, "{row}");
-        let start = format!("{} |", row["name"].as_str().unwrap());
-        let cells = in_cells(&text);
-        let line = cells.lines().find(|line| line.starts_with(&start)).unwrap();
-        for (key, value) in row["changes"].as_object().unwrap() {
-            assert!(line.contains(&format!("{key}={}", value.as_str().unwrap())), "{line}");
-        }
-        assert!(line.contains(&format!(" {:.2} {change:+.1} ", number(row, "bad2.0"))), "{line}");
-    }
-
-    // A row is what --set gives by itself.
-    let changed = rows.iter().find(|row| row["changes"]["sub-pixel"] == "false").unwrap();
-    for (row, flags) in [(default, &[][..]), (changed, &["--set", "sub-pixel=false"])] {
-        let alone = json(&evaluated(folder.path(), &[&["part", "--json", "-"], flags].concat()));
-        for key in ["avg", "bad0.5", "bad2.0"] {
-            assert_eq!(row[key], alone["mean"]["final"]["all"][key], "{flags:?}, {key}");
-        }
-    }
-    assert!(number(changed, "bad0.5") > number(default, "bad0.5"));
-
-    // Around the preset paper, with its own figures.
-    let text = evaluated(folder.path(), &["ablations", "part", "--method", "paper", "--json", "out.json"]);
-    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-    let all = json(&fs::read_to_string(at("out.json")).unwrap());
-    let rows = all["rows"].as_array().unwrap();
-    let changed = rows.iter().find(|row| row["changes"]["zone-sigmas"] == "0").unwrap();
-    for (row, flags) in [(&rows[0], &[][..]), (changed, &["--set", "zone-sigmas=0"])] {
-        let alone = [&["part", "--json", "-", "--method", "paper"], flags].concat();
-        let alone = json(&evaluated(folder.path(), &alone));
-        let cells = [("raw", &row["raw"]), ("final", row)].map(|(map, ours)| {
-            let figures = ["avg", "psnr", "bad2.0"].map(|key| {
-                assert_eq!(ours[key], alone["mean"][map]["all"][key], "{flags:?}, {map}, {key}");
-                format!("{:.2}", number(ours, key))
-            });
-            figures.join(" ")
-        });
-        let cells = format!(" | {} ", cells.join(" | "));
-        assert!(in_cells(&text).contains(&cells), "no `{cells}` in:\n{text}");
-    }
-    assert_eq!(rows[0]["name"], "paper");
-    refused(folder.path(), &["ablations", "part", "--method", "fgs"], 2, &["fgs", "default, paper"]);
-
-    for flags in [
-        &["--set", "levels=2"][..],
-        &["--memory", "1GiB"],
-        &["--report", "r"],
-        &["--breakdown"],
-        &["--truth", "part/disp0GT.pfm"],
-    ] {
-        let args = [&["ablations", "part"], flags].concat();
-        refused(folder.path(), &args, 2, &[flags[0], "unexpected argument"]);
-    }
-    refused(folder.path(), &["ablations"], 2, &["DIR", "`mrfgs evaluate ablations --help`"]);
 }

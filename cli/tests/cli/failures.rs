@@ -240,9 +240,6 @@ const FAILURES: &[Failure] = &[
         2,
         &["--json", "misfit/disp0GT.pfm is an input", "another name"],
     ),
-    ("evaluate paper", 2, &["DIR", "mrfgs evaluate paper --help"]),
-    ("evaluate paper misfit --json folder", 1, &["folder", "is a folder"]),
-    ("evaluate ablations misfit --json misfit/calib.txt", 2, &["--json", "misfit/calib.txt", "another name"]),
     // Batches.
     ("batch", 2, &["<LIST> <OUTDIR>", "mrfgs batch --help"]),
     ("batch none.csv out", 1, &["none.csv", "no such file", "check the name"]),

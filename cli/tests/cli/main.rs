@@ -5,6 +5,7 @@
 mod batch;
 mod bench;
 mod calibrations;
+mod documents;
 mod evaluate;
 mod failures;
 #[path = "../../../tests/common/files.rs"]
@@ -19,6 +20,7 @@ mod points;
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;
 mod report;
+mod results;
 mod robust;
 mod sequences;
 
@@ -210,7 +212,7 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and theirs.
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 14] = [
     "",
     "match",
     "rectify",
@@ -218,8 +220,6 @@ const COMMANDS: [&str; 16] = [
     "batch",
     "evaluate",
     "evaluate map",
-    "evaluate paper",
-    "evaluate ablations",
     "evaluate submission",
     "bench",
     "inspect",

@@ -57,8 +57,9 @@ A list:
 /// the folder of LIST; lines that begin with # are comments. LIST may also be a folder: each folder in it that is not hidden
 /// is a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the truth.
 ///
-/// Names are names of files: up to 200 bytes, in letters of any script, with spaces, but without / \ : * ? " < > | and
-/// control characters, no . or - first, no . or space last. Names must differ by more than upper and lower case.
+/// Names become names of files. They have up to 200 bytes, in letters of any script, with spaces, but without
+/// / \ : * ? " < > | and control characters, no . or - first, no . or space last. Names must differ by more
+/// than upper and lower case.
 ///
 /// For each pair the map goes to OUTDIR/NAME.pfm (see --format), and then its record to OUTDIR/NAME.json: the fields of
 /// `match --json`, `status` ("done" or "failed", with a `reason`), `warnings`, the `request` (inputs with sizes in bytes and
@@ -76,7 +77,7 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     maps: MapArgs,
-    /// Matches one of N parts of the list, the K-th from 1 on, such as 2/8
+    /// Matches the K-th of N parts of the list (K from 1 on), such as 2/8
     ///
     /// The part of a pair depends on its name and N alone (64-bit FNV-1a, upper and lower half joined by exclusive or,
     /// modulo N), so it stays the same when pairs are added or removed. Runs at the same time into the same OUTDIR, of parts or
@@ -89,7 +90,7 @@ pub(crate) struct Args {
     status: bool,
     #[command(flatten)]
     reading: ReadingArgs,
-    /// Prints nothing but failures
+    /// Prints errors only
     #[arg(long)]
     quiet: bool,
 

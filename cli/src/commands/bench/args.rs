@@ -21,20 +21,22 @@ Examples:
 
 const METHOD: &str = "A preset, or a TOML file whose keys replace those of the preset [default: default and paper, one after the other]";
 
-/// Measure how long matches take on the CPU and on a device, and how close that is to what the machine can do
+/// Measure how long matches take on the CPU and on a device, beside what the machine could do
 ///
-/// Every pair is matched by the presets default and paper, or by the method of --method, on each device: once to warm up
-/// and then several times, without reading or writing files in between, as a program does that keeps its `Matcher`. Each
-/// pair, method and device has a process of its own. Figures are medians; each repeat is one match for the whole time and
-/// one more for the times of the stages, by the device's own clock where it has one.
+/// Every pair is matched by the presets default and paper, or by the method of --method, on each device: once
+/// to warm up and then several times, without reading or writing files in between, like a program that keeps
+/// its `Matcher`. Each pair, method and device has a process of its own. Figures are medians; each repeat is
+/// one match for the whole time and one more for the times of the stages, by the device's own clock if it has
+/// one.
 ///
-/// A label update is one value of a dependency message: per iteration pixels x labels x members of a factor, summed over
-/// the levels that take part, labels that are not kept included. Labels kept is the share that volumes hold after label
-/// windows have left out the rest. The message stages are dependency, resolution and belief. They move at least every volume that
-/// they read or write once per run. The copy rate (bytes read and written, from one large buffer to another, measured
-/// after the matches) shows how fast that could be; volumes that fit into caches can be faster. Processor time is that of
-/// all threads, peak memory the most that the process held, including the buffers of a software device. What needs more
-/// memory than there is, is named and left out.
+/// A label update is one value of a dependency message: per iteration pixels x labels x members of a factor,
+/// summed over the levels that take part, labels that are not kept included. Labels kept is the share that
+/// volumes hold after label windows have left out the rest. The message stages are dependency, resolution and
+/// belief. They move at least every volume that they read or write once per run. The copy rate (bytes read
+/// and written, from one large buffer to another, measured after the matches) shows how fast that could be;
+/// volumes that fit into caches can be faster. Processor time is that of all threads, peak memory the most
+/// that the process held, including the buffers of a software device. Matches that need more memory than
+/// there is are named and left out.
 ///
 /// --json holds `version`, `threads`, `repeats`, `methods` (by name: their keys) and `pairs`, one entry for each pair and
 /// method: `name`, `method`, `width`, `height`, `labels` and `devices` (as --device names them, null without the memory:

@@ -2,7 +2,7 @@
 
 use mrfgs::evaluation::{Breakdown, Detection, Report, Sparsification, mean};
 use mrfgs::options::Method;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 /// The figures of all pairs, and what they are of.
 #[derive(Serialize)]
@@ -55,15 +55,4 @@ impl Findings {
 /// The mean over all pairs; none if one of them lacks the figure.
 fn over<T>(pairs: &[Figures], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) -> Option<T>) -> Option<T> {
     mean(&pairs.iter().map(of).collect::<Option<Vec<_>>>()?)
-}
-
-/// Values with their names, in order; an object in JSON.
-pub(super) type Named<T> = Vec<(&'static str, T)>;
-
-/// Named values as an object.
-pub(super) fn object<T: Serialize, S: Serializer>(
-    named: &Named<T>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(named.iter().map(|(name, value)| (name, value)))
 }

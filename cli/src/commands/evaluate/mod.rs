@@ -1,12 +1,10 @@
 //! `mrfgs evaluate`.
 
-mod ablations;
 mod breakdown;
 mod findings;
 mod map;
 mod metrics;
 mod pairs;
-mod paper;
 mod report;
 mod scenes;
 mod submission;
@@ -24,16 +22,15 @@ Examples:
   mrfgs evaluate Teddy Cones --report report  # then open report/index.html
   mrfgs evaluate Teddy Cones --breakdown
   mrfgs evaluate HalfSize/Art --truth-scale 2
-  mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png
-  mrfgs evaluate paper Teddy Cones Dolls Rocks1 Motorcycle";
+  mrfgs evaluate map mine.pfm --truth disp0GT.pfm --mask mask0nocc.png";
 
 /// Match pairs with known truth and print their errors
 ///
-/// A DIR has the layout of one of the Middlebury sets, recognised by its files: im0.png, im1.png, disp0GT.pfm and calib.txt
-/// with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and disp2.png (2003). The truth
-/// of the older sets has 8 bits (see --truth-scale); without a calib.txt their range is from 0 to the largest known disparity,
-/// rounded up. A mask0nocc.png, if there is one, says which pixels both views see (255). Write ./map for a folder that is
-/// called like a command.
+/// A DIR has the layout of one of the Middlebury sets, recognised by its files: im0.png, im1.png, disp0GT.pfm
+/// and calib.txt with ndisp (2014); view1.png, view5.png and disp1.png (2005, 2006); or im2.png, im6.png and
+/// disp2.png (2003). The truth of the older sets has 8 bits (see --truth-scale); without a calib.txt their
+/// range is from 0 to the largest known disparity, rounded up. A mask0nocc.png, if there is one, says which
+/// pixels both views see (255). If a folder is called like a command, write ./map.
 ///
 /// The table shows the map before post-processing (raw) and the final one: average error, RMS (px), PSNR against 255 (dB),
 /// pixels wrong by more than 0.5, 1, 2 and 4 px or invalid (%), and valid ones (%), over all pixels with known truth and
@@ -51,8 +48,6 @@ pub(crate) struct Args {
 #[derive(Subcommand)]
 enum Mode {
     Map(map::Args),
-    Paper(paper::Args),
-    Ablations(ablations::Args),
     Submission(submission::Args),
 }
 
@@ -62,8 +57,6 @@ impl Args {
         let execution = match &self.mode {
             None => &self.pairs.execution,
             Some(Mode::Map(_)) => return false,
-            Some(Mode::Paper(args)) => &args.execution,
-            Some(Mode::Ablations(args)) => &args.execution,
             Some(Mode::Submission(args)) => &args.execution,
         };
         execution.device.asks_drivers()
@@ -77,8 +70,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             pairs::run(&args.pairs)
         }
         Some(Mode::Map(args)) => map::run(args),
-        Some(Mode::Paper(args)) => paper::run(args),
-        Some(Mode::Ablations(args)) => ablations::run(args),
         Some(Mode::Submission(args)) => submission::run(args),
     }
 }

@@ -55,19 +55,18 @@ pub(super) struct PairsArgs {
 pub(super) fn run(args: &PairsArgs) -> Result<()> {
     stop::listen();
     let destination = args.report.destination(args.scenes.json())?;
-    args.scenes.check_json(&args.dirs, Some(&args.method))?;
+    args.scenes.check_json(&args.dirs, &args.method)?;
     let method = args.method.method()?;
     let folders = args.scenes.folders(&args.dirs)?;
     let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
     let mut pictures = Vec::new();
-    let findings =
-        scenes::match_all(&args.scenes, &folders, &mut matcher, method, None, |scene, maps, _| {
-            if destination.is_some() {
-                let (truth, estimate) = (scene.ground.truth(), maps.final_map());
-                pictures.push(report::pictures(&scene.name, truth, &estimate, Some((&scene.pair, maps)))?);
-            }
-            Ok(())
-        })?;
+    let findings = scenes::match_all(&args.scenes, &folders, &mut matcher, method, |scene, maps, _| {
+        if destination.is_some() {
+            let (truth, estimate) = (scene.ground.truth(), maps.final_map());
+            pictures.push(report::pictures(&scene.name, truth, &estimate, Some((&scene.pair, maps)))?);
+        }
+        Ok(())
+    })?;
     let mut text = metrics::text(&findings);
     if args.breakdown {
         text.push_str(&breakdown::text(&findings));

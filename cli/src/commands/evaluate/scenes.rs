@@ -52,9 +52,9 @@ impl SceneArgs {
     }
 
     /// Finds out before any computing whether the JSON can be written, and refuses it in place of a file that is read.
-    pub(super) fn check_json(&self, dirs: &[PathBuf], method: Option<&MethodArgs>) -> Result<()> {
+    pub(super) fn check_json(&self, dirs: &[PathBuf], method: &MethodArgs) -> Result<()> {
         let inputs = dirs.iter().flat_map(|dir| folder::inputs(dir));
-        let files = method.into_iter().flat_map(MethodArgs::files).map(Path::to_owned);
+        let files = method.files().map(Path::to_owned);
         check_json(self.json(), &inputs.chain(files).collect::<Vec<_>>())
     }
 
@@ -77,23 +77,20 @@ pub(super) fn check_json(json: Option<&Path>, inputs: &[PathBuf]) -> Result<()> 
     files::distinct(&inputs, &[("--json", path)])
 }
 
-/// Matches every folder by `method`, called `called` where there are several methods; `see` gets every pair with its maps and
-/// their time.
+/// Matches every folder by `method`; `see` gets every pair with its maps and their time.
 pub(super) fn match_all(
     args: &SceneArgs,
     folders: &[Folder],
     matcher: &mut Matcher,
     method: Method,
-    called: Option<&str>,
     mut see: impl FnMut(&Scene, &Maps, Duration) -> Result<()>,
 ) -> Result<Findings> {
     let mut figures = Vec::new();
     let mut ran_on = None;
     for folder in folders {
         let scene = folder.read(args.reading.reader(), args.figures.truth_scale)?;
-        let name = called.map_or(scene.name.clone(), |called| format!("{}, {called}", scene.name));
         let (matched, time) =
-            matching::run(matcher, &scene.pair, scene.range, &method, Some(&name), false, None)?;
+            matching::run(matcher, &scene.pair, scene.range, &method, Some(&scene.name), false, None)?;
         see(&scene, &matched.maps, time)?;
         let (ground, maps, estimate) = (&scene.ground, &matched.maps, matched.maps.final_map());
         figures.push(Figures {

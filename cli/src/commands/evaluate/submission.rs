@@ -62,13 +62,12 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if let Some(path) = files::json_file(args.scenes.json()) {
         files::outside(("DIR", submission.folder.place()), ("--json", path))?;
     }
-    args.scenes.check_json(&args.dirs, Some(&args.method))?;
+    args.scenes.check_json(&args.dirs, &args.method)?;
     let folders = args.scenes.folders(&args.dirs)?;
     let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
-    let findings =
-        scenes::match_all(&args.scenes, &folders, &mut matcher, method, None, |scene, maps, time| {
-            submission.add(&scene.name, &maps.final_map(), time)
-        })?;
+    let findings = scenes::match_all(&args.scenes, &folders, &mut matcher, method, |scene, maps, time| {
+        submission.add(&scene.name, &maps.final_map(), time)
+    })?;
     files::deliver(args.scenes.json(), &findings, &metrics::text(&findings), |written| {
         let place = submission.folder.place().to_owned();
         written.note(&place, submission.folder.publish())

@@ -31,12 +31,12 @@ Examples:
 
 /// Match a pair and print the time of every stage; with DIR, show every step as a picture
 ///
-/// The times are by the device's own clock where it has one. What is neither a stage nor done around the stages is in
-/// `rest`: with DIR, that is mostly the pictures.
+/// The times are by the device's own clock if it has one. `rest` is all other time: with DIR, mostly that of
+/// the pictures.
 ///
-/// DIR gets pictures and small tables: corrected images, zones, matches, label ranges, costs, graphs, a map of each level,
-/// and the change of each iteration. With them a match takes a multiple of the time, and it must fit into --memory in one
-/// piece.
+/// DIR gets pictures and small tables: corrected images, zones, matches, label ranges, costs, graphs, a map
+/// of each level, and the change of each iteration. With DIR a match takes several times as long, and it must
+/// fit into --memory in one piece.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {

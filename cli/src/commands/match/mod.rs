@@ -33,7 +33,7 @@ Examples:
   mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run
   # Range and cameras from the calib.txt beside im0.png:
   mrfgs match im0.png im1.png d.pfm --also depth,points
-  # Images as the cameras took them:
+  # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Points as LAZ, in the frame of the left camera as it took the image:
   mrfgs match l.png r.png d.pfm --rectify --calib c --also points-original.laz";
@@ -43,16 +43,18 @@ Examples:
 /// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF or PFM, recognised by their
 /// content. Pixels that are transparent, not finite, or without data are ignored.
 ///
-/// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for invalid pixels,
-/// .tif or .tiff as float with NaN and with the georeference of LEFT, .png as in KITTI: 16 bits with disparity times 256 and 0 for invalid pixels (ranges
-/// within 0 to 255 only; a disparity of 0 becomes 1/256). `-` writes PFM to standard output. If OUTPUT is a symbolic link,
-/// the file it leads to is written.
+/// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for
+/// invalid pixels, .tif or .tiff as float with NaN and with the georeference of LEFT, .png as in KITTI: 16
+/// bits with disparity times 256 and 0 for invalid pixels (ranges within 0 to 255 only; a disparity of 0
+/// becomes 1/256). `-` writes PFM to standard output. If OUTPUT is a symbolic link, the file it leads to is
+/// written.
 ///
-/// Depth and points take the cameras from a calibration: P1 and P2 of OpenCV, the projections of ROS, or Middlebury's
-/// cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels), doffs (cx1 - cx0, pixels) and baseline; with --rectify any that `mrfgs rectify`
-/// takes. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the unit of the baseline: metres of ROS and Kalibr,
-/// millimetres of Middlebury, and that of the chessboard of OpenCV. Where d + doffs is 0 or less there is no depth.
-/// An entry `unit` in the file (mm, cm or m) states the unit.
+/// Depth and points need the cameras of a calibration: P1 and P2 of OpenCV, the projections of ROS, or
+/// Middlebury's cam0=[f 0 cx; 0 f cy; 0 0 1] (pixels), doffs (cx1 - cx0, pixels) and baseline; with --rectify
+/// any that `mrfgs rectify` takes. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the
+/// unit of the baseline: metres with ROS and Kalibr, millimetres with Middlebury, that of the chessboard with
+/// OpenCV. Where d + doffs is 0 or less there is no depth. An entry `unit` in the file (mm, cm or m) states
+/// the unit.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -61,11 +63,12 @@ pub(crate) struct Args {
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: PathBuf,
 
-    /// Which way disparities count in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes right-minus-left
+    /// Sign convention of disparities, in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes
+    /// right-minus-left
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
-    /// LEFT and RIGHT are as the cameras took them: rectifies them by --calib first, as `mrfgs rectify` does. All outputs are of
-    /// the rectified left view
+    /// LEFT and RIGHT are raw images: rectifies them by --calib first, as `mrfgs rectify` does. All outputs
+    /// are of the rectified left view
     #[arg(long, requires = "calib")]
     rectify: bool,
     #[command(flatten)]
@@ -73,7 +76,7 @@ pub(crate) struct Args {
     /// Checks everything and prints the plan (levels, schedule, memory), but runs and writes nothing
     #[arg(long)]
     dry_run: bool,
-    /// Prints nothing but failures
+    /// Prints errors only
     #[arg(long)]
     quiet: bool,
 
@@ -86,12 +89,13 @@ pub(crate) struct Args {
     also: AlsoArgs,
     /// Writes what ran and what it found as JSON; `-` prints it
     ///
-    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`, `width`, `height`, `sign`,
-    /// `range` (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver` (of the device), `note` (why another device
-    /// was taken), `tiles`, `moved_up` (how far the right view was, in pixels), `smoothed` (the standard deviations by
-    /// which the left and the right view were, in pixels), `iterations` and `seconds` (of the match). In percent of all
-    /// pixels: `density` (with a disparity), which is the sum of `measured` and `filled`. `mean_confidence` is that of the
-    /// measured pixels.
+    /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`,
+    /// `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver`
+    /// (of the device), `note` (why another device was taken), `tiles`, `moved_up` (by how many pixels the
+    /// right view was moved up), `smoothed` (how much the left and the right view were smoothed: standard
+    /// deviations, in pixels), `iterations` and `seconds` (of the match). `density` is the share of pixels
+    /// with a disparity (%), the sum of `measured` and `filled`. `mean_confidence` is that of the measured
+    /// pixels.
     #[arg(long, value_name = "FILE", help_heading = "More outputs")]
     json: Option<PathBuf>,
 }

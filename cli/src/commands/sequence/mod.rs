@@ -36,7 +36,7 @@ Examples:
   mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
   # What ffmpeg -i stereo.mkv -f yuv4mpegpipe - sends, matched and played:
   mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
-  # Images as the cameras took them, to depth in millimetres:
+  # Raw images and a calibration, to depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
 /// Match the frames of a video, one after the other
@@ -49,9 +49,9 @@ Examples:
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
 /// with --also side-by-side, LEFT stands beside it. ffmpeg and ffplay read it.
 ///
-/// The range is that of the first frame where none is given. While a frame is matched, the next ones are read and
-/// rectified, and the last one is written. Whatever ends a sequence early, an error or Ctrl-C, the maps of all frames before
-/// are there and whole.
+/// Without --max-disparity the range is that of the first frame. While a frame is matched, the next ones are
+/// read and rectified, and the last one is written. If an error or Ctrl-C ends a sequence early, the maps of
+/// all frames before are complete.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]
 pub(crate) struct Args {
@@ -63,11 +63,11 @@ pub(crate) struct Args {
     #[arg(required = true)]
     output: PathBuf,
 
-    /// How both views lie in a frame, where RIGHT is not given
+    /// How both views share a frame, if RIGHT is not given
     #[arg(long, value_enum, value_name = "WHICH", default_value = "side-by-side")]
     layout: Layout,
-    /// What streams hold that are no YUV4MPEG2 but pixels alone (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are
-    /// gray, gray16le, rgb24 and bgr24
+    /// Size and format of raw streams (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are gray,
+    /// gray16le, rgb24 and bgr24
     #[arg(long, value_name = "SIZE,FORMAT", value_parser = raw_frames)]
     raw_frames: Option<RawFrames>,
     #[command(flatten)]
@@ -75,7 +75,7 @@ pub(crate) struct Args {
     /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; as `mrfgs match` takes it
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
-    /// Frames are as the cameras took them: rectifies them by --calib first
+    /// Frames are raw images: rectifies them by --calib first
     #[arg(long, requires = "calib")]
     rectify: bool,
     #[command(flatten)]
@@ -84,7 +84,7 @@ pub(crate) struct Args {
     maps: MapArgs,
     #[command(flatten)]
     reading: ReadingArgs,
-    /// Prints nothing but failures
+    /// Prints errors only
     #[arg(long)]
     quiet: bool,
 
