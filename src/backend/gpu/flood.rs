@@ -3,7 +3,8 @@
 //! A device goes over all pixels at once, so it gains nothing by going over messages and beliefs together: the stage has no
 //! shader of its own.
 
-use super::steps::{Job, Recorder};
+use super::Kernel;
+use super::steps::Recorder;
 use crate::backend::Stage;
 use crate::error::Result;
 use crate::plan::Plan;
@@ -13,7 +14,7 @@ pub(super) fn parts(level: usize) -> [Stage; 2] {
     [Stage::Dependency(level), Stage::Belief(level)]
 }
 
-pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
+pub(super) fn kernels(_: &Plan, _: usize) -> Vec<Kernel> {
     Vec::new()
 }
 
