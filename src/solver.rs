@@ -6,7 +6,7 @@ use crate::backend::wavefront::Wavefront;
 use crate::backend::{Backend, Stage};
 use crate::error::Result;
 use crate::front::Prepared;
-use crate::options::{Fill, MatchingCost, Median, Method, Order};
+use crate::options::{Fill, Median, Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::watch::Watch;
 use std::iter;
@@ -174,11 +174,11 @@ fn joining(plan: &Plan, phase: &Phase) -> Vec<Stage> {
 pub fn streamed(plan: &Plan) -> Plan {
     let method = &plan.method;
     let Some(last) = plan.phases.last() else { return plan.clone() };
-    // Convergence looks at the whole level, and so do zones and the sums of the matching cost that is not a census.
+    // Convergence looks at the whole level, and so do zones and some matching costs.
     let whole = plan.phases.len() == 1
         || method.schedule.tolerance > 0.0
         || plan.limits_labels()
-        || method.cost.matching == MatchingCost::Sad;
+        || !method.cost.matching.facts().by_rows;
     let stages = iter::once(Stage::Evidence(0))
         .chain(joining(plan, last))
         .chain((0..last.iterations).flat_map(|i| iteration(plan, last, i)))

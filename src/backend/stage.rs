@@ -78,17 +78,8 @@ macro_rules! for_every_stage {
                 /// Matching cost of level 0, 0 ..= [`crate::plan::COST_MAX`].
                 ///
                 /// The cost of pixel (x, y) and disparity d compares left (x, y) with right (x - d, y). It is
-                /// [`Plan::outside_cost`](crate::plan::Plan::outside_cost) when x - d is outside the image or either pixel is masked. Otherwise:
-                /// - SAD: round(S / (768 n)), at most [`crate::plan::COST_MAX`], ties up, where n counts the places (i, j) of the
-                ///   window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked, and S sums
-                ///   |dr| + |dg| + |db| over them.
-                /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each other
-                ///   place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is below the
-                ///   centre's.
-                /// - AD-census: that plus (w min(|dr| + |dg| + |db|, 64) + 32) >> 6, channels in whole 8-bit levels (>> 8), with the
-                ///   weight w = floor(48 min(v, t) / t) of the left pixel, 48 where t = [`Plan::colour_variance`](crate::plan::Plan::colour_variance) is 0. Over the same
-                ///   window, clamped places again,
-                ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
+                /// [`Plan::outside_cost`](crate::plan::Plan::outside_cost) when x - d is outside the image or either pixel is masked.
+                /// Otherwise [`MatchingCost`](crate::options::MatchingCost) says what it is.
                 Cost cost;
                 /// The label map of level 0, and the sum over its pixels of the squared difference from the map of the last
                 /// time (of label indices; from 0 the first time). But for the first time, the map has settled where the sum is at

@@ -5,6 +5,18 @@ use crate::error::OptionError;
 
 words! {
     /// Matching cost of a pixel and a label.
+    ///
+    /// What it is exactly, where both pixels are inside and unmasked, in cost units:
+    /// - SAD: round(S / (768 n)), at most [`COST_MAX`](crate::plan::COST_MAX), ties up, where n counts the places (i, j) of the
+    ///   window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked, and S sums
+    ///   |dr| + |dg| + |db| over them.
+    /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each other
+    ///   place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is below the
+    ///   centre's.
+    /// - AD-census: that plus (w min(|dr| + |dg| + |db|, 64) + 32) >> 6, channels in whole 8-bit levels (>> 8), with the
+    ///   weight w = floor(48 min(v, t) / t) of the left pixel, 48 where t = [`Plan::colour_variance`](crate::plan::Plan::colour_variance) is 0. Over the same
+    ///   window, clamped places again,
+    ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
     MatchingCost {
         /// Mean absolute colour difference over a square window, in 8-bit levels.
         Sad = "sad",
@@ -17,12 +29,28 @@ words! {
     }
 }
 
+/// What is true of a matching cost.
+#[derive(Clone, Copy, Debug)]
+pub struct CostFacts {
+    /// The largest cost of a label, and so of one outside the image.
+    pub most: f64,
+    /// Cost units that stand for a cost of 1.
+    pub units: f64,
+    /// Cost units of the largest colour difference, where colour has its full weight.
+    pub colour_weight: u32,
+    /// Whether the costs of a row can be computed at any time from what is taken of both views before, so that level 0 need not be
+    /// held whole.
+    pub by_rows: bool,
+}
+
 impl MatchingCost {
-    /// The largest cost of a label.
-    pub(crate) const fn most(self) -> f64 {
+    /// What is true of it.
+    #[must_use]
+    pub const fn facts(self) -> CostFacts {
         match self {
-            Self::Sad => 254.0,
-            Self::Census | Self::AdCensus => 1.625,
+            Self::Sad => CostFacts { most: 254.0, units: 1.0, colour_weight: 0, by_rows: false },
+            Self::Census => CostFacts { most: 1.625, units: 128.0, colour_weight: 0, by_rows: true },
+            Self::AdCensus => CostFacts { most: 1.625, units: 128.0, colour_weight: 48, by_rows: true },
         }
     }
 }
@@ -50,7 +78,7 @@ options! {
         colour_contrast: f64 = 5.0, takes real(0.0..=128.0), unit "8-bit levels", source "not in the paper";
         /// Cost of a label that falls outside the right image or on a masked pixel. It is the same for all such labels, so
         /// that none is preferred. It may not be larger than the largest matching cost.
-        outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.most()), unit "as the matching cost", source "open";
+        outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.facts().most), unit "as the matching cost", source "open";
         /// How a level's cost volume comes from the next finer one.
         pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass; open along the labels";
     }
@@ -59,7 +87,7 @@ options! {
 impl CostOptions {
     /// Checks what a row alone cannot: the range of `outside_cost` depends on `matching`.
     pub(super) fn check(&self) -> Result<(), (String, OptionError)> {
-        let (value, high) = (self.outside_cost, self.matching.most());
+        let (value, high) = (self.outside_cost, self.matching.facts().most);
         if value <= high {
             return Ok(());
         }

@@ -24,12 +24,16 @@ shader! {
         let (window, run) = (plan.method.cost.sad_window as usize, SAD_RUN as usize);
         kernel((window + run - 1) * (1 + 5 * window + run) + run * 5)
     };
-    census: Census { left, right, left_census_out, right_census_out, weight_out }
-        if plan.method.cost.matching != MatchingCost::Sad
-        => kernel((2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2));
-    ad_census: AdCensus { left, right, cost, left_census, right_census, weight }
-        if plan.method.cost.matching != MatchingCost::Sad
-        => kernel(4);
+    census: Census { left, right, left_census_out, right_census_out, weight_out } if takes_census(plan) => {
+        kernel((2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2))
+    };
+    ad_census: AdCensus { left, right, cost, left_census, right_census, weight } if takes_census(plan) => {
+        kernel(4)
+    };
+}
+
+fn takes_census(plan: &Plan) -> bool {
+    matches!(plan.method.cost.matching, MatchingCost::Census | MatchingCost::AdCensus)
 }
 
 fn kernel<B: Bindings>(loops: usize) -> Kernel<B> {
