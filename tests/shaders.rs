@@ -162,7 +162,8 @@ fn every_kernel_binds_what_its_entry_point_uses() {
     for_every_kernel(|kernel, _, _| check_bindings(kernel, &kernel.shader.source()));
 }
 
-/// Control: names that the shader does not have, and those that the entry point does not use or that are missing, are noticed.
+/// Control: names that the shader does not have, that the entry point does not use, or that are missing, are
+/// noticed.
 #[test]
 fn other_bindings_are_noticed() {
     let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];

@@ -7,16 +7,17 @@ words! {
     /// Matching cost of a pixel and a label.
     ///
     /// What it is exactly, where both pixels are inside and unmasked, in cost units:
-    /// - SAD: round(S / (768 n)), at most [`COST_MAX`](crate::plan::COST_MAX), ties up, where n counts the places (i, j) of the
-    ///   window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked, and S sums
-    ///   |dr| + |dg| + |db| over them.
-    /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each other
-    ///   place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is below the
-    ///   centre's.
-    /// - AD-census: that plus (w min(|dr| + |dg| + |db|, 64) + 32) >> 6, channels in whole 8-bit levels (>> 8), with the
-    ///   weight w = floor(48 min(v, t) / t) of the left pixel, 48 where t = [`Plan::colour_variance`](crate::plan::Plan::colour_variance) is 0. Over the same
-    ///   window, clamped places again,
-    ///   v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is masked.
+    /// - SAD: round(S / (768 n)), at most [`COST_MAX`](crate::plan::COST_MAX), ties up, where n counts the
+    ///   places (i, j) of the window at which left (x + i, y + j) and right (x - d + i, y + j) are both inside
+    ///   and unmasked, and S sums |dr| + |dg| + |db| over them.
+    /// - Census: 4 min(h, 40), where h bits of the two censuses differ. The census of a pixel has a bit for each
+    ///   other place of a 9 x 7 window, set where that place, clamped to the image, is unmasked and its grey is
+    ///   below the centre's.
+    /// - AD-census: that plus (w min(|dr| + |dg| + |db|, 64) + 32) >> 6, channels in whole 8-bit levels (>> 8),
+    ///   with the weight w = floor(48 min(v, t) / t) of the left pixel, 48 where
+    ///   t = [`Plan::colour_variance`](crate::plan::Plan::colour_variance) is 0. Over the same window, clamped
+    ///   places again, v = 63 sum g^2 - (sum g)^2 with g the grey >> 8, that of the centre where the place is
+    ///   masked.
     MatchingCost {
         /// Mean absolute colour difference over a square window, in 8-bit levels.
         Sad = "sad",
@@ -38,8 +39,8 @@ pub struct CostFacts {
     pub units: f64,
     /// Cost units of the largest colour difference, where colour has its full weight.
     pub colour_weight: u32,
-    /// Whether the costs of a row can be computed at any time from what is taken of both views before, so that level 0 need not be
-    /// held whole.
+    /// Whether the costs of a row can be computed at any time from what is taken of both views before, so that
+    /// level 0 need not be held whole.
     pub by_rows: bool,
 }
 

@@ -11,7 +11,9 @@ shader! {
     labels: Labels { belief, label_map, squares } => kernel(plan, plan.levels[0].quads());
     sums: Sums { squares, row_sums } => kernel(plan, plan.levels[0].width);
     // The messages of a level take few dispatches, also together with those of others.
-    settle: Settle { row_sums, convergence, groups } => kernel(plan, plan.levels[0].height + 64 * plan.levels.len());
+    settle: Settle { row_sums, convergence, groups } => {
+        kernel(plan, plan.levels[0].height + 64 * plan.levels.len())
+    };
 }
 
 fn kernel<B: Bindings>(plan: &Plan, loops: usize) -> Kernel<B> {

@@ -1,4 +1,4 @@
-//! Kernels: the entry points of the shaders, each declared once, with what it binds by the names that its shader gives it.
+//! Kernels: the entry points of the shaders, each declared once, with what it binds by the names of its shader.
 
 use super::rows::Binding;
 use super::shader::{Constant, Shader};
@@ -10,13 +10,15 @@ use std::marker::PhantomData;
 pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 
 /// Declares the shader of a stage: its own uniform, and a row for each entry point:
-/// `ENTRY: BINDINGS { NAMES } => KERNEL;`. The names are those of the shader. `ENTRY(plan, level)` gives the kernel, and
-/// `kernels(plan, level)` lists all, but for those whose row has a condition (`if ...` before the `=>`) that does not hold.
+/// `ENTRY: BINDINGS { NAMES } => KERNEL;`. The names are those of the shader. `ENTRY(plan, level)` gives the
+/// kernel, and `kernels(plan, level)` lists all, but for those whose row has a condition that does not hold
+/// (`if ...` before the `=>`).
 macro_rules! shader {
     (
         $stage:literal($plan:ident, $level:ident) { $( $field:ident: $type:ty ),* $(,)? }
         $(
-            $entry:ident: $bindings:ident { $( $name:ident ),+ $(,)? } $( if $condition:expr )? => $kernel:expr;
+            $entry:ident: $bindings:ident { $( $name:ident ),+ $(,)? }
+            $( if $condition:expr )? => $kernel:expr;
         )+
     ) => {
         #[repr(C)]
@@ -34,7 +36,7 @@ macro_rules! shader {
 
             impl $crate::backend::gpu::kernel::Bindings for $bindings {
                 type Uniform = Uniform;
-                const SHADER: $crate::backend::gpu::shader::Shader = $crate::backend::gpu::shader::Shader::new(
+                const SHADER: $crate::backend::gpu::Shader = $crate::backend::gpu::Shader::new(
                     $stage,
                     stringify!($entry),
                     include_str!(concat!("../../../shaders/", $stage, ".wgsl")),
@@ -53,7 +55,10 @@ macro_rules! shader {
         )+
 
         #[allow(unused_variables, reason = "not every condition depends on both")]
-        pub(super) fn kernels($plan: &$crate::plan::Plan, $level: usize) -> Vec<$crate::backend::gpu::Kernel> {
+        pub(super) fn kernels(
+            $plan: &$crate::plan::Plan,
+            $level: usize,
+        ) -> Vec<$crate::backend::gpu::Kernel> {
             let mut kernels = Vec::new();
             $( if true $( && $condition )? { kernels.push($entry($plan, $level).any()); } )+
             kernels

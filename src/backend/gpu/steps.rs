@@ -219,8 +219,8 @@ impl<'a> Recorder<'a> {
         self.dispatch_sections(kernel, &[section], bindings)
     }
 
-    /// Dispatches `kernel` for all rows of `levels` at once, which [share](super::buffers::Shared) their buffers. `own` gives the
-    /// parameters of a level and its number of invocations in a row.
+    /// Dispatches `kernel` for all rows of `levels` at once, which [share](super::buffers::Shared) their
+    /// buffers. `own` gives the parameters of a level and its number of invocations in a row.
     pub(super) fn levels<B: Bindings>(
         &mut self,
         kernel: &Kernel<B>,
