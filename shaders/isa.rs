@@ -8,7 +8,7 @@
 mod variants;
 
 use ash::{ext, khr, vk};
-use mrfgs::low_level::backend::gpu::{Constant, Kernel};
+use mrfgs::low_level::backend::gpu::{Constant, Shader};
 use naga::AddressSpace;
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
@@ -116,9 +116,9 @@ fn run(names: &[String]) -> Result<(), String> {
     let gpus = GPUS.into_iter().filter(|gpu| names.is_empty() || names.iter().any(|name| name == gpu));
     // All of them before there are threads.
     let radeons = gpus.map(Radeon::open).collect::<Result<Vec<_>, _>>()?;
-    let jobs = variants::jobs(&variants::plans());
-    let kernels: Vec<&Kernel> = jobs.iter().map(|job| &job.kernel).collect();
-    let known: BTreeSet<String> = kernels.iter().map(|kernel| name(kernel)).collect();
+    let kernels: Vec<Shader> =
+        variants::kernels(&variants::plans()).into_iter().map(|kernel| kernel.shader).collect();
+    let known: BTreeSet<String> = kernels.iter().map(name).collect();
     if let Some(stale) = EXCEPTIONS.iter().find(|exception| !known.contains(exception.kernel)) {
         return Err(format!("EXCEPTIONS in shaders/isa.rs: there is no kernel `{}`", stale.kernel));
     }
@@ -175,7 +175,7 @@ fn run(names: &[String]) -> Result<(), String> {
 }
 
 /// The name of a kernel, which its variants share. Arrays of one item a slot make others of it.
-fn name(kernel: &Kernel) -> String {
+fn name(kernel: &Shader) -> String {
     let entry = match kernel.entry() {
         "main" => String::new(),
         entry => format!("/{entry}"),

@@ -45,12 +45,12 @@ pub(crate) fn plans() -> Vec<Plan> {
     plans
 }
 
-/// Every job of `plans`, each kernel once.
-pub(crate) fn jobs(plans: &[Plan]) -> Vec<gpu::Job> {
+/// Every kernel of `plans`, each shader once.
+pub(crate) fn kernels(plans: &[Plan]) -> Vec<gpu::Kernel> {
     let mut seen = HashSet::new();
-    let jobs = plans.iter().flat_map(|plan| {
-        let of_stages = Stage::all(plan).into_iter().flat_map(|stage| gpu::jobs(stage, plan));
-        of_stages.chain(gpu::other_jobs(plan))
+    let kernels = plans.iter().flat_map(|plan| {
+        let of_stages = Stage::all(plan).into_iter().flat_map(|stage| gpu::kernels(stage, plan));
+        of_stages.chain(gpu::other_kernels(plan))
     });
-    jobs.filter(|job| seen.insert(job.kernel.clone())).collect()
+    kernels.filter(|kernel| seen.insert(kernel.shader.clone())).collect()
 }

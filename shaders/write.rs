@@ -11,10 +11,10 @@ fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [folder] = &args[..] else { return Err(Error::other("give FOLDER")) };
     fs::create_dir_all(folder)?;
-    for (number, job) in variants::jobs(&variants::plans()).iter().enumerate() {
-        let kernel = &job.kernel;
-        let name = format!("{number:03}.{}.{}.wgsl", kernel.stage(), kernel.entry());
-        fs::write(Path::new(folder).join(name), kernel.source())?;
+    for (number, kernel) in variants::kernels(&variants::plans()).iter().enumerate() {
+        let shader = &kernel.shader;
+        let name = format!("{number:03}.{}.{}.wgsl", shader.stage(), shader.entry());
+        fs::write(Path::new(folder).join(name), shader.source())?;
     }
     Ok(())
 }

@@ -25,14 +25,10 @@ pub use arithmetic::{EvidenceScale, HARD_CAP, Truncation, TruncationRule, UNITS_
 
 /// Largest matching cost at level 0, in cost units.
 pub const COST_MAX: u8 = 254;
-/// Cost units that stand for a matching cost of 1 where the cost uses the census.
-pub const CENSUS_UNITS: f64 = 128.0;
 /// Cost units of each census bit that differs.
 pub const CENSUS_BIT_COST: u32 = 4;
 /// Largest number of differing census bits that counts.
 pub const CENSUS_BITS: u32 = 40;
-/// Cost units of the largest colour difference, where colour has its full weight.
-pub const COLOUR_WEIGHT: u32 = 48;
 /// Truncation of the colour difference, in 8-bit levels summed over the channels.
 pub const COLOUR_MOST: u32 = 64;
 /// Horizontal radius of the window of census and contrast, which is 9 x 7.
@@ -63,10 +59,12 @@ pub const WINDOW_REACH: usize = 2;
 pub const WINDOW_MARGIN: i32 = 2;
 
 // The largest costs of a label match what the options state.
-const _: () = assert!(MatchingCost::Sad.most() as u32 == COST_MAX as u32);
-const _: () = assert!(
-    (MatchingCost::AdCensus.most() * CENSUS_UNITS) as u32 == CENSUS_BITS * CENSUS_BIT_COST + COLOUR_WEIGHT
-);
+const _: () = {
+    let (sad, ad_census) = (MatchingCost::Sad.facts(), MatchingCost::AdCensus.facts());
+    assert!((sad.most * sad.units) as u32 == COST_MAX as u32);
+    let census = CENSUS_BITS * CENSUS_BIT_COST;
+    assert!((ad_census.most * ad_census.units) as u32 == census + ad_census.colour_weight);
+};
 const _: () = assert!(255 + (GRAPH_WINDOW * GRAPH_WINDOW + 3) as u32 * HARD_CAP as u32 <= u16::MAX as u32);
 
 /// Size of one level.
@@ -167,10 +165,7 @@ impl Plan {
     /// [`crate::Error::Option`] when an option of the method is out of range.
     pub fn new(width: usize, height: usize, range: DisparityRange, method: &Method) -> Result<Self> {
         let method = method.clone().validated()?;
-        let cost_units = match method.cost.matching {
-            MatchingCost::Sad => 1.0,
-            MatchingCost::Census | MatchingCost::AdCensus => CENSUS_UNITS,
-        };
+        let cost_units = method.cost.matching.facts().units;
         let mut levels = Vec::new();
         let mut gain = 1.0;
         let (mut size, mut min, mut max) = ((width, height), range.min, range.max);
@@ -339,10 +334,10 @@ impl Plan {
         }
     }
 
-    /// Cost units of the largest colour difference at full weight: [`COLOUR_WEIGHT`], or 0 without colour.
+    /// Cost units of the largest colour difference at full weight, or 0 without colour.
     #[must_use]
     pub fn colour_weight(&self) -> u32 {
-        if self.method.cost.matching == MatchingCost::AdCensus { COLOUR_WEIGHT } else { 0 }
+        self.method.cost.matching.facts().colour_weight
     }
 
     /// The variance of grey (in squared 8-bit levels, times [`CENSUS_PLACES`] squared) from which on colour
@@ -356,7 +351,7 @@ impl Plan {
     /// Whether the matching cost goes row by row, so that costs can be computed where they are read.
     #[must_use]
     pub fn costs_go_by_rows(&self) -> bool {
-        self.method.cost.matching != MatchingCost::Sad
+        self.method.cost.matching.facts().by_rows
     }
 
     /// Whether the pyramid takes the minimum over d instead of a low-pass.
@@ -426,7 +421,7 @@ mod tests {
             let mut method = Method::default();
             method.messages.temperature = temperature;
             for gain in [1.0, 243.0] {
-                let scale = EvidenceScale::new(gain, CENSUS_UNITS, &method);
+                let scale = EvidenceScale::new(gain, method.cost.matching.facts().units, &method);
                 let mut last = 0;
                 for difference in 0..=u16::MAX {
                     let e = scale.apply(difference);

@@ -8,16 +8,16 @@
 mod variants;
 
 use mrfgs::low_level::backend::Stage;
-use mrfgs::low_level::backend::gpu::{Job, MAX_LOOP_ITERATIONS, UniformLayout, jobs};
+use mrfgs::low_level::backend::gpu::{Kernel, MAX_LOOP_ITERATIONS, UniformLayout, binding_number, kernels};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::{DisparityRange, Method};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::LazyLock;
 
 static PLANS: LazyLock<Vec<Plan>> = LazyLock::new(variants::plans);
-static JOBS: LazyLock<Vec<Job>> = LazyLock::new(|| variants::jobs(&PLANS));
+static KERNELS: LazyLock<Vec<Kernel>> = LazyLock::new(|| variants::kernels(&PLANS));
 
 fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
     let module = naga::front::wgsl::parse_str(source).map_err(|e| e.emit_to_string(source))?;
@@ -28,22 +28,23 @@ fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
 }
 
 /// Runs `check` on every kernel, and reports all failures at once.
-fn for_every_kernel(check: impl Fn(&Job, &Module, &ModuleInfo) -> Result<(), String>) {
-    let entries: HashSet<_> = JOBS.iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
-    assert!(entries.len() > 20 && JOBS.len() > entries.len(), "only {} kernels", JOBS.len());
-    let failures: Vec<String> = JOBS
+fn for_every_kernel(check: impl Fn(&Kernel, &Module, &ModuleInfo) -> Result<(), String>) {
+    let entries: HashSet<_> =
+        KERNELS.iter().map(|kernel| (kernel.shader.stage(), kernel.shader.entry())).collect();
+    assert!(entries.len() > 20 && KERNELS.len() > entries.len(), "only {} kernels", KERNELS.len());
+    let failures: Vec<String> = KERNELS
         .iter()
-        .filter_map(|job| {
-            let result =
-                validated(&job.kernel.source()).and_then(|(module, info)| check(job, &module, &info));
-            result.err().map(|e| format!("{:?}: {e}", job.kernel))
+        .filter_map(|kernel| {
+            let source = kernel.shader.source();
+            let result = validated(&source).and_then(|(module, info)| check(kernel, &module, &info));
+            result.err().map(|e| format!("{:?}: {e}", kernel.shader))
         })
         .collect();
     assert!(
         failures.is_empty(),
         "{} of {} kernels fail:\n{}",
         failures.len(),
-        JOBS.len(),
+        KERNELS.len(),
         failures.join("\n")
     );
 }
@@ -54,7 +55,7 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
         .unwrap()
         .filter_map(|e| e.unwrap().path().file_name()?.to_str()?.strip_suffix(".wgsl").map(str::to_owned))
         .collect();
-    let kernels: HashSet<String> = JOBS.iter().map(|job| job.kernel.stage().to_owned()).collect();
+    let kernels: HashSet<String> = KERNELS.iter().map(|kernel| kernel.shader.stage().to_owned()).collect();
     assert_eq!(files, kernels);
     let mut stages: HashSet<&str> = PLANS.iter().flat_map(Stage::all).map(Stage::name).collect();
     // The sweep has no shader of its own. Filled pixels take planes and medians by the shaders of these. The upload is no stage.
@@ -66,9 +67,9 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
 #[test]
 fn every_entry_point_is_a_kernel() {
     let used: HashSet<(&str, &str)> =
-        JOBS.iter().map(|job| (job.kernel.stage(), job.kernel.entry())).collect();
-    for_every_kernel(|job, module, _| {
-        let unused = module.entry_points.iter().find(|e| !used.contains(&(job.kernel.stage(), &e.name)));
+        KERNELS.iter().map(|kernel| (kernel.shader.stage(), kernel.shader.entry())).collect();
+    for_every_kernel(|kernel, module, _| {
+        let unused = module.entry_points.iter().find(|e| !used.contains(&(kernel.shader.stage(), &e.name)));
         unused.map_or(Ok(()), |e| Err(format!("nothing runs `{}`", e.name)))
     });
 }
@@ -80,7 +81,7 @@ fn every_shader_validates_and_no_capability_is_asked() {
 
 #[test]
 fn validation_can_fail() {
-    let source = jobs(Stage::Belief(0), &PLANS[0])[0].kernel.source();
+    let source = kernels(Stage::Belief(0), &PLANS[0])[0].shader.source();
     assert!(validated(&source).is_ok());
     assert!(validated(&source.replace("pack_narrow(values)", "values")).is_err());
     // 64-bit integers are a capability that was not requested.
@@ -104,9 +105,9 @@ fn layout_of(module: &Module, name: &str) -> Result<(Vec<(String, usize)>, usize
 
 #[test]
 fn uniforms_are_laid_out_as_the_rust_structs() {
-    for_every_kernel(|job, module, _| {
+    for_every_kernel(|kernel, module, _| {
         let inner = UniformLayout::inner();
-        for (name, layout) in inner.iter().chain([&("Params", job.uniform.clone())]) {
+        for (name, layout) in inner.iter().chain([&("Params", kernel.uniform.clone())]) {
             let (fields, bytes) = layout_of(module, name)?;
             let expected: Vec<_> = layout.fields.iter().map(|(name, at)| ((*name).to_owned(), *at)).collect();
             if fields != expected {
@@ -123,11 +124,11 @@ fn uniforms_are_laid_out_as_the_rust_structs() {
 /// Control: a moved field is detected.
 #[test]
 fn a_uniform_of_another_layout_is_noticed() {
-    let job = &jobs(Stage::Evidence(0), &PLANS[0])[0];
-    let source = job.kernel.source();
+    let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
+    let source = kernel.shader.source();
     let fields = |source: &str| layout_of(&validated(source).unwrap().0, "Params").unwrap().0;
     let expected = |fields: &[(String, usize)]| {
-        fields.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>() == job.uniform.fields
+        fields.iter().map(|(name, at)| (name.as_str(), *at)).collect::<Vec<_>>() == kernel.uniform.fields
     };
     assert!(expected(&fields(&source)));
     assert!(!expected(&fields(
@@ -135,18 +136,58 @@ fn a_uniform_of_another_layout_is_noticed() {
     )));
 }
 
-/// The index of the job's entry point.
-fn entry_point(job: &Job, module: &Module) -> usize {
-    module.entry_points.iter().position(|e| e.name == job.kernel.entry()).expect("it compiles")
+/// The index of the kernel's entry point.
+fn entry_point(kernel: &Kernel, module: &Module) -> usize {
+    module.entry_points.iter().position(|e| e.name == kernel.shader.entry()).expect("it compiles")
+}
+
+/// Compares what `kernel` binds with what its entry point uses of the shader with this `source`.
+fn check_bindings(kernel: &Kernel, source: &str) -> Result<(), String> {
+    let (module, info) = validated(source)?;
+    let info = info.get_entry_point(entry_point(kernel, &module));
+    let used = module.global_variables.iter().filter(|(handle, _)| !info[*handle].is_empty());
+    let mut used: BTreeMap<Option<u32>, &str> = used
+        .filter_map(|(_, variable)| Some((Some(variable.binding?.binding), variable.name.as_deref()?)))
+        .collect();
+    let uniform = used.remove(&Some(0));
+    let bound = kernel.names.iter().map(|name| (binding_number(source, name), *name)).collect();
+    if uniform.is_some() && used == bound {
+        return Ok(());
+    }
+    Err(format!("uses {uniform:?} and {used:?}, and binds {bound:?}"))
+}
+
+#[test]
+fn every_kernel_binds_what_its_entry_point_uses() {
+    for_every_kernel(|kernel, _, _| check_bindings(kernel, &kernel.shader.source()));
+}
+
+/// Control: names that the shader does not have, that the entry point does not use, or that are missing, are
+/// noticed.
+#[test]
+fn other_bindings_are_noticed() {
+    let kernel = &kernels(Stage::Evidence(0), &PLANS[0])[0];
+    let source = kernel.shader.source();
+    assert_eq!(kernel.names, ["cost", "evidence", "belief", "windows"]);
+    check_bindings(kernel, &source).unwrap();
+    check_bindings(kernel, &source.replace("@binding(3)", "@binding(9)")).unwrap();
+    assert!(check_bindings(kernel, &source.replace("evidence", "proof")).is_err());
+    let unused = "@group(0) @binding(9) var<storage, read> unused: array<u32>;\n";
+    let more = unused.to_owned() + &source;
+    for names in [&["cost", "evidence", "belief"][..], &["cost", "evidence", "belief", "windows", "unused"]] {
+        let mut changed = kernel.clone();
+        changed.names = names;
+        assert!(check_bindings(&changed, &more).is_err(), "{names:?}");
+    }
 }
 
 #[test]
 fn every_shader_stays_within_the_limits_of_all_devices() {
-    for_every_kernel(|job, module, info| {
+    for_every_kernel(|kernel, module, info| {
         let mut layouter = naga::proc::Layouter::default();
         layouter.update(module.to_ctx()).map_err(|e| e.to_string())?;
         let (mut storage, mut workgroup) = (0, 0);
-        let entry = entry_point(job, module);
+        let entry = entry_point(kernel, module);
         for (handle, variable) in module.global_variables.iter() {
             if info.get_entry_point(entry)[handle].is_empty() {
                 continue;
@@ -170,8 +211,8 @@ fn every_shader_stays_within_the_limits_of_all_devices() {
 #[test]
 fn loops_stay_below_what_drivers_run() {
     let count = |plan: &Plan| {
-        let jobs = Stage::all(plan).into_iter().flat_map(|stage| jobs(stage, plan));
-        jobs.map(|job| job.loops).max().unwrap()
+        let kernels = Stage::all(plan).into_iter().flat_map(|stage| kernels(stage, plan));
+        kernels.map(|kernel| kernel.loops).max().unwrap()
     };
     for plan in PLANS.iter() {
         assert!(count(plan) <= MAX_LOOP_ITERATIONS, "{} iterations", count(plan));
@@ -185,8 +226,8 @@ fn loops_stay_below_what_drivers_run() {
 
 #[test]
 fn every_shader_translates_to_spirv_msl_and_hlsl() {
-    for_every_kernel(|job, module, info| {
-        let entry = (ShaderStage::Compute, job.kernel.entry().to_owned());
+    for_every_kernel(|kernel, module, info| {
+        let entry = (ShaderStage::Compute, kernel.shader.entry().to_owned());
         let spirv = naga::back::spv::PipelineOptions { shader_stage: entry.0, entry_point: entry.1.clone() };
         let words =
             naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), Some(&spirv))

@@ -95,8 +95,8 @@ pub trait Backend {
     /// of the thread has had its turn.
     fn keep_up(&mut self) -> Promise<'_, ()>;
 
-    /// Whether [`Stage::Change`] has found that the map has settled. A device that would have to be waited for says no, unless it is
-    /// to `wait` or takes times; once the map has settled it does nothing for the messages of the iterations that follow.
+    /// Whether [`Stage::Change`] has found that the map has settled. A device returns false unless it is to `wait` or takes
+    /// times, since an answer takes waiting; once the map has settled, it skips the messages of further iterations.
     fn settled(&mut self, wait: bool) -> Promise<'_, bool>;
 
     /// How many iterations found the map settled already.

@@ -5,6 +5,39 @@ use crate::error::OptionError;
 
 words! {
     /// Matching cost of a pixel and a label.
+    ///
+    /// Where both pixels are inside and unmasked, left (x, y) and right (x - d, y) cost as follows, with channels
+    /// and grey as [`Pixel`](crate::image::Pixel) holds them (`>> 8` makes them 8-bit), and dr, dg and db the
+    /// differences of the channels between left and right:
+    ///
+    /// - **SAD**, over the places (i, j) of a square of side `sad_window` around the pixel at which
+    ///   left (x + i, y + j) and right (x - d + i, y + j) are both inside and unmasked:
+    ///
+    ///   ```text
+    ///   n    = the number of these places
+    ///   S    = sum of |dr| + |dg| + |db| over them
+    ///   cost = min(floor((S + 384 n) / (768 n)), COST_MAX)         the mean in 8 bits, ties up
+    ///   ```
+    ///
+    /// - **Census**. The census of a pixel has a bit for each other place of its 9 x 7 neighbourhood,
+    ///   clamped to the image: set where the place is unmasked and its grey is below the centre's.
+    ///
+    ///   ```text
+    ///   h    = the number of bits in which the two censuses differ
+    ///   cost = 4 min(h, 40)
+    ///   ```
+    ///
+    /// - **AD-census** adds the difference in colour, with a weight w that grows with the contrast of
+    ///   the left image. g is the grey `>> 8` of each of the 63 clamped places of the 9 x 7
+    ///   neighbourhood of left (x, y), that of the centre where the place is masked; t is
+    ///   [`colour_variance`](crate::plan::Plan::colour_variance).
+    ///
+    ///   ```text
+    ///   A    = min(|dr| + |dg| + |db|, 64)                         of channels >> 8
+    ///   v    = 63 (sum of g^2) - (sum of g)^2                      63^2 times the variance
+    ///   w    = floor(48 min(v, t) / t)                             48 where t = 0
+    ///   cost = 4 min(h, 40) + ((w A + 32) >> 6)
+    ///   ```
     MatchingCost {
         /// Mean absolute colour difference over a square window, in 8-bit levels.
         Sad = "sad",
@@ -17,12 +50,28 @@ words! {
     }
 }
 
+/// What is true of a matching cost.
+#[derive(Clone, Copy, Debug)]
+pub struct CostFacts {
+    /// The largest cost of a label, and so of one outside the image.
+    pub most: f64,
+    /// Cost units that stand for a cost of 1.
+    pub units: f64,
+    /// Cost units of the largest colour difference, where colour has its full weight.
+    pub colour_weight: u32,
+    /// Whether the costs of a row can be computed at any time from what is taken of both views before, so that
+    /// level 0 need not be held whole.
+    pub by_rows: bool,
+}
+
 impl MatchingCost {
-    /// The largest cost of a label.
-    pub(crate) const fn most(self) -> f64 {
+    /// What is true of it.
+    #[must_use]
+    pub const fn facts(self) -> CostFacts {
         match self {
-            Self::Sad => 254.0,
-            Self::Census | Self::AdCensus => 1.625,
+            Self::Sad => CostFacts { most: 254.0, units: 1.0, colour_weight: 0, by_rows: false },
+            Self::Census => CostFacts { most: 1.625, units: 128.0, colour_weight: 0, by_rows: true },
+            Self::AdCensus => CostFacts { most: 1.625, units: 128.0, colour_weight: 48, by_rows: true },
         }
     }
 }
@@ -50,7 +99,7 @@ options! {
         colour_contrast: f64 = 5.0, takes real(0.0..=128.0), unit "8-bit levels", source "not in the paper";
         /// Cost of a label that falls outside the right image or on a masked pixel. It is the same for all such labels, so
         /// that none is preferred. It may not be larger than the largest matching cost.
-        outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.most()), unit "as the matching cost", source "open";
+        outside_cost: f64 = 0.7, takes real(0.0..=MatchingCost::Sad.facts().most), unit "as the matching cost", source "open";
         /// How a level's cost volume comes from the next finer one.
         pyramid: Pyramid = Pyramid::Minimum, takes one_of(Pyramid::WORDS), source "section 2.4: low-pass; open along the labels";
     }
@@ -59,7 +108,7 @@ options! {
 impl CostOptions {
     /// Checks what a row alone cannot: the range of `outside_cost` depends on `matching`.
     pub(super) fn check(&self) -> Result<(), (String, OptionError)> {
-        let (value, high) = (self.outside_cost, self.matching.most());
+        let (value, high) = (self.outside_cost, self.matching.facts().most);
         if value <= high {
             return Ok(());
         }

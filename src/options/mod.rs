@@ -24,7 +24,7 @@ mod row;
 mod schedule;
 mod tiles;
 
-pub use cost::{CostOptions, MatchingCost, Pyramid};
+pub use cost::{CostFacts, CostOptions, MatchingCost, Pyramid};
 pub use execution::{DeviceChoice, Execution};
 pub use front::{FrontOptions, Illumination, ZoneExtent};
 pub use graph::GraphOptions;

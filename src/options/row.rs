@@ -225,6 +225,9 @@ macro_rules! words {
         }
 
         impl $name {
+            /// All of them.
+            pub const ALL: &[Self] = &[ $( Self::$variant, )+ ];
+
             /// The words, as users write them.
             pub const WORDS: &[$crate::options::Word] = &[ $(
                 $crate::options::Word { word: $word, meaning: concat!($($meaning),+).trim_ascii() },

@@ -138,22 +138,12 @@ pub fn as_it_is() -> FrontOptions {
 pub fn method(random: &mut Random, neighbours: usize) -> Method {
     let mut m = Method::default();
     m.front = as_it_is();
-    m.cost.matching = random.pick(&[
-        MatchingCost::Sad,
-        MatchingCost::Census,
-        MatchingCost::AdCensus,
-        MatchingCost::AdCensus,
-    ]);
+    m.cost.matching = random.pick(&[MatchingCost::ALL, &[MatchingCost::AdCensus]].concat());
     m.cost.colour_contrast = random.pick(&[0.0, 0.3, 5.0, 40.0, 128.0]);
     m.cost.sad_window = random.pick(&[1, 3, 5, 7, 9]);
-    m.cost.outside_cost = match m.cost.matching {
-        MatchingCost::Sad => f64::from(random.within(0, 254)),
-        MatchingCost::Census | MatchingCost::AdCensus => f64::from(random.within(0, 1625)) / 1000.0,
-    };
-    m.messages.temperature = match m.cost.matching {
-        MatchingCost::Sad => random.log_within(0.1, 300.0),
-        MatchingCost::Census | MatchingCost::AdCensus => random.log_within(0.01, 10.0),
-    };
+    let most = m.cost.matching.facts().most;
+    m.cost.outside_cost = f64::from(random.within(0, (1000.0 * most) as u32)) / 1000.0;
+    m.messages.temperature = random.log_within(0.001 * most, 6.0 * most);
     m.messages.evidence_cap = random.pick(&[0.25, 3.0, 8.0, 63.75]);
     m.messages.evidence_gain = random.pick(&[1.0, 1.7, 3.0, 4.0]);
     m.cost.pyramid = random.pick(&[Pyramid::LowPass, Pyramid::Minimum]);

@@ -12,7 +12,7 @@ use mrfgs::options::{MatchingCost, Method};
 #[test]
 fn cost() {
     on_all(|case, backend, random| {
-        for cost in [MatchingCost::Sad, MatchingCost::Census, MatchingCost::AdCensus] {
+        for &cost in MatchingCost::ALL {
             let mut plan = case.plan.clone();
             plan.method.cost.matching = cost;
             backend.prepare(&plan, Prepared::new(&case.pair)).unwrap();

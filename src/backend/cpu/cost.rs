@@ -1,7 +1,8 @@
 //! Matching cost of level 0: see [`crate::backend::Stage::Cost`].
 
+mod sad;
+
 use super::features::{RowFeatures, Sums, Views};
-use super::sad;
 use super::units::Units;
 use super::volumes::Volumes;
 use crate::image::Pair;

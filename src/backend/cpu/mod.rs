@@ -6,7 +6,6 @@ mod least_squares;
 mod pages;
 mod places;
 mod probe;
-mod sad;
 mod units;
 mod volumes;
 mod windows;

@@ -3,10 +3,9 @@
 //! Floor: `census` moves 52 bytes a pixel at 2,500 operations, and asks for 2,000, the 63 places of the window in both images;
 //! `ad_census` moves 1 byte a label at 100 operations for four, and asks for 32, the right row once a label.
 
+use super::kernel::{Bindings, Kernel, shader};
 use super::rows::with_halo;
-use super::shader::Kernel;
-use super::steps::{Job, Recorder};
-use super::uniform::uniform;
+use super::steps::Recorder;
 use crate::error::Result;
 use crate::options::MatchingCost;
 use crate::plan::{
@@ -16,11 +15,38 @@ use crate::plan::{
 use crate::program::together::BAND;
 use std::ops::Range;
 
-const SHADER: &str = include_str!("../../../shaders/cost.wgsl");
 /// Pixels of a row that share an invocation of `sad`.
 const SAD_RUN: u32 = 8;
 
-uniform! { outside_cost: u32, colour_weight: u32, colour_variance: u32, sad_radius: i32 }
+shader! {
+    "cost"(plan, level) { outside_cost: u32, colour_weight: u32, colour_variance: u32, sad_radius: i32 }
+    sad: Sad { left, right, cost } if plan.method.cost.matching == MatchingCost::Sad => {
+        let (window, run) = (plan.method.cost.sad_window as usize, SAD_RUN as usize);
+        kernel((window + run - 1) * (1 + 5 * window + run) + run * 5)
+    };
+    census: Census { left, right, left_census_out, right_census_out, weight_out } if takes_census(plan) => {
+        kernel((2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2))
+    };
+    ad_census: AdCensus { left, right, cost, left_census, right_census, weight } if takes_census(plan) => {
+        kernel(4)
+    };
+}
+
+fn takes_census(plan: &Plan) -> bool {
+    matches!(plan.method.cost.matching, MatchingCost::Census | MatchingCost::AdCensus)
+}
+
+fn kernel<B: Bindings>(loops: usize) -> Kernel<B> {
+    Kernel::new(loops)
+        .with("SAD_RUN", SAD_RUN as i32)
+        .with("COST_MAX", u32::from(COST_MAX))
+        .with("CENSUS_RADIUS_X", CENSUS_RADIUS_X as i32)
+        .with("CENSUS_RADIUS_Y", CENSUS_RADIUS_Y as i32)
+        .with("CENSUS_PLACES", CENSUS_PLACES)
+        .with("CENSUS_BITS", CENSUS_BITS)
+        .with("CENSUS_BIT_COST", CENSUS_BIT_COST)
+        .with("COLOUR_MOST", COLOUR_MOST)
+}
 
 impl Uniform {
     fn of(plan: &Plan) -> Self {
@@ -33,74 +59,48 @@ impl Uniform {
     }
 }
 
-/// `sad`; or `census` and `ad_census`.
-pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    let job = |entry: &'static str, loops| {
-        let kernel = Kernel::new("cost", entry, SHADER)
-            .with("SAD_RUN", SAD_RUN as i32)
-            .with("COST_MAX", u32::from(COST_MAX))
-            .with("CENSUS_RADIUS_X", CENSUS_RADIUS_X as i32)
-            .with("CENSUS_RADIUS_Y", CENSUS_RADIUS_Y as i32)
-            .with("CENSUS_PLACES", CENSUS_PLACES)
-            .with("CENSUS_BITS", CENSUS_BITS)
-            .with("CENSUS_BIT_COST", CENSUS_BIT_COST)
-            .with("COLOUR_MOST", COLOUR_MOST);
-        Job::new::<Uniform>(kernel, loops)
-    };
-    if plan.method.cost.matching == MatchingCost::Sad {
-        let (window, run) = (plan.method.cost.sad_window as usize, SAD_RUN as usize);
-        return vec![job("sad", (window + run - 1) * (1 + 5 * window + run) + run * 5)];
-    }
-    let window = (2 * CENSUS_RADIUS_Y as usize + 1) * (2 * CENSUS_RADIUS_X as usize + 2);
-    vec![job("census", window), job("ad_census", 4)]
-}
-
+/// What is taken of both views, and costs where all rows of these are held.
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (plan, b, l) = (r.plan, r.buffers, r.params());
-    let own = Uniform::of(plan);
-    let cost = &r.here().cost;
-    match &jobs(plan, 0)[..] {
-        [census, _] => {
-            r.rows(census, &own, l.width, |rows| {
+    match plan.method.cost.matching {
+        MatchingCost::Sad => {}
+        MatchingCost::Census | MatchingCost::AdCensus => {
+            r.rows(&census(plan, 0), &Uniform::of(plan), l.width, |rows| {
                 let seen = with_halo(rows, CENSUS_RADIUS_Y, l.height);
-                vec![
-                    (1, b.left.bind(&seen)),
-                    (2, b.right.bind(&seen)),
-                    (7, b.census[0].bind(rows)),
-                    (8, b.census[1].bind(rows)),
-                    (9, b.contrast.bind(rows)),
-                ]
+                Census {
+                    left: b.left.bind(&seen),
+                    right: b.right.bind(&seen),
+                    left_census_out: b.census[0].bind(rows),
+                    right_census_out: b.census[1].bind(rows),
+                    weight_out: b.contrast.bind(rows),
+                }
             })?;
-            if plan.holds_all_rows() {
-                record_costs(r)?;
-            }
-        }
-        jobs => {
-            r.rows(&jobs[0], &own, l.width.div_ceil(SAD_RUN) * l.quads, |rows| {
-                let seen = with_halo(rows, plan.method.cost.sad_window / 2, l.height);
-                vec![(1, b.left.bind(&seen)), (2, b.right.bind(&seen)), (3, cost.bind(rows))]
-            })?;
-            r.renew(cost);
         }
     }
-    Ok(())
+    if plan.holds_all_rows() { record_costs(r) } else { Ok(()) }
 }
 
-/// Costs from what [`record`] has taken of both views.
+/// Costs from both views and what [`record`] has taken of them.
 pub(super) fn record_costs(r: &mut Recorder) -> Result<()> {
-    let (plan, b, l, cost) = (r.plan, r.buffers, r.params(), &r.here().cost);
-    let [_, ad_census] = &jobs(plan, 0)[..] else { unreachable!("costs of the census") };
-    r.rows(ad_census, &Uniform::of(plan), l.width * l.quads, |rows| {
-        vec![
-            (1, b.left.bind(rows)),
-            (2, b.right.bind(rows)),
-            (3, cost.bind(rows)),
-            (4, b.census[0].bind(rows)),
-            (5, b.census[1].bind(rows)),
-            (6, b.contrast.bind(rows)),
-        ]
-    })?;
-    r.renew(cost);
+    let (plan, b, l, here) = (r.plan, r.buffers, r.params(), r.here());
+    let own = Uniform::of(plan);
+    match plan.method.cost.matching {
+        MatchingCost::Sad => r.rows(&sad(plan, 0), &own, l.width.div_ceil(SAD_RUN) * l.quads, |rows| {
+            let seen = with_halo(rows, plan.method.cost.sad_window / 2, l.height);
+            Sad { left: b.left.bind(&seen), right: b.right.bind(&seen), cost: here.cost.bind(rows) }
+        }),
+        MatchingCost::Census | MatchingCost::AdCensus => {
+            r.rows(&ad_census(plan, 0), &own, l.width * l.quads, |rows| AdCensus {
+                left: b.left.bind(rows),
+                right: b.right.bind(rows),
+                cost: here.cost.bind(rows),
+                left_census: b.census[0].bind(rows),
+                right_census: b.census[1].bind(rows),
+                weight: b.contrast.bind(rows),
+            })
+        }
+    }?;
+    r.renew(&here.cost);
     Ok(())
 }
 

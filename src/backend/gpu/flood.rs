@@ -3,11 +3,12 @@
 //! A device goes over all pixels at once, so it gains nothing by going over messages and beliefs together: the stage has no
 //! shader of its own.
 
-use super::steps::{Job, Recorder};
+use super::Kernel;
+use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::Plan;
 
-pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
+pub(super) fn kernels(_: &Plan, _: usize) -> Vec<Kernel> {
     Vec::new()
 }
 

@@ -1,22 +1,34 @@
 //! The graph of a level: see [`Stage::Graph`](crate::backend::Stage::Graph).
 
 use super::buffers::Shared;
-use super::rows::{HALO, with_halo};
-use super::shader::Kernel;
-use super::steps::{Job, Recorder};
-use super::uniform::{LevelParams, uniform};
+use super::kernel::{Bindings, Kernel, shader};
+use super::rows::{Binding, HALO, with_halo};
+use super::steps::Recorder;
+use super::uniform::LevelParams;
 use crate::error::Result;
 use crate::graph::{NO_KEY, NO_MEMBER, RANK_BITS, by_distance, code, spatial_weight};
 use crate::plan::{GRAPH_WINDOW, Plan};
 use std::ops::Range;
 
-const SHADER: &str = include_str!("../../../shaders/graph.wgsl");
 /// Neighbours that `choose` finds in one pass over the window, at most.
 const CHOSEN: usize = 8;
 /// Places of the window besides the centre.
 const PLACES: usize = GRAPH_WINDOW * GRAPH_WINDOW - 1;
 
-uniform! { ranked: [[u32; 4]; PLACES / 16], fine: LevelParams, weight: u32, guide_at: u32, fine_at: u32 }
+shader! {
+    "graph"(plan, level) {
+        ranked: [[u32; 4]; PLACES / 16], fine: LevelParams, weight: u32, guide_at: u32, fine_at: u32
+    }
+    downsample: Downsample { guide, coarse_guide } if level > 0 => kernel(plan, 5 * 6);
+    choose: Choose { guide, members_out } if plan.neighbours > 0 => {
+        let chosen = chosen(plan);
+        let pass = chosen + PLACES * (1 + chosen) + chosen.div_ceil(4) * 5;
+        kernel(plan, plan.neighbours.div_ceil(chosen) * pass)
+    };
+    transpose: Transpose { members_in, incoming } if plan.neighbours > 0 => {
+        kernel(plan, (PLACES + 1) * (1 + plan.neighbours.div_ceil(4)))
+    };
+}
 
 impl Uniform {
     fn of(plan: &Plan) -> Self {
@@ -28,70 +40,60 @@ impl Uniform {
     }
 }
 
-/// `downsample`, but at level 0; and where there are neighbours, `choose` and `transpose`.
-pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
-    let chosen = plan.neighbours.clamp(1, CHOSEN);
-    let job = |entry, loops| {
-        let kernel = Kernel::new("graph", entry, SHADER)
-            .with("NEIGHBOURS", plan.neighbours as u32)
-            .with("CHOSEN", chosen as u32)
-            .with("NO_MEMBER", u32::from(NO_MEMBER))
-            .with("NO_KEY", NO_KEY)
-            .with("RANK_BITS", RANK_BITS)
-            .with("PLACES", PLACES as u32)
-            .with("WINDOW", GRAPH_WINDOW as u32)
-            .with("RADIUS", HALO);
-        Job::new::<Uniform>(kernel, loops).over_levels(plan)
-    };
-    let mut jobs = Vec::new();
-    if level > 0 {
-        jobs.push(job("downsample", 5 * 6));
-    }
-    if plan.neighbours > 0 {
-        let pass = chosen + PLACES * (1 + chosen) + chosen.div_ceil(4) * 5;
-        jobs.push(job("choose", plan.neighbours.div_ceil(chosen) * pass));
-        jobs.push(job("transpose", (PLACES + 1) * (1 + plan.neighbours.div_ceil(4))));
-    }
-    jobs
+/// Neighbours that `choose` finds in one pass.
+fn chosen(plan: &Plan) -> usize {
+    plan.neighbours.clamp(1, CHOSEN)
+}
+
+fn kernel<B: Bindings>(plan: &Plan, loops: usize) -> Kernel<B> {
+    Kernel::new(loops)
+        .with("NEIGHBOURS", plan.neighbours as u32)
+        .with("CHOSEN", chosen(plan) as u32)
+        .with("NO_MEMBER", u32::from(NO_MEMBER))
+        .with("NO_KEY", NO_KEY)
+        .with("RANK_BITS", RANK_BITS)
+        .with("PLACES", PLACES as u32)
+        .with("WINDOW", GRAPH_WINDOW as u32)
+        .with("RADIUS", HALO)
+        .over_levels(plan)
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
-    let (here, l) = (r.here(), r.params());
-    downsample(r)?;
-    let jobs = jobs(r.plan, r.level);
-    if let [.., choose, _] = &jobs[..]
-        && r.plan.neighbours > 0
-    {
-        r.rows(choose, &Uniform::of(r.plan), l.width, |rows| {
-            vec![(1, here.guide.bind(&with_halo(rows, HALO, l.height))), (3, here.members.bind(rows))]
+    let (plan, here, l) = (r.plan, r.here(), r.params());
+    record_guide(r)?;
+    if plan.neighbours > 0 {
+        r.rows(&choose(plan, r.level), &Uniform::of(plan), l.width, |rows| Choose {
+            guide: here.guide.bind(&with_halo(rows, HALO, l.height)),
+            members_out: here.members.bind(rows),
         })?;
     }
-    transpose(r)
+    record_transposed(r)
 }
 
 /// The same for all of `levels` at once, but for their guides.
 pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
     for z in levels.clone() {
         r.level = z;
-        downsample(r)?;
+        record_guide(r)?;
     }
     let (plan, buffers) = (r.plan, r.buffers);
-    let jobs = jobs(plan, levels.start);
-    if let [.., choose, transpose] = &jobs[..]
-        && plan.neighbours > 0
-    {
+    if plan.neighbours > 0 {
         let own = |z: usize| {
             let here = &buffers.levels[z];
             (Uniform { guide_at: here.guide_at(), ..Uniform::of(plan) }, here.params.width)
         };
-        r.levels(choose, levels.clone(), own, &[(1, &shared.guide), (3, &shared.members)])?;
-        r.levels(transpose, levels, own, &[(4, &shared.members), (5, &shared.incoming)])?;
+        let [guide, members, incoming] =
+            [&shared.guide, &shared.members, &shared.incoming].map(Binding::whole);
+        let bindings = Choose { guide, members_out: members.clone() };
+        r.levels(&choose(plan, levels.start), levels.clone(), own, bindings)?;
+        let bindings = Transpose { members_in: members, incoming };
+        r.levels(&transpose(plan, levels.start), levels, own, bindings)?;
     }
     Ok(())
 }
 
 /// Makes the guide of the level from that of the next finer one.
-fn downsample(r: &mut Recorder) -> Result<()> {
+fn record_guide(r: &mut Recorder) -> Result<()> {
     if r.level == 0 {
         return Ok(());
     }
@@ -99,22 +101,24 @@ fn downsample(r: &mut Recorder) -> Result<()> {
     let own = Uniform { fine: finer.params, ..Uniform::default() };
     // A dispatch must not read and write one buffer.
     let next = r.buffers.next_guide(&l);
-    r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
+    r.rows(&downsample(r.plan, r.level), &own, l.width, |rows| {
         let fine_rows = 2 * rows.start..(2 * rows.end).min(finer.params.height);
         let seen = with_halo(&fine_rows, 2, finer.params.height);
-        vec![(1, finer.guide.bind(&seen)), (2, next.bind(rows))]
+        Downsample { guide: finer.guide.bind(&seen), coarse_guide: next.bind(rows) }
     })?;
     r.copies(next.copy_to(&here.guide));
     Ok(())
 }
 
 /// Finds for every pixel the factors that hold it.
-pub(super) fn transpose(r: &mut Recorder) -> Result<()> {
+pub(super) fn record_transposed(r: &mut Recorder) -> Result<()> {
     let (here, l) = (r.here(), r.params());
     r.renew(&here.members);
-    let jobs = jobs(r.plan, r.level);
-    let Some(job) = jobs.last().filter(|_| r.plan.neighbours > 0) else { return Ok(()) };
-    r.rows(job, &Uniform::default(), l.width, |rows| {
-        vec![(4, here.members.bind(&with_halo(rows, HALO, l.height))), (5, here.incoming.bind(rows))]
+    if r.plan.neighbours == 0 {
+        return Ok(());
+    }
+    r.rows(&transpose(r.plan, r.level), &Uniform::default(), l.width, |rows| Transpose {
+        members_in: here.members.bind(&with_halo(rows, HALO, l.height)),
+        incoming: here.incoming.bind(rows),
     })
 }

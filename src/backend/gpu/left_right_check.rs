@@ -1,32 +1,24 @@
 //! What the right view says of each pixel: see [`Stage::LeftRightCheck`](crate::backend::Stage::LeftRightCheck).
 
-use super::shader::Kernel;
-use super::steps::{Job, Recorder};
-use super::uniform::uniform;
+use super::kernel::{Kernel, shader};
+use super::steps::Recorder;
 use crate::error::Result;
 use crate::options::LeftRightCheck;
-use crate::plan::Plan;
 use crate::stage::NO_LABEL;
 
-const SHADER: &str = include_str!("../../../shaders/left_right_check.wgsl");
-
-uniform! { is_on: u32 }
-
-pub(super) fn jobs(_: &Plan, _: usize) -> Vec<Job> {
-    let kernel = Kernel::new("left_right_check", "main", SHADER).with("NO_LABEL", u32::from(NO_LABEL));
-    vec![Job::new::<Uniform>(kernel, 0)]
+shader! {
+    "left_right_check"(plan, level) { is_on: u32 }
+    main: Main { optima, right_labels, left, flags } => Kernel::new(0).with("NO_LABEL", u32::from(NO_LABEL));
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
     let is_on = r.plan.method.refinement.left_right_check != LeftRightCheck::Off;
     let own = Uniform { is_on: is_on.into() };
-    r.rows(&jobs(r.plan, 0)[0], &own, l.width, |rows| {
-        vec![
-            (1, b.optima.bind(rows)),
-            (2, b.right_labels.bind(rows)),
-            (3, b.left.bind(rows)),
-            (4, b.flags.bind(rows)),
-        ]
+    r.rows(&main(r.plan, 0), &own, l.width, |rows| Main {
+        optima: b.optima.bind(rows),
+        right_labels: b.right_labels.bind(rows),
+        left: b.left.bind(rows),
+        flags: b.flags.bind(rows),
     })
 }

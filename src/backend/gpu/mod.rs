@@ -13,6 +13,7 @@ mod allocator;
 mod buffers;
 mod convergence;
 mod device;
+mod kernel;
 mod levels;
 mod probe;
 mod queue;
@@ -43,14 +44,14 @@ use buffers::{Buffers, LevelBuffers};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
+pub use kernel::{Kernel, MAX_LOOP_ITERATIONS};
 use levels::record_levels;
 use rows::Rows;
-pub use shader::{Constant, Kernel};
+pub use shader::{Constant, Shader, binding_number};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
-pub use steps::{Job, MAX_LOOP_ITERATIONS};
 use steps::{Pipelines, Recorder, Step};
 use timer::Timer;
 pub use uniform::UniformLayout;
@@ -72,13 +73,13 @@ macro_rules! declare {
 
         /// What `stage` runs of its shader, for `plan`, without a device.
         #[must_use]
-        pub fn jobs(stage: Stage, plan: &Plan) -> Vec<Job> {
+        pub fn kernels(stage: Stage, plan: &Plan) -> Vec<Kernel> {
             match stage {
-                $( Stage::$level(z) => $level_name::jobs(plan, z), )*
-                $( Stage::$level_row(z) => $level_row_name::jobs(plan, z), )*
-                $( Stage::$finest => $finest_name::jobs(plan, 0), )*
-                $( Stage::$finest_row => $finest_row_name::jobs(plan, 0), )*
-                $( Stage::$map => $map_name::jobs(plan, 0), )*
+                $( Stage::$level(z) => $level_name::kernels(plan, z), )*
+                $( Stage::$level_row(z) => $level_row_name::kernels(plan, z), )*
+                $( Stage::$finest => $finest_name::kernels(plan, 0), )*
+                $( Stage::$finest_row => $finest_row_name::kernels(plan, 0), )*
+                $( Stage::$map => $map_name::kernels(plan, 0), )*
             }
         }
 
@@ -96,10 +97,10 @@ macro_rules! declare {
 
 crate::for_every_stage!(declare);
 
-/// What a match by `plan` may run, beside the [`jobs`] of its stages.
+/// What a match by `plan` may run, beside the [`kernels`] of its stages.
 #[must_use]
-pub fn other_jobs(plan: &Plan) -> Vec<Job> {
-    upload::jobs(plan)
+pub fn other_kernels(plan: &Plan) -> Vec<Kernel> {
+    upload::kernels(plan, 0)
 }
 
 /// The GPU path on one device.

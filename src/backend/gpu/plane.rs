@@ -2,29 +2,29 @@
 //!
 //! Floor, a pixel: that of the median, and in each of two rounds 1,500 bytes asked for (53 places) and 2,500 operations.
 
-use super::median;
-use super::shader::Kernel;
-use super::steps::{Job, Recorder};
+use super::shader::Shader;
+use super::steps::Recorder;
+use super::{Kernel, median};
 use crate::error::Result;
 use crate::plan::Plan;
 use crate::plan::planes::{PLANE_BITS, PLANE_FARTHEST, PLANE_STEEPEST};
 use crate::weights::MedianWeights;
 
-const SHADER: &str = include_str!("../../../shaders/plane.wgsl");
+const SHADER: Shader = Shader::new("plane", "main", include_str!("../../../shaders/plane.wgsl"));
 
-pub(super) fn kernel() -> Kernel {
-    Kernel::new("plane", "main", SHADER)
+/// The kernel for a window with `weights`. It binds what the median does.
+pub(super) fn kernel(weights: &MedianWeights) -> Kernel<median::Main> {
+    median::over_window(SHADER, weights, PLANE_BITS.len())
         .with("FIRST_BITS", PLANE_BITS[0])
         .with("SECOND_BITS", PLANE_BITS[1])
         .with("STEEPEST", PLANE_STEEPEST)
         .with("FARTHEST", PLANE_FARTHEST)
 }
 
-pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    vec![median::job(&MedianWeights::of(&plan.method), kernel(), PLANE_BITS.len())]
+pub(super) fn kernels(plan: &Plan, _: usize) -> Vec<Kernel> {
+    vec![kernel(&MedianWeights::of(&plan.method)).any()]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
-    let job = &jobs(r.plan, 0)[0];
-    median::record_as(r, job)
+    median::record_as(r, &kernel(&MedianWeights::of(&r.plan.method)))
 }

@@ -106,8 +106,9 @@ impl Probe for Gpu {
             }
         }
         here.members.write(&mut self.device, &words)?;
-        let steps = self
-            .recorded_at(level, &state.plan, &state.buffers, None, |recorder| graph::transpose(recorder))?;
+        let steps = self.recorded_at(level, &state.plan, &state.buffers, None, |recorder| {
+            graph::record_transposed(recorder)
+        })?;
         self.state = Some(state);
         self.record(&steps)
     }

@@ -3,22 +3,17 @@
 //! Floor, for a fine label of level 1: 1 + 2/8 bytes moved, 31 asked for (the 5 x 5 window), 100 operations for four labels.
 
 use super::cost;
+use super::kernel::{Kernel, shader};
 use super::rows::with_halo;
-use super::shader::Kernel;
-use super::steps::{Job, Recorder};
-use super::uniform::{LevelParams, uniform};
+use super::steps::Recorder;
+use super::uniform::LevelParams;
 use crate::error::Result;
-use crate::plan::Plan;
 
-const SHADER: &str = include_str!("../../../shaders/pyramid.wgsl");
-
-uniform! { fine: LevelParams, label_offset: i32 }
-
-pub(super) fn jobs(plan: &Plan, level: usize) -> Vec<Job> {
-    let kernel = Kernel::new("pyramid", "main", SHADER)
+shader! {
+    "pyramid"(plan, level) { fine: LevelParams, label_offset: i32 }
+    main: Main { fine_cost, cost } => Kernel::new(7 * 31)
         .with("FINE_NARROW", level == 1)
         .with("LOW_PASS", !plan.minimum_over_d());
-    vec![Job::new::<Uniform>(kernel, 7 * 31)]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
@@ -32,9 +27,10 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 fn record_rows(r: &mut Recorder) -> Result<()> {
     let (finer, here, l) = (r.finer(), r.here(), r.params());
     let own = Uniform { fine: finer.params, label_offset: r.plan.label_offset(r.level) };
-    r.rows(&jobs(r.plan, r.level)[0], &own, 2 * l.width * l.quads, |rows| {
+    r.rows(&main(r.plan, r.level), &own, 2 * l.width * l.quads, |rows| {
         let fine_rows = 2 * rows.start..(2 * rows.end).min(finer.params.height);
-        vec![(1, finer.cost.bind(&with_halo(&fine_rows, 2, finer.params.height))), (2, here.cost.bind(rows))]
+        let seen = with_halo(&fine_rows, 2, finer.params.height);
+        Main { fine_cost: finer.cost.bind(&seen), cost: here.cost.bind(rows) }
     })?;
     r.renew(&here.cost);
     Ok(())

@@ -4,16 +4,26 @@
 //! for four labels.
 
 use super::buffers::Shared;
-use super::shader::Kernel;
-use super::steps::{Job, Recorder};
-use super::uniform::{LevelParams, uniform};
+use super::kernel::{Kernel, shader};
+use super::rows::Binding;
+use super::steps::Recorder;
+use super::uniform::LevelParams;
 use crate::error::Result;
-use crate::plan::{Plan, TruncationRule};
+use crate::plan::TruncationRule;
 use std::ops::Range;
 
-const SHADER: &str = include_str!("../../../shaders/resolution.wgsl");
-
-uniform! { fine: LevelParams, label_offset: i32, tau: u32, fine_at: u32 }
+shader! {
+    "resolution"(plan, level) { fine: LevelParams, label_offset: i32, tau: u32, fine_at: u32 }
+    main: Main { fine_belief, coarse_belief, down, up, windows, fine_windows } => {
+        // The finest levels have the most labels.
+        let (coarse, fine) = (plan.levels[1].stride, plan.levels[0].stride);
+        Kernel::new(fine + 3 * coarse + fine / 2)
+            .of_width(plan.volume_width)
+            .with("ABSOLUTE", plan.resolution.rule == TruncationRule::Absolute)
+            .with("INTERPOLATING", plan.interpolating())
+            .over_levels(plan)
+    };
+}
 
 impl Uniform {
     fn of(r: &Recorder, level: usize) -> Self {
@@ -26,29 +36,19 @@ impl Uniform {
     }
 }
 
-pub(super) fn jobs(plan: &Plan, _: usize) -> Vec<Job> {
-    // The finest levels have the most labels.
-    let (coarse, fine) = (plan.levels[1].stride, plan.levels[0].stride);
-    let kernel = Kernel::new("resolution", "main", SHADER)
-        .of_width(plan.volume_width)
-        .with("ABSOLUTE", plan.resolution.rule == TruncationRule::Absolute)
-        .with("INTERPOLATING", plan.interpolating());
-    vec![Job::new::<Uniform>(kernel, fine + 3 * coarse + fine / 2).over_levels(plan)]
-}
-
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (finer, here, l) = (r.finer(), r.here(), r.params());
     let own = Uniform::of(r, r.level);
-    r.rows(&jobs(r.plan, r.level)[0], &own, l.width, |rows| {
+    r.rows(&main(r.plan, r.level), &own, l.width, |rows| {
         let fine_rows = 2 * rows.start..(2 * rows.end).min(finer.params.height);
-        vec![
-            (1, finer.belief.bind(&fine_rows)),
-            (2, here.belief.bind(rows)),
-            (3, finer.down.bind(&fine_rows)),
-            (4, here.up.bind(rows)),
-            (5, here.windows.bind(&(0..1))),
-            (6, finer.windows.bind(&(0..1))),
-        ]
+        Main {
+            fine_belief: finer.belief.bind(&fine_rows),
+            coarse_belief: here.belief.bind(rows),
+            down: finer.down.bind(&fine_rows),
+            up: here.up.bind(rows),
+            windows: here.windows.bind(&(0..1)),
+            fine_windows: finer.windows.bind(&(0..1)),
+        }
     })
 }
 
@@ -59,7 +59,13 @@ pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usi
         (Uniform { fine, fine_at, ..Uniform::of(r, z) }, r.buffers.levels[z].params.width)
     });
     let (own, first): (Vec<_>, _) = (own.collect(), levels.start);
-    let s = shared;
-    let bound = [&s.belief, &s.belief, &s.down, &s.up, &s.windows, &s.windows];
-    r.levels(&jobs(r.plan, 1)[0], levels, |z| own[z - first], &(1..).zip(bound).collect::<Vec<_>>())
+    let bindings = Main {
+        fine_belief: Binding::whole(&shared.belief),
+        coarse_belief: Binding::whole(&shared.belief),
+        down: Binding::whole(&shared.down),
+        up: Binding::whole(&shared.up),
+        windows: Binding::whole(&shared.windows),
+        fine_windows: Binding::whole(&shared.windows),
+    };
+    r.levels(&main(r.plan, first), levels, |z| own[z - first], bindings)
 }

@@ -80,32 +80,21 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
     }
 }
 
-/// An entry point of a stage's shader, with the constants that specialise it. Equal kernels are compiled
-/// once.
+/// An entry point of a stage's shader, with the constants that specialise it. Equal ones are compiled once.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Kernel {
+pub struct Shader {
     stage: &'static str,
     entry: &'static str,
     text: &'static str,
-    width: Option<VolumeWidth>,
-    constants: Vec<(&'static str, Constant)>,
+    /// Width of messages and beliefs.
+    pub(super) width: Option<VolumeWidth>,
+    pub(super) constants: Vec<(&'static str, Constant)>,
 }
 
-impl Kernel {
+impl Shader {
     /// The entry point `entry` of the shader of `stage`, whose file holds `text`.
-    pub(super) fn new(stage: &'static str, entry: &'static str, text: &'static str) -> Self {
+    pub(super) const fn new(stage: &'static str, entry: &'static str, text: &'static str) -> Self {
         Self { stage, entry, text, width: None, constants: Vec::new() }
-    }
-
-    /// The same for messages and beliefs of this width.
-    pub(super) fn of_width(self, width: VolumeWidth) -> Self {
-        Self { width: Some(width), ..self }
-    }
-
-    /// The same with one more constant.
-    pub(super) fn with(mut self, name: &'static str, value: impl Into<Constant>) -> Self {
-        self.constants.push((name, value.into()));
-        self
     }
 
     /// Name of the stage that the shader belongs to.
@@ -153,6 +142,18 @@ impl Kernel {
     }
 }
 
+/// The number of the binding that the shader with this `source` calls `name`.
+#[must_use]
+pub fn binding_number(source: &str, name: &str) -> Option<u32> {
+    let bindings = source.lines().filter_map(|line| line.strip_prefix("@group(0) @binding("));
+    let mut parts = bindings.filter_map(|line| {
+        let (number, variable) = line.split_once(") var<")?;
+        let (_, variable) = variable.split_once("> ")?;
+        Some((number, variable.split_once(':')?.0))
+    });
+    parts.find(|part| part.1 == name)?.0.parse().ok()
+}
+
 fn shared_part(name: &str) -> &'static str {
     SHARED.iter().find(|part| part.0 == name).expect("an import names a file in shaders/shared").1
 }
@@ -191,7 +192,8 @@ mod tests {
 
     #[test]
     fn constants_have_their_types() {
-        let kernel = Kernel::new("a", "main", "").with("A", 3).with("B", 4u32).with("C", true);
-        assert_eq!(kernel.source(), "const A: i32 = 3;\nconst B: u32 = 4u;\nconst C = true;\n");
+        let constants = vec![("A", 3.into()), ("B", 4u32.into()), ("C", true.into())];
+        let shader = Shader { constants, ..Shader::new("a", "main", "") };
+        assert_eq!(shader.source(), "const A: i32 = 3;\nconst B: u32 = 4u;\nconst C = true;\n");
     }
 }

@@ -2,16 +2,14 @@
 
 use super::buffers::{Buffers, LevelBuffers};
 use super::device::Device;
+use super::kernel::{Bindings, Kernel, MAX_LOOP_ITERATIONS};
 use super::rows::{Binding, Copy, Rows};
-use super::shader::{Kernel, WORKGROUP};
-use super::uniform::{self, Band, Header, Layout, LevelParams, UniformLayout};
+use super::shader::{Shader, WORKGROUP, binding_number};
+use super::uniform::{self, Band, Header, LevelParams};
 use crate::error::{DeviceError, MemoryError, Result};
 use crate::plan::{LevelPlan, Plan};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
-
-/// Largest total number of loop iterations of one invocation.
-pub const MAX_LOOP_ITERATIONS: usize = 32_768;
 
 /// The commands of a stage, in order.
 pub(super) enum Step {
@@ -37,37 +35,16 @@ pub(super) enum Groups {
     UntilSettled(usize),
 }
 
+/// A compiled kernel.
+#[derive(Clone)]
+pub(super) struct Pipeline {
+    inner: wgpu::ComputePipeline,
+    /// The binding number of each of its names.
+    numbers: Vec<u32>,
+}
+
 /// Compiled kernels.
-pub(super) type Pipelines = HashMap<Kernel, wgpu::ComputePipeline>;
-
-/// A kernel as a plan specialises it, before there is a device.
-#[derive(Clone, Debug)]
-pub struct Job {
-    /// The entry point and its constants.
-    pub kernel: Kernel,
-    /// Largest total number of loop iterations of one invocation. Mesa 22 stops a shader silently after about
-    /// 65,000.
-    pub loops: usize,
-    /// The uniform that it reads: one, or an array of one for each of so many levels.
-    pub uniform: UniformLayout,
-    sections: Option<usize>,
-}
-
-impl Job {
-    /// `kernel` with `U` as the stage's own uniform, and at most `loops` loop iterations.
-    pub(super) fn new<U: Layout>(kernel: Kernel, loops: usize) -> Self {
-        Self { kernel, loops, uniform: UniformLayout::of::<U>(), sections: None }
-    }
-
-    /// The same for a kernel that may go over as many levels at once as `plan` has.
-    pub(super) fn over_levels(self, plan: &Plan) -> Self {
-        let levels = plan.levels.len();
-        Self { kernel: self.kernel.with("SECTIONS", levels as u32), sections: Some(levels), ..self }
-    }
-}
-
-/// Buffers to bind, each with its binding number in the shader.
-pub(super) type Bindings = Vec<(u32, Binding)>;
+pub(super) type Pipelines = HashMap<Shader, Pipeline>;
 
 /// What a dispatch does at a level.
 struct Section<U> {
@@ -110,34 +87,38 @@ impl<'a> Recorder<'a> {
         self.here().params
     }
 
-    /// Dispatches `job` for the rows of the level, with `threads` invocations per row and one dispatch per
+    /// Dispatches `kernel` for the rows of the level, with `threads` invocations per row and one dispatch per
     /// band. `bind` gives the buffers for a range of rows.
-    pub(super) fn rows<U: Layout>(
+    pub(super) fn rows<B: Bindings>(
         &mut self,
-        job: &Job,
-        own: &U,
+        kernel: &Kernel<B>,
+        own: &B::Uniform,
         threads: u32,
-        bind: impl Fn(&Range<u32>) -> Bindings,
+        bind: impl Fn(&Range<u32>) -> B,
     ) -> Result<()> {
-        for rows in self.bands(&self.cuts(), &bind)? {
-            let bindings = bind(&rows);
-            let height = rows.end - rows.start;
-            self.dispatch(job, own, rows, (threads, height), &bindings)?;
-        }
-        Ok(())
+        self.each_band(kernel, own, |height| (threads, height), bind)
     }
 
     /// The same with one invocation per row.
-    pub(super) fn one_a_row<U: Layout>(
+    pub(super) fn one_a_row<B: Bindings>(
         &mut self,
-        job: &Job,
-        own: &U,
-        bind: impl Fn(&Range<u32>) -> Bindings,
+        kernel: &Kernel<B>,
+        own: &B::Uniform,
+        bind: impl Fn(&Range<u32>) -> B,
     ) -> Result<()> {
-        for rows in self.bands(&self.cuts(), &bind)? {
-            let bindings = bind(&rows);
-            let height = rows.end - rows.start;
-            self.dispatch(job, own, rows, (height, 1), &bindings)?;
+        self.each_band(kernel, own, |height| (height, 1), bind)
+    }
+
+    fn each_band<B: Bindings>(
+        &mut self,
+        kernel: &Kernel<B>,
+        own: &B::Uniform,
+        size: impl Fn(u32) -> (u32, u32),
+        bind: impl Fn(&Range<u32>) -> B,
+    ) -> Result<()> {
+        for rows in self.bands(&self.cuts(), |rows| bind(rows).all())? {
+            let (size, bindings) = (size(rows.end - rows.start), bind(&rows));
+            self.dispatch(kernel, own, rows, size, bindings)?;
         }
         Ok(())
     }
@@ -192,13 +173,13 @@ impl<'a> Recorder<'a> {
 
     /// Bands of all rows, as few as possible, such that no binding exceeds the device's largest. For bindings
     /// that hold no volumes.
-    pub(super) fn map_bands(&self, bind: impl Fn(&Range<u32>) -> Bindings) -> Result<Vec<Range<u32>>> {
+    pub(super) fn map_bands(&self, bind: impl Fn(&Range<u32>) -> Vec<Binding>) -> Result<Vec<Range<u32>>> {
         self.bands(&[0, self.params().height], bind)
     }
 
     /// The same between given `cuts`.
-    fn bands(&self, cuts: &[u32], bind: impl Fn(&Range<u32>) -> Bindings) -> Result<Vec<Range<u32>>> {
-        let largest = |rows: &Range<u32>| bind(rows).iter().map(|(_, b)| b.size()).max().unwrap_or(0);
+    fn bands(&self, cuts: &[u32], bind: impl Fn(&Range<u32>) -> Vec<Binding>) -> Result<Vec<Range<u32>>> {
+        let largest = |rows: &Range<u32>| bind(rows).iter().map(Binding::size).max().unwrap_or(0);
         let mut bands = Vec::new();
         for part in cuts.windows(2).map(|ends| ends[0]..ends[1]) {
             let mut rows = part.end - part.start;
@@ -225,49 +206,46 @@ impl<'a> Recorder<'a> {
         Ok(bands)
     }
 
-    /// Dispatches `job` for the band `rows`, with `size.0` invocations in each of `size.1` rows.
-    pub(super) fn dispatch<U: Layout>(
+    /// Dispatches `kernel` for the band `rows`, with `size.0` invocations in each of `size.1` rows.
+    pub(super) fn dispatch<B: Bindings>(
         &mut self,
-        job: &Job,
-        own: &U,
+        kernel: &Kernel<B>,
+        own: &B::Uniform,
         rows: Range<u32>,
         size: (u32, u32),
-        bindings: &[(u32, Binding)],
+        bindings: B,
     ) -> Result<()> {
-        self.dispatch_sections(
-            job,
-            &[Section { level: self.params(), rows, size, at: (0, 0), own: *own }],
-            bindings,
-        )
+        let section = Section { level: self.params(), rows, size, at: (0, 0), own: *own };
+        self.dispatch_sections(kernel, &[section], bindings)
     }
 
-    /// Dispatches `job` for all rows of `levels` at once, which [share](super::buffers::Shared) their buffers. `own` gives the
-    /// parameters of a level and its number of invocations in a row.
-    pub(super) fn levels<U: Layout>(
+    /// Dispatches `kernel` for all rows of `levels` at once, which [share](super::buffers::Shared) their
+    /// buffers. `own` gives the parameters of a level and its number of invocations in a row.
+    pub(super) fn levels<B: Bindings>(
         &mut self,
-        job: &Job,
+        kernel: &Kernel<B>,
         levels: Range<usize>,
-        own: impl Fn(usize) -> (U, u32),
-        bindings: &[(u32, &wgpu::Buffer)],
+        own: impl Fn(usize) -> (B::Uniform, u32),
+        bindings: B,
     ) -> Result<()> {
         let sections = levels.map(|z| {
             let (here, (own, threads)) = (&self.buffers.levels[z], own(z));
             let (level, at) = here.shared_params(self.plan);
             Section { level, rows: 0..level.height, size: (threads, level.height), at, own }
         });
-        let bindings: Bindings = bindings.iter().map(|(place, b)| (*place, Binding::whole(b))).collect();
-        self.dispatch_sections(job, &sections.collect::<Vec<_>>(), &bindings)
+        self.dispatch_sections(kernel, &sections.collect::<Vec<_>>(), bindings)
     }
 
-    fn dispatch_sections<U: Layout>(
+    fn dispatch_sections<B: Bindings>(
         &mut self,
-        job: &Job,
-        sections: &[Section<U>],
-        bindings: &[(u32, Binding)],
+        kernel: &Kernel<B>,
+        sections: &[Section<B::Uniform>],
+        bindings: B,
     ) -> Result<()> {
-        let pipeline = self.pipeline(job)?;
-        let row_groups = |section: &Section<U>| section.size.0.div_ceil(WORKGROUP).max(1);
-        let groups = |section: &Section<U>| u64::from(row_groups(section)) * u64::from(section.size.1);
+        let pipeline = self.pipeline(kernel)?;
+        let row_groups = |section: &Section<B::Uniform>| section.size.0.div_ceil(WORKGROUP).max(1);
+        let groups =
+            |section: &Section<B::Uniform>| u64::from(row_groups(section)) * u64::from(section.size.1);
         let total: u64 = sections.iter().map(groups).sum();
         let grid = total.min(u64::from(self.device.max_groups)).max(1) as u32;
         let (mut bytes, mut first_group) = (Vec::new(), 0);
@@ -287,7 +265,7 @@ impl<'a> Recorder<'a> {
             first_group += groups(section) as u32;
         }
         // The shader's array has room for all levels.
-        bytes.resize(bytes.len() / sections.len() * job.sections.unwrap_or(1), 0);
+        bytes.resize(bytes.len() / sections.len() * kernel.sections, 0);
         let work: u64 = sections.iter().map(|s| u64::from(s.size.0) * u64::from(s.size.1)).sum();
         let device = self.device.inner()?;
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
@@ -297,15 +275,13 @@ impl<'a> Recorder<'a> {
             mapped_at_creation: false,
         });
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
-        entries.extend(
-            bindings.iter().map(|(place, binding)| wgpu::BindGroupEntry {
-                binding: *place,
-                resource: binding.resource(),
-            }),
-        );
+        let bindings = bindings.all();
+        entries.extend(pipeline.numbers.iter().zip(&bindings).map(|(number, binding)| {
+            wgpu::BindGroupEntry { binding: *number, resource: binding.resource() }
+        }));
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &pipeline.get_bind_group_layout(0),
+            layout: &pipeline.inner.get_bind_group_layout(0),
             entries: &entries,
         });
         self.device.write(&uniform, &bytes)?;
@@ -318,40 +294,44 @@ impl<'a> Recorder<'a> {
             }
         };
         self.steps.push(Step::Dispatch(Dispatch {
-            pipeline,
+            pipeline: pipeline.inner,
             bind_group,
             groups,
-            work: job.loops.max(1) as u64 * work,
+            work: kernel.loops.max(1) as u64 * work,
         }));
         Ok(())
     }
 
-    /// The pipeline of `job`, compiled on first use.
-    fn pipeline(&mut self, job: &Job) -> Result<wgpu::ComputePipeline> {
-        let Job { kernel, loops, .. } = job;
+    /// The pipeline of `kernel`, compiled on first use.
+    fn pipeline<B>(&mut self, kernel: &Kernel<B>) -> Result<Pipeline> {
+        let Kernel { shader, loops, names, .. } = kernel;
         if *loops > MAX_LOOP_ITERATIONS {
             let LevelPlan { width, height, labels, .. } = self.plan.levels[0];
-            let (neighbours, shader) = (self.plan.neighbours, kernel.stage());
+            let (neighbours, shader) = (self.plan.neighbours, shader.stage());
             return Err(DeviceError::TooLargeForShader { width, height, labels, neighbours, shader }.into());
         }
-        if let Some(pipeline) = self.pipelines.get(kernel) {
+        if let Some(pipeline) = self.pipelines.get(shader) {
             return Ok(pipeline.clone());
         }
+        let source = shader.source();
+        let number = |name: &&str| binding_number(&source, name).expect("the shader has what is bound");
+        let numbers = names.iter().map(number).collect();
         let device = self.device.inner()?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(kernel.stage()),
-            source: wgpu::ShaderSource::Wgsl(kernel.source().into()),
+            label: Some(shader.stage()),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(kernel.stage()),
+        let inner = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(shader.stage()),
             layout: None,
             module: &module,
-            entry_point: Some(kernel.entry()),
+            entry_point: Some(shader.entry()),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
         self.device.check()?;
-        self.pipelines.insert(kernel.clone(), pipeline.clone());
+        let pipeline = Pipeline { inner, numbers };
+        self.pipelines.insert(shader.clone(), pipeline.clone());
         Ok(pipeline)
     }
 }

@@ -17,30 +17,13 @@ macro_rules! layout {
     };
 }
 
-/// Declares `Uniform`, the stage's own fields in the order of its shader.
-macro_rules! uniform {
-    ($( $field:ident: $type:ty ),* $(,)?) => {
-        #[repr(C)]
-        #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-        pub(super) struct Uniform {
-            $( $field: $type, )*
-        }
-
-        $crate::backend::gpu::uniform::layout!(Uniform: $($field),*);
-    };
-}
-
-pub(super) use {layout, uniform};
+pub(super) use layout;
 
 /// Names and offsets of the fields of a struct, in bytes. Fields whose names start with `padding` do not
 /// exist in the shader.
 pub(super) trait Layout: Pod {
     /// Every field.
     const FIELDS: &'static [(&'static str, usize)];
-}
-
-impl Layout for () {
-    const FIELDS: &'static [(&'static str, usize)] = &[];
 }
 
 /// `Level` of `shaders/shared/band.wgsl`.

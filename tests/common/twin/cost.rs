@@ -17,18 +17,18 @@ pub fn cost(plan: &Plan, pair: &Pair) -> Vec<u32> {
                     out.push(u32::from(plan.outside_cost));
                     continue;
                 }
+                let census = || {
+                    let at = |x: i64| (y * level.width as i64 + x) as usize;
+                    let (l, r) = (&left_census[at(x)], &right_census[at(x - d)]);
+                    let hamming = l.iter().zip(r).filter(|(l, r)| l != r).count();
+                    4 * (hamming as i64).min(40)
+                };
                 let cost = match plan.method.cost.matching {
                     MatchingCost::Sad => sad(left, right, x, y, d, i64::from(plan.method.cost.sad_window)),
-                    MatchingCost::Census | MatchingCost::AdCensus => {
-                        let at = |x: i64| (y * level.width as i64 + x) as usize;
-                        let (l, r) = (&left_census[at(x)], &right_census[at(x - d)]);
-                        let hamming = l.iter().zip(r).filter(|(l, r)| l != r).count();
-                        let census = 4 * (hamming as i64).min(40);
+                    MatchingCost::Census => census(),
+                    MatchingCost::AdCensus => {
                         let colour = difference(left, x, right, x - d, y, |level| level / 256).min(64);
-                        match plan.method.cost.matching {
-                            MatchingCost::AdCensus => census + (weight(plan, left, x, y) * colour + 32) / 64,
-                            _ => census,
-                        }
+                        census() + (weight(plan, left, x, y) * colour + 32) / 64
                     }
                 };
                 out.push(u32::try_from(cost).unwrap());

@@ -3,7 +3,7 @@
 //! Every thread goes down a band of rows. It keeps the sums over the window's rows for each column and label: the row that
 //! enters the window is added, the one that leaves it is taken off. Along a row, these sums are added up in the same way.
 
-use super::units::{block, block_mut, each_lane, padding};
+use crate::backend::cpu::units::{block, block_mut, each_lane, padding};
 use crate::image::{Image, Pair, Pixel};
 use crate::plan::{COST_MAX, LABEL_BLOCK, LevelPlan, Plan};
 use rayon::prelude::*;
