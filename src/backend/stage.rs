@@ -133,11 +133,11 @@ macro_rules! for_every_stage {
                 /// [`flag::OUTSIDE`]: crate::maps::flag::OUTSIDE
                 /// [`flag::OCCLUDED`]: crate::maps::flag::OCCLUDED
                 LeftRightCheck left_right_check;
-                /// Sets [`flag::SPECKLE`](crate::maps::flag::SPECKLE), among the pixels that [`Stage::LeftRightCheck`] left without a flag, on
-                /// those whose runner-up has the belief of the best label, and on every pixel of each region of fewer than
-                /// [`crate::options::RefinementOptions::speckle_size`] pixels. Regions are of the others, 4-connected; labels that
-                /// differ by at most one connect. (A tie says that nothing tells the labels apart, as where an image is overexposed. The
-                /// best label is then merely the lowest, in regions that may be large.)
+                /// Among the pixels that [`Stage::LeftRightCheck`] left without a flag, those whose runner-up has the belief of the best
+                /// label get [`flag::TIE`](crate::maps::flag::TIE). The others form 4-connected regions; labels that differ by at most one
+                /// connect. Every pixel of a region of fewer than [`crate::options::RefinementOptions::speckle_size`] pixels gets
+                /// [`flag::SPECKLE`](crate::maps::flag::SPECKLE). A tie is in no region, so no pixel gets both. (A tie says that nothing tells the
+                /// labels apart, as where an image is overexposed. The best label is then merely the lowest, in regions that may be large.)
                 SpeckleFilter speckle_filter;
                 /// [`Map::Confidence`](super::Map::Confidence): how far the best runner-up is behind the optimum, in half units (eighths of a nat), at most 255;
                 /// 255 where there is no runner-up, 0 for invalid pixels. Sets
@@ -172,8 +172,8 @@ macro_rules! for_every_stage {
                 /// 5. A filled pixel (x, y) takes the vote of that half-size pixel with a vote, among the 3 x 3 around (x >> 1, y >> 1) that are inside, whose colour
                 ///    differs least from its own (c >> 8), [`VOTE_AWAY`](crate::plan::votes::VOTE_AWAY) added for each column and row away, the first in reading order on ties. Without any it
                 ///    keeps what it has. A valid pixel that is not sure is outvoted where half-size pixel (x >> 1, y >> 1) has a vote that is more than
-                ///    [`VOTE_OUTVOTES`](crate::plan::votes::VOTE_OUTVOTES) from its disparity. It takes this vote, its flags are [`flag::SPECKLE`](crate::maps::flag::SPECKLE) and
-                ///    [`flag::FILLED`](crate::maps::flag::FILLED), and its confidence is 0.
+                ///    [`VOTE_OUTVOTES`](crate::plan::votes::VOTE_OUTVOTES) from its disparity. It takes this vote, its flags are [`flag::OUTVOTED`](crate::maps::flag::OUTVOTED) and
+                ///    [`flag::FILLED`](crate::maps::flag::FILLED) alone, and its confidence is 0.
                 VoteFill vote_fill;
                 /// [`Stage::Plane`] on filled pixels alone, or [`Stage::Median`] where [`crate::options::RefinementOptions::plane`] is off,
                 /// twice: with places as far apart as either of [`FILL_STEP_BITS`](crate::weights::FILL_STEP_BITS) says. x and y count in places
