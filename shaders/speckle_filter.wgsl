@@ -178,13 +178,11 @@ fn flag(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let seen = params.band.first_row + id.y - halo_start(params.halo);
     let here = id.y * pitch + id.x;
     let at = atomicLoad(&parents[seen * pitch + id.x]);
-    var speckle = false;
     if at != NOWHERE {
-        speckle = atomicLoad(&sizes[at]) < params.size;
-    } else {
-        speckle = (flags[here] & VALIDITY) == 0u && tie(here);
-    }
-    if speckle {
-        flags[here] |= SPECKLE;
+        if atomicLoad(&sizes[at]) < params.size {
+            flags[here] |= SPECKLE;
+        }
+    } else if (flags[here] & VALIDITY) == 0u && tie(here) {
+        flags[here] |= TIE;
     }
 }

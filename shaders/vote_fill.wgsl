@@ -288,7 +288,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let vote = votes[(middle.y - params.first_voted) * params.half_pitch + middle.x];
         if may_be_outvoted(flags[at]) && vote != NONE && abs(vote - disparity[at]) > VOTE_OUTVOTES {
             disparity[at] = vote;
-            flags[at] = SPECKLE | FILLED;
+            flags[at] = OUTVOTED | FILLED;
         }
         return;
     }

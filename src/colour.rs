@@ -170,25 +170,22 @@ pub fn classes(class: &Plane<usize>, palette: &[(u32, [u8; 3])]) -> Plane<[u8; 3
 }
 
 /// The colours of [`validity`]: the bit that decides, and its colour. The colour-blind can tell them apart.
-pub const VALIDITY: [(u32, [u8; 3]); 6] = [
+pub const VALIDITY: [(u32, [u8; 3]); 8] = [
     (0, [226, 226, 226]),
     (flag::OUTSIDE as u32, [0, 114, 178]),
     (flag::OCCLUDED as u32, [230, 159, 0]),
     (flag::SPECKLE as u32, [204, 121, 167]),
+    (flag::TIE as u32, [86, 180, 233]),
+    (flag::OUTVOTED as u32, [213, 94, 0]),
     (flag::LOW_CONFIDENCE as u32, [0, 158, 115]),
     (flag::MASKED as u32, [0, 0, 0]),
 ];
 
 /// The validity map in the colours of [`VALIDITY`], with the numbers of the bits below it. If a pixel has
-/// several flags, the first reason for which it was rejected decides. A pixel that has no disparity in the
-/// end is half as bright.
+/// several of these flags, the first decides. A pixel that has no disparity in the end is half as bright.
 #[must_use]
 pub fn validity(map: &Plane<u8>) -> Plane<[u8; 3]> {
-    const FIRST: [u8; 5] = [flag::MASKED, flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::LOW_CONFIDENCE];
-    let decisive = |flags: u8| FIRST.into_iter().find(|bit| flags & bit != 0).unwrap_or(0);
-    let place = |flags: &u8| {
-        VALIDITY.iter().position(|entry| entry.0 == decisive(*flags) as u32).unwrap_or(VALIDITY.len())
-    };
+    let place = |&flags: &u8| VALIDITY.iter().position(|(bit, _)| u32::from(flags) & bit != 0).unwrap_or(0);
     let mut picture = classes(&map.map(place), &VALIDITY);
     for (out, &flags) in picture.data_mut().iter_mut().zip(map.data()) {
         if !has_disparity(flags) {
@@ -444,12 +441,14 @@ mod tests {
 
     #[test]
     fn validity_shows_the_first_reason_and_what_stays_open() {
-        let flags = [0, 1 | 16, 2 | 16, 2, 4 | 2 | 16, 8, 32, 4 | 16];
-        let picture = validity(&Plane::new(8, 1, flags.to_vec()));
+        let flags = [0, 1 | 16, 2 | 16, 2, 4 | 2 | 16, 8, 32, 4 | 16, 64, 128 | 16];
+        let picture = validity(&Plane::new(10, 1, flags.to_vec()));
         let colours = VALIDITY.map(|entry| entry.1);
-        let [trusted, outside, occluded, small, low, masked] = colours;
-        let expected = [trusted, outside, occluded, occluded.map(|v| v / 2), occluded, low, masked, small];
-        assert_eq!([0, 1, 2, 3, 4, 5, 6, 7].map(|x| picture[(x, 0)]), expected);
+        let [trusted, outside, occluded, small, tie, outvoted, low, masked] = colours;
+        let half = |colour: Rgb| colour.map(|v| v / 2);
+        let expected =
+            [trusted, outside, occluded, half(occluded), occluded, low, masked, small, half(tie), outvoted];
+        assert_eq!(picture.data()[..10], expected);
         for (i, a) in colours.iter().enumerate() {
             for b in &colours[..i] {
                 assert!(a.iter().zip(b).map(|(a, b)| a.abs_diff(*b) as u32).sum::<u32>() > 60, "{a:?} {b:?}");

@@ -11,7 +11,7 @@ pub mod flag {
     pub const OUTSIDE: u8 = 1;
     /// The right view disagrees: occluded, or mistaken.
     pub const OCCLUDED: u8 = 2;
-    /// The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
+    /// The pixel is in a region too small to be trusted.
     pub const SPECKLE: u8 = 4;
     /// The confidence is below the floor; the disparity stays.
     pub const LOW_CONFIDENCE: u8 = 8;
@@ -19,9 +19,26 @@ pub mod flag {
     pub const FILLED: u8 = 16;
     /// The pixel is masked in the input, and has no disparity.
     pub const MASKED: u8 = 32;
-    /// Any of the reasons for which a disparity is given up before the fill.
-    pub const INVALID: u8 = OUTSIDE | OCCLUDED | SPECKLE | MASKED;
+    /// Two labels match equally well.
+    pub const TIE: u8 = 64;
+    /// The pixels around it outvote the disparity, and it is filled in from them.
+    pub const OUTVOTED: u8 = 128;
+    /// Any of the reasons for which a disparity is given up. A pixel has at most one of them.
+    pub const INVALID: u8 = OUTSIDE | OCCLUDED | SPECKLE | MASKED | TIE | OUTVOTED;
 }
+
+/// The bits of the validity map, each with its name and what it says; 0 stands for a pixel without any.
+pub const REASONS: [(u8, &str, &str); 9] = [
+    (0, "measured", "found in both views and trusted"),
+    (flag::OUTSIDE, "outside", "the match is outside the right image"),
+    (flag::OCCLUDED, "occluded", "the right view disagrees: hidden there, or mistaken"),
+    (flag::SPECKLE, "small region", "in a region too small to be trusted"),
+    (flag::TIE, "tie", "two disparities match equally well"),
+    (flag::OUTVOTED, "outvoted", "the pixels around it agree on another disparity, which it has taken"),
+    (flag::LOW_CONFIDENCE, "low confidence", "another disparity is nearly as good"),
+    (flag::FILLED, "filled", "taken from pixels around it"),
+    (flag::MASKED, "masked", "the image holds no data here"),
+];
 
 /// What a match leaves behind; all maps have the size of the images.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -134,7 +134,6 @@ fn maps_on(backend: &mut dyn Backend, case: &Case, tiles: &Tiles) -> mrfgs::Resu
 
 /// The first documented invariant that the maps violate.
 fn broken(maps: &Maps, pair: &Pair, range: DisparityRange) -> Option<String> {
-    const KNOWN: u8 = flag::INVALID | flag::LOW_CONFIDENCE | flag::FILLED;
     let sizes = [maps.disparity.size(), maps.raw.size(), maps.confidence.size(), maps.validity.size()];
     if sizes != [pair.size(); 4] {
         return Some(format!("sizes {sizes:?} of a pair of {:?}", pair.size()));
@@ -147,7 +146,8 @@ fn broken(maps: &Maps, pair: &Pair, range: DisparityRange) -> Option<String> {
         let (disparity, raw) = (maps.disparity[at], maps.raw[at]);
         let masked = pair.left().masked[at];
         let promises = [
-            ("bits that mean nothing", validity & !KNOWN == 0),
+            ("two reasons", (validity & (flag::INVALID | flag::LOW_CONFIDENCE)).count_ones() <= 1),
+            ("outvoted, and not filled", validity & flag::OUTVOTED == 0 || validity & flag::FILLED != 0),
             ("the mask", (validity & flag::MASKED != 0) == masked),
             ("masked, and filled", !masked || validity & flag::FILLED == 0),
             ("filled without need", validity & flag::FILLED == 0 || validity & flag::INVALID != 0),
@@ -232,7 +232,9 @@ fn broken_promises_are_noticed() {
         let what = broken(&changed, &pair, range);
         assert!(what.as_ref().is_some_and(|what| what.contains(word)), "{word}: {what:?}");
     };
-    noticed("bits", |maps| maps.validity[(1, 1)] |= 64);
+    noticed("two reasons", |maps| maps.validity[(1, 1)] = flag::TIE | flag::SPECKLE);
+    noticed("two reasons", |maps| maps.validity[(1, 1)] = flag::OUTVOTED | flag::LOW_CONFIDENCE);
+    noticed("outvoted, and", |maps| maps.validity[(1, 1)] = flag::OUTVOTED);
     noticed("the mask", |maps| maps.validity[(8, 6)] = 0);
     noticed("masked, and", |maps| maps.validity[(8, 6)] |= flag::FILLED);
     noticed("filled without", |maps| maps.validity[(1, 1)] = flag::FILLED);

@@ -14,7 +14,7 @@ pub enum Flag {
     Outside = 1,
     /// The right view disagrees: occluded, or mistaken.
     Occluded = 2,
-    /// The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
+    /// The pixel is in a region too small to be trusted.
     Speckle = 4,
     /// The confidence is low; the disparity stays.
     LowConfidence = 8,
@@ -22,6 +22,10 @@ pub enum Flag {
     Filled = 16,
     /// The pixel is ignored, and has no disparity.
     Masked = 32,
+    /// Two labels match equally well.
+    Tie = 64,
+    /// The pixels around it outvote the disparity, and it is filled in from them.
+    Outvoted = 128,
 }
 
 // The header takes numbers alone.
@@ -32,6 +36,8 @@ const _: () = assert!(
         && Flag::LowConfidence as u8 == flag::LOW_CONFIDENCE
         && Flag::Filled as u8 == flag::FILLED
         && Flag::Masked as u8 == flag::MASKED
+        && Flag::Tie as u8 == flag::TIE
+        && Flag::Outvoted as u8 == flag::OUTVOTED
 );
 
 /// Where maps are written; all of them have the size of the images. Null leaves a map out. Strides are in bytes, from a row to the next

@@ -45,8 +45,9 @@ class Matched:
         """How far the best runner-up is behind, in 1/8 nat; 0 where there is no measurement."""
     @property
     def validity(self) -> npt.NDArray[np.uint8]:
-        """Why each pixel is what it is: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, a tie
-        or outvoted, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted."""
+        """Why each pixel is what it is: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
+        confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured
+        and trusted."""
     @property
     def right(self) -> npt.NDArray[np.float32] | None:
         """Disparity of the right view in pixels, +inf where there is none: right (x, y) with disparity d is seen at left

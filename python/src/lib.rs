@@ -97,8 +97,8 @@ struct PyMatched {
     raw: Py<PyArray2<f32>>,
     /// How far the best runner-up is behind, in 1/8 nat, uint8; 0 where there is no measurement.
     confidence: Py<PyArray2<u8>>,
-    /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, a tie
-    /// or outvoted, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted.
+    /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
+    /// confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured and trusted.
     validity: Py<PyArray2<u8>>,
     /// Disparity of the right view in pixels, float32, +inf where there is none: right (x, y) with disparity d is seen at left
     /// (x + d, y). None unless the option "right-map" asks for it.

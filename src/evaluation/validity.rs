@@ -8,9 +8,9 @@ use crate::image::Plane;
 use crate::maps::flag;
 
 /// The flags of pixels without a match of their own.
-const FLAGGED: u8 = flag::OUTSIDE | flag::OCCLUDED | flag::SPECKLE;
+const FLAGGED: u8 = flag::INVALID & !flag::MASKED;
 
-/// How well the flags for outside, occluded and speckle pixels detect the pixels that one view does not see.
+/// How well the flags of pixels without a match of their own detect the pixels that one view does not see.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Detection {
     /// Share of the flagged pixels that one view does not see, in percent; `None` when none is flagged.
@@ -67,18 +67,21 @@ mod tests {
             0,
             0,
             flag::OUTSIDE,
+            flag::TIE,
+            flag::OUTVOTED | flag::FILLED,
         ];
-        let mut truth = Plane::filled(8, 1, 3.0);
+        let mut truth = Plane::filled(10, 1, 3.0);
         truth[(7, 0)] = f32::INFINITY;
-        let mask = Plane::new(8, 1, vec![128, 0, 255, 128, 255, 255, 128, 128]);
-        // Flagged: 0, 1, 2. Not seen by one view: 0, 1, 3, 6.
-        let found = detect(&Plane::new(8, 1, flags.to_vec()), &truth, &mask).unwrap();
-        assert_eq!(found, Detection { precision: Some(200.0 / 3.0), recall: Some(50.0) });
+        let mask = Plane::new(10, 1, vec![128, 0, 255, 128, 255, 255, 128, 128, 255, 128]);
+        // Flagged: 0, 1, 2, 8, 9. Not seen by one view: 0, 1, 3, 6, 9.
+        let found = detect(&Plane::new(10, 1, flags.to_vec()), &truth, &mask).unwrap();
+        assert_eq!(found, Detection { precision: Some(60.0), recall: Some(60.0) });
 
-        let nothing = Plane::filled(8, 1, 0);
+        let nothing = Plane::filled(10, 1, 0);
         let found = detect(&nothing, &truth, &mask).unwrap();
         assert_eq!(found, Detection { precision: None, recall: Some(0.0) });
-        let found = detect(&Plane::filled(8, 1, flag::OCCLUDED), &truth, &Plane::filled(8, 1, 255)).unwrap();
+        let found =
+            detect(&Plane::filled(10, 1, flag::OCCLUDED), &truth, &Plane::filled(10, 1, 255)).unwrap();
         assert_eq!(found, Detection { precision: Some(0.0), recall: None });
 
         let error = detect(&Plane::filled(7, 1, 0), &truth, &mask).unwrap_err().to_string();

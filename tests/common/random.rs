@@ -462,8 +462,15 @@ fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plan
         } else if random.one_in(6) {
             flag::MASKED
         } else {
-            let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE]);
-            if filled && !random.one_in(4) { reason | flag::FILLED } else { reason }
+            let reason =
+                random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::TIE, flag::OUTVOTED]);
+            // Only the votes, after the fill, outvote a pixel, and fill it in at once.
+            match (filled, reason) {
+                (true, flag::OUTVOTED) => flag::OUTVOTED | flag::FILLED,
+                (false, flag::OUTVOTED) => flag::TIE,
+                (true, _) if !random.one_in(4) => reason | flag::FILLED,
+                _ => reason,
+            }
         };
         validity.into()
     })

@@ -67,7 +67,8 @@ fn nothing_valid() {
             (m.refinement.median, m.refinement.speckle_size) = (Median::All, 100);
         });
         let pair = random::pair(&mut random, size.0, size.1);
-        for all in [flag::MASKED, flag::OCCLUDED, flag::OUTSIDE | flag::LOW_CONFIDENCE, flag::SPECKLE] {
+        let outside = flag::OUTSIDE | flag::LOW_CONFIDENCE;
+        for all in [flag::MASKED, flag::OCCLUDED, outside, flag::SPECKLE, flag::TIE, flag::OUTVOTED] {
             let mut maps = random::finest(&mut random, &plan, false);
             maps.validity = Plane::filled(size.0, size.1, all.into());
             let mut expected = maps.clone();

@@ -56,7 +56,7 @@ fn the_doubtful_are_outvoted() {
             backend.run(Stage::VoteFill).unwrap();
             let [disparity, validity, confidence] = [Map::Disparity, Map::Validity, Map::Confidence]
                 .map(|map| pollster::block_on(backend.map(map)).unwrap());
-            let given_up = i32::from(flag::SPECKLE | flag::FILLED);
+            let given_up = i32::from(flag::OUTVOTED | flag::FILLED);
             for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
                 let at = (x, y);
                 if validity[at] == given_up {

@@ -5,7 +5,7 @@ use crate::matched::colours;
 use js_sys::{Array, Object, Reflect, Uint8Array};
 use mrfgs::colour::{VALIDITY, preview};
 use mrfgs::image::{Plane, Rect};
-use mrfgs::maps::flag;
+use mrfgs::maps::REASONS;
 use mrfgs::options::PRESETS;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -31,19 +31,6 @@ pub fn presets() -> Array {
 #[wasm_bindgen]
 #[must_use]
 pub fn reasons() -> Array {
-    const ALL: [(u8, &str, &str); 7] = [
-        (0, "measured", "found in both views and trusted"),
-        (flag::OUTSIDE, "outside", "the match is outside the right image"),
-        (flag::OCCLUDED, "occluded", "the right view disagrees: hidden there, or mistaken"),
-        (
-            flag::SPECKLE,
-            "small region",
-            "in a region too small to be trusted, tied between two disparities, or outvoted by the pixels around it",
-        ),
-        (flag::LOW_CONFIDENCE, "low confidence", "another disparity is nearly as good"),
-        (flag::FILLED, "filled", "taken from pixels around it"),
-        (flag::MASKED, "masked", "the image holds no data here"),
-    ];
     let reason = |&(bit, name, about): &(u8, &str, &str)| {
         let colour = VALIDITY
             .iter()
@@ -51,7 +38,7 @@ pub fn reasons() -> Array {
             .map_or(JsValue::UNDEFINED, |entry| Uint8Array::from(&entry.1[..]).into());
         object(&[("bit", bit.into()), ("name", name.into()), ("about", about.into()), ("colour", colour)])
     };
-    ALL.iter().map(reason).collect()
+    REASONS.iter().map(reason).collect()
 }
 
 /// 256 colours, RGB, from the least to the largest value.

@@ -112,8 +112,9 @@ static ALL: [Also; 16] = [
     },
     Also {
         word: "validity",
-        help: "Why a pixel is what it is: 8-bit .png, the sum of 1 match outside the right image, 2 occluded, 4 in a \
-               small region, a tie or outvoted, 8 low confidence, 16 filled, 32 masked; 0 is measured and trusted",
+        help: "Why a pixel is what it is: 8-bit .png, the sum of 1 outside (the match is not in the right image), 2 \
+               occluded, 4 small region, 8 low confidence, 16 filled, 32 masked, 64 tie (two disparities match equally \
+               well), 128 outvoted (by the pixels around it); 0 is measured and trusted",
         kind: Kind::Bytes(|maps| &maps.validity),
         key: None,
     },

@@ -261,7 +261,8 @@ fn a_breakdown_adds_up() {
     let (validity, mask) = (grey("map.validity.png").unwrap(), grey("Teddy/mask0nocc.png").unwrap());
     let of = |flagged: bool, unseen: bool| {
         let pixels = validity.data().iter().zip(mask.data());
-        pixels.filter(|&(v, m)| (v & 7 != 0) == flagged && (*m != 255) == unseen).count() as f64
+        pixels.filter(|&(v, m)| (v & (1 | 2 | 4 | 64 | 128) != 0) == flagged && (*m != 255) == unseen).count()
+            as f64
     };
     let [hits, alarms, missed] = [of(true, true), of(true, false), of(false, true)];
     near(&teddy["validity"]["precision"], 100.0 * hits / (hits + alarms));

@@ -21,7 +21,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
             labels[inside.clone()].iter_mut().zip(&mut seen[inside]).zip(pixels)
         {
             if *flags == 0 && optimum.runner_up == optimum.best {
-                *flags = flag::SPECKLE;
+                *flags = flag::TIE;
             }
             (*label, *seen) = (optimum.label, *flags != 0);
         }

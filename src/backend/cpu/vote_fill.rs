@@ -328,7 +328,7 @@ fn take(maps: &mut MapSet, left: &Image, colours: &Plane<[u8; 3]>, elected: &Pla
                 && may_be_outvoted(*flags, *confidence)
                 && (vote - *disparity).abs() > VOTE_OUTVOTES
             {
-                (*disparity, *flags, *confidence) = (vote, flag::SPECKLE | flag::FILLED, 0);
+                (*disparity, *flags, *confidence) = (vote, flag::OUTVOTED | flag::FILLED, 0);
             }
         }
     });

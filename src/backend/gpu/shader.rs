@@ -65,6 +65,8 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
                 ("LOW_CONFIDENCE", flag::LOW_CONFIDENCE),
                 ("FILLED", flag::FILLED),
                 ("MASKED", flag::MASKED),
+                ("TIE", flag::TIE),
+                ("OUTVOTED", flag::OUTVOTED),
                 ("INVALID", flag::INVALID),
                 ("VALIDITY", u8::MAX),
             ];

@@ -5,7 +5,7 @@ use mrfgs::options::Nearer;
 
 /// Whether a pixel's disparity is rejected before the fill.
 pub fn invalid(validity: i32) -> bool {
-    [flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::MASKED]
+    [flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::TIE, flag::OUTVOTED, flag::MASKED]
         .iter()
         .any(|&bit| validity & i32::from(bit) != 0)
 }

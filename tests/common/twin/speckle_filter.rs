@@ -3,15 +3,15 @@ use mrfgs::image::Plane;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::flag;
 
-/// Flags pixels whose runner-up is as good as the optimum, and small regions of the others. Every pixel starts as its own region; regions that touch take the smaller number,
-/// until nothing changes.
+/// Flags ties, pixels whose runner-up is as good as the optimum, and small regions of the others. Every pixel starts as
+/// its own region; regions that touch take the smaller number, until nothing changes.
 pub fn speckle_filter(plan: &Plan, maps: &mut Finest) {
     let (width, height) = plan.size();
     for y in 0..height {
         for x in 0..width {
             let at = (x, y);
             if maps.validity[at] == 0 && maps.runner_up[at] - maps.best[at] == 0 {
-                maps.validity[at] = i32::from(flag::SPECKLE);
+                maps.validity[at] = i32::from(flag::TIE);
             }
         }
     }

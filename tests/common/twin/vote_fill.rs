@@ -48,7 +48,7 @@ pub fn vote_fill(plan: &Plan, pair: &Pair, maps: &mut Finest) {
                     vote.filter(|vote| (vote - i64::from(before.disparity[at])).abs() > VOTE_OUTVOTES.into())
                 {
                     maps.disparity[at] = vote as i32;
-                    maps.validity[at] = i32::from(flag::SPECKLE | flag::FILLED);
+                    maps.validity[at] = i32::from(flag::OUTVOTED | flag::FILLED);
                     maps.confidence[at] = 0;
                 }
                 continue;

@@ -11,7 +11,7 @@ use mrfgs::colour::{self, ColourMap};
 use mrfgs::evaluation::{Metrics, Report};
 use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::front::zones;
-use mrfgs::maps::Maps;
+use mrfgs::maps::{Maps, REASONS};
 
 use crate::failure::Result;
 use crate::outputs::files;
@@ -156,23 +156,16 @@ pub(super) fn pictures(
 }
 
 fn validity_legend() -> String {
-    let meaning = |bit: u32| match bit {
-        0 => "measured and trusted",
-        1 => "match outside the right image",
-        2 => "occluded",
-        4 => "in a small region, a tie or outvoted",
-        8 => "low confidence",
-        _ => "masked",
-    };
     let mut out = String::new();
     for (bit, [r, g, b]) in colour::VALIDITY {
+        let reason = REASONS.iter().find(|reason| u32::from(reason.0) == bit);
+        let (_, name, about) = reason.expect("each colour is that of a reason");
         let _ = write!(
             out,
-            r#"<span class="class"><i style="background:rgb({r},{g},{b})"></i>{bit} {}</span> "#,
-            meaning(bit)
+            r#"<span class="class" title="{about}"><i style="background:rgb({r},{g},{b})"></i>{bit} {name}</span> "#
         );
     }
-    out + "Half as bright: no disparity. Otherwise pixels of 1, 2 and 4 are filled (16)."
+    out + "Half as bright: no disparity. Otherwise pixels of 1, 2, 4, 64 and 128 are filled (16)."
 }
 
 /// Where a report goes.
