@@ -23,7 +23,7 @@ type Imports = BTreeSet<(Names, Names)>;
 struct Package {
     /// Each module, and the file that it is in.
     modules: BTreeMap<Names, Names>,
-    /// What `use` and exported macros add to modules, by its full name: the module that says it, and its path.
+    /// What `use` and exported macros add, by its full name: the module that says it, and its path.
     added: BTreeMap<Names, (Names, Names)>,
     /// The paths in the code of each module. What is only passed on is no import.
     paths: BTreeSet<(Names, Names)>,
