@@ -1,12 +1,11 @@
 //! What a matcher is to do, and where.
 
-use std::ffi::c_char;
+use std::ffi::{CStr, c_char};
 use std::path::Path;
 
 use mrfgs::options::{Execution, Method};
 
 use crate::status::{Failure, Status, call};
-use crate::text;
 
 /// What a matcher is to do, and where.
 #[derive(Default)]
@@ -25,6 +24,19 @@ unsafe fn change(options: *mut Options, change: impl FnOnce(&mut Options) -> Res
         let options = unsafe { options.as_mut() };
         change(options.ok_or_else(|| Failure::argument("options are null"))?)
     })
+}
+
+/// The text of the argument `name`.
+///
+/// # Safety
+/// `text` is null or ends with a 0, and stays as it is for `'a`.
+unsafe fn text<'a>(name: &str, text: *const c_char) -> Result<&'a str, Failure> {
+    if text.is_null() {
+        return Err(Failure::argument(format!("{name} is null")));
+    }
+    // SAFETY: it is not null, and the caller promises the rest.
+    let text = unsafe { CStr::from_ptr(text) };
+    text.to_str().map_err(|_| Failure::argument(format!("{name} is no UTF-8")))
 }
 
 /// The preset "default", on a GPU where there is one and else on the CPU, with a thread for each core.
@@ -47,7 +59,7 @@ pub unsafe extern "C" fn mrfgs_options_free(options: *mut Options) {
 pub unsafe extern "C" fn mrfgs_options_preset(options: *mut Options, name: *const c_char) -> Status {
     let set = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        options.method = Method::preset(unsafe { text::of("the name", name) }?)?;
+        options.method = Method::preset(unsafe { text("the name", name) }?)?;
         Ok(())
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -63,9 +75,9 @@ pub unsafe extern "C" fn mrfgs_options_set(
 ) -> Status {
     let set = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        let key = unsafe { text::of("the key", key) }?;
+        let key = unsafe { text("the key", key) }?;
         // SAFETY: the caller promises that it is a text.
-        let value = unsafe { text::of("the value", value) }?;
+        let value = unsafe { text("the value", value) }?;
         Ok(options.method.set(key, value)?)
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -77,7 +89,7 @@ pub unsafe extern "C" fn mrfgs_options_set(
 pub unsafe extern "C" fn mrfgs_options_load(options: *mut Options, path: *const c_char) -> Status {
     let load = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        let path = unsafe { text::of("the path", path) }?;
+        let path = unsafe { text("the path", path) }?;
         Ok(options.method.load(Path::new(path))?)
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -90,7 +102,7 @@ pub unsafe extern "C" fn mrfgs_options_load(options: *mut Options, path: *const 
 pub unsafe extern "C" fn mrfgs_options_device(options: *mut Options, name: *const c_char) -> Status {
     let set = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        options.execution.device = unsafe { text::of("the name", name) }?.into();
+        options.execution.device = unsafe { text("the name", name) }?.into();
         Ok(())
     };
     // SAFETY: the caller promises that the pointer is good.

@@ -1,22 +1,7 @@
-//! Texts from C, and for C.
+//! Texts for C.
 
 use std::cell::RefCell;
-use std::ffi::{CStr, CString, c_char};
-
-use crate::status::Failure;
-
-/// The text of the argument `name`.
-///
-/// # Safety
-/// `text` is null or ends with a 0, and stays as it is for `'a`.
-pub(crate) unsafe fn of<'a>(name: &str, text: *const c_char) -> Result<&'a str, Failure> {
-    if text.is_null() {
-        return Err(Failure::argument(format!("{name} is null")));
-    }
-    // SAFETY: it is not null, and the caller promises the rest.
-    let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map_err(|_| Failure::argument(format!("{name} is no UTF-8")))
-}
+use std::ffi::{CString, c_char};
 
 /// A text that C reads, until the next one is said.
 pub(crate) struct Said(RefCell<Option<CString>>);

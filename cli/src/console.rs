@@ -18,12 +18,14 @@ pub(crate) fn printed(result: io::Result<()>) -> Result<()> {
     }
 }
 
-/// Writes data to standard output. A reader that leaves before the end has no whole map, so unlike with text that is a
-/// failure.
-pub(crate) fn print_data(bytes: &[u8]) -> Result<()> {
+/// Writes data to standard output, all of a map or a part of a film. A reader that leaves before the end has not the whole,
+/// so unlike with text that is a failure.
+pub(crate) fn print_data(bytes: &[u8], what: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
-        ErrorKind::BrokenPipe => Error::write("standard output", "its reader left before the end of the map"),
+        ErrorKind::BrokenPipe => {
+            Error::write("standard output", format!("its reader left before the end of the {what}"))
+        }
         _ => Error::write("standard output", e),
     })
 }

@@ -31,7 +31,7 @@ pub(crate) fn run(
         job = job.inspect(inspector);
     }
     let matched = job.run();
-    bar.finish();
+    drop(bar);
     let (matched, time) = (matched?, start.elapsed());
     if !quiet {
         if let Some(note) = &matched.note {

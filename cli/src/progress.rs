@@ -1,10 +1,11 @@
-//! The bars that show how far a match is, how far a batch, and how far a sequence.
+//! The bars that show how far a match is, how far a batch, and how far a sequence. On a terminal they are drawn from [`PATIENCE`]
+//! or the first item on, elsewhere they hide themselves, and what takes long tells a log now and then.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use mrfgs::Progress;
 
 use crate::console;
@@ -13,175 +14,125 @@ use crate::stop;
 /// What is over sooner than this needs no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
 const STEPS: u64 = 1000;
-/// How often a batch tells a log how far it is.
+/// How often a log is told.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// A bar on a terminal, from [`PATIENCE`] on.
+/// A bar of `length` steps where it is known, else a spinner. It goes when it is dropped.
+fn bar(length: Option<usize>, template: &str, quiet: bool) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::with_draw_target(length.map(|length| length as u64), target);
+    bar.with_style(style).with_finish(ProgressFinish::AndClear)
+}
+
+/// How far a match is.
 pub(crate) struct Bar {
     start: Instant,
-    wanted: bool,
-    name: String,
-    drawn: Option<ProgressBar>,
+    bar: ProgressBar,
 }
 
 impl Bar {
     pub(crate) fn new(name: Option<&str>, quiet: bool) -> Self {
-        let wanted = !quiet && std::io::stderr().is_terminal();
-        Self { start: Instant::now(), wanted, name: name.unwrap_or("mrfgs").into(), drawn: None }
+        let bar = bar(Some(STEPS as usize), "{prefix} [{bar:40}] {percent:>3} % {msg}", quiet);
+        Self { start: Instant::now(), bar: bar.with_prefix(name.unwrap_or("mrfgs").to_owned()) }
     }
 
     /// Shows how far it is, and says whether to go on.
     pub(crate) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
-        if self.wanted && self.start.elapsed() > PATIENCE {
-            let bar = self.drawn.get_or_insert_with(|| {
-                let style = ProgressStyle::with_template("{prefix} [{bar:40}] {percent:>3} % {msg}");
-                ProgressBar::new(STEPS)
-                    .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-                    .with_prefix(self.name.clone())
-            });
-            bar.set_message(match progress.tile {
+        if self.start.elapsed() > PATIENCE {
+            self.bar.set_message(match progress.tile {
                 Some((tile, all)) => format!("tile {tile} of {all}: {}", progress.stage),
                 None => progress.stage.into(),
             });
-            bar.set_position((progress.done * STEPS as f64) as u64);
+            self.bar.set_position((progress.done * STEPS as f64) as u64);
         }
         stop::go_on()
     }
-
-    /// Takes the bar away.
-    pub(crate) fn finish(self) {
-        if let Some(bar) = self.drawn {
-            bar.finish_and_clear();
-        }
-    }
 }
 
-/// The pairs done of all those of a batch: a bar on a terminal, elsewhere a line now and then.
+/// The pairs done of all those of a batch.
 pub(crate) struct PairBar {
-    drawn: Option<ProgressBar>,
-    log: Option<Log>,
+    bar: ProgressBar,
+    log: Log,
 }
 
 impl PairBar {
     /// For so many pairs, of which some are done.
     pub(crate) fn new(pairs: usize, done: usize, quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let bar = || {
-            let style = ProgressStyle::with_template("mrfgs [{bar:40}] {pos} of {len} {msg}");
-            let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
-            let bar = ProgressBar::new(pairs as u64).with_style(style);
-            bar.set_position(done as u64);
-            bar
-        };
-        Self {
-            drawn: (terminal && !quiet).then(bar),
-            log: (!terminal && !quiet).then(|| Log { pairs, done, last: Instant::now() }),
-        }
+        let bar = bar(Some(pairs), "mrfgs [{bar:40}] {pos} of {len} {msg}", quiet);
+        bar.set_position(done as u64);
+        Self { bar, log: Log::new(quiet) }
     }
 
     /// Shows the pair at work.
     pub(crate) fn begin(&mut self, name: &str) {
-        if let Some(bar) = &self.drawn {
-            bar.set_message(name.to_owned());
-        }
-        if let Some(line) = self.log.as_mut().and_then(|log| log.line(name, Instant::now())) {
-            console::say(&line);
-        }
+        self.bar.set_message(name.to_owned());
+        self.log.tell(|| line(&self.bar, name));
     }
 
     /// Counts a pair that is done or has failed.
     pub(crate) fn end(&mut self) {
-        if let Some(bar) = &self.drawn {
-            bar.inc(1);
-        }
-        if let Some(log) = &mut self.log {
-            log.done += 1;
-        }
+        self.bar.inc(1);
     }
 
     /// Lets `say` write to standard error past the bar.
     pub(crate) fn past(&self, say: impl FnOnce()) {
-        match &self.drawn {
-            Some(bar) => bar.suspend(say),
-            None => say(),
-        }
+        self.bar.suspend(say);
     }
 }
 
-impl Drop for PairBar {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.drawn {
-            bar.finish_and_clear();
-        }
-    }
+/// How far a batch is, for a log.
+fn line(bar: &ProgressBar, name: &str) -> String {
+    format!("{} of {} pairs, now {name}", bar.position(), bar.length().unwrap_or_default())
 }
 
-/// The frames done of a sequence: a line on a terminal that is drawn anew, elsewhere one now and then.
+/// The frames done of a sequence.
 pub(crate) struct FrameBar {
     start: Instant,
-    frames: usize,
     all: Option<usize>,
-    drawn: Option<ProgressBar>,
-    /// When a log was last told; `None` where nothing is to be.
-    told: Option<Instant>,
+    bar: ProgressBar,
+    log: Log,
 }
 
 impl FrameBar {
     /// For `all` frames, where their number is known.
     pub(crate) fn new(all: Option<usize>, quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let start = Instant::now();
-        let drawn = (terminal && !quiet).then(|| {
-            let style = ProgressStyle::with_template("mrfgs {spinner} {msg}");
-            ProgressBar::new_spinner().with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
-        });
-        Self { start, frames: 0, all, drawn, told: (!terminal && !quiet).then_some(start) }
+        let bar = bar(None, "mrfgs {spinner} {msg}", quiet);
+        Self { start: Instant::now(), all, bar, log: Log::new(quiet) }
     }
 
     /// Counts a frame that is done.
     pub(crate) fn end(&mut self) {
-        self.frames += 1;
-        if let Some(bar) = &self.drawn {
-            bar.set_message(self.line());
-            bar.tick();
-        }
-        let now = Instant::now();
-        if self.told.is_some_and(|told| now.duration_since(told) >= SILENCE) {
-            console::say(&self.line());
-            self.told = Some(now);
-        }
-    }
-
-    fn line(&self) -> String {
-        let rate = self.frames as f64 / self.start.elapsed().as_secs_f64();
+        self.bar.inc(1);
+        let frames = self.bar.position();
+        let rate = frames as f64 / self.start.elapsed().as_secs_f64();
         let of = self.all.map(|all| format!(" of {all}")).unwrap_or_default();
-        format!("{}{of} frames, {rate:.1} a second", self.frames)
+        let line = format!("{frames}{of} frames, {rate:.1} a second");
+        self.bar.set_message(line.clone());
+        self.log.tell(|| line);
     }
 }
 
-impl Drop for FrameBar {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.drawn {
-            bar.finish_and_clear();
-        }
-    }
-}
-
-/// How far a batch is, for logs.
-struct Log {
-    pairs: usize,
-    done: usize,
-    /// When it last was told.
-    last: Instant,
-}
+/// When a log was last told; `None` where nothing is to be.
+struct Log(Option<Instant>);
 
 impl Log {
-    /// What to tell before the pair `name`, if it is time.
-    fn line(&mut self, name: &str, now: Instant) -> Option<String> {
-        (now.duration_since(self.last) >= SILENCE).then(|| {
-            self.last = now;
-            format!("{} of {} pairs, now {name}", self.done, self.pairs)
-        })
+    fn new(quiet: bool) -> Self {
+        Self((!quiet && !std::io::stderr().is_terminal()).then(Instant::now))
+    }
+
+    fn tell(&mut self, line: impl FnOnce() -> String) {
+        if self.is_due(Instant::now()) {
+            console::say(&line());
+        }
+    }
+
+    fn is_due(&mut self, now: Instant) -> bool {
+        let due = self.0.is_some_and(|last| now.duration_since(last) >= SILENCE);
+        if due {
+            self.0 = Some(now);
+        }
+        due
     }
 }
 
@@ -192,11 +143,15 @@ mod tests {
     #[test]
     fn a_log_tells_now_and_then() {
         let start = Instant::now();
-        let mut log = Log { pairs: 9, done: 2, last: start };
-        assert_eq!(log.line("a", start + SILENCE / 2), None);
-        assert_eq!(log.line("b", start + SILENCE), Some("2 of 9 pairs, now b".into()));
-        assert_eq!(log.line("c", start + SILENCE + SILENCE / 2), None);
-        log.done = 5;
-        assert_eq!(log.line("d", start + 2 * SILENCE), Some("5 of 9 pairs, now d".into()));
+        let mut log = Log(Some(start));
+        assert!(!log.is_due(start + SILENCE / 2));
+        assert!(log.is_due(start + SILENCE));
+        assert!(!log.is_due(start + SILENCE + SILENCE / 2));
+        assert!(log.is_due(start + 2 * SILENCE));
+        assert!(!Log(None).is_due(start + 2 * SILENCE));
+        let mut pairs = PairBar::new(9, 2, true);
+        assert_eq!(line(&pairs.bar, "b"), "2 of 9 pairs, now b");
+        (0..3).for_each(|_| pairs.end());
+        assert_eq!(line(&pairs.bar, "d"), "5 of 9 pairs, now d");
     }
 }

@@ -24,10 +24,7 @@ const TARGETS: [(&str, Target); 6] = [
 /// The files of a target.
 fn corpus(target: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = entries.collect();
-    files.sort();
-    files
+    glob::glob(folder.join("*").to_str().unwrap()).unwrap().map(Result::unwrap).collect()
 }
 
 #[test]

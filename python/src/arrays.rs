@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use mrfgs::calibration::matrix::Matrix;
 use mrfgs::image::raster::{self, Raster, Samples};
 use mrfgs::image::{self, Pair, Plane};
 use numpy::{
@@ -10,8 +11,9 @@ use numpy::{
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-use crate::exception;
+use crate::exceptions::exception;
 
 /// What is given for `name` as an array, in the byte order of this machine and aligned; copied where it is not. A masked array
 /// stays one.
@@ -192,6 +194,15 @@ fn masked_array<'py, T: Element>(
 pub(crate) fn map<T: Element>(py: Python, plane: Plane<T>) -> PyResult<Bound<PyArray2<T>>> {
     let shape = [plane.height(), plane.width()];
     plane.into_data().into_pyarray(py).reshape(shape)
+}
+
+/// The matrices of both views as arrays of float64.
+pub(crate) fn matrices<'py>(py: Python<'py>, both: &[Matrix; 2]) -> PyResult<Bound<'py, PyTuple>> {
+    let matrix = |matrix: &Matrix| {
+        let rows: Vec<Vec<f64>> = matrix.iter().map(|row| row.to_vec()).collect();
+        PyArray2::from_vec2(py, &rows)
+    };
+    PyTuple::new(py, [matrix(&both[0])?, matrix(&both[1])?])
 }
 
 /// A map of disparities; what a masked array masks is not finite.

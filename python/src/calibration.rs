@@ -10,7 +10,8 @@ use pyo3::exceptions::{PyFileNotFoundError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::{exception, words};
+use crate::exceptions::exception;
+use crate::words;
 
 /// What is known of a pair of cameras, read from files.
 ///

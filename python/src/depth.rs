@@ -15,8 +15,8 @@ use pyo3::types::{PyTuple, PyType};
 
 use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
-use crate::rectification::matrices;
-use crate::{PyMatched, exception};
+use crate::exceptions::exception;
+use crate::matched::PyMatched;
 
 /// The cameras of a rectified pair: from disparities to depths and points.
 ///
@@ -153,7 +153,7 @@ impl PyRig {
     fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
         let camera = |cx: f64| [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]];
-        matrices(py, &[camera(cx), camera(cx + self.doffs)])
+        arrays::matrices(py, &[camera(cx), camera(cx + self.doffs)])
     }
 
     /// Distance of the principal points along the row, cx of the right camera less cx of the left one, in pixels.

@@ -4,7 +4,8 @@ use mrfgs::evaluation::{self, Metrics};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::{arrays, exception};
+use crate::arrays;
+use crate::exceptions::exception;
 
 /// Compares a disparity map with the truth, as `mrfgs evaluate map` does.
 ///

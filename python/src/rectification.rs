@@ -2,11 +2,9 @@
 
 use std::sync::OnceLock;
 
-use mrfgs::calibration::matrix::Matrix;
 use mrfgs::calibration::write;
 use mrfgs::image::calib::Calibration;
 use mrfgs::rectification::{Options, Rectification};
-use numpy::PyArray2;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -14,7 +12,7 @@ use pyo3::types::PyTuple;
 use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
 use crate::depth::PyRig;
-use crate::exception;
+use crate::exceptions::exception;
 
 /// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
 ///
@@ -130,7 +128,7 @@ impl PyRectification {
     /// OpenCV.
     #[getter]
     fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        matrices(py, self.by.rotations())
+        arrays::matrices(py, self.by.rotations())
     }
 
     /// The cameras of the rectified pair, as a Rig: for depth and points.
@@ -164,13 +162,4 @@ fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
     let pixels = |count: i64| usize::try_from(count).ok().filter(|count| *count > 0);
     let both = pixels(width).zip(pixels(height));
     both.ok_or_else(|| PyValueError::new_err("size: give (width, height), both above 0"))
-}
-
-/// The matrices of both views as arrays of float64.
-pub(crate) fn matrices<'py>(py: Python<'py>, both: &[Matrix; 2]) -> PyResult<Bound<'py, PyTuple>> {
-    let matrix = |matrix: &Matrix| {
-        let rows: Vec<Vec<f64>> = matrix.iter().map(|row| row.to_vec()).collect();
-        PyArray2::from_vec2(py, &rows)
-    };
-    PyTuple::new(py, [matrix(&both[0])?, matrix(&both[1])?])
 }

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use mrfgs::image::Pair;
 use mrfgs::options::{DisparityRange, Method};
@@ -13,7 +14,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyIterator;
 
 use crate::arrays::{self, Image};
-use crate::{PATIENCE, PyMatched, exception, searched, warn};
+use crate::exceptions::{self, exception};
+use crate::matched::PyMatched;
+use crate::range;
+
+/// How long a Ctrl-C may wait until somebody looks.
+pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Pairs that are taken before their results are asked for: one whose maps come down, one that is matched, and one that waits.
 const AHEAD: usize = 3;
@@ -137,7 +143,7 @@ impl State {
                 Ok(matched) => {
                     self.counts[1] += 1;
                     if self.settings.warn {
-                        warn(py, matched.warnings())?;
+                        exceptions::warn(py, matched.warnings())?;
                     }
                     return PyMatched::of(py, matched).map(Some);
                 }
@@ -160,16 +166,16 @@ impl State {
 
     fn job(&self, item: &Bound<PyAny>) -> PyResult<(Pair, DisparityRange)> {
         let py = item.py();
-        let Settings { range, min_disparity, no_data, warn, .. } = self.settings;
+        let Settings { range: given, min_disparity, no_data, warn, .. } = self.settings;
         let one = |i: usize| item.get_item(i).ok().filter(|_| item.len().is_ok_and(|count| count == 2));
         let Some((left, right)) = one(0).zip(one(1)) else {
             return Err(PyTypeError::new_err("give two arrays, left and right"));
         };
         let (left, right) = (Image::of("left", &left)?, Image::of("right", &right)?);
         let pair = arrays::pair(&left, &right, None, no_data)?;
-        let found = searched(py, &pair, range, min_disparity)?;
+        let found = range::searched(py, &pair, given, min_disparity)?;
         if warn {
-            self::warn(py, py.detach(|| check::warnings(&pair, range)))?;
+            exceptions::warn(py, py.detach(|| check::warnings(&pair, given)))?;
         }
         Ok((pair, found))
     }

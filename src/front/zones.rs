@@ -19,9 +19,8 @@ use rayon::prelude::*;
 use crate::image::{Image, Plane};
 use crate::options::ZoneExtent;
 use gabor::{ORIENTATIONS, Response};
-
-/// The zone of masked pixels. It is not counted.
-pub const MASKED: u32 = u32::MAX;
+pub use kmeans::Options;
+pub use regions::{MASKED, Zones};
 
 /// Features are integers, in 1 / `UNITS` of their standard deviation.
 const UNITS: f64 = 64.0;
@@ -44,37 +43,6 @@ const MAX_CLUSTERS: usize = 255;
 const VECTOR: usize = 16;
 /// Bits of the interpolation weights, across and down.
 const WEIGHT_BITS: u32 = 8;
-
-/// The parameters of the segmentation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// Largest number of clusters, up to 255: the K of K-means.
-    pub clusters: usize,
-    /// Whether a zone is a cluster, or a connected region of one.
-    pub extent: ZoneExtent,
-    /// Number of clusterings from different starts; the tightest is taken.
-    pub replicates: usize,
-    /// Largest number of iterations of each clustering; it ends when no sample changes its zone.
-    pub iterations: usize,
-    /// Seed of the random starts.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    /// The preset `paper`.
-    fn default() -> Self {
-        Self { clusters: 15, extent: ZoneExtent::Region, replicates: 5, iterations: 500, seed: 0 }
-    }
-}
-
-/// A segmentation.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Zones {
-    /// Zone of each pixel, 0 .. `count` in the order of their first pixels, or [`MASKED`].
-    pub map: Plane<u32>,
-    /// Number of zones.
-    pub count: usize,
-}
 
 /// Segments an image by its texture.
 ///

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use mrfgs::rectification::Options;
 
+use crate::failure::{Failure, Result};
+
 /// The calibration that rectifies, and how.
 #[derive(clap::Args)]
 pub(crate) struct RectificationArgs {
@@ -17,6 +19,15 @@ pub(crate) struct RectificationArgs {
 impl RectificationArgs {
     pub(crate) fn options(&self) -> Options {
         Options { alpha: self.alpha, ..Options::default() }
+    }
+
+    /// The options where images are to be rectified. Else they take none.
+    pub(crate) fn options_if(&self, rectifies: bool) -> Result<Option<Options>> {
+        if self.alpha.is_some() && !rectifies {
+            let reason = "is of a rectification; add --rectify, or leave --alpha out";
+            return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
+        }
+        Ok(rectifies.then(|| self.options()))
     }
 }
 

@@ -1,6 +1,5 @@
 //! `mrfgs man`.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
@@ -10,7 +9,7 @@ use mrfgs::Error;
 use mrfgs::image::write;
 
 use crate::failure::Result;
-use crate::outputs::files::Written;
+use crate::outputs::files::{self, Written};
 
 /// Write the man pages: mrfgs.1 and one for each subcommand
 #[derive(clap::Args)]
@@ -21,15 +20,12 @@ pub(crate) struct Args {
 
 /// Writes the man pages of `program`.
 pub(crate) fn run(args: &Args, mut program: Command) -> Result<()> {
-    match fs::create_dir(&args.folder) {
-        Err(e) if e.kind() == ErrorKind::NotFound => {
-            return Err(
-                Error::write(&args.folder, "there is no folder to make it in; create that first").into()
-            );
+    files::create_folder(&args.folder).map_err(|e| match e.kind() {
+        ErrorKind::NotFound => {
+            Error::write(&args.folder, "there is no folder to make it in; create that first")
         }
-        Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(&args.folder, e).into()),
-        _ => {}
-    }
+        _ => Error::write(&args.folder, e),
+    })?;
     program.build();
     let mut written = Written::default();
     for (name, command) in pages(&program, "mrfgs") {

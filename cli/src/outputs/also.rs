@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mrfgs::calibration::matrix::Matrix;
 use mrfgs::colour::{self, ColourMap};
@@ -57,84 +56,68 @@ pub(crate) enum View {
 
 /// All outputs, in the order in which they are written. One more is one more row.
 static ALL: [Also; 16] = [
+    row(
+        "raw",
+        "The disparity map before post-processing, in the format of the disparity map",
+        Kind::Disparity(View::Left, |maps| Some(maps.raw_map())),
+    ),
     Also {
-        word: "raw",
-        help: "The disparity map before post-processing, in the format of the disparity map",
-        kind: Kind::Disparity(View::Left, |maps| Some(maps.raw_map())),
-        key: None,
-    },
-    Also {
-        word: "right",
-        help: "The disparity map of the right view, refined like that of the left one, in the format of the disparity \
-               map: right (x, y) with disparity d is seen at left (x + d, y)",
-        kind: Kind::Disparity(View::Right, Maps::right_map),
         key: Some("right-map"),
+        ..row(
+            "right",
+            "The disparity map of the right view, refined like that of the left one, in the format of the disparity map: \
+             right (x, y) with disparity d is seen at left (x + d, y)",
+            Kind::Disparity(View::Right, Maps::right_map),
+        )
     },
-    Also {
-        word: "depth",
-        help: "The depth of every pixel, as float: .pfm (+infinity where there is none), or .tif (NaN) if the disparity \
-               map is TIFF",
-        kind: Kind::Depth,
-        key: None,
-    },
-    Also {
-        word: "depth-mm",
-        help: "The depth of every pixel in millimetres, as ROS and TUM have it: 16-bit .png, 0 where there is none or it is \
-               above 65535. It takes a calibration whose unit is known",
-        kind: Kind::Millimetres,
-        key: None,
-    },
-    points(
+    row(
+        "depth",
+        "The depth of every pixel, as float: .pfm (+infinity where there is none), or .tif (NaN) if the disparity map is \
+         TIFF",
+        Kind::Depth,
+    ),
+    row(
+        "depth-mm",
+        "The depth of every pixel in millimetres, as ROS and TUM have it: 16-bit .png, 0 where there is none or it is above \
+         65535. It takes a calibration whose unit is known",
+        Kind::Millimetres,
+    ),
+    row(
         "points",
         "Points with the colours of LEFT and their confidence: binary .ply (`quality`), x to the right, y down, z forward \
          of the left camera. Invalid, filled and low-confidence pixels are left out. points.pcd writes PCD (`intensity`, \
          for ROS, PCL and Open3D), points.las and points.laz write LAS 1.2 and LAZ (intensity: 257 times the confidence)",
-        Frame::Matched,
-        CloudFormat::Ply,
+        Kind::Points(Frame::Matched, CloudFormat::Ply),
     ),
-    points("points.pcd", "", Frame::Matched, CloudFormat::Pcd),
-    points("points.las", "", Frame::Matched, CloudFormat::Las),
-    points("points.laz", "", Frame::Matched, CloudFormat::Laz),
-    points(
+    row("points.pcd", "", Kind::Points(Frame::Matched, CloudFormat::Pcd)),
+    row("points.las", "", Kind::Points(Frame::Matched, CloudFormat::Las)),
+    row("points.laz", "", Kind::Points(Frame::Matched, CloudFormat::Laz)),
+    row(
         "points-original",
         "The same in the frame of the left camera before --rectify: that of the calibration. Also as .pcd, .las and .laz",
-        Frame::Original,
-        CloudFormat::Ply,
+        Kind::Points(Frame::Original, CloudFormat::Ply),
     ),
-    points("points-original.pcd", "", Frame::Original, CloudFormat::Pcd),
-    points("points-original.las", "", Frame::Original, CloudFormat::Las),
-    points("points-original.laz", "", Frame::Original, CloudFormat::Laz),
-    Also {
-        word: "confidence",
-        help: "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
-        kind: Kind::Bytes(|maps| &maps.confidence),
-        key: None,
-    },
-    Also {
-        word: "validity",
-        help: "Why a pixel is what it is: 8-bit .png, the sum of 1 outside (the match is not in the right image), 2 \
-               occluded, 4 small region, 8 low confidence, 16 filled, 32 masked, 64 tie (two disparities match equally \
-               well), 128 outvoted (by the pixels around it); 0 is measured and trusted",
-        kind: Kind::Bytes(|maps| &maps.validity),
-        key: None,
-    },
-    Also {
-        word: "preview",
-        help: "The disparity map in colours, with a scale: .png",
-        kind: Kind::Picture { beside: false },
-        key: None,
-    },
-    Also {
-        word: "side-by-side",
-        help: "LEFT and beside it the preview: .png",
-        kind: Kind::Picture { beside: true },
-        key: None,
-    },
+    row("points-original.pcd", "", Kind::Points(Frame::Original, CloudFormat::Pcd)),
+    row("points-original.las", "", Kind::Points(Frame::Original, CloudFormat::Las)),
+    row("points-original.laz", "", Kind::Points(Frame::Original, CloudFormat::Laz)),
+    row(
+        "confidence",
+        "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
+        Kind::Bytes(|maps| &maps.confidence),
+    ),
+    row(
+        "validity",
+        "Why a pixel is what it is: 8-bit .png, the sum of 1 outside (the match is not in the right image), 2 \
+         occluded, 4 small region, 8 low confidence, 16 filled, 32 masked, 64 tie (two disparities match equally \
+         well), 128 outvoted (by the pixels around it); 0 is measured and trusted",
+        Kind::Bytes(|maps| &maps.validity),
+    ),
+    row("preview", "The disparity map in colours, with a scale: .png", Kind::Picture { beside: false }),
+    row("side-by-side", "LEFT and beside it the preview: .png", Kind::Picture { beside: true }),
 ];
 
-/// A row for points.
-const fn points(word: &'static str, help: &'static str, frame: Frame, format: CloudFormat) -> Also {
-    Also { word, help, kind: Kind::Points(frame, format), key: None }
+const fn row(word: &'static str, help: &'static str, kind: Kind) -> Also {
+    Also { word, help, kind, key: None }
 }
 
 /// The outputs beside the disparity map.
@@ -146,8 +129,8 @@ pub(crate) struct AlsoArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parser())]
     also: Vec<&'static Also>,
     /// Colours of the previews, from far to near [default: turbo]
-    #[arg(long, value_name = "NAME")]
-    colours: Option<Colours>,
+    #[arg(long, value_name = "NAME", value_parser = colours())]
+    colours: Option<ColourMap>,
 }
 
 fn parser() -> impl TypedValueParser<Value = &'static Also> {
@@ -157,25 +140,15 @@ fn parser() -> impl TypedValueParser<Value = &'static Also> {
         .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
 }
 
-/// The colours of a preview.
-#[derive(Clone, Copy, ValueEnum)]
-enum Colours {
-    /// Cold to warm
-    Turbo,
-    /// Violet to yellow, with even steps of lightness
-    Viridis,
-    /// Dark to bright
-    Grey,
-}
-
-impl From<Colours> for ColourMap {
-    fn from(colours: Colours) -> Self {
-        match colours {
-            Colours::Turbo => Self::Turbo,
-            Colours::Viridis => Self::Viridis,
-            Colours::Grey => Self::Grey,
-        }
-    }
+fn colours() -> impl TypedValueParser<Value = ColourMap> {
+    let maps = [
+        ("turbo", "Cold to warm", ColourMap::Turbo),
+        ("viridis", "Violet to yellow, with even steps of lightness", ColourMap::Viridis),
+        ("grey", "Dark to bright", ColourMap::Grey),
+    ];
+    PossibleValuesParser::new(maps.map(|(name, help, _)| PossibleValue::new(name).help(help))).try_map(
+        move |word| maps.into_iter().find(|map| map.0 == word).map(|map| map.2).ok_or("no such word"),
+    )
 }
 
 /// What a match has found, for its outputs.
@@ -242,7 +215,7 @@ impl AlsoArgs {
     /// The disparity map in colours, with the left image `beside` it.
     fn picture(&self, beside: bool, outcome: &Outcome) -> Plane<[u8; 3]> {
         let (DisparityRange { min, max }, map) = (outcome.range, outcome.maps.final_map());
-        let colours = self.colours.map(ColourMap::from).unwrap_or_default();
+        let colours = self.colours.unwrap_or_default();
         let preview = colour::preview(&map, min as f32, max as f32, colours);
         match outcome.left.filter(|_| beside) {
             Some(left) => colour::side_by_side(&left.to_rgb8(), &preview),
@@ -369,24 +342,11 @@ mod tests {
         let names = |output: &str| -> Vec<String> {
             all_beside(Path::new(output)).map(|path| path.to_str().unwrap().to_owned()).collect()
         };
-        let of_pfm = [
-            "raw.pfm",
-            "right.pfm",
-            "depth.pfm",
-            "depth-mm.png",
-            "points.ply",
-            "points.pcd",
-            "points.las",
-            "points.laz",
-            "points-original.ply",
-            "points-original.pcd",
-            "points-original.las",
-            "points-original.laz",
-            "confidence.png",
-            "validity.png",
-            "preview.png",
-        ];
-        assert_eq!(names("a/b.c.pfm")[..15], of_pfm.map(|end| format!("a/b.c.{end}")));
+        let of_pfm = "raw.pfm right.pfm depth.pfm depth-mm.png points.ply points.pcd points.las points.laz \
+                      points-original.ply points-original.pcd points-original.las points-original.laz \
+                      confidence.png validity.png preview.png";
+        let of_pfm: Vec<_> = of_pfm.split(' ').map(|end| format!("a/b.c.{end}")).collect();
+        assert_eq!(names("a/b.c.pfm")[..15], of_pfm);
         assert_eq!(names("d.png")[..2], ["d.raw.png", "d.right.png"]);
         assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.right.TIFF", "d.depth.TIFF"]);
     }

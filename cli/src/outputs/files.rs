@@ -1,6 +1,7 @@
 //! Where outputs go, and the files written so far.
 
 use std::fs;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
@@ -110,6 +111,14 @@ pub(crate) fn deliver(
     more(&mut written)?;
     written.keep();
     Ok(console::print(&printed)?)
+}
+
+/// Makes a folder unless it is there. Says whether it was not.
+pub(crate) fn create_folder(path: &Path) -> io::Result<bool> {
+    match fs::create_dir(path) {
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
+        made => made.map(|()| true),
+    }
 }
 
 /// Where a folder for outputs is, or would be.

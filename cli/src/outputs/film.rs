@@ -1,11 +1,12 @@
 //! Films of maps, as YUV4MPEG2 for ffmpeg and players.
 
-use std::io::{self, ErrorKind, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use mrfgs::image::{Plane, write::Growing};
 use mrfgs::{Error, Result};
 
+use crate::console;
 use crate::outputs::files::is_printed;
 
 /// Frames a second where the input does not say it.
@@ -21,7 +22,7 @@ pub(crate) struct Film {
 
 /// Where the frames go.
 enum Sink {
-    Printed(io::Stdout),
+    Printed,
     File(Growing),
 }
 
@@ -46,7 +47,7 @@ impl Film {
             );
             bytes.extend_from_slice(header.as_bytes());
             self.sink.insert(if is_printed(&self.path) {
-                Sink::Printed(io::stdout())
+                Sink::Printed
             } else {
                 Sink::File(Growing::new(&self.path)?)
             })
@@ -54,17 +55,10 @@ impl Film {
         bytes.extend_from_slice(b"FRAME\n");
         let yuv: Vec<[u8; 3]> = picture.data().iter().map(|rgb| to_yuv(*rgb)).collect();
         (0..3).for_each(|plane| bytes.extend(yuv.iter().map(|pixel| pixel[plane])));
-        let written = match sink {
-            Sink::Printed(out) => out.write_all(&bytes).and_then(|()| out.flush()),
-            Sink::File(file) => file.write_all(&bytes),
-        };
-        written.map_err(|e| match (sink, e.kind()) {
-            (Sink::Printed(_), ErrorKind::BrokenPipe) => {
-                Error::write("standard output", "its reader left before the end of the film")
-            }
-            (Sink::Printed(_), _) => Error::write("standard output", e),
-            (Sink::File(_), _) => Error::write(&self.path, e),
-        })
+        match sink {
+            Sink::Printed => console::print_data(&bytes, "film"),
+            Sink::File(file) => file.write_all(&bytes).map_err(|e| Error::write(&self.path, e)),
+        }
     }
 
     /// Ends the film.

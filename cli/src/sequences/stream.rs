@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use clap::ValueEnum;
 use mrfgs::image::raster::{Raster, Samples};
 use mrfgs::{Error, Result};
 
@@ -20,7 +21,7 @@ pub(crate) struct RawFrames {
 }
 
 /// The pixels of raw frames, by ffmpeg's names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum PixelFormat {
     Gray,
     Gray16le,
@@ -38,13 +39,7 @@ pub(crate) fn raw_frames(text: &str) -> Result<RawFrames, String> {
         let (size, format) = text.split_once(',')?;
         let (width, height) = size.split_once('x')?;
         let number = |text: &str| text.parse().ok().filter(|n| (1..=1 << 24).contains(n));
-        let format = match format {
-            "gray" => PixelFormat::Gray,
-            "gray16le" => PixelFormat::Gray16le,
-            "rgb24" => PixelFormat::Rgb24,
-            "bgr24" => PixelFormat::Bgr24,
-            _ => return None,
-        };
+        let format = PixelFormat::from_str(format, false).ok()?;
         Some(RawFrames { size: (number(width)?, number(height)?), format })
     };
     parsed().ok_or_else(|| said.into())

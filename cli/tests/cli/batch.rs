@@ -4,37 +4,37 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant, SystemTime};
+use std::process::Child;
+use std::time::SystemTime;
 
 use serde_json::Value;
-use tempfile::TempDir;
 
-use super::{Run, listing, run, scene};
+use super::evaluate::copy;
+use super::*;
 
 const SCENES: [&str; 4] = ["slanted", "steep", "thin", "wall"];
 
 /// A folder with a list of so many pairs, cut from the scenes at different places.
-fn pairs(count: usize, (width, height): (u32, u32)) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
+fn pairs(count: usize, (width, height): (u32, u32)) -> Folder {
+    let folder = Folder::new();
     let mut list = String::from("name,left,right,max_disparity\n# all are cut from scenes\n");
-    fs::create_dir(folder.path().join("images")).unwrap();
+    fs::create_dir(folder.join("images")).unwrap();
     let views =
         SCENES.map(|name| ["im0.png", "im1.png"].map(|file| image::open(scene(name).join(file)).unwrap()));
     for i in 0..count {
         let (x, y) = (i as u32 * 3 % (240 - width), i as u32 * 5 % (180 - height));
         for (view, side) in views[i % SCENES.len()].iter().zip(["left", "right"]) {
-            let file = folder.path().join(format!("images/{i}-{side}.png"));
+            let file = folder.join(format!("images/{i}-{side}.png"));
             view.crop_imm(x, y, width, height).save(file).unwrap();
         }
         writeln!(list, "pair-{i},images/{i}-left.png,images/{i}-right.png,31").unwrap();
     }
-    fs::write(folder.path().join("list.csv"), list).unwrap();
+    fs::write(folder.join("list.csv"), list).unwrap();
     folder
 }
 
 fn batch(folder: &Path, args: &[&str]) -> Run {
-    run(folder, &[&["batch"], args, &["--device", "cpu"]].concat())
+    run(folder, &[&["batch"], args, &["--device cpu"]].concat())
 }
 
 fn record(folder: &Path, name: &str) -> Value {
@@ -63,39 +63,27 @@ fn maps(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-fn started(folder: &Path, args: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .current_dir(folder)
-        .arg("batch")
-        .args(args)
-        .args(["--device", "cpu", "--threads", "1"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+fn begun(folder: &Path) -> Child {
+    started(folder, &["batch list.csv out --device cpu --threads 1"])
 }
 
 /// Waits until the folder has so many records.
 fn wait_for(folder: &Path, records: usize) {
-    let start = Instant::now();
-    while names(folder, ".json").len() < records {
-        assert!(start.elapsed() < Duration::from_secs(120), "no record {records}");
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    wait_until("at so many records", || names(folder, ".json").len() >= records);
 }
 
 #[test]
 fn a_batch_is_its_single_matches() {
     let folder = pairs(3, (96, 64));
-    let told = batch(folder.path(), &["list.csv", "out", "--also", "confidence,validity,raw"]).succeeded();
+    let told = batch(&folder, &["list.csv", "out", "--also", "confidence,validity,raw"]).succeeded();
     assert_eq!((told.stdout.as_str(), told.stderr.as_str()), ("", "mrfgs: 3 done, 0 skipped, 0 failed\n"));
-    let at = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
     for i in 0..3 {
         let [left, right] = ["left", "right"].map(|side| format!("images/{i}-{side}.png"));
         let single = |max| {
-            let args = ["match", &left, &right, "a.pfm", "--max-disparity", max, "--device", "cpu"];
-            let more = ["--also", "validity,confidence,raw"];
-            run(folder.path(), &[args.as_slice(), &more].concat()).succeeded();
+            let args = ["match", &left, &right, "a.pfm --max-disparity", max, "--device cpu"];
+            let more = ["--also validity,confidence,raw"];
+            run(&folder, &[args.as_slice(), &more].concat()).succeeded();
         };
         single("31");
         for end in [".pfm", ".raw.pfm", ".confidence.png", ".validity.png"] {
@@ -104,18 +92,18 @@ fn a_batch_is_its_single_matches() {
         single("15");
         assert!(at("a.pfm") != at(&format!("out/pair-{i}.pfm")), "another range is another map");
     }
-    let record = record(&folder.path().join("out"), "pair-1");
+    let record = record(&folder.join("out"), "pair-1");
     assert_eq!(record["status"], "done");
     assert_eq!((&record["labels"], &record["width"]), (&32.into(), &96.into()));
     assert_eq!(record["files"]["output"], "pair-1.pfm");
     assert!(record["density"].as_f64().unwrap() > 90.0 && record["seconds"].as_f64().unwrap() > 0.0);
-    assert_eq!(listing(&folder.path().join("out")).len(), 15, "nothing else is left");
+    assert_eq!(listing(&folder.join("out")).len(), 15, "nothing else is left");
 
     for format in ["png", "tif"] {
         let name = format!("a.{format}");
-        batch(folder.path(), &["list.csv", format, "--format", format, "--quiet"]).succeeded();
-        let args = ["match", "images/0-left.png", "images/0-right.png", &name, "--max-disparity", "31"];
-        run(folder.path(), &[args.as_slice(), &["--device", "cpu"]].concat()).succeeded();
+        batch(&folder, &["list.csv", format, "--format", format, "--quiet"]).succeeded();
+        let args = ["match images/0-left.png images/0-right.png", &name, "--max-disparity 31"];
+        run(&folder, &[args.as_slice(), &["--device cpu"]].concat()).succeeded();
         assert!(at(&name) == at(&format!("{format}/pair-0.{format}")));
     }
 }
@@ -123,35 +111,33 @@ fn a_batch_is_its_single_matches() {
 /// Outputs that take the cameras, with the calib.txt beside the left image or in the folder of the pair.
 #[test]
 fn a_batch_writes_depth_and_points() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    fs::create_dir_all(folder.path().join("data/wall")).unwrap();
-    for file in ["im0.png", "im1.png", "calib.txt"] {
-        fs::copy(scene("wall").join(file), folder.path().join("data/wall").join(file)).unwrap();
-    }
+    let folder = Folder::new();
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
+    fs::create_dir(folder.join("data")).unwrap();
+    copy("wall", &folder.join("data/wall"));
     let row = "wall,data/wall/im0.png,data/wall/im1.png,31\n";
-    fs::write(folder.path().join("list.csv"), format!("name,left,right,max_disparity\n{row}")).unwrap();
-    let also = ["--also", "points,depth,preview,side-by-side", "--colours", "viridis"];
-    let args = ["match", "data/wall/im0.png", "data/wall/im1.png", "one.tif", "--device", "cpu"];
-    run(folder.path(), &[&args[..], &also].concat()).succeeded();
+    fs::write(folder.join("list.csv"), format!("name,left,right,max_disparity\n{row}")).unwrap();
+    let also = ["--also points,depth,preview,side-by-side --colours viridis"];
+    let args = ["match data/wall/im0.png data/wall/im1.png one.tif --device cpu"];
+    run(&folder, &[&args[..], &also].concat()).succeeded();
     for list in ["list.csv", "data"] {
         let out = format!("out-{}", list.trim_end_matches(".csv"));
         let args = [&[list, &out, "--format", "tif"], &also[..]].concat();
-        batch(folder.path(), &args).succeeded();
+        batch(&folder, &args).succeeded();
         for end in [".tif", ".depth.tif", ".points.ply", ".preview.png", ".side-by-side.png"] {
             assert!(at(&format!("one{end}")) == at(&format!("{out}/wall{end}")), "{end} of {list}");
         }
-        let inputs = record(&folder.path().join(&out), "wall")["request"]["inputs"].to_string();
+        let inputs = record(&folder.join(&out), "wall")["request"]["inputs"].to_string();
         assert!(inputs.contains("calib.txt"), "a new calibration is another request: {inputs}");
     }
     // Points in another format take the place of the old ones.
-    let las = ["--also", "points.las"];
-    run(folder.path(), &[&args[..], &las].concat()).succeeded();
-    batch(folder.path(), &[&["data", "out-data", "--format", "tif"], &las[..]].concat()).succeeded();
+    let las = ["--also points.las"];
+    run(&folder, &[&args[..], &las].concat()).succeeded();
+    batch(&folder, &[&["data", "out-data", "--format", "tif"], &las[..]].concat()).succeeded();
     assert!(at("one.points.las") == at("out-data/wall.points.las"));
-    assert!(!folder.path().join("out-data/wall.points.ply").exists());
-    fs::remove_file(folder.path().join("data/wall/calib.txt")).unwrap();
-    let told = batch(folder.path(), &[&["list.csv", "none"], &also[..]].concat());
+    assert!(!folder.join("out-data/wall.points.ply").exists());
+    fs::remove_file(folder.join("data/wall/calib.txt")).unwrap();
+    let told = batch(&folder, &[&["list.csv", "none"], &also[..]].concat());
     assert!(
         told.stderr.contains("wall: --also depth: takes the cameras, and there is no calib.txt"),
         "{told:?}"
@@ -162,9 +148,9 @@ fn a_batch_writes_depth_and_points() {
 #[test]
 fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
     let folder = pairs(3, (64, 48));
-    let out = folder.path().join("out");
+    let out = folder.join("out");
     let again = |args: &[&str], said: &str| {
-        let told = batch(folder.path(), &[&["list.csv", "out"], args].concat()).succeeded();
+        let told = batch(&folder, &[&["list.csv", "out"], args].concat()).succeeded();
         assert_eq!(told.stderr, format!("mrfgs: {said}\n"));
     };
     again(&[], "3 done, 0 skipped, 0 failed");
@@ -184,34 +170,34 @@ fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
         again(&[], "1 done, 2 skipped, 0 failed");
         assert!(fs::read(out.join("pair-1.pfm")).unwrap() == whole);
     }
-    fs::copy(folder.path().join("images/1-left.png"), folder.path().join("images/2-left.png")).unwrap();
+    fs::copy(folder.join("images/1-left.png"), folder.join("images/2-left.png")).unwrap();
     again(&[], "1 done, 2 skipped, 0 failed");
-    let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
-    fs::write(folder.path().join("list.csv"), list.replacen(",31\n", ",30\n", 1)).unwrap();
+    let list = fs::read_to_string(folder.join("list.csv")).unwrap();
+    fs::write(folder.join("list.csv"), list.replacen(",31\n", ",30\n", 1)).unwrap();
     again(&[], "1 done, 2 skipped, 0 failed");
-    again(&["--also", "validity"], "3 done, 0 skipped, 0 failed");
-    again(&["--set", "temperature=0.3"], "3 done, 0 skipped, 0 failed");
+    again(&["--also validity"], "3 done, 0 skipped, 0 failed");
+    again(&["--set temperature=0.3"], "3 done, 0 skipped, 0 failed");
     assert!(names(&out, ".validity.png").is_empty(), "maps of an earlier request go with its record");
-    again(&["--set", "temperature=0.3"], "0 done, 3 skipped, 0 failed");
+    again(&["--set temperature=0.3"], "0 done, 3 skipped, 0 failed");
     // The record of another version.
     let text = fs::read_to_string(out.join("pair-2.json")).unwrap();
     let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(text.contains(&version));
     fs::write(out.join("pair-2.json"), text.replace(&version, "\"version\": \"0.0.1\"")).unwrap();
-    again(&["--set", "temperature=0.3"], "1 done, 2 skipped, 0 failed");
+    again(&["--set temperature=0.3"], "1 done, 2 skipped, 0 failed");
 }
 
 #[cfg(unix)]
 #[test]
 fn a_killed_batch_resumes() {
     let folder = pairs(20, (120, 90));
-    batch(folder.path(), &["list.csv", "whole", "--quiet"]).succeeded();
-    let whole = maps(&folder.path().join("whole"));
+    batch(&folder, &["list.csv", "whole", "--quiet"]).succeeded();
+    let whole = maps(&folder.join("whole"));
     assert_eq!(whole.len(), 20);
-    let out = folder.path().join("out");
+    let out = folder.join("out");
     let mut killed = 0;
     for records in [1, 5, 9, 14] {
-        let mut child = started(folder.path(), &["list.csv", "out"]);
+        let mut child = begun(&folder);
         wait_for(&out, records);
         child.kill().unwrap();
         killed += usize::from(!child.wait_with_output().unwrap().status.success());
@@ -227,7 +213,7 @@ fn a_killed_batch_resumes() {
     fs::write(out.join(".pair-19.tmp/pair-19.pfm"), "half").unwrap();
     let (complete, before) = (names(&out, ".json"), times(&out));
     assert!((14..20).contains(&complete.len()), "{complete:?}");
-    let told = batch(folder.path(), &["list.csv", "out"]).succeeded();
+    let told = batch(&folder, &["list.csv", "out"]).succeeded();
     let (done, skipped) = (20 - complete.len(), complete.len());
     assert_eq!(told.stderr, format!("mrfgs: {done} done, {skipped} skipped, 0 failed\n"));
     assert!(maps(&out) == whole);
@@ -244,10 +230,10 @@ fn a_killed_batch_resumes() {
 fn runs_at_the_same_time_share_the_pairs() {
     // Long enough that none does it all before the others begin.
     let folder = pairs(30, (160, 120));
-    batch(folder.path(), &["list.csv", "single"]).succeeded();
-    let whole = maps(&folder.path().join("single"));
-    let out = folder.path().join("out");
-    let runs = [(); 3].map(|()| started(folder.path(), &["list.csv", "out"]));
+    batch(&folder, &["list.csv", "single"]).succeeded();
+    let whole = maps(&folder.join("single"));
+    let out = folder.join("out");
+    let runs = [(); 3].map(|()| begun(&folder));
     let done = runs.map(|run| {
         let output = run.wait_with_output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
@@ -267,12 +253,11 @@ fn runs_at_the_same_time_share_the_pairs() {
 #[test]
 fn an_interrupted_batch_tidies_up() {
     let folder = pairs(12, (160, 120));
-    let out = folder.path().join("out");
+    let out = folder.join("out");
     for (signal, records) in [("-INT", 1), ("-TERM", 4)] {
-        let child = started(folder.path(), &["list.csv", "out"]);
+        let child = begun(&folder);
         wait_for(&out, records);
-        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        send(signal, &child);
         let output = child.wait_with_output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(130), "{said}");
@@ -280,18 +265,18 @@ fn an_interrupted_batch_tidies_up() {
         assert_eq!(said, format!("mrfgs: stopped after {complete} of 12; run it again to resume\n"));
         assert_eq!(listing(&out).len(), 2 * complete, "nothing half written is left");
     }
-    batch(folder.path(), &["list.csv", "out"]).succeeded();
+    batch(&folder, &["list.csv", "out"]).succeeded();
     assert_eq!(listing(&out).len(), 24);
 }
 
 #[test]
 fn a_bad_pair_does_not_stop_the_others() {
     let folder = pairs(4, (64, 48));
-    let out = folder.path().join("out");
-    let good = fs::read(folder.path().join("images/1-right.png")).unwrap();
-    fs::write(folder.path().join("images/1-right.png"), "text").unwrap();
-    fs::remove_file(folder.path().join("images/2-left.png")).unwrap();
-    let told = batch(folder.path(), &["list.csv", "out", "--quiet"]);
+    let out = folder.join("out");
+    let good = fs::read(folder.join("images/1-right.png")).unwrap();
+    fs::write(folder.join("images/1-right.png"), "text").unwrap();
+    fs::remove_file(folder.join("images/2-left.png")).unwrap();
+    let told = batch(&folder, &["list.csv", "out", "--quiet"]);
     assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""));
     let lines: Vec<_> = told.stderr.lines().collect();
     assert_eq!(lines.len(), 3, "{lines:?}");
@@ -304,15 +289,15 @@ fn a_bad_pair_does_not_stop_the_others() {
     assert_eq!(failed["status"], "failed");
     assert!(failed["reason"].as_str().unwrap().contains("images/1-right.png"));
 
-    fs::write(folder.path().join("images/1-right.png"), good).unwrap();
-    let told = batch(folder.path(), &["list.csv", "out"]);
+    fs::write(folder.join("images/1-right.png"), good).unwrap();
+    let told = batch(&folder, &["list.csv", "out"]);
     assert_eq!(told.code, Some(1));
     assert!(told.stderr.contains("1 done, 2 skipped, 1 failed: pair-2;"), "{told:?}");
     assert_eq!(record(&out, "pair-1")["status"], "done");
     // What no format holds is a fault of the pair too.
-    let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
-    fs::write(folder.path().join("list.csv"), list.replacen(",31\n", ",300\n", 1)).unwrap();
-    let told = batch(folder.path(), &["list.csv", "out", "--format", "png"]);
+    let list = fs::read_to_string(folder.join("list.csv")).unwrap();
+    fs::write(folder.join("list.csv"), list.replacen(",31\n", ",300\n", 1)).unwrap();
+    let told = batch(&folder, &["list.csv", "out", "--format", "png"]);
     assert!(told.stderr.contains("pair-0: cannot write out/pair-0.png: 16-bit PNG"), "{told:?}");
     assert!(told.stderr.contains("2 done, 0 skipped, 2 failed"), "{told:?}");
     assert_eq!(names(&out, ".pfm"), <[&str; 0]>::default(), "maps of an earlier request go with its record");
@@ -321,99 +306,90 @@ fn a_bad_pair_does_not_stop_the_others() {
 #[test]
 fn shards_are_disjoint_and_make_the_whole() {
     let folder = pairs(9, (64, 48));
-    batch(folder.path(), &["list.csv", "whole"]).succeeded();
+    batch(&folder, &["list.csv", "whole"]).succeeded();
     let mut found = Vec::new();
     for shard in ["1/3", "2/3", "3/3"] {
         let apart = format!("part-{}", &shard[..1]);
         for out in [&apart, "together"] {
-            batch(folder.path(), &["list.csv", out, "--shard", shard, "--quiet"]).succeeded();
+            batch(&folder, &["list.csv", out, "--shard", shard, "--quiet"]).succeeded();
         }
-        found.extend(names(&folder.path().join(apart), ".json"));
+        found.extend(names(&folder.join(apart), ".json"));
     }
     found.sort();
-    let whole = folder.path().join("whole");
+    let whole = folder.join("whole");
     assert_eq!(found, names(&whole, ".json"), "each pair is in exactly one shard");
-    assert!(maps(&folder.path().join("together")) == maps(&whole));
+    assert!(maps(&folder.join("together")) == maps(&whole));
     // More pairs move none of the others.
-    let list = fs::read_to_string(folder.path().join("list.csv")).unwrap();
+    let list = fs::read_to_string(folder.join("list.csv")).unwrap();
     let more = list.replacen("pair-0,", "new,images/0-left.png,images/0-right.png,31\npair-0,", 1);
-    fs::write(folder.path().join("list.csv"), more).unwrap();
+    fs::write(folder.join("list.csv"), more).unwrap();
     for shard in ["1/3", "2/3", "3/3"] {
-        batch(folder.path(), &["list.csv", "together", "--shard", shard, "--quiet"]).succeeded();
-        let told = batch(folder.path(), &["list.csv", "together", "--shard", shard, "--status"]).succeeded();
+        batch(&folder, &["list.csv", "together", "--shard", shard, "--quiet"]).succeeded();
+        let told = batch(&folder, &["list.csv", "together", "--shard", shard, "--status"]).succeeded();
         assert!(told.stdout.ends_with(" complete, 0 failed, 0 missing\n"), "{told:?}");
     }
-    let told = batch(folder.path(), &["list.csv", "together"]).succeeded();
+    let told = batch(&folder, &["list.csv", "together"]).succeeded();
     assert_eq!(told.stderr, "mrfgs: 0 done, 10 skipped, 0 failed\n");
 }
 
 #[test]
 fn status_tells_and_runs_nothing() {
     let folder = pairs(4, (64, 48));
-    let before = listing(folder.path());
-    let status = || batch(folder.path(), &["list.csv", "out", "--status"]).succeeded().stdout;
+    let before = listing(&folder);
+    let status = || batch(&folder, &["list.csv", "out", "--status"]).succeeded().stdout;
     let all = |state: &str| ["0", "1", "2", "3"].map(|i| format!("{state:<9} pair-{i}\n")).concat();
     assert_eq!(status(), all("missing") + "0 complete, 0 failed, 4 missing\n");
-    assert!(listing(folder.path()) == before);
-    let image = folder.path().join("images/3-left.png");
+    assert!(listing(&folder) == before);
+    let image = folder.join("images/3-left.png");
     let good = fs::read(&image).unwrap();
     fs::write(&image, "").unwrap();
-    assert_eq!(batch(folder.path(), &["list.csv", "out"]).code, Some(1));
-    fs::remove_file(folder.path().join("out/pair-1.json")).unwrap();
-    let (told, out) = (status(), folder.path().join("out"));
+    assert_eq!(batch(&folder, &["list.csv", "out"]).code, Some(1));
+    fs::remove_file(folder.join("out/pair-1.json")).unwrap();
+    let (told, out) = (status(), folder.join("out"));
     let lines: Vec<_> = told.lines().collect();
     assert_eq!(lines[..3], ["complete  pair-0", "missing   pair-1", "complete  pair-2"]);
     assert!(lines[3].starts_with("failed    pair-3: cannot read images/3-left.png"), "{told}");
     assert_eq!(lines[4], "2 complete, 1 failed, 1 missing");
     assert!(!out.join("pair-1.json").exists());
     fs::write(&image, good).unwrap();
-    batch(folder.path(), &["list.csv", "out"]).succeeded();
+    batch(&folder, &["list.csv", "out"]).succeeded();
     assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
-    let other =
-        batch(folder.path(), &["list.csv", "out", "--status", "--also", "validity"]).succeeded().stdout;
+    let other = batch(&folder, &["list.csv", "out", "--status", "--also", "validity"]).succeeded().stdout;
     assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
 }
 
 #[test]
 fn the_folders_in_a_folder_are_pairs() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
+    fs::create_dir(folder.join("data")).unwrap();
     for name in ["slanted", "wall"] {
-        fs::create_dir_all(folder.path().join("data").join(name)).unwrap();
-        for file in ["im0.png", "im1.png", "calib.txt"] {
-            fs::copy(scene(name).join(file), folder.path().join("data").join(name).join(file)).unwrap();
-        }
+        copy(name, &folder.join("data").join(name));
     }
-    fs::create_dir(folder.path().join("data/.hidden")).unwrap();
-    fs::write(folder.path().join("data/readme"), "").unwrap();
-    batch(folder.path(), &["data", "out"]).succeeded();
-    let args = ["match", "data/wall/im0.png", "data/wall/im1.png", "wall.pfm", "--device", "cpu"];
-    run(folder.path(), &args).succeeded();
-    assert_eq!(names(&folder.path().join("out"), ".pfm"), ["slanted", "wall"]);
-    assert!(maps(&folder.path().join("out"))["wall"] == maps(folder.path())["wall"]);
-    fs::create_dir(folder.path().join("data/empty")).unwrap();
-    let told = batch(folder.path(), &["data", "out"]);
+    fs::create_dir(folder.join("data/.hidden")).unwrap();
+    fs::write(folder.join("data/readme"), "").unwrap();
+    batch(&folder, &["data", "out"]).succeeded();
+    run(&folder, &["match data/wall/im0.png data/wall/im1.png wall.pfm --device cpu"]).succeeded();
+    assert_eq!(names(&folder.join("out"), ".pfm"), ["slanted", "wall"]);
+    assert!(maps(&folder.join("out"))["wall"] == maps(&folder)["wall"]);
+    fs::create_dir(folder.join("data/empty")).unwrap();
+    let told = batch(&folder, &["data", "out"]);
     assert!(told.stderr.contains("0 done, 2 skipped, 1 failed: empty;"), "{told:?}");
-    let told = batch(folder.path(), &["data", "data/out"]);
+    let told = batch(&folder, &["data", "data/out"]);
     told.failed(1, &["data/out", "the folder of the pairs", "give another"], "inside");
-    fs::remove_dir(folder.path().join("data/empty")).unwrap();
+    fs::remove_dir(folder.join("data/empty")).unwrap();
     // Whatever file systems allow is a name.
-    let wall = folder.path().join("data/wall");
     for name in ["two words", "straße №1 (ä) 日本"] {
-        let to = folder.path().join("data").join(name);
-        fs::create_dir(&to).unwrap();
-        for file in ["im0.png", "im1.png", "calib.txt"] {
-            fs::copy(wall.join(file), to.join(file)).unwrap();
-        }
+        copy("wall", &folder.join("data").join(name));
     }
-    let told = batch(folder.path(), &["data", "out"]).succeeded();
+    let told = batch(&folder, &["data", "out"]).succeeded();
     assert_eq!(told.stderr, "mrfgs: 2 done, 2 skipped, 0 failed\n");
-    let all = maps(&folder.path().join("out"));
+    let all = maps(&folder.join("out"));
     assert!(all["two words"] == all["wall"] && all["straße №1 (ä) 日本"] == all["wall"]);
-    let told = batch(folder.path(), &["data", "out"]).succeeded();
+    let told = batch(&folder, &["data", "out"]).succeeded();
     assert_eq!(told.stderr, "mrfgs: 0 done, 4 skipped, 0 failed\n");
-    fs::create_dir(folder.path().join("data/a:b")).unwrap();
-    batch(folder.path(), &["data", "new"]).failed(1, &["data/a:b", "rename it"], "name");
-    assert!(!folder.path().join("new").exists());
+    fs::create_dir(folder.join("data/a:b")).unwrap();
+    batch(&folder, &["data", "new"]).failed(1, &["data/a:b", "rename it"], "name");
+    assert!(!folder.join("new").exists());
 }
 
 #[test]
@@ -445,35 +421,28 @@ fn a_bad_list_is_refused_before_anything_runs() {
         ("name,left,right,min_disparity\na,l,r,1.5\n", &["line 2", "min_disparity", "whole number"]),
     ];
     for (text, words) in lists {
-        fs::write(folder.path().join("bad.csv"), text).unwrap();
-        let before = listing(folder.path());
+        fs::write(folder.join("bad.csv"), text).unwrap();
+        let before = listing(&folder);
         for more in [&[][..], &["--status"]] {
-            let told = batch(folder.path(), &[&["bad.csv", "out"], more].concat());
+            let told = batch(&folder, &[&["bad.csv", "out"], more].concat());
             told.failed(1, &[&["bad.csv"], *words].concat(), text);
         }
-        assert!(listing(folder.path()) == before, "{text}");
+        assert!(listing(&folder) == before, "{text}");
     }
-    fs::write(folder.path().join("bad.csv"), b"name,left,right\n\xff,l,r\n").unwrap();
-    batch(folder.path(), &["bad.csv", "out"]).failed(1, &["bad.csv", "UTF-8"], "bytes");
+    fs::write(folder.join("bad.csv"), b"name,left,right\n\xff,l,r\n").unwrap();
+    batch(&folder, &["bad.csv", "out"]).failed(1, &["bad.csv", "UTF-8"], "bytes");
     // Quotes, spaces, columns in another order, a byte order mark, the line ends of another system.
     let good = "\u{feff}mask,right, left ,name\r\n,\"images/0-right.png\",images/0-left.png,a\r\n";
-    fs::write(folder.path().join("good.csv"), good).unwrap();
-    let told = batch(folder.path(), &["good.csv", "out"]).succeeded();
+    fs::write(folder.join("good.csv"), good).unwrap();
+    let told = batch(&folder, &["good.csv", "out"]).succeeded();
     assert_eq!(told.stderr, "mrfgs: 1 done, 0 skipped, 0 failed\n");
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_without_permission_ends_a_batch_at_once() {
-    use std::os::unix::fs::PermissionsExt;
     let folder = pairs(2, (64, 48));
-    let mut locked = folder.path().join("locked");
-    fs::create_dir(&locked).unwrap();
-    fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
-    if fs::write(locked.join("probe"), "").is_ok() {
-        // This is root, who may write anywhere but where the kernel says no.
-        locked = "/sys".into();
-    }
+    let locked = locked(&folder);
     let locked = locked.to_str().unwrap();
-    batch(folder.path(), &["list.csv", locked]).failed(1, &[locked, "nothing can be created"], "locked");
+    batch(&folder, &["list.csv", locked]).failed(1, &[locked, "nothing can be created"], "locked");
 }

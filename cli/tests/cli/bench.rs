@@ -4,20 +4,20 @@ use std::fs;
 
 use serde_json::Value;
 
-use super::{has_gpu, listing, run, workshop};
+use super::{Folder, has_gpu, listing, run, workshop};
 
 #[test]
 fn a_bench_gives_every_figure_of_both_backends() {
     let folder = workshop();
     let (backends, which) = if has_gpu() {
-        (&["cpu", "gpu"][..], &["--device", "cpu", "--device", "gpu"][..])
+        (&["cpu", "gpu"][..], &["--device cpu --device gpu"][..])
     } else {
-        (&["cpu"][..], &["--device", "cpu"][..])
+        (&["cpu"][..], &["--device cpu"][..])
     };
-    let args = ["bench", "misfit", "without-disp0GT.pfm", "--repeats", "2", "--json", "out.json"];
-    let more = ["--threads", "2", "--set", "levels=1", "--set", "percentile=92"];
-    let told = run(folder.path(), &[&args[..], which, &more].concat()).succeeded();
-    let json = fs::read_to_string(folder.path().join("out.json")).unwrap();
+    let args = ["bench misfit without-disp0GT.pfm --repeats 2 --json out.json"];
+    let more = ["--threads 2 --set levels=1 --set percentile=92"];
+    let told = run(&folder, &[&args[..], which, &more].concat()).succeeded();
+    let json = fs::read_to_string(folder.join("out.json")).unwrap();
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
     assert_eq!((&json["threads"], &json["repeats"]), (&2.into(), &2.into()));
@@ -102,29 +102,28 @@ fn a_bench_gives_every_figure_of_both_backends() {
     }
 
     // A single case, printed.
-    let args = ["bench", "misfit", "--method", "fgs", "--device", "cpu", "--repeats", "1", "--json", "-"];
-    let pairs = &run(folder.path(), &args).succeeded().json()["pairs"];
+    let args = ["bench misfit --method fgs --device cpu --repeats 1 --json -"];
+    let pairs = &run(&folder, &args).succeeded().json()["pairs"];
     assert_eq!((pairs.as_array().unwrap().len(), &pairs[0]["method"]), (1, &"fgs".into()));
     assert_eq!(pairs[0]["devices"]["gpu"], Value::Null);
 }
 
 #[test]
 fn a_bench_without_folders_makes_up_its_pair() {
-    let folder = tempfile::tempdir().unwrap();
-    let args = ["bench", "--method", "default", "--device", "cpu", "--repeats", "1", "--set", "levels=1"];
-    let told = run(folder.path(), &args).succeeded();
+    let folder = Folder::new();
+    let told = run(&folder, &["bench --method default --device cpu --repeats 1 --set levels=1"]).succeeded();
     assert!(told.stdout.contains("small, method default: 450 x 375 pixels, 60 labels"), "{}", told.stdout);
-    assert!(listing(folder.path()).is_empty());
+    assert!(listing(&folder).is_empty());
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_bench_that_cannot_be_written_fails() {
     let folder = workshop();
-    let before = listing(folder.path());
-    let args = ["bench", "misfit", "--method", "default", "--device", "cpu", "--repeats", "1"];
-    let told = run(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat());
+    let before = listing(&folder);
+    let args = ["bench misfit --method default --device cpu --repeats 1"];
+    let told = run(&folder, &[&args[..], &["--json /dev/full"]].concat());
     assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""), "{told:?}");
     assert!(told.stderr.lines().last().unwrap().contains("/dev/full"), "{told:?}");
-    assert!(listing(folder.path()) == before);
+    assert!(listing(&folder) == before);
 }

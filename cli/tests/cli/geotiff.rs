@@ -8,7 +8,7 @@ use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
 use super::files::{Tiff, Values};
-use super::{run, scene_file};
+use super::{Folder, run, scene_file};
 use Values::{Double, Long, Short};
 
 const KEYS: [u16; 8] = [1, 1, 0, 1, 3072, 0, 1, 32_631];
@@ -40,40 +40,29 @@ fn east(path: &Path) -> f64 {
 
 #[test]
 fn maps_lie_where_their_views_lie() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     write_view(&at("left.tif"), "im0.png", 4e5);
     write_view(&at("right.tif"), "im1.png", 7e5);
     fs::copy(scene_file("slanted", "calib.txt"), at("calib.txt")).unwrap();
     fs::write(at("list.csv"), "left,right,name\nleft.tif,right.tif,d\n").unwrap();
-    let more = ["--device", "cpu", "--quiet", "--method", "fast", "--also", "raw,right,depth"];
-    run(folder.path(), &[&["match", "left.tif", "right.tif", "d.tif"], &more[..]].concat()).succeeded();
-    run(folder.path(), &[&["batch", "list.csv", "maps", "--format", "tif"], &more[..]].concat()).succeeded();
+    let more = ["--device cpu --quiet --method fast --also raw,right,depth"];
+    run(&folder, &[&["match left.tif right.tif d.tif"], &more[..]].concat()).succeeded();
+    run(&folder, &[&["batch list.csv maps --format tif"], &more[..]].concat()).succeeded();
     for (name, expected) in [("d.tif", 4e5), ("d.raw.tif", 4e5), ("d.right.tif", 7e5), ("d.depth.tif", 4e5)] {
         for path in [at(name), at("maps").join(name)] {
             assert!((east(&path) - expected).abs() < 1e-9, "{}", path.display());
         }
     }
     // As a frame of a sequence.
-    let line = ["sequence", "lef*.tif", "righ*.tif", "frames", "--format", "tif", "--calib", "calib.txt"];
-    run(folder.path(), &[&line, &more[..]].concat()).succeeded();
+    let line = ["sequence lef*.tif righ*.tif frames --format tif --calib calib.txt"];
+    run(&folder, &[&line, &more[..]].concat()).succeeded();
     for name in ["tif", "raw.tif", "right.tif", "depth.tif"] {
         let [frame, map] = [at(&format!("frames/left.{name}")), at(&format!("d.{name}"))];
         assert!(fs::read(&frame).unwrap() == fs::read(map).unwrap(), "{}", frame.display());
     }
     // The same in tiles.
-    let tiled = [
-        "match",
-        "left.tif",
-        "right.tif",
-        "tiled.tif",
-        "--device",
-        "cpu",
-        "--method",
-        "fast",
-        "--memory",
-        "12MiB",
-    ];
-    assert!(run(folder.path(), &tiled).succeeded().stderr.contains(" tiles, "));
+    let tiled = ["match left.tif right.tif tiled.tif --device cpu --method fast --memory 12MiB"];
+    assert!(run(&folder, &tiled).succeeded().stderr.contains(" tiles, "));
     assert!((east(&at("tiled.tif")) - 4e5).abs() < 1e-9);
 }

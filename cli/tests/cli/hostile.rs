@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::files::{Png, jpeg, tiff};
-use super::{listing, run, scene, workshop};
+use super::{listing, run, scene, shell, workshop};
 
 /// Small files that claim gigantic or impossible images, each with words of what is said.
 fn hostile() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
@@ -83,17 +83,12 @@ fn what_a_header_claims_is_refused_everywhere() {
     let folder = workshop();
     for (name, bytes, words) in hostile() {
         assert!(bytes.len() < 1000, "{name} is small");
-        fs::write(folder.path().join(name), &bytes).unwrap();
-        let before = listing(folder.path());
+        fs::write(folder.join(name), &bytes).unwrap();
+        let before = listing(&folder);
         let words = [&[name], words].concat();
         for line in [
             "match NAME right.png out.pfm --max-disparity 9",
             "match left.png NAME out.pfm --max-disparity 9",
-        ] {
-            let line = line.replace("NAME", name);
-            run(folder.path(), &line.split(' ').collect::<Vec<_>>()).failed(1, &words, &line);
-        }
-        for line in [
             "match left.png right.png out.pfm --max-disparity 9 --mask NAME",
             "evaluate map NAME --truth unknown.pfm",
             "evaluate map unknown.pfm --truth NAME",
@@ -106,10 +101,10 @@ fn what_a_header_claims_is_refused_everywhere() {
             } else {
                 &words
             };
-            run(folder.path(), &line.split(' ').collect::<Vec<_>>()).failed(1, words, &line);
+            run(&folder, &[&line]).failed(1, words, &line);
         }
-        assert!(listing(folder.path()) == before, "{name}: the folder has changed");
-        fs::remove_file(folder.path().join(name)).unwrap();
+        assert!(listing(&folder) == before, "{name}: the folder has changed");
+        fs::remove_file(folder.join(name)).unwrap();
     }
 }
 
@@ -117,7 +112,7 @@ fn what_a_header_claims_is_refused_everywhere() {
 #[test]
 fn the_limit_on_pixels_is_kept_everywhere() {
     let folder = workshop();
-    let before = listing(folder.path());
+    let before = listing(&folder);
     let dir = scene("slanted").to_str().unwrap().to_owned();
     let disparity = format!("{dir}/disp0GT.pfm");
     let size = ["240 x 180", "at most 43199", "raise --max-pixels"];
@@ -130,43 +125,38 @@ fn the_limit_on_pixels_is_kept_everywhere() {
         (format!("evaluate map {disparity} --truth {disparity} --max-pixels 43199"), size),
         (format!("bench {dir} --repeats 1 --device cpu --max-pixels 43199"), size),
     ] {
-        run(folder.path(), &line.split(' ').collect::<Vec<_>>()).failed(1, &words, &line);
+        run(&folder, &[&line]).failed(1, &words, &line);
     }
     for (value, words) in [("0", "0 is not in 1.."), ("-1", "-1"), ("10M", "10M"), ("1e6", "1e6")] {
-        let args = ["match", "left.png", "right.png", "out.pfm", "--max-pixels", value];
-        run(folder.path(), &args).failed(2, &["--max-pixels", words], value);
+        let told = run(&folder, &["match left.png right.png out.pfm --max-pixels", value]);
+        told.failed(2, &["--max-pixels", words], value);
     }
-    assert!(listing(folder.path()) == before);
+    assert!(listing(&folder) == before);
     // As many as there are will do.
-    let args = "match left.png right.png out.pfm --max-disparity 31 --max-pixels 2400 --device cpu --quiet";
-    run(folder.path(), &args.split(' ').collect::<Vec<_>>()).succeeded();
+    run(&folder, &["match left.png right.png out.pfm --max-disparity 31 --max-pixels 2400 --quiet"])
+        .succeeded();
 }
 
 /// No allocation that the address space does not hold can be had, whether it is touched or not.
 #[cfg(target_os = "linux")]
 mod memory {
     use super::*;
-    use std::process::{Command, Output};
+    use std::process::Output;
 
     /// The program and its threads take 100 MiB or so of addresses.
     const KIB: u32 = 256 << 10;
 
     fn limited(folder: &Path, line: &str) -> Output {
-        Command::new("sh")
-            .current_dir(folder)
-            .args(["-c", &format!("ulimit -v {KIB} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")])
-            .args(line.split(' '))
-            .output()
-            .unwrap()
+        shell(folder, &format!("ulimit -v {KIB}"), line)
     }
 
     #[test]
     fn what_a_header_claims_takes_no_memory() {
         let folder = workshop();
         for (name, bytes, _) in hostile() {
-            fs::write(folder.path().join(name), &bytes).unwrap();
+            fs::write(folder.join(name), &bytes).unwrap();
             // What is too large by default, and what is within the limit but not within the file.
-            let output = limited(folder.path(), &format!("match {name} {name} out.pfm --max-disparity 9"));
+            let output = limited(&folder, &format!("match {name} {name} out.pfm --max-disparity 9"));
             let said = String::from_utf8_lossy(&output.stderr);
             assert_eq!(output.status.code(), Some(1), "{name}: {output:?}");
             assert!(
@@ -186,9 +176,9 @@ mod memory {
         encoder.set_icc_profile(vec![0; 400 << 20]).unwrap();
         encoder.write_image(&[7; 2400], 60, 40, ExtendedColorType::L8).unwrap();
         assert!(bytes.len() < 2 << 20, "{} bytes", bytes.len());
-        fs::write(folder.path().join("profile.png"), bytes).unwrap();
+        fs::write(folder.join("profile.png"), bytes).unwrap();
         let line = "match profile.png left.png out.pfm --max-disparity 9 --device cpu --threads 1";
-        let output = limited(folder.path(), line);
+        let output = limited(&folder, line);
         // It may be refused or read without its profile.
         assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
     }
@@ -198,7 +188,7 @@ mod memory {
     fn the_limit_holds() {
         let folder = workshop();
         let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --threads 1";
-        assert!(limited(folder.path(), line).status.success());
+        assert!(limited(&folder, line).status.success());
         // Random bytes between header and pixels, so that the claim of 900 million pixels is not absurd.
         let filler = vec![b'x'; 100_000];
         let png = Png {
@@ -209,9 +199,9 @@ mod memory {
             chunks: &[(*b"tEXt", &filler)],
             rows: &[0],
         };
-        fs::write(folder.path().join("claim.png"), png.bytes()).unwrap();
+        fs::write(folder.join("claim.png"), png.bytes()).unwrap();
         let line = "match claim.png claim.png out.pfm --max-disparity 9 --device cpu --max-pixels 900000000";
-        let output = limited(folder.path(), line);
+        let output = limited(&folder, line);
         assert_eq!(output.status.code(), Some(1), "{output:?}");
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(said.contains("1.7 GiB of memory are needed and cannot be had"), "{said}");

@@ -27,14 +27,33 @@ mod sequences;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use mrfgs::low_level::backend::gpu;
 use mrfgs::maps::REASONS;
 use mrfgs::options::{self, Method, Takes};
 use serde_json::Value;
 use tempfile::TempDir;
+
+/// A folder that goes with its test.
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+}
+
+impl Deref for Folder {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        self.0.path()
+    }
+}
 
 /// What a run of the program leaves.
 #[derive(Debug)]
@@ -49,16 +68,29 @@ fn run(folder: &Path, args: &[&str]) -> Run {
     run_with(folder, args, &[])
 }
 
+/// The arguments in `args`, each of which is a path or holds words with spaces between them.
+fn words<'a>(folder: &Path, args: &[&'a str]) -> Vec<&'a str> {
+    let is_path = |args: &str| Path::new(args).is_absolute() || folder.join(args).exists();
+    args.iter().flat_map(|args| if is_path(args) { vec![*args] } else { args.split(' ').collect() }).collect()
+}
+
+/// The program in `folder`.
+fn program(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Command {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_mrfgs"));
+    program.current_dir(folder).args(words(folder, args));
+    // As on a machine without a display, where the Vulkan loader would complain on standard error.
+    program.env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE").envs(environment.iter().copied());
+    program
+}
+
+/// The program at work in `folder`, with pipes to all its ends.
+fn started(folder: &Path, args: &[&str]) -> Child {
+    let mut program = program(folder, args, &[]);
+    program.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
 fn run_with(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .current_dir(folder)
-        .args(args)
-        // As on a machine without a display, where the Vulkan loader would complain on standard error.
-        .env_remove("XDG_RUNTIME_DIR")
-        .env_remove("RUST_BACKTRACE")
-        .envs(environment.iter().copied())
-        .output()
-        .unwrap();
+    let output = program(folder, args, environment).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
@@ -70,13 +102,14 @@ impl Run {
     }
 
     /// Exactly one line on standard error, with all these words, and nothing on standard output.
+    /// ` & ` separates words, too.
     fn failed(&self, code: i32, words: &[&str], what: &str) {
         assert_eq!(self.code, Some(code), "{what}: {self:?}");
         assert_eq!(self.stdout, "", "{what}");
         assert!(self.stderr.starts_with("mrfgs: ") && self.stderr.ends_with('\n'), "{what}: {self:?}");
         assert_eq!(self.stderr.lines().count(), 1, "{what}: {}", self.stderr);
         assert!(!self.stderr.contains("panicked"), "{what}: {}", self.stderr);
-        for word in words {
+        for word in words.iter().flat_map(|words| words.split(" & ")) {
             assert!(self.stderr.contains(word), "{what}: no `{word}` in: {}", self.stderr);
         }
     }
@@ -84,6 +117,43 @@ impl Run {
     fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap()
     }
+}
+
+/// Runs the program after a command of the shell.
+fn shell(folder: &Path, before: &str, line: &str) -> Output {
+    Command::new("sh")
+        .current_dir(folder)
+        .args(["-c", &format!("{before} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")])
+        .args(line.split(' '))
+        .env_remove("RUST_BACKTRACE")
+        .output()
+        .unwrap()
+}
+
+/// Waits until something is so.
+fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed() < Duration::from_secs(120), "not {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Sends a signal such as `-INT`.
+#[cfg(unix)]
+fn send(signal: &str, child: &Child) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+/// A folder below `folder` that nobody may write to.
+#[cfg(target_os = "linux")]
+fn locked(folder: &Path) -> PathBuf {
+    use std::os::unix::fs::PermissionsExt;
+    let locked = folder.join("locked");
+    fs::create_dir(&locked).unwrap();
+    fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
+    // Root may write anywhere but where the kernel says no.
+    if fs::write(locked.join("probe"), "").is_ok() { "/sys".into() } else { locked }
 }
 
 /// Everything in a folder and below it: the content of files, `None` for folders.
@@ -117,9 +187,9 @@ fn scene_file(name: &str, file: &str) -> String {
 }
 
 /// A folder with a pair of 60 x 40 pixels without calib.txt, and with much that is wrong.
-fn workshop() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+fn workshop() -> Folder {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
         let image = image::open(scene("slanted").join(from)).unwrap();
         image.crop_imm(100, 80, 60, 40).save(at(to)).unwrap();
@@ -231,10 +301,10 @@ const COMMANDS: [&str; 14] = [
 
 #[test]
 fn help_fits_a_terminal_of_80_columns() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for command in COMMANDS {
         let args: Vec<_> = command.split_whitespace().chain(["--help"]).collect();
-        let help = run_with(folder.path(), &args, &[("COLUMNS", "80")]).succeeded().stdout;
+        let help = run_with(&folder, &args, &[("COLUMNS", "80")]).succeeded().stdout;
         let (_, examples) = help.split_once("Examples:\n").unwrap_or_default();
         for line in help.lines() {
             assert!(line.chars().count() <= 80, "{command}: {line}");
@@ -249,23 +319,23 @@ fn help_fits_a_terminal_of_80_columns() {
 
 #[test]
 fn devices_say_what_auto_takes() {
-    let folder = tempfile::tempdir().unwrap();
-    let told = run(folder.path(), &["devices"]).succeeded();
+    let folder = Folder::new();
+    let told = run(&folder, &["devices"]).succeeded();
     let last = told.stdout.lines().last().unwrap();
     assert!(last.contains("`auto` takes "), "{}", told.stdout);
 }
 
 #[test]
 fn the_later_word_counts() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     fs::write(
-        folder.path().join("my.toml"),
+        folder.join("my.toml"),
         "levels = 3\nschedule.iterations = 2\n[cost]\nmatching = \"ad-census\"\noutside-cost = 1\n",
     )
     .unwrap();
     let dir = scene("wall").to_str().unwrap().to_owned();
-    let args = ["evaluate", &dir, "--json", "-", "--set", "levels=2", "--set", "graph.levels=1"];
-    let told = run(folder.path(), &[&args[..], &["--method", "paper", "--method", "my.toml"]].concat());
+    let args = ["evaluate", &dir, "--json - --set levels=2 --set graph.levels=1"];
+    let told = run(&folder, &[&args[..], &["--method paper --method my.toml"]].concat());
     let method = &told.succeeded().json()["method"];
     assert_eq!(method["graph"]["levels"], 1, "--set after --method, the last --set last");
     assert_eq!(method["schedule"]["iterations"], 2, "a file after the preset");
@@ -276,10 +346,10 @@ fn the_later_word_counts() {
 
 #[test]
 fn presets_can_be_pasted_into_a_file() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for (name, _) in options::PRESETS {
-        let told = run(folder.path(), &["presets", name]).succeeded();
-        let path = folder.path().join("pasted.toml");
+        let told = run(&folder, &["presets", name]).succeeded();
+        let path = folder.join("pasted.toml");
         fs::write(&path, &told.stdout).unwrap();
         for (other, _) in options::PRESETS {
             let mut method = Method::preset(other).unwrap();
@@ -287,7 +357,7 @@ fn presets_can_be_pasted_into_a_file() {
             assert_eq!(method, Method::preset(name).unwrap(), "{name} over {other}");
         }
     }
-    let listing = run(folder.path(), &["presets"]).succeeded().stdout;
+    let listing = run(&folder, &["presets"]).succeeded().stdout;
     for group in options::GROUPS {
         assert!(listing.lines().any(|l| l.starts_with(&format!("[{}] ", group.name))), "{}", group.name);
         for key in group.keys {
@@ -312,14 +382,14 @@ fn presets_can_be_pasted_into_a_file() {
 
 #[test]
 fn help_teaches() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let help = |args: &[&str]| {
-        let told = run(folder.path(), args).succeeded();
+        let told = run(&folder, args).succeeded();
         assert_eq!(told.stderr, "");
         // As it is wrapped depends on the terminal.
         told.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
     };
-    let text = help(&["match", "--help"]);
+    let text = help(&["match --help"]);
     for (bit, name, _) in REASONS {
         assert!(text.contains(&format!("{bit} {name}")) || bit == 0, "{bit} {name}");
     }
@@ -327,16 +397,16 @@ fn help_teaches() {
         assert!(text.contains(words), "{words}");
     }
     assert!(help(&["--help"]).contains("Exit status: 0"));
-    assert!(help(&["evaluate", "--help"]).contains("mask0nocc.png"));
-    assert!(help(&["batch", "--help"]).contains("name,left,right,max_disparity # a comment"));
-    assert!(help(&["presets", "--help"]).contains("Examples:"));
-    assert!(help(&["bench", "--help"]).contains("[default: default and paper,"));
+    assert!(help(&["evaluate --help"]).contains("mask0nocc.png"));
+    assert!(help(&["batch --help"]).contains("name,left,right,max_disparity # a comment"));
+    assert!(help(&["presets --help"]).contains("Examples:"));
+    assert!(help(&["bench --help"]).contains("[default: default and paper,"));
 }
 
 #[test]
 fn the_version_names_what_a_report_needs() {
-    let folder = tempfile::tempdir().unwrap();
-    let told = run(folder.path(), &["--version"]).succeeded().stdout;
+    let folder = Folder::new();
+    let told = run(&folder, &["--version"]).succeeded().stdout;
     let mut lines = told.lines();
     assert_eq!(lines.next(), Some(format!("mrfgs {}", env!("CARGO_PKG_VERSION")).as_str()));
     assert!(lines.next().is_some_and(|line| line.starts_with("wgpu ")), "{told}");
@@ -345,7 +415,7 @@ fn the_version_names_what_a_report_needs() {
     for (line, device) in lines.zip(devices) {
         assert!(line.contains(&device.name) && line.contains(&device.driver), "{line}");
     }
-    assert_eq!(run(folder.path(), &["-V"]).succeeded().stdout, told);
+    assert_eq!(run(&folder, &["-V"]).succeeded().stdout, told);
 }
 
 #[cfg(target_os = "linux")]
@@ -370,13 +440,13 @@ fn a_reader_that_leaves_early_is_no_failure() {
 
 #[test]
 fn shells_and_readers_get_every_flag() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        let script = run(folder.path(), &["completions", shell]).succeeded().stdout;
+        let script = run(&folder, &["completions", shell]).succeeded().stdout;
         assert!(script.contains("mrfgs") && script.contains("max-disparity"), "{shell}");
     }
-    run(folder.path(), &["man", "pages"]).succeeded();
-    let pages = listing(&folder.path().join("pages"));
+    run(&folder, &["man pages"]).succeeded();
+    let pages = listing(&folder.join("pages"));
     let names: Vec<_> = pages.keys().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
     for command in COMMANDS {
         let name = format!("mrfgs {command}").trim_end().replace(' ', "-") + ".1";
@@ -390,5 +460,5 @@ fn shells_and_readers_get_every_flag() {
         assert!(page.contains(flag), "no {flag} in:\n{page}");
     }
     // Again, over what is there.
-    run(folder.path(), &["man", "pages"]).succeeded();
+    run(&folder, &["man pages"]).succeeded();
 }

@@ -2,26 +2,24 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
 use mrfgs::image::read;
 use mrfgs::maps::flag;
 
-use super::{NO_DRIVER, in_cells, listing, run, run_with, scene, scene_file, workshop};
+use super::*;
 
 #[test]
 fn match_writes_every_output_in_every_format() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("slanted", file));
     let mask = image::GrayImage::from_fn(240, 180, |x, y| image::Luma([u8::from(x > 200 && y < 9) * 9]));
     mask.save(at("mask.png")).unwrap();
 
-    let common = ["--mask", "mask.png", "--threads", "2", "--device", "cpu"];
-    let first = ["match", &left, &right, "a.pfm", "--also", "raw,confidence", "--also", "validity,preview"];
+    let common = ["--mask mask.png --threads 2 --device cpu"];
+    let first = ["match", &left, &right, "a.pfm --also raw,confidence --also validity,preview"];
     let first = [&first[..], &common].concat();
-    let told = run(folder.path(), &first).succeeded();
+    let told = run(&folder, &first).succeeded();
     assert_eq!(told.stdout, "");
     assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
     for words in ["mrfgs: 240 x 180, 32 labels, ", " s on the CPU path, 2 threads\n"] {
@@ -61,8 +59,8 @@ fn match_writes_every_output_in_every_format() {
         ("c.tiff", "c.raw.tiff", f32::INFINITY),
         ("C.PFM", "C.raw.PFM", f32::INFINITY),
     ] {
-        let args = ["match", &left, &right, output, "--also", "raw", "--mask", "mask.png", "--threads", "1"];
-        let quiet = run(folder.path(), &[&args[..], &["--quiet", "--max-disparity", "31"]].concat());
+        let args = ["match", &left, &right, output, "--also raw --mask mask.png --threads 1"];
+        let quiet = run(&folder, &[&args[..], &["--quiet --max-disparity 31"]].concat());
         let quiet = quiet.succeeded();
         assert_eq!((quiet.stdout, quiet.stderr), (String::new(), String::new()));
         for (name, expected) in [(output, &map), (raw, &read::read_disparity(&at("a.raw.pfm")).unwrap())] {
@@ -89,15 +87,14 @@ fn match_writes_every_output_in_every_format() {
     assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
 
     // Without the fill, what is invalid stays so.
-    let args =
-        ["match", &left, &right, "d.pfm", "--set", "fill=row", "--set", "fill=none", "--mask", "mask.png"];
-    run(folder.path(), &[&args[..], &["--also", "validity"]].concat()).succeeded();
+    let args = ["match", &left, &right, "d.pfm --set fill=row --set fill=none --mask mask.png"];
+    run(&folder, &[&args[..], &["--also validity"]].concat()).succeeded();
     let map = read::read_disparity(&at("d.pfm")).unwrap();
     let validity = read::grey8(&at("d.validity.png")).unwrap();
     assert!(map.data().iter().zip(validity.data()).all(|(d, f)| d.is_finite() == (f & flag::INVALID == 0)));
     assert!(map.data().iter().filter(|d| !d.is_finite()).count() > 1000);
 
-    let names: Vec<_> = listing(folder.path()).into_keys().collect();
+    let names: Vec<_> = listing(&folder).into_keys().collect();
     assert_eq!(names.len(), 14, "nothing else is left: {names:?}");
 }
 
@@ -105,26 +102,24 @@ fn match_writes_every_output_in_every_format() {
 fn ranges_may_be_negative() {
     let folder = workshop();
     // With the views swapped, every disparity has the other sign.
-    let args =
-        ["match", "right.png", "left.png", "out.tif", "--min-disparity", "-31", "--max-disparity", "-1"];
-    run(folder.path(), &args).succeeded();
-    let map = read::read_disparity(&folder.path().join("out.tif")).unwrap();
+    run(&folder, &["match right.png left.png out.tif --min-disparity -31 --max-disparity -1"]).succeeded();
+    let map = read::read_disparity(&folder.join("out.tif")).unwrap();
     assert_eq!(map.size(), (60, 40));
     assert!(map.data().iter().all(|d| (-31.0..=-1.0).contains(d)));
 }
 
 #[test]
 fn a_range_is_found_where_none_is_given() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png"), ("disp0GT.pfm", "truth.pfm")] {
-        fs::copy(scene("mixed").join(from), folder.path().join(to)).unwrap();
+        fs::copy(scene("mixed").join(from), folder.join(to)).unwrap();
     }
-    let truth = read::read_disparity(&folder.path().join("truth.pfm")).unwrap();
+    let truth = read::read_disparity(&folder.join("truth.pfm")).unwrap();
     let finite = || truth.data().iter().copied().filter(|d| d.is_finite());
     let (least, most) = (finite().fold(f32::MAX, f32::min), finite().fold(f32::MIN, f32::max));
-    for extra in [&[][..], &["--max-disparity", "auto"][..]] {
-        let args = [&["match", "left.png", "right.png", "out.pfm"], extra].concat();
-        let said = run(folder.path(), &args).succeeded().stderr;
+    for extra in [&[][..], &["--max-disparity auto"][..]] {
+        let args = [&["match left.png right.png out.pfm"], extra].concat();
+        let said = run(&folder, &args).succeeded().stderr;
         let line = said.lines().find(|l| l.contains("by sparse matches")).expect("said on stderr");
         let numbers: Vec<f32> =
             line.split_whitespace().filter_map(|w| w.trim_end_matches(',').parse().ok()).collect();
@@ -132,21 +127,20 @@ fn a_range_is_found_where_none_is_given() {
         assert!(numbers[1] - numbers[0] < 1.5 * (most - least), "{line} and the truth is {least} to {most}");
     }
     // What the user says counts.
-    let args =
-        ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "auto", "--min-disparity", "2"];
-    assert!(run(folder.path(), &args).succeeded().stderr.contains("disparities 2 to "));
+    let args = ["match left.png right.png out.pfm --max-disparity auto --min-disparity 2"];
+    assert!(run(&folder, &args).succeeded().stderr.contains("disparities 2 to "));
 }
 
 #[test]
 fn a_pair_that_is_not_rectified_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "47"];
+    let folder = Folder::new();
+    let args = ["match left.png right.png out.pfm --max-disparity 47"];
     for (shift, warns) in [(0, false), (1, true), (2, true)] {
         for (from, to, top) in [("im0.png", "left.png", 0), ("im1.png", "right.png", shift)] {
             let image = image::open(scene("mixed").join(from)).unwrap();
-            image.crop_imm(0, top, 320, 230).save(folder.path().join(to)).unwrap();
+            image.crop_imm(0, top, 320, 230).save(folder.join(to)).unwrap();
         }
-        let said = run(folder.path(), &args).succeeded().stderr;
+        let said = run(&folder, &args).succeeded().stderr;
         assert_eq!(said.contains("not rectified"), warns, "{said}");
     }
 }
@@ -154,78 +148,67 @@ fn a_pair_that_is_not_rectified_is_named() {
 /// A range that is found has negative disparities then, and says nothing of what the user knows.
 #[test]
 fn swapped_views_are_told_whatever_the_range() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
     let list = format!("name,left,right,max_disparity\nauto,{right},{left},auto\ngiven,{right},{left},47\n");
-    fs::write(folder.path().join("list.csv"), list).unwrap();
+    fs::write(folder.join("list.csv"), list).unwrap();
     for (range, told) in [(&["auto"][..], true), (&["47"], true), (&["0", "--min-disparity", "-47"], false)] {
-        let args = ["match", &right, &left, "out.pfm", "--device", "cpu", "--max-disparity"];
-        let said = run(folder.path(), &[&args[..], range].concat()).succeeded().stderr;
+        let args = ["match", &right, &left, "out.pfm --device cpu --max-disparity"];
+        let said = run(&folder, &[&args[..], range].concat()).succeeded().stderr;
         assert_eq!(said.contains("warning: the views seem to be swapped"), told, "{range:?}: {said}");
     }
-    run(folder.path(), &["batch", "list.csv", "maps", "--device", "cpu"]).succeeded();
+    run(&folder, &["batch list.csv maps --device cpu"]).succeeded();
     for name in ["auto", "given"] {
-        let record = fs::read_to_string(folder.path().join(format!("maps/{name}.json"))).unwrap();
+        let record = fs::read_to_string(folder.join(format!("maps/{name}.json"))).unwrap();
         assert!(record.contains("the views seem to be swapped"), "{name}: {record}");
     }
 }
 
 #[test]
 fn what_stands_for_no_data_is_ignored() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
     // A border of 255 on the left, which no other pixel has.
     for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
         let mut image = image::open(scene("mixed").join(from)).unwrap().to_luma8();
         for (x, _, pixel) in image.enumerate_pixels_mut() {
             pixel.0[0] = if x < 9 { 255 } else { pixel.0[0].min(254) };
         }
-        image.save(at(to)).unwrap();
+        image.save(folder.join(to)).unwrap();
     }
     let map = |more: &[&str]| {
-        let args = [
-            "match",
-            "left.png",
-            "right.png",
-            "out.tif",
-            "--max-disparity",
-            "47",
-            "--device",
-            "cpu",
-            "--quiet",
-        ];
-        run(folder.path(), &[&args[..], more].concat()).succeeded();
-        read::read_disparity(&at("out.tif")).unwrap()
+        let args = ["match left.png right.png out.tif --max-disparity 47 --device cpu --quiet"];
+        run(&folder, &[&args[..], more].concat()).succeeded();
+        read::read_disparity(&folder.join("out.tif")).unwrap()
     };
     let border = |map: &mrfgs::image::Plane<f32>| {
         (0..240).flat_map(|y| (0..9).map(move |x| (x, y))).all(|at| map[at].is_infinite())
     };
-    let ignored = map(&["--no-data", "255"]);
+    let ignored = map(&["--no-data 255"]);
     assert!(border(&ignored) && ignored[(20, 20)].is_finite());
-    assert!(!border(&map(&[])) && !border(&map(&["--no-data", "-1"])));
+    assert!(!border(&map(&[])) && !border(&map(&["--no-data -1"])));
 }
 
 #[test]
 fn a_range_that_cuts_off_the_scene_is_told() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
     let said = |more: &[&str]| {
-        let args = ["match", &left, &right, "out.pfm", "--device", "cpu"];
-        run(folder.path(), &[&args[..], more].concat()).succeeded().stderr
+        let args = ["match", &left, &right, "out.pfm --device cpu"];
+        run(&folder, &[&args[..], more].concat()).succeeded().stderr
     };
     let warning = "warning: ";
-    assert!(!said(&["--max-disparity", "47"]).contains(warning));
-    let told = said(&["--max-disparity", "25"]);
+    assert!(!said(&["--max-disparity 47"]).contains(warning));
+    let told = said(&["--max-disparity 25"]);
     assert!(
         told.lines().last().unwrap().ends_with("raise --max-disparity") && told.contains(warning),
         "{told}"
     );
-    let told = said(&["--max-disparity", "47", "--min-disparity", "19"]);
+    let told = said(&["--max-disparity 47 --min-disparity 19"]);
     assert!(
         told.lines().last().unwrap().ends_with("lower --min-disparity") && told.contains(warning),
         "{told}"
     );
-    assert_eq!(said(&["--max-disparity", "25", "--quiet"]), "");
+    assert_eq!(said(&["--max-disparity 25 --quiet"]), "");
 }
 
 #[test]
@@ -236,8 +219,8 @@ fn inspect_shows_every_step() {
     for (preset, more) in
         [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "label-range-width"][..])]
     {
-        run(folder.path(), &[&args[..], &["--method", preset]].concat()).succeeded();
-        let steps = folder.path().join("steps");
+        run(&folder, &[&args[..], &["--method", preset]].concat()).succeeded();
+        let steps = folder.join("steps");
         let size = |name: &str| {
             let picture = image::open(steps.join(format!("{name}.png"))).unwrap();
             (picture.width(), picture.height())
@@ -254,7 +237,7 @@ fn inspect_shows_every_step() {
         assert_eq!(steps.join("zones.png").exists(), preset == "paper");
         let changes = fs::read_to_string(steps.join("change-per-iteration.csv")).unwrap();
         assert!(changes.lines().count() > 3 && changes.starts_with("iteration,rms_change_px"), "{changes}");
-        assert!(listing(folder.path()).keys().all(|p| !p.to_str().unwrap().contains(".mrfgs-")));
+        assert!(listing(&folder).keys().all(|p| !p.to_str().unwrap().contains(".mrfgs-")));
         fs::remove_dir_all(steps).unwrap();
     }
 }
@@ -270,64 +253,53 @@ fn what_is_stopped_leaves_nothing_behind() {
         ("-TERM", &["evaluate", &dirs[0], &dirs[1], "--report", "report"]),
     ];
     for (signal, args) in runs {
-        let folder = tempfile::tempdir().unwrap();
-        let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-            .current_dir(folder.path())
-            .args(args)
-            .args(["--method", "paper", "--set", "tolerance=0", "--device", "cpu", "--threads", "1"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let folder = Folder::new();
+        let more = ["--method paper --set tolerance=0 --device cpu --threads 1"];
+        let mut child = started(&folder, &[args, &more].concat());
         let mut told = BufReader::new(child.stderr.take().unwrap());
         let mut said = String::new();
         if args[0] == "evaluate" {
             told.read_line(&mut said).unwrap();
             assert!(said.contains("slanted"), "{said}");
         } else {
-            let start = Instant::now();
-            while fs::read_dir(folder.path()).unwrap().next().is_none() {
-                assert!(start.elapsed() < Duration::from_secs(60), "no folder is begun");
-                std::thread::sleep(Duration::from_millis(1));
-            }
+            wait_until("begun", || fs::read_dir(&*folder).unwrap().next().is_some());
         }
-        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        send(signal, &child);
         told.read_to_string(&mut said).unwrap();
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{args:?}: {said}");
         assert_eq!(said.lines().last(), Some("mrfgs: stopped; nothing is left behind"), "{args:?}");
         assert_eq!(output.stdout, b"", "{args:?}");
-        assert!(listing(folder.path()).is_empty(), "{args:?}: {:?}", listing(folder.path()).keys());
+        assert!(listing(&folder).is_empty(), "{args:?}: {:?}", listing(&folder).keys());
     }
 }
 
 #[test]
 fn files_in_the_way_are_replaced_and_devices_are_not() {
     let folder = workshop();
-    fs::write(folder.path().join("out.pfm"), "old").unwrap();
-    let mut args = vec!["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
+    fs::write(folder.join("out.pfm"), "old").unwrap();
+    let mut args = vec!["match left.png right.png out.pfm --max-disparity 15 --quiet"];
     #[cfg(unix)]
     {
-        args.extend(["--also", "raw,preview"]);
+        args.extend(["--also raw,preview"]);
         for file in ["out.raw.pfm", "out.preview.png"] {
-            std::os::unix::fs::symlink("/dev/null", folder.path().join(file)).unwrap();
+            std::os::unix::fs::symlink("/dev/null", folder.join(file)).unwrap();
         }
     }
-    run(folder.path(), &args).succeeded();
-    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (60, 40));
+    run(&folder, &args).succeeded();
+    assert_eq!(read::read_disparity(&folder.join("out.pfm")).unwrap().size(), (60, 40));
     #[cfg(unix)]
     for file in ["out.raw.pfm", "out.preview.png"] {
-        assert!(fs::symlink_metadata(folder.path().join(file)).unwrap().is_symlink(), "{file}");
+        assert!(fs::symlink_metadata(folder.join(file)).unwrap().is_symlink(), "{file}");
     }
 }
 
 #[test]
 fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     let folder = workshop();
-    let before = listing(folder.path());
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "20", "--dry-run"];
-    let plan = run(folder.path(), &[&args[..], &["--quiet", "--also", "raw"]].concat()).succeeded();
+    let before = listing(&folder);
+    let args = ["match left.png right.png out.pfm --max-disparity 20 --dry-run"];
+    let plan = run(&folder, &[&args[..], &["--quiet --also raw"]].concat()).succeeded();
     assert_eq!(plan.stderr, "");
     for words in [
         "60 x 40 pixels, disparities 0 to 20 (21 labels)",
@@ -341,21 +313,21 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     ] {
         assert!(in_cells(&plan.stdout).contains(words), "no `{words}` in:\n{}", plan.stdout);
     }
-    let more = run(folder.path(), &[&args[..], &["--set", "final-iterations=3"]].concat()).succeeded();
+    let more = run(&folder, &[&args[..], &["--set final-iterations=3"]].concat()).succeeded();
     assert!(more.stdout.contains("3 iterations of level 0, the others in between"), "{}", more.stdout);
-    let accurate = run(folder.path(), &[&args[..], &["--method", "accurate"]].concat()).succeeded();
+    let accurate = run(&folder, &[&args[..], &["--method accurate"]].concat()).succeeded();
     let (own, double) = accurate.stdout.split_once("\nThen at twice the size:\n\n").unwrap();
     assert!(own == plan.stdout && double.starts_with("120 x 80 pixels, disparities 0 to 40 (41 labels)"));
-    let paper = run(folder.path(), &[&args[..], &["--method", "paper"]].concat()).succeeded();
+    let paper = run(&folder, &[&args[..], &["--method paper"]].concat()).succeeded();
     for words in
         ["16 bits", "30 iterations of levels 0 to 5", "or fewer, once the map changes by at most 0.1 px"]
     {
         assert!(paper.stdout.contains(words), "no `{words}` in:\n{}", paper.stdout);
     }
     // It finds what a real run would.
-    let args = ["match", "left.png", "right.png", "none/out.pfm", "--max-disparity", "20", "--dry-run"];
-    run(folder.path(), &args).failed(1, &["none", "create it"], "--dry-run");
-    assert!(listing(folder.path()) == before);
+    let args = ["match left.png right.png none/out.pfm --max-disparity 20 --dry-run"];
+    run(&folder, &args).failed(1, &["none", "create it"], "--dry-run");
+    assert!(listing(&folder) == before);
 }
 
 /// What `--memory` lets a match take decides on tiles, which are told.
@@ -363,11 +335,11 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
 fn little_memory_makes_tiles() {
     let folder = workshop();
     let (left, right) = (scene_file("thin", "im0.png"), scene_file("thin", "im1.png"));
-    let args = ["match", &left, &right, "out.pfm", "--device", "cpu"];
-    let with = |more: &[&str]| run(folder.path(), &[&args[..], more].concat());
+    let args = ["match", &left, &right, "out.pfm --device cpu"];
+    let with = |more: &[&str]| run(&folder, &[&args[..], more].concat());
     let one = with(&["--dry-run"]).succeeded();
     assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
-    let tiled = with(&["--dry-run", "--memory", "16MiB"]).succeeded();
+    let tiled = with(&["--dry-run --memory 16MiB"]).succeeded();
     for words in
         ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "all"]
     {
@@ -375,12 +347,12 @@ fn little_memory_makes_tiles() {
     }
     let told = with(&[]).succeeded();
     assert!(told.stderr.contains("32 labels, 16 iterations"), "{told:?}");
-    let told = with(&["--memory", "16MiB"]).succeeded();
+    let told = with(&["--memory 16MiB"]).succeeded();
     assert!(told.stderr.contains("32 labels, 4 tiles, 16 iterations"), "{told:?}");
-    assert_eq!(read::read_disparity(&folder.path().join("out.pfm")).unwrap().size(), (240, 180));
+    assert_eq!(read::read_disparity(&folder.join("out.pfm")).unwrap().size(), (240, 180));
     let inspect = |more: &[&str]| {
-        let args = ["inspect", &left, &right, "--device", "cpu", "--memory", "16MiB"];
-        run(folder.path(), &[&args[..], more].concat())
+        let args = ["inspect", &left, &right, "--device cpu --memory 16MiB"];
+        run(&folder, &[&args[..], more].concat())
     };
     let told = inspect(&[]).succeeded();
     assert!(told.stderr.contains("32 labels, 4 tiles, 16 iterations"), "{told:?}");
@@ -389,18 +361,18 @@ fn little_memory_makes_tiles() {
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }
     // Steps of one piece are what the folder shows.
-    let before = listing(folder.path());
+    let before = listing(&folder);
     let refused = inspect(&["steps"]);
     refused.failed(2, &["DIR", "in one piece", "give --memory"], "the steps of tiles");
-    assert!(listing(folder.path()) == before);
+    assert!(listing(&folder) == before);
 }
 
 #[test]
 fn inspect_names_every_stage() {
     let folder = workshop();
-    let before = listing(folder.path());
-    let args = ["inspect", "left.png", "right.png", "--max-disparity", "9", "--device", "cpu"];
-    let table = run(folder.path(), &args).succeeded().stdout;
+    let before = listing(&folder);
+    let args = ["inspect left.png right.png --max-disparity 9 --device cpu"];
+    let table = run(&folder, &args).succeeded().stdout;
     let row = |name: &str| table.lines().find(|l| l.starts_with(name)).map(str::to_owned);
     for stage in [
         "stage ",
@@ -419,16 +391,16 @@ fn inspect_names_every_stage() {
     assert!(row("all ").unwrap().ends_with(" 100.0 %"), "{table}");
     assert!(row("flood, level 5").unwrap().split_whitespace().nth(3) == Some("15"), "{table}");
     assert!(!table.contains("dispatches"), "{table}");
-    assert!(listing(folder.path()) == before, "without DIR it writes nothing");
+    assert!(listing(&folder) == before, "without DIR it writes nothing");
 }
 
 #[cfg(not(target_os = "macos"))]
 #[test]
 fn without_a_driver_auto_takes_the_cpu_path() {
     let folder = workshop();
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", "auto"];
-    let told = run_with(folder.path(), &args, NO_DRIVER).succeeded();
+    let args = ["match left.png right.png out.pfm --max-disparity 9 --device auto"];
+    let told = run_with(&folder, &args, NO_DRIVER).succeeded();
     assert!(told.stderr.contains(" on the CPU path, "), "{}", told.stderr);
-    let told = run_with(folder.path(), &["devices"], NO_DRIVER).succeeded();
+    let told = run_with(&folder, &["devices"], NO_DRIVER).succeeded();
     assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` takes the CPU path\n");
 }

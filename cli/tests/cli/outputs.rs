@@ -2,14 +2,14 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use mrfgs::image::{Plane, pfm, read};
 use mrfgs::maps::{flag, has_disparity};
 use mrfgs::options::Method;
 use serde_json::Value;
 
-use super::{has_gpu, listing, run, scene, scene_file, workshop};
+use super::{Folder, has_gpu, listing, program, run, scene, scene_file, started, workshop};
 
 /// Focal length and baseline of the scenes of 240 x 180 pixels and 32 labels, and the middle of their images.
 pub(super) const FOCAL_LENGTH: f64 = 180.0;
@@ -19,7 +19,7 @@ pub(super) const MIDDLE: [f64; 2] = [119.5, 89.5];
 /// Matches a scene in `folder`; what it says on standard error.
 pub(super) fn matched(folder: &Path, name: &str, more: &[&str]) -> String {
     let (left, right) = (scene_file(name, "im0.png"), scene_file(name, "im1.png"));
-    let told = run(folder, &[&["match", &left, &right], more, &["--device", "cpu"]].concat()).succeeded();
+    let told = run(folder, &[&["match", &left, &right], more, &["--device cpu"]].concat()).succeeded();
     told.stderr
 }
 
@@ -55,12 +55,11 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 
 #[test]
 fn depth_is_that_of_the_cameras() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let said = matched(folder.path(), "repetitive", &["d.pfm", "--also", "depth", "--set", "fill=none"]);
+    let folder = Folder::new();
+    let said = matched(&folder, "repetitive", &["d.pfm", "--also", "depth", "--set", "fill=none"]);
     let told = said.lines().find(|line| line.contains("depths ")).unwrap();
     assert!(told.contains("unit: that of the baseline in ") && told.ends_with("calib.txt"), "{told}");
-    let (disparities, depths) = (map(at("d.pfm")), map(at("d.depth.pfm")));
+    let (disparities, depths) = (map(folder.join("d.pfm")), map(folder.join("d.depth.pfm")));
     assert!(depth_error(&depths, &disparities, 0.0) < 1e-6);
     assert!(depth_error(&depths, &disparities, 0.1) > 1e-3, "the comparison sees a tenth of a pixel");
     assert!(depths.data().contains(&f32::INFINITY), "what has no disparity has no depth");
@@ -88,10 +87,10 @@ fn agreement(left: &Plane<f32>, right: &Plane<f32>) -> usize {
 
 #[test]
 fn the_right_map_is_that_of_the_right_view() {
-    let folder = tempfile::tempdir().unwrap();
-    for more in [&[][..], &["--set", "left-right-check=off"], &["--memory", "24MiB"]] {
-        matched(folder.path(), "mixed", &[&["d.pfm", "--also", "right"], more].concat());
-        let [left, right] = ["d.pfm", "d.right.pfm"].map(|file| map(folder.path().join(file)));
+    let folder = Folder::new();
+    for more in [&[][..], &["--set left-right-check=off"], &["--memory 24MiB"]] {
+        matched(&folder, "mixed", &[&["d.pfm", "--also", "right"], more].concat());
+        let [left, right] = ["d.pfm", "d.right.pfm"].map(|file| map(folder.join(file)));
         assert_eq!(left.size(), right.size());
         assert!(agreement(&left, &right) > 85, "{more:?}: {}", agreement(&left, &right));
         // Controls: the same map does not agree with itself, nor with the right view's in a mirror.
@@ -108,14 +107,14 @@ fn the_right_map_is_that_of_the_right_view() {
 
 #[test]
 fn offset_principal_points_move_the_depth() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     let calib = fs::read_to_string(scene("slanted").join("calib.txt")).unwrap();
     for doffs in [2.5, -12.0] {
         fs::write(at("other.txt"), calib.replace("doffs=0", &format!("doffs={doffs}"))).unwrap();
-        let args = ["--calib", "other.txt", "--quiet", "--also", "depth"];
-        matched(folder.path(), "slanted", &[&args[..], &["d.pfm"]].concat());
-        matched(folder.path(), "slanted", &[&args[..], &["d.tif"]].concat());
+        let args = ["--calib other.txt --quiet --also depth"];
+        matched(&folder, "slanted", &[&args[..], &["d.pfm"]].concat());
+        matched(&folder, "slanted", &[&args[..], &["d.tif"]].concat());
         let (disparities, depths) = (map(at("d.pfm")), map(at("d.depth.pfm")));
         assert!(depth_error(&depths, &disparities, doffs) < 1e-6, "{doffs}");
         let beyond = depths.data().iter().filter(|z| !z.is_finite()).count();
@@ -134,20 +133,17 @@ fn offset_principal_points_move_the_depth() {
 #[test]
 fn a_calibration_file_elsewhere_gives_the_range() {
     let folder = workshop();
-    let args = ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt"];
-    let told = run(folder.path(), &args).succeeded();
+    let told = run(&folder, &["match left.png right.png out.pfm --calib camera/calib.txt"]).succeeded();
     assert!(told.stderr.contains(", 17 labels, "), "{told:?}");
     // It may hold less than depth takes, as long as nobody asks for depth.
-    let args =
-        ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--calib", "half/calib.txt"];
-    run(folder.path(), &args).succeeded();
+    run(&folder, &["match left.png right.png out.pfm --max-disparity 9 --calib half/calib.txt"]).succeeded();
 }
 
 #[test]
 fn the_pictures_of_the_guide_are_those_of_its_commands() {
-    let folder = tempfile::tempdir().unwrap();
-    matched(folder.path(), "mixed", &["d.pfm", "--also", "preview,points"]);
-    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let folder = Folder::new();
+    matched(&folder, "mixed", &["d.pfm", "--also", "preview,points"]);
+    let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     super::render_cloud::run(&[at("d.points.ply"), at("cloud.png")]).unwrap();
     // The sines of another system may put a point into the next pixel.
     for (made, name, most) in
@@ -164,13 +160,12 @@ fn the_pictures_of_the_guide_are_those_of_its_commands() {
 #[test]
 fn json_tells_what_ran_and_what_came_of_it() {
     let folder = workshop();
-    let at = |name: &str| folder.path().join(name);
-    let args =
-        ["match", "left.png", "right.png", "out.pfm", "--calib", "camera/calib.txt", "--device", "cpu"];
-    let args = [&args[..], &["--mask", "flat-mask.png", "--also", "confidence,validity"]].concat();
+    let at = |name: &str| folder.join(name);
+    let args = ["match left.png right.png out.pfm --calib camera/calib.txt --device cpu"];
+    let args = [&args[..], &["--mask flat-mask.png --also confidence,validity"]].concat();
     let mask = image::GrayImage::from_fn(60, 40, |x, _| image::Luma([u8::from(x < 6)]));
     mask.save(at("flat-mask.png")).unwrap();
-    let told = run(folder.path(), &[&args[..], &["--json", "m.json", "--threads", "1"]].concat()).succeeded();
+    let told = run(&folder, &[&args[..], &["--json m.json --threads 1"]].concat()).succeeded();
     assert_eq!(told.stdout, "");
     let found = json(at("m.json"));
     let text = fs::read_to_string(at("m.json")).unwrap();
@@ -223,12 +218,12 @@ fn json_tells_what_ran_and_what_came_of_it() {
     assert!(share(&measured) > 20.0 && share(&filled) > 1.0, "neither is nothing");
 
     // Printed, standard output holds nothing else.
-    let told = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded();
+    let told = run(&folder, &[&args[..], &["--json -"]].concat()).succeeded();
     let printed = told.json();
     assert_eq!(printed["measured"], found["measured"]);
-    let inspect = ["inspect", "left.png", "right.png", "--calib", "camera/calib.txt", "--device", "cpu"];
-    let inspect = [&inspect[..], &["--mask", "flat-mask.png", "--json", "-"]].concat();
-    let printed = run(folder.path(), &inspect).succeeded().json();
+    let inspect = ["inspect left.png right.png --calib camera/calib.txt --device cpu"];
+    let inspect = [&inspect[..], &["--mask flat-mask.png --json -"]].concat();
+    let printed = run(&folder, &inspect).succeeded().json();
     assert_eq!((&printed["measured"], &printed["files"]["output"]), (&found["measured"], &Value::Null));
     let stages = printed["stages"].as_object().unwrap();
     assert!(stages["flood, level 0"].as_f64().unwrap() > 0.0, "{stages:?}");
@@ -237,9 +232,9 @@ fn json_tells_what_ran_and_what_came_of_it() {
 
     // A device has a driver.
     if has_gpu() {
-        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9", "--device", "gpu"];
-        let told = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded();
-        let (found, listed) = (told.json(), run(folder.path(), &["devices"]).succeeded().stdout);
+        let args = ["match left.png right.png out.pfm --max-disparity 9 --device gpu"];
+        let told = run(&folder, &[&args[..], &["--json -"]].concat()).succeeded();
+        let (found, listed) = (told.json(), run(&folder, &["devices"]).succeeded().stdout);
         assert!(told.stderr.contains(&format!(" on {}", found["ran_on"].as_str().unwrap())), "{told:?}");
         let driver = found["driver"].as_str().unwrap();
         assert!(!driver.is_empty() && listed.contains(&format!("| {driver} ")), "{driver} in {listed}");
@@ -248,7 +243,7 @@ fn json_tells_what_ran_and_what_came_of_it() {
     // A map without a pixel has no confidence.
     let all = image::GrayImage::from_pixel(60, 40, image::Luma([1]));
     all.save(at("flat-mask.png")).unwrap();
-    let none = run(folder.path(), &[&args[..], &["--json", "-"]].concat()).succeeded().json();
+    let none = run(&folder, &[&args[..], &["--json -"]].concat()).succeeded().json();
     assert_eq!([&none["density"], &none["mean_confidence"]], [&Value::from(0.0), &Value::Null]);
 }
 
@@ -256,20 +251,20 @@ fn json_tells_what_ran_and_what_came_of_it() {
 fn the_colours_of_a_preview_can_be_chosen() {
     let folder = workshop();
     let picture = |name: &str, more: &[&str]| {
-        let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "15", "--quiet"];
-        run(folder.path(), &[&args[..], &["--also", name], more].concat()).succeeded();
-        image::open(folder.path().join(format!("out.{name}.png"))).unwrap().into_rgb8()
+        let args = ["match left.png right.png out.pfm --max-disparity 15 --quiet"];
+        run(&folder, &[&args[..], &["--also", name], more].concat()).succeeded();
+        image::open(folder.join(format!("out.{name}.png"))).unwrap().into_rgb8()
     };
     let usual = picture("preview", &[]);
-    assert_eq!(usual, picture("preview", &["--colours", "turbo"]));
+    assert_eq!(usual, picture("preview", &["--colours turbo"]));
     let [viridis, grey] = ["viridis", "grey"].map(|name| picture("preview", &["--colours", name]));
     assert!(usual != viridis && viridis != grey && usual != grey);
     let even = |p: &image::Rgb<u8>| p.0[0] == p.0[1] && p.0[1] == p.0[2];
     assert!(grey.pixels().all(even) && !viridis.pixels().all(even));
 
-    let both = picture("side-by-side", &["--colours", "viridis"]);
+    let both = picture("side-by-side", &["--colours viridis"]);
     assert_eq!(both.dimensions(), (2 * 60, viridis.height()));
-    let left = image::open(folder.path().join("left.png")).unwrap().into_rgb8();
+    let left = image::open(folder.join("left.png")).unwrap().into_rgb8();
     for (x, y, pixel) in both.enumerate_pixels() {
         let expected = match (x < 60, y < 40) {
             (true, true) => *left.get_pixel(x, y),
@@ -283,18 +278,16 @@ fn the_colours_of_a_preview_can_be_chosen() {
 #[test]
 fn png_holds_disparities_as_kitti_reads_them() {
     let folder = workshop();
-    let at = |name: &str| folder.path().join(name);
     let mask = image::GrayImage::from_fn(60, 40, |x, y| image::Luma([u8::from(x < 5 && y > 30)]));
-    mask.save(at("mask.png")).unwrap();
+    mask.save(folder.join("mask.png")).unwrap();
     // A pair of the same image twice is at infinity: disparity 0, but valid.
     for (right, most) in [("right.png", 15), ("left.png", 3)] {
         for output in ["out.pfm", "out.png"] {
-            let args =
-                ["match", "left.png", right, output, "--mask", "mask.png", "--quiet", "--max-disparity"];
-            run(folder.path(), &[&args[..], &[&most.to_string()]].concat()).succeeded();
+            let args = ["match left.png", right, output, "--mask mask.png --quiet --max-disparity"];
+            run(&folder, &[&args[..], &[&most.to_string()]].concat()).succeeded();
         }
-        let disparities = map(at("out.pfm"));
-        let png = image::open(at("out.png")).unwrap();
+        let disparities = map(folder.join("out.pfm"));
+        let png = image::open(folder.join("out.png")).unwrap();
         assert_eq!(png.color(), image::ColorType::L16);
         let png = png.into_luma16();
         for (x, y, level) in png.enumerate_pixels() {
@@ -312,72 +305,58 @@ fn png_holds_disparities_as_kitti_reads_them() {
     }
 }
 
-/// The program with its standard output as it is given.
-fn with_output(folder: &Path, args: &[&str], stdout: impl Into<Stdio>) -> std::process::Child {
-    Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .current_dir(folder)
-        .args(args)
-        .env("XDG_RUNTIME_DIR", std::env::temp_dir())
-        .stdout(stdout)
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
-
 #[test]
 fn standard_output_takes_the_map_and_nothing_else() {
     let folder = workshop();
-    let args = ["match", "left.png", "right.png", "out.pfm", "--max-disparity", "9"];
-    run(folder.path(), &args).succeeded();
-    let before = listing(folder.path());
-    let args = ["match", "left.png", "right.png", "-", "--max-disparity", "9"];
-    let output = with_output(folder.path(), &args, Stdio::piped()).wait_with_output().unwrap();
+    run(&folder, &["match left.png right.png out.pfm --max-disparity 9"]).succeeded();
+    let before = listing(&folder);
+    let output =
+        started(&folder, &["match left.png right.png - --max-disparity 9"]).wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
-    assert!(output.stdout == fs::read(folder.path().join("out.pfm")).unwrap(), "the bytes of the file");
+    assert!(output.stdout == fs::read(folder.join("out.pfm")).unwrap(), "the bytes of the file");
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("60 x 40, 10 labels"), "{said}");
-    assert!(listing(folder.path()) == before);
+    assert!(listing(&folder) == before);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_map_that_does_not_reach_its_reader_is_a_failure() {
     let folder = workshop();
-    let before = listing(folder.path());
-    let args = ["match", "left.png", "right.png", "-", "--max-disparity", "9", "--quiet"];
-    let args = [&args[..], &["--json", "m.json"]].concat();
+    let before = listing(&folder);
     for (closed, words) in [(true, "its reader left"), (false, "No space left")] {
         let stdout = if closed {
             Stdio::piped()
         } else {
             fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into()
         };
-        let mut child = with_output(folder.path(), &args, stdout);
+        let line = "match left.png right.png - --max-disparity 9 --quiet --json m.json";
+        let mut child = program(&folder, &[line], &[]).stdout(stdout).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{said}");
         assert!(said.contains("standard output") && said.contains(words), "{said}");
         assert_eq!(said.lines().count(), 1, "{said}");
-        assert!(listing(folder.path()) == before, "{words}: something is left");
+        assert!(listing(&folder) == before, "{words}: something is left");
     }
 }
 
 #[test]
 fn submissions_have_the_layout_of_the_benchmark() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     let dirs = ["slanted", "thin"].map(|name| scene(name).to_str().unwrap().to_owned());
-    let args = ["--device", "cpu", "--json", "a.json"];
+    let args = ["--device cpu --json a.json"];
     let submitted = |to: [&str; 2], more: &[&str]| {
-        let pairs = ["evaluate", "submission", to[0], to[1], &dirs[0], &dirs[1]];
-        run(folder.path(), &[&pairs, &args[..], more].concat()).succeeded();
+        let pairs = ["evaluate submission", to[0], to[1], &dirs[0], &dirs[1]];
+        run(&folder, &[&pairs, &args[..], more].concat()).succeeded();
     };
     // A folder that is there and empty will do.
     fs::create_dir(at("trainingQ")).unwrap();
     submitted(["trainingQ", "MR-FGS_2"], &[]);
-    submitted(["sparse", "X"], &["--set", "fill=none"]);
-    let names: Vec<_> = listing(folder.path()).into_keys().collect();
+    submitted(["sparse", "X"], &["--set fill=none"]);
+    let names: Vec<_> = listing(&folder).into_keys().collect();
     let mut expected = vec![at("a.json"), at("sparse"), at("trainingQ")];
     for pair in ["slanted", "thin"] {
         expected.extend([at("trainingQ").join(pair), at("sparse").join(pair)]);
@@ -390,11 +369,11 @@ fn submissions_have_the_layout_of_the_benchmark() {
 
     let figures = json(at("a.json"));
     for (i, pair) in ["slanted", "thin"].into_iter().enumerate() {
-        matched(folder.path(), pair, &["d.pfm", "--quiet"]);
+        matched(&folder, pair, &["d.pfm", "--quiet"]);
         let [dense, sparse] = [("trainingQ", "MR-FGS_2"), ("sparse", "X_s")]
             .map(|(dir, method)| fs::read(at(dir).join(pair).join(format!("disp0{method}.pfm"))).unwrap());
         assert!(dense == fs::read(at("d.pfm")).unwrap(), "{pair}: the map of a match");
-        matched(folder.path(), pair, &["d.pfm", "--quiet", "--set", "fill=none"]);
+        matched(&folder, pair, &["d.pfm", "--quiet", "--set", "fill=none"]);
         assert!(
             sparse == fs::read(at("d.pfm")).unwrap() && sparse != dense,
             "{pair}: the map without a fill"

@@ -10,7 +10,7 @@ use serde_json::Value;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
 
-use super::{run, scene, scene_file};
+use super::{Folder, run, scene, scene_file};
 
 /// Rows and columns at the borders without data.
 const MARGIN: usize = 6;
@@ -67,17 +67,16 @@ fn read_pfm(path: &Path) -> Plane<f32> {
 
 #[test]
 fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
     let views =
         ["im0.png", "im1.png"].map(|file| image::open(scene("slanted").join(file)).unwrap().to_luma8());
     for (view, name) in views.iter().zip(["left.tif", "right.tif"]) {
-        write_view(&at(name), view);
+        write_view(&folder.join(name), view);
     }
     let plugin = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/asp-plugin");
     let call = |options: &str| {
         let output = Command::new(&plugin)
-            .current_dir(folder.path())
+            .current_dir(&*folder)
             .env("MRFGS", env!("CARGO_BIN_EXE_mrfgs"))
             .args(plugin_options(options))
             .args(["left.tif", "right.tif", "out.tif"])
@@ -89,7 +88,8 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
     for options in ["--device cpu", "--device cpu --threads 1 --min-disparity -31 --max-disparity 0"] {
         let (success, told) = call(options);
         assert!(success, "{told}");
-        let (found, truth) = (read_map(&at("out.tif")), read_pfm(&scene("slanted").join("disp0GT.pfm")));
+        let (found, truth) =
+            (read_map(&folder.join("out.tif")), read_pfm(&scene("slanted").join("disp0GT.pfm")));
         assert_eq!(found.size(), truth.size());
         let (width, height) = found.size();
         let (mut errors, mut holes) = (Vec::new(), 0);
@@ -117,21 +117,20 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
 
 #[test]
 fn the_sign_turns_map_and_range_around() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let matched = |name: &str, more: &[&str]| {
         let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
-        let args =
-            [&["match", &left, &right, name, "--set", "fill=none", "--device", "cpu", "--json", "-"], more];
-        let told = run(folder.path(), &args.concat()).succeeded();
-        (read_map(&folder.path().join(name)), told.json())
+        let args = [&["match", &left, &right, name, "--set fill=none --device cpu --json -"], more];
+        let told = run(&folder, &args.concat()).succeeded();
+        (read_map(&folder.join(name)), told.json())
     };
-    let (ours, told) = matched("ours.tif", &["--max-disparity", "30", "--min-disparity", "2"]);
+    let (ours, told) = matched("ours.tif", &["--max-disparity 30 --min-disparity 2"]);
     let range = |told: &Value| ["min", "max"].map(|end| told["range"][end].as_i64().unwrap());
     assert_eq!((told["sign"].as_str(), range(&told)), (Some("left-minus-right"), [2, 30]));
     let turned = ["--sign", "right-minus-left", "--min-disparity", "-30", "--max-disparity", "-2"];
-    let (theirs, told) = matched("theirs.tif", &[&turned[..], &["--also", "raw"]].concat());
+    let (theirs, told) = matched("theirs.tif", &[&turned[..], &["--also raw"]].concat());
     assert_eq!((told["sign"].as_str(), range(&told)), (Some("right-minus-left"), [-30, -2]));
-    let raw = read_map(&folder.path().join("theirs.raw.tif"));
+    let raw = read_map(&folder.join("theirs.raw.tif"));
     let mut invalid = 0;
     for (i, (&d, &turned)) in ours.data().iter().zip(theirs.data()).enumerate() {
         invalid += usize::from(d.is_nan());
@@ -147,15 +146,15 @@ fn the_sign_turns_map_and_range_around() {
         .args(turned)
         .output()
         .unwrap();
-    std::fs::write(folder.path().join("printed.pfm"), printed.stdout).unwrap();
+    std::fs::write(folder.join("printed.pfm"), printed.stdout).unwrap();
     let expected = theirs.map(|&d| if d.is_nan() { f32::INFINITY } else { d });
-    assert_eq!(read_pfm(&folder.path().join("printed.pfm")), expected);
+    assert_eq!(read_pfm(&folder.join("printed.pfm")), expected);
 
     // One end alone: the far one is at 0, as it is the other way round.
-    let (_, told) = matched("a.tif", &["--sign", "right-minus-left", "--min-disparity", "-20"]);
+    let (_, told) = matched("a.tif", &["--sign right-minus-left --min-disparity -20"]);
     assert_eq!(range(&told), [-20, 0]);
     // And by a calibration.
-    let (_, told) = matched("b.tif", &["--sign", "right-minus-left"]);
+    let (_, told) = matched("b.tif", &["--sign right-minus-left"]);
     let (_, ours) = matched("c.tif", &[]);
     assert_eq!(range(&told), {
         let [min, max] = range(&ours);

@@ -7,7 +7,7 @@ use mrfgs::image::read;
 use mrfgs::maps::flag;
 
 use super::outputs::{BASELINE, FOCAL_LENGTH, MIDDLE, map, matched, median};
-use super::{listing, run, scene, scene_file};
+use super::{Folder, listing, run, scene, scene_file};
 
 /// A point of a cloud: position, colour, confidence.
 pub(super) type Point = ([f64; 3], [u8; 3], u8);
@@ -53,10 +53,9 @@ pub(super) fn cloud(path: &Path) -> Vec<Point> {
 
 #[test]
 fn points_are_what_is_measured_and_trusted() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let args = ["d.pfm", "--also", "depth,points,confidence,validity"];
-    let said = matched(folder.path(), "slanted", &args);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
+    let said = matched(&folder, "slanted", &["d.pfm", "--also", "depth,points,confidence,validity"]);
     let points = cloud(&at("d.points.ply"));
     assert!(said.contains(&format!("; {} points; unit: ", points.len())), "{said}");
     let (depths, confidence) = (map(at("d.depth.pfm")), read::grey8(&at("d.confidence.png")).unwrap());
@@ -150,10 +149,9 @@ fn apart(some: &[Point], others: &[Point]) -> f64 {
 
 #[test]
 fn every_format_holds_the_same_points() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let said =
-        matched(folder.path(), "slanted", &["d.pfm", "--also", "points,points.pcd,points.las,points.laz"]);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
+    let said = matched(&folder, "slanted", &["d.pfm", "--also", "points,points.pcd,points.las,points.laz"]);
     let points = cloud(&at("d.points.ply"));
     assert!(points.len() > 20_000);
     assert_eq!(said.matches(" points").count(), 1, "{said}");
@@ -175,12 +173,12 @@ fn every_format_holds_the_same_points() {
     let bytes = |name: &str| fs::metadata(at(name)).unwrap().len();
     assert!(2 * bytes("d.points.laz") < bytes("d.points.las"), "{}", bytes("d.points.laz"));
 
-    let before = listing(folder.path());
+    let before = listing(&folder);
     let (left, right) = (scene_file("slanted", "im0.png"), scene_file("slanted", "im1.png"));
     for word in ["points.xyz", "points.ply.las", "depth.las", "points."] {
-        let told = run(folder.path(), &["match", &left, &right, "e.pfm", "--also", word]);
+        let told = run(&folder, &["match", &left, &right, "e.pfm --also", word]);
         told.failed(2, &["--also", word, "points"], word);
-        assert!(listing(folder.path()) == before, "{word}");
+        assert!(listing(&folder) == before, "{word}");
     }
 }
 
@@ -191,10 +189,10 @@ fn above_the_floor([_, y, z]: [f64; 3]) -> f64 {
 
 #[test]
 fn points_of_a_plane_lie_in_it() {
-    let folder = tempfile::tempdir().unwrap();
-    matched(folder.path(), "repetitive", &["d.pfm", "--also", "points", "--quiet"]);
+    let folder = Folder::new();
+    matched(&folder, "repetitive", &["d.pfm", "--also", "points", "--quiet"]);
     let truth = map(scene("repetitive").join("disp0GT.pfm"));
-    let on_floor: Vec<_> = cloud(&folder.path().join("d.points.ply"))
+    let on_floor: Vec<_> = cloud(&folder.join("d.points.ply"))
         .into_iter()
         .filter(|(p, ..)| {
             let pixel = [0, 1].map(|i| (p[i] / p[2] * FOCAL_LENGTH + MIDDLE[i]).round());

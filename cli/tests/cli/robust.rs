@@ -2,30 +2,20 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use super::{listing, run, scene_file, workshop};
-
-fn shell(folder: &Path, before: &str, line: &str) -> Output {
-    Command::new("sh")
-        .current_dir(folder)
-        .args(["-c", &format!("{before} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")])
-        .args(line.split(' '))
-        .env_remove("RUST_BACKTRACE")
-        .output()
-        .unwrap()
-}
+use super::{Folder, listing, program, run, scene_file, shell, workshop};
 
 /// Whatever the limit, a match ends well or says in one line that there is not enough; no allocation aborts.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_limit_of_memory_aborts() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let large = |name: &str, ending: &str| {
         let image = image::open(scene_file("mixed", name)).unwrap();
         let image = image.resize_exact(640, 480, image::imageops::FilterType::Triangle);
-        image.to_rgb8().save(folder.path().join(format!("{name}.{ending}"))).unwrap();
+        image.to_rgb8().save(folder.join(format!("{name}.{ending}"))).unwrap();
     };
     for ending in ["jpg", "png", "tif"] {
         large("im0.png", ending);
@@ -42,7 +32,7 @@ fn no_limit_of_memory_aborts() {
         );
         // The program itself takes some 60 MiB of addresses.
         let enough = (80..1024).step_by(20).find(|limit| {
-            let output = shell(folder.path(), &format!("ulimit -v {}", limit << 10), &line);
+            let output = shell(&folder, &format!("ulimit -v {}", limit << 10), &line);
             let said = String::from_utf8_lossy(&output.stderr);
             let enough = output.status.success();
             if enough {
@@ -54,8 +44,8 @@ fn no_limit_of_memory_aborts() {
                     said.starts_with("mrfgs: ") && said.lines().count() == 1 && said.contains("memory");
                 assert!(told, "{ending}, {limit} MiB: {said}");
             }
-            assert_eq!(folder.path().join("out.pfm").exists(), enough, "{ending}, {limit} MiB");
-            let _ = fs::remove_file(folder.path().join("out.pfm"));
+            assert_eq!(folder.join("out.pfm").exists(), enough, "{ending}, {limit} MiB");
+            let _ = fs::remove_file(folder.join("out.pfm"));
             enough
         });
         assert!(enough.is_some(), "{ending}: 1 GiB is not enough");
@@ -68,7 +58,7 @@ fn no_limit_of_memory_aborts() {
 #[test]
 fn a_full_disk_is_told_with_the_name_of_the_output() {
     let folder = workshop();
-    let before = listing(folder.path());
+    let before = listing(&folder);
     // A file may have 4 KiB here, and the signal that says so is ignored.
     for (line, name) in [
         ("match left.png right.png out.pfm --max-disparity 9", "cannot write out.pfm: File too large"),
@@ -79,29 +69,23 @@ fn a_full_disk_is_told_with_the_name_of_the_output() {
         ("inspect left.png right.png steps --max-disparity 9", "cannot write steps: File too large"),
         ("batch camera.csv out", "cannot write out/camera.pfm: File too large"),
     ] {
-        fs::write(folder.path().join("camera.csv"), "name,left,right\ncamera,camera/left.png,right.png\n")
-            .unwrap();
+        fs::write(folder.join("camera.csv"), "name,left,right\ncamera,camera/left.png,right.png\n").unwrap();
         let quiet = if line.starts_with("inspect") { "" } else { " --quiet" };
         let line = format!("{line} --device cpu{quiet}");
-        let output = shell(folder.path(), "trap '' XFSZ; ulimit -f 8", &line);
+        let output = shell(&folder, "trap '' XFSZ; ulimit -f 8", &line);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{line}: {said}");
         assert!(said.contains(name) && said.lines().count() == 1 && !said.contains(".tmp"), "{line}: {said}");
-        fs::remove_file(folder.path().join("camera.csv")).unwrap();
-        let _ = fs::remove_dir(folder.path().join("out"));
-        assert!(listing(folder.path()) == before, "{line}");
+        fs::remove_file(folder.join("camera.csv")).unwrap();
+        let _ = fs::remove_dir(folder.join("out"));
+        assert!(listing(&folder) == before, "{line}");
     }
 }
 
 /// Starts a match and kills it after a time.
 #[cfg(unix)]
 fn killed(folder: &Path, after: Duration, line: &str) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .current_dir(folder)
-        .args(line.split(' '))
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child = program(folder, &[line], &[]).stderr(Stdio::null()).spawn().unwrap();
     let start = Instant::now();
     while start.elapsed() < after && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(1));
@@ -114,20 +98,20 @@ fn killed(folder: &Path, after: Duration, line: &str) {
 #[test]
 fn a_killed_match_leaves_nothing_half_written() {
     let folder = workshop();
-    let before = listing(folder.path());
+    let before = listing(&folder);
     let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --also raw,confidence";
-    run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
+    run(&folder, &[line]).succeeded();
     let whole: Vec<_> = ["out.pfm", "out.raw.pfm", "out.confidence.png"]
-        .map(|name| fs::read(folder.path().join(name)).unwrap())
+        .map(|name| fs::read(folder.join(name)).unwrap())
         .into();
     for ms in [1, 5, 10, 15, 20, 25, 30, 40, 60] {
         for name in ["out.pfm", "out.raw.pfm", "out.confidence.png"] {
-            let _ = fs::remove_file(folder.path().join(name));
+            let _ = fs::remove_file(folder.join(name));
         }
-        killed(folder.path(), Duration::from_millis(ms), line);
-        let mut after = listing(folder.path());
+        killed(&folder, Duration::from_millis(ms), line);
+        let mut after = listing(&folder);
         for (name, whole) in ["out.pfm", "out.raw.pfm", "out.confidence.png"].into_iter().zip(&whole) {
-            if let Some(found) = after.remove(&folder.path().join(name)) {
+            if let Some(found) = after.remove(&folder.join(name)) {
                 assert!(found.as_ref() == Some(whole), "{name} after {ms} ms");
             }
         }
@@ -139,26 +123,25 @@ fn a_killed_match_leaves_nothing_half_written() {
 #[test]
 fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     let folder = workshop();
-    let before = listing(folder.path());
+    let before = listing(&folder);
     let line = "inspect left.png right.png steps --max-disparity 9 --device cpu";
-    let args: Vec<_> = line.split(' ').collect();
     // As a run leaves it that is killed on its way.
-    let staging = folder.path().join(".steps.tmp");
+    let staging = folder.join(".steps.tmp");
     fs::create_dir_all(staging.join("new")).unwrap();
     fs::write(staging.join("new/half.png"), "half").unwrap();
     fs::write(staging.join("lock"), "").unwrap();
-    run(folder.path(), &args).succeeded();
-    assert!(!staging.exists() && folder.path().join("steps/change-per-iteration.csv").exists());
-    assert!(!folder.path().join("steps/half.png").exists());
+    run(&folder, &[line]).succeeded();
+    assert!(!staging.exists() && folder.join("steps/change-per-iteration.csv").exists());
+    assert!(!folder.join("steps/half.png").exists());
     // One that runs is left alone.
-    fs::remove_dir_all(folder.path().join("steps")).unwrap();
+    fs::remove_dir_all(folder.join("steps")).unwrap();
     fs::create_dir(&staging).unwrap();
     let lock = fs::File::create(staging.join("lock")).unwrap();
     lock.lock().unwrap();
-    run(folder.path(), &args).failed(1, &["steps", "another run is writing it"], "locked");
+    run(&folder, &[line]).failed(1, &["steps", "another run is writing it"], "locked");
     drop(lock);
     fs::remove_dir_all(&staging).unwrap();
-    assert!(listing(folder.path()) == before);
+    assert!(listing(&folder) == before);
 }
 
 /// A link as output stays a link, and what it leads to is written, there already or not.
@@ -167,7 +150,7 @@ fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
 fn links_are_followed_everywhere() {
     use std::os::unix::fs::symlink;
     let folder = workshop();
-    let at = |name: &str| folder.path().join(name);
+    let at = |name: &str| folder.join(name);
     fs::create_dir(at("below")).unwrap();
     let is_link = |name: &str| fs::symlink_metadata(at(name)).unwrap().is_symlink();
     let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --quiet --also preview";
@@ -175,24 +158,24 @@ fn links_are_followed_everywhere() {
         for (link, to) in [("out.pfm", "below/map.pfm"), ("out.preview.png", "below/picture.png")] {
             let _ = symlink(to, at(link));
         }
-        run(folder.path(), &line.split(' ').collect::<Vec<_>>()).succeeded();
+        run(&folder, &[line]).succeeded();
         assert!(is_link("out.pfm") && is_link("out.preview.png"));
         assert!(fs::read(at("below/map.pfm")).unwrap().starts_with(b"Pf\n"));
         assert!(fs::read(at("below/picture.png")).unwrap().starts_with(b"\x89PNG"));
     }
     // An input is one by whatever name.
     symlink("left.png", at("other.png")).unwrap();
-    let args = ["match", "left.png", "right.png", "other.png", "--max-disparity", "9"];
-    run(folder.path(), &args).failed(2, &["other.png is LEFT already"], "an input");
+    let args = ["match left.png right.png other.png --max-disparity 9"];
+    run(&folder, &args).failed(2, &["other.png is LEFT already"], "an input");
 
     fs::create_dir(at("maps")).unwrap();
     fs::write(at("list.csv"), "name,left,right,max_disparity\na,left.png,right.png,9\n").unwrap();
     for name in ["a.pfm", "a.json"] {
         symlink(Path::new("../below").join(name), at("maps").join(name)).unwrap();
     }
-    let batch = ["batch", "list.csv", "maps", "--device", "cpu", "--quiet"];
-    for more in [&[][..], &["--set", "temperature=0.3"]] {
-        run(folder.path(), &[&batch[..], more].concat()).succeeded();
+    let batch = ["batch list.csv maps --device cpu --quiet"];
+    for more in [&[][..], &["--set temperature=0.3"]] {
+        run(&folder, &[&batch[..], more].concat()).succeeded();
         assert!(is_link("maps/a.pfm") && is_link("maps/a.json"));
         assert!(fs::read(at("below/a.pfm")).unwrap().starts_with(b"Pf\n"));
         assert!(fs::read_to_string(at("below/a.json")).unwrap().contains("\"done\""));

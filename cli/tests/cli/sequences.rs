@@ -1,16 +1,13 @@
 //! `mrfgs sequence`: whatever the frames come in, the maps are those of `match`; and whatever ends a sequence early, what was done
 //! before stays.
 
-use std::io::Read;
-use std::process::{Child, Output, Stdio};
-use std::time::{Duration, Instant};
-
 use super::*;
+use std::io::Read;
 
 const SIZE: (u32, u32) = (64, 48);
 /// Scenes whose corners are the frames, in this order: the tenth comes after the second.
 const SCENES: [(&str, &str); 3] = [("f1", "slanted"), ("f2", "thin"), ("f10", "repetitive")];
-const RANGE: [&str; 4] = ["--max-disparity", "23", "--device", "cpu"];
+const RANGE: [&str; 1] = ["--max-disparity 23 --device cpu"];
 
 fn frame(scene_name: &str, view: usize) -> image::RgbImage {
     let image = image::open(scene(scene_name).join(format!("im{view}.png"))).unwrap();
@@ -18,9 +15,9 @@ fn frame(scene_name: &str, view: usize) -> image::RgbImage {
 }
 
 /// A folder with the frames of both cameras, and of both in one.
-fn cameras() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+fn cameras() -> Folder {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     for camera in ["left", "right", "beside", "above"] {
         fs::create_dir(at(camera)).unwrap();
     }
@@ -47,7 +44,7 @@ fn cameras() -> TempDir {
 fn wanted(folder: &Path, options: &[&str]) -> Vec<Vec<u8>> {
     let maps = SCENES.map(|(name, _)| {
         let (left, right) = (format!("left/{name}.png"), format!("right/{name}.ppm"));
-        let line = [&["match", &left, &right, "wanted.pfm", "--quiet"], &RANGE[..], options].concat();
+        let line = [&["match", &left, &right, "wanted.pfm --quiet"], &RANGE[..], options].concat();
         run(folder, &line).succeeded();
         fs::read(folder.join("wanted.pfm")).unwrap()
     });
@@ -66,12 +63,6 @@ fn fed(folder: &Path, args: &[&str], bytes: &[u8]) -> Output {
     // Where it ends early, it does not take them all.
     let _ = child.stdin.take().unwrap().write_all(bytes);
     child.wait_with_output().unwrap()
-}
-
-fn started(folder: &Path, args: &[&str]) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mrfgs"));
-    command.current_dir(folder).args(args).env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE");
-    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 /// All frames with both views beside each other, by the luma alone.
@@ -94,7 +85,7 @@ const GREY: &str = "YUV4MPEG2 W128 H48 F30000:1001 Ip A1:1 Cmono XYSCSS=400\n";
 #[test]
 fn files_in_any_order_give_the_maps_of_match() {
     let folder = cameras();
-    let at = folder.path();
+    let at: &Path = &folder;
     let wanted = wanted(at, &[]);
     let names = SCENES.map(|(name, _)| name);
     for (i, (left, right, layout)) in [
@@ -118,14 +109,14 @@ fn files_in_any_order_give_the_maps_of_match() {
         assert_eq!(listing(&at.join(&output)).len(), 3);
     }
     // Control: views exchanged are another pair.
-    run(at, &[&["sequence", "right", "left", "swapped", "--quiet"], &RANGE[..]].concat()).succeeded();
+    run(at, &[&["sequence right left swapped --quiet"], &RANGE[..]].concat()).succeeded();
     assert_ne!(maps(&at.join("swapped"), names), wanted);
 }
 
 #[test]
 fn streams_give_the_maps_of_their_pixels() {
     let folder = cameras();
-    let at = folder.path();
+    let at: &Path = &folder;
     let numbers = ["000000", "000001", "000002"];
     // Pixels alone: what the files hold.
     let mut raw = Vec::new();
@@ -134,17 +125,17 @@ fn streams_give_the_maps_of_their_pixels() {
             raw.extend(frame(scene, view).into_raw());
         }
     }
-    let line = ["sequence", "-", "raw", "--raw-frames", "64x96,rgb24", "--layout", "top-bottom", "--quiet"];
+    let line = ["sequence - raw --raw-frames 64x96,rgb24 --layout top-bottom --quiet"];
     let output = fed(at, &[&line, &RANGE[..]].concat(), &raw);
     assert!(output.status.success(), "{output:?}");
     assert_eq!(maps(&at.join("raw"), numbers), wanted(at, &[]));
     // Luma alone, in a stream, a file, and grey images.
     let grey = grey_stream(GREY);
     fs::write(at.join("both.y4m"), &grey).unwrap();
-    let output = fed(at, &[&["sequence", "-", "piped"], &RANGE[..]].concat(), &grey);
+    let output = fed(at, &[&["sequence - piped"], &RANGE[..]].concat(), &grey);
     assert!(output.status.success(), "{output:?}");
     // A pipe may hand its header on in pieces.
-    let mut child = started(at, &[&["sequence", "-", "pieces"], &RANGE[..]].concat());
+    let mut child = started(at, &[&["sequence - pieces"], &RANGE[..]].concat());
     let mut stdin = child.stdin.take().unwrap();
     for piece in [&grey[..5], &grey[5..30], &grey[30..]] {
         stdin.write_all(piece).unwrap();
@@ -154,7 +145,7 @@ fn streams_give_the_maps_of_their_pixels() {
     drop(stdin);
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    run(at, &[&["sequence", "both.y4m", "filed", "--quiet"], &RANGE[..]].concat()).succeeded();
+    run(at, &[&["sequence both.y4m filed --quiet"], &RANGE[..]].concat()).succeeded();
     for (name, scene) in SCENES {
         for (view, path) in [format!("left/{name}.png"), format!("right/{name}.ppm")].iter().enumerate() {
             let green = frame(scene, view).pixels().map(|pixel| pixel[1]).collect();
@@ -183,10 +174,10 @@ fn film(bytes: &[u8], (width, height): (usize, usize)) -> (String, Vec<Vec<u8>>)
 #[test]
 fn films_show_the_previews() {
     let folder = cameras();
-    let at = folder.path();
-    let line = ["sequence", "left", "right", "film.y4m", "--colours", "grey"];
+    let at: &Path = &folder;
+    let line = ["sequence left right film.y4m --colours grey"];
     run(at, &[&line, &RANGE[..]].concat()).succeeded();
-    let files = ["sequence", "left", "right", "maps", "--colours", "grey", "--also", "preview,side-by-side"];
+    let files = ["sequence left right maps --colours grey --also preview,side-by-side"];
     run(at, &[&files, &RANGE[..]].concat()).succeeded();
     let preview =
         |name: &str, what: &str| image::open(at.join(format!("maps/{name}.{what}.png"))).unwrap().to_luma8();
@@ -205,11 +196,8 @@ fn films_show_the_previews() {
     }
     assert!(off(&pictures[0], "f10") > 20.0, "control: another frame looks different");
     // To standard output, beside the left image, at the rate of the stream.
-    let output = fed(
-        at,
-        &[&["sequence", "-", "-", "--also", "side-by-side", "--quiet"], &RANGE[..]].concat(),
-        &grey_stream(GREY),
-    );
+    let output =
+        fed(at, &[&["sequence - - --also side-by-side --quiet"], &RANGE[..]].concat(), &grey_stream(GREY));
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     let wide = preview("f1", "side-by-side").dimensions();
     let (header, pictures) = film(&output.stdout, (wide.0 as usize, wide.1 as usize));
@@ -219,8 +207,8 @@ fn films_show_the_previews() {
 
 #[test]
 fn raw_frames_are_rectified_once_and_for_all() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let folder = Folder::new();
+    let at: &Path = &folder;
     for (camera, file) in [("left", "left.png"), ("right", "right.png")] {
         fs::create_dir(at.join(camera)).unwrap();
         for name in ["a.png", "b.png"] {
@@ -228,10 +216,10 @@ fn raw_frames_are_rectified_once_and_for_all() {
         }
     }
     let calib = scene_file("raw", "cameras.yml");
-    let options = ["--rectify", "--calib", &calib, "--max-disparity", "31", "--device", "cpu", "--quiet"];
-    let line = ["sequence", "left", "right", "maps", "--also", "depth,points"];
+    let options = ["--rectify --calib", &calib, "--max-disparity 31 --device cpu --quiet"];
+    let line = ["sequence left right maps --also depth,points"];
     run(at, &[&line, &options[..]].concat()).succeeded();
-    let line = ["match", "left/a.png", "right/a.png", "a.pfm", "--also", "depth,points"];
+    let line = ["match left/a.png right/a.png a.pfm --also depth,points"];
     run(at, &[&line, &options[..]].concat()).succeeded();
     for (of_sequence, of_match) in [
         ("a.pfm", "a.pfm"),
@@ -245,15 +233,14 @@ fn raw_frames_are_rectified_once_and_for_all() {
         );
     }
     // Control: unrectified views are another pair.
-    let line = ["sequence", "left", "right", "others", "--max-disparity", "31", "--device", "cpu", "--quiet"];
-    run(at, &line).succeeded();
+    run(at, &["sequence left right others --max-disparity 31 --device cpu --quiet"]).succeeded();
     assert_ne!(fs::read(at.join("others/a.pfm")).unwrap(), fs::read(at.join("a.pfm")).unwrap());
 }
 
 #[test]
 fn sequences_that_make_no_sense_are_told_in_one_line() {
     let folder = cameras();
-    let at = folder.path();
+    let at: &Path = &folder;
     fs::create_dir_all(at.join("none")).unwrap();
     fs::create_dir_all(at.join("fewer")).unwrap();
     fs::create_dir_all(at.join("twice")).unwrap();
@@ -276,53 +263,43 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         fs::write(at.join(name), header.to_owned() + "FRAME\n").unwrap();
     }
     let before = listing(at);
-    let none = |words: &'static [&'static str]| (1, words);
-    let usage = |words: &'static [&'static str]| (2, words);
-    for (line, (code, words)) in [
-        ("left right maps --max-disparity auto --calib nothing.yml", none(&["nothing.yml"])),
-        ("nowhere right maps", none(&["nowhere"])),
-        ("none maps", none(&["none", "holds no images"])),
-        ("left/*.jpg right/* maps", none(&["left/*.jpg", "no image"])),
-        ("left/f%d.png right maps", none(&["left/f%d.png", "write *"])),
-        ("left fewer maps", none(&["left holds 3", "fewer 1"])),
-        ("twice maps", none(&["f1.png", "F1.ppm"])),
-        ("odd maps", none(&["frame a", "63 x 48", "odd"])),
-        ("left/f1.png right/f1.ppm maps", none(&["left/f1.png", "neither a folder"])),
-        ("text.y4m maps", none(&["text.y4m", "yuv4mpegpipe"])),
-        ("empty.y4m maps", none(&["empty.y4m", "is empty"])),
-        ("head.y4m maps", none(&["head.y4m", "no frame"])),
-        ("huge.y4m maps", none(&["huge.y4m", "4294967295", "limit"])),
-        ("wide.y4m maps", none(&["wide.y4m", "size"])),
-        ("none.y4m maps", none(&["none.y4m", "size"])),
-        ("size.y4m maps", none(&["size.y4m", "size"])),
-        ("kind.y4m maps", none(&["kind.y4m", "yuv444p"])),
-        ("rate.y4m maps", none(&["rate.y4m", "damaged"])),
-        (
-            "head.y4m maps --raw-frames 8000x8000,rgb24 --max-pixels 1000",
-            none(&["head.y4m", "limit of 1000"]),
-        ),
-        ("head.y4m maps --raw-frames 80x80,yuv420p", usage(&["--raw-frames", "gray16le"])),
-        ("- - maps", usage(&["RIGHT", "one stream"])),
-        ("left right left", none(&["left", "another folder"])),
-        ("left right head.y4m/maps", none(&["maps"])),
-        ("head.y4m head.y4m", usage(&["OUTPUT", "already"])),
-        ("left right none/film.y4m --also validity", usage(&["--also validity", "folder"])),
-        ("left right nowhere/film.y4m", none(&["nowhere"])),
-        ("left right nowhere/maps", none(&["nowhere"])),
-        ("left right maps --also depth", usage(&["--also depth", "--calib"])),
-        ("left right maps --colours grey", usage(&["--colours", "preview"])),
-        ("left right maps --rectify", usage(&["--calib"])),
-        ("left right maps --alpha 0.5", usage(&["--alpha", "--rectify"])),
-        ("left right maps --format png --min-disparity -9", none(&["png"])),
-        ("left", usage(&["OUTPUT"])),
+    for (line, code, words) in [
+        ("left right maps --max-disparity auto --calib nothing.yml", 1, "nothing.yml"),
+        ("nowhere right maps", 1, "nowhere"),
+        ("none maps", 1, "none & holds no images"),
+        ("left/*.jpg right/* maps", 1, "left/*.jpg & no image"),
+        ("left/f%d.png right maps", 1, "left/f%d.png & write *"),
+        ("left fewer maps", 1, "left holds 3 & fewer 1"),
+        ("twice maps", 1, "f1.png & F1.ppm"),
+        ("odd maps", 1, "frame a & 63 x 48 & odd"),
+        ("left/f1.png right/f1.ppm maps", 1, "left/f1.png & neither a folder"),
+        ("text.y4m maps", 1, "text.y4m & yuv4mpegpipe"),
+        ("empty.y4m maps", 1, "empty.y4m & is empty"),
+        ("head.y4m maps", 1, "head.y4m & no frame"),
+        ("huge.y4m maps", 1, "huge.y4m & 4294967295 & limit"),
+        ("wide.y4m maps", 1, "wide.y4m & size"),
+        ("none.y4m maps", 1, "none.y4m & size"),
+        ("size.y4m maps", 1, "size.y4m & size"),
+        ("kind.y4m maps", 1, "kind.y4m & yuv444p"),
+        ("rate.y4m maps", 1, "rate.y4m & damaged"),
+        ("head.y4m maps --raw-frames 8000x8000,rgb24 --max-pixels 1000", 1, "head.y4m & limit of 1000"),
+        ("head.y4m maps --raw-frames 80x80,yuv420p", 2, "--raw-frames & gray16le"),
+        ("- - maps", 2, "RIGHT & one stream"),
+        ("left right left", 1, "left & another folder"),
+        ("left right head.y4m/maps", 1, "maps"),
+        ("head.y4m head.y4m", 2, "OUTPUT & already"),
+        ("left right none/film.y4m --also validity", 2, "--also validity & folder"),
+        ("left right nowhere/film.y4m", 1, "nowhere"),
+        ("left right nowhere/maps", 1, "nowhere"),
+        ("left right maps --also depth", 2, "--also depth & --calib"),
+        ("left right maps --colours grey", 2, "--colours & preview"),
+        ("left right maps --rectify", 2, "--calib"),
+        ("left right maps --alpha 0.5", 2, "--alpha & --rectify"),
+        ("left right maps --format png --min-disparity -9", 1, "png"),
+        ("left", 2, "OUTPUT"),
     ] {
-        let mut words_of_line = vec!["sequence"];
-        words_of_line.extend(line.split(' '));
-        if !line.contains("--max-disparity") {
-            words_of_line.extend(["--max-disparity", "23"]);
-        }
-        words_of_line.extend(["--device", "cpu", "--quiet"]);
-        run(at, &words_of_line).failed(code, words, line);
+        let range = if line.contains("--max-disparity") { "" } else { " --max-disparity 23" };
+        run(at, &[&format!("sequence {line}{range} --device cpu --quiet")]).failed(code, &[words], line);
         assert_eq!(listing(at), before, "{line}");
     }
 }
@@ -331,7 +308,7 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
 #[test]
 fn what_was_done_before_a_failure_stays() {
     let folder = cameras();
-    let at = folder.path();
+    let at: &Path = &folder;
     let wanted = wanted(at, &[]);
     let whole = grey_stream(GREY);
     fs::write(at.join("cut.y4m"), &whole[..whole.len() - 1]).unwrap();
@@ -383,21 +360,17 @@ fn what_was_done_before_a_failure_stays() {
 #[cfg(unix)]
 #[test]
 fn what_was_done_before_a_signal_stays() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let folder = Folder::new();
+    let at: &Path = &folder;
     // Two frames, and a third that never ends.
     let stream = grey_stream(GREY);
     let stopped = |output: &str, signal: &str, ready: &dyn Fn() -> bool| {
-        let mut child = started(at, &[&["sequence", "-", output], &RANGE[..]].concat());
+        let mut child = started(at, &[&["sequence -", output], &RANGE[..]].concat());
         let mut stdin = child.stdin.take().unwrap();
         stdin.write_all(&stream[..stream.len() - 100]).unwrap();
         stdin.flush().unwrap();
-        let start = Instant::now();
-        while !ready() {
-            assert!(start.elapsed() < Duration::from_secs(60), "{output} is not ready");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        wait_until("ready", ready);
+        send(signal, &child);
         let mut said = String::new();
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
         (child.wait().unwrap().code(), said)
@@ -423,8 +396,7 @@ fn what_was_done_before_a_signal_stays() {
 #[test]
 fn a_player_that_is_closed_ends_it() {
     let folder = cameras();
-    let mut child =
-        started(folder.path(), &[&["sequence", "left", "right", "-", "--quiet"], &RANGE[..]].concat());
+    let mut child = started(&folder, &[&["sequence left right - --quiet"], &RANGE[..]].concat());
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
@@ -439,8 +411,7 @@ fn a_device_gives_the_same_maps() {
         return;
     }
     let folder = cameras();
-    let at = folder.path();
-    run(at, &["sequence", "left", "right", "maps", "--max-disparity", "23", "--device", "gpu", "--quiet"])
-        .succeeded();
+    let at: &Path = &folder;
+    run(at, &["sequence left right maps --max-disparity 23 --device gpu --quiet"]).succeeded();
     assert_eq!(maps(&at.join("maps"), SCENES.map(|(name, _)| name)), wanted(at, &[]));
 }

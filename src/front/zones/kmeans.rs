@@ -7,10 +7,32 @@
 
 use rayon::prelude::*;
 
-use super::Options;
+use crate::options::ZoneExtent;
 
 /// Points that a thread takes at a time.
 const CHUNK: usize = 512;
+
+/// The parameters of the segmentation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Largest number of clusters, up to 255: the K of K-means.
+    pub clusters: usize,
+    /// Whether a zone is a cluster, or a connected region of one.
+    pub extent: ZoneExtent,
+    /// Number of clusterings from different starts; the tightest is taken.
+    pub replicates: usize,
+    /// Largest number of iterations of each clustering; it ends when no sample changes its zone.
+    pub iterations: usize,
+    /// Seed of the random starts.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    /// The preset `paper`.
+    fn default() -> Self {
+        Self { clusters: 15, extent: ZoneExtent::Region, replicates: 5, iterations: 500, seed: 0 }
+    }
+}
 
 /// The centroids of the points, whose `dimensions` values are up to 512 in size, one after the other. There
 /// are at most `count` of them, and fewer where there are fewer different points. The replicate with the

@@ -2,7 +2,17 @@
 
 use crate::image::Plane;
 
-use super::{MASKED, Zones};
+/// The zone of masked pixels. It is not counted.
+pub const MASKED: u32 = u32::MAX;
+
+/// A segmentation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Zones {
+    /// Zone of each pixel, 0 .. `count` in the order of their first pixels, or [`MASKED`].
+    pub map: Plane<u32>,
+    /// Number of zones.
+    pub count: usize,
+}
 
 /// The connected regions of `clusters`: pixels are of one region where a path of neighbours (above, below, left, right) of
 /// the same cluster joins them. What is [`MASKED`] stays so.

@@ -34,12 +34,7 @@ pub(super) struct Listed {
 
 /// The source of a pair; paths are as the list has them.
 enum Source {
-    Row {
-        left: String,
-        right: String,
-        mask: Option<String>,
-        search: Search,
-    },
+    Row(Row),
     /// The folder in [`List::base`] that has the pair's name.
     Folder,
 }
@@ -73,10 +68,7 @@ impl List {
 
     fn of_rows(path: &Path) -> Result<Self> {
         let rows = list::read(path)?.into_iter();
-        let pairs = rows.map(|Row { name, left, right, mask, max_disparity, min_disparity }| {
-            let search = Search { max_disparity, min_disparity };
-            Listed { name, source: Source::Row { left, right, mask, search } }
-        });
+        let pairs = rows.map(|row| Listed { name: row.name.clone(), source: Source::Row(row) });
         Ok(Self { base: path.parent().unwrap_or(Path::new("")).to_owned(), pairs: pairs.collect() })
     }
 
@@ -106,8 +98,8 @@ impl Listed {
     /// `cameras`.
     pub(super) fn inputs(&self, base: &Path, cameras: bool) -> Vec<String> {
         let inputs = match &self.source {
-            Source::Row { left, right, mask, search } => {
-                let calibrated = cameras || search.max_disparity.is_none();
+            Source::Row(Row { left, right, mask, max_disparity, .. }) => {
+                let calibrated = cameras || max_disparity.is_none();
                 let calibration = calibrated.then(|| calibration_beside(left));
                 [left, right].into_iter().cloned().chain(calibration).chain(mask.clone()).collect()
             }
@@ -121,52 +113,41 @@ impl Listed {
     /// What the list says of its range.
     pub(super) fn search(&self) -> Search {
         match &self.source {
-            Source::Row { search, .. } => *search,
+            &Source::Row(Row { max_disparity, min_disparity, .. }) => Search { max_disparity, min_disparity },
             Source::Folder => Search { max_disparity: None, min_disparity: None },
         }
     }
 
     /// Reads its images and what else its range takes, and the cameras for the output `cameras`.
     pub(super) fn read(&self, base: &Path, reader: Reader, cameras: Option<&Also>) -> Result<Input> {
-        let rig = |pair: &Pair, left: &Path, calibration: Option<(&Path, &Calibration)>| {
-            let rig = |word| cameras::rig(word, calibration, left, pair.size(), "put one there");
-            cameras.map(rig).transpose()
-        };
-        match &self.source {
-            Source::Row { left, right, mask, search } => {
-                let [left_path, right_path] = [left, right].map(|path| base.join(path));
-                let mask_path = mask.as_ref().map(|path| base.join(path));
-                let pair = reader.pair(&left_path, &right_path, mask_path.as_deref())?;
-                let calibration = match search.max_disparity {
-                    Some(_) if cameras.is_none() => None,
-                    _ => Calibration::beside(&left_path)?,
-                };
-                let calibration_path = left_path.with_file_name(CALIBRATION);
-                let known = calibration.as_ref().map(|known| (calibration_path.as_path(), known));
-                let found = search.range(&pair, known, Sign::default())?;
-                let Found { range, by_matches } = found;
-                let rig = rig(&pair, &left_path, known)?;
-                let calibration = known.map(|_| calibration_beside(left));
-                let [left, right] = [left, right].map(Clone::clone);
-                let files = Files { left, right, mask: mask.clone(), calibration, output: None };
-                Ok(Input { pair, range, by_matches, rig, files })
+        let at = |path: &String| base.join(path);
+        let (pair, range, [left, right], mask) = match &self.source {
+            Source::Row(Row { left, right, mask, .. }) => {
+                let pair = reader.pair(&at(left), &at(right), mask.as_ref().map(at).as_deref())?;
+                (pair, None, [left, right].map(Clone::clone), mask.clone())
             }
             Source::Folder => {
-                let dir = base.join(&self.name);
+                let dir = at(&self.name);
                 let folder = Folder::to_match(&dir)?;
                 let (pair, range) = folder.read_pair(reader)?;
-                let [left_path, _] = folder.view_names().map(|file| dir.join(file));
-                let calibration_path = dir.join(CALIBRATION);
-                let calibration = cameras.map(|_| Calibration::beside(&left_path)).transpose()?.flatten();
-                let known = calibration.as_ref().map(|known| (calibration_path.as_path(), known));
-                let rig = rig(&pair, &left_path, known)?;
-                let inside = |file: &str| shown(&Path::new(&self.name).join(file));
-                let [left, right] = folder.view_names().map(inside);
-                let calibration = calibration_path.exists().then(|| inside(CALIBRATION));
-                let files = Files { left, right, mask: None, calibration, output: None };
-                Ok(Input { pair, range, by_matches: false, rig, files })
+                let views = folder.view_names().map(|file| shown(&Path::new(&self.name).join(file)));
+                (pair, Some(range), views, None)
             }
-        }
+        };
+        let beside = calibration_beside(&left);
+        let (path, search, is_folder) = (at(&beside), self.search(), range.is_some());
+        let is_calibrated = cameras.is_some() || search.max_disparity.is_none() && !is_folder;
+        let calibration = if is_calibrated { Calibration::beside(&at(&left))? } else { None };
+        let known = calibration.as_ref().map(|known| (path.as_path(), known));
+        let Found { range, by_matches } = match range {
+            Some(range) => Found { range, by_matches: false },
+            None => search.range(&pair, known, Sign::default())?,
+        };
+        let rig = |word| cameras::rig(word, known, &at(&left), pair.size(), "put one there");
+        let rig = cameras.map(rig).transpose()?;
+        let calibration = (known.is_some() || is_folder && path.exists()).then_some(beside);
+        let files = Files { left, right, mask, calibration, output: None };
+        Ok(Input { pair, range, by_matches, rig, files })
     }
 }
 

@@ -6,8 +6,6 @@ mod shard;
 
 use std::collections::{HashSet, VecDeque};
 use std::fmt::Write as _;
-use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -131,10 +129,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     stop::listen();
     let matcher = Matcher::builder().method(method.clone()).execution(execution).build()?;
-    match fs::create_dir(&args.folder) {
-        Err(e) if e.kind() != ErrorKind::AlreadyExists => Err(Error::write(&args.folder, e).into()),
-        _ => batch.run(&pairs, matcher),
-    }
+    files::create_folder(&args.folder).map_err(|e| Error::write(&args.folder, e))?;
+    batch.run(&pairs, matcher)
 }
 
 /// Refuses an output folder that could not be one, and outputs that would overwrite an input.
@@ -200,21 +196,13 @@ impl Batch<'_> {
         let mut text = String::new();
         let [mut complete, mut failed, mut missing] = [0; 3];
         for listed in pairs {
-            let name = &listed.name;
-            let _ = match self.state(listed) {
-                State::Complete => {
-                    complete += 1;
-                    writeln!(text, "complete  {name}")
-                }
-                State::Failed(reason) => {
-                    failed += 1;
-                    writeln!(text, "failed    {name}: {reason}")
-                }
-                State::Missing => {
-                    missing += 1;
-                    writeln!(text, "missing   {name}")
-                }
+            let (count, state, reason) = match self.state(listed) {
+                State::Complete => (&mut complete, "complete", String::new()),
+                State::Failed(reason) => (&mut failed, "failed", format!(": {reason}")),
+                State::Missing => (&mut missing, "missing", String::new()),
             };
+            *count += 1;
+            let _ = writeln!(text, "{state:<9} {}{reason}", listed.name);
         }
         let _ = writeln!(text, "{complete} complete, {failed} failed, {missing} missing");
         Ok(console::print(&text)?)
@@ -308,26 +296,13 @@ impl Batch<'_> {
         let wanted = &self.args.maps;
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
-        let (maps, sign) = (&matched.maps, Sign::default());
-        let outcome = Outcome {
-            maps,
-            range,
-            sign,
-            left: pair.as_ref().map(Pair::left),
-            rig,
-            rectifying: None,
-            georeferences,
-        };
+        let (maps, sign, left) = (&matched.maps, Sign::default(), pair.as_ref().map(Pair::left));
+        let outcome = Outcome { maps, range, sign, left, rig, rectifying: None, georeferences };
         let staged = |file: &str| claim.folder().join(file);
-        // The user knows the file by its place in the output folder.
-        let at = |file: &str, result: Result<()>| result.map_err(|e| e.at(&self.args.folder.join(file)));
         let map = wanted.map(&listed.name);
-        at(
-            &map,
-            outcome.writer(View::Left).disparity(&staged(&map), &maps.final_map()).map_err(Failure::from),
-        )?;
+        self.named(&map, outcome.writer(View::Left).disparity(&staged(&map), &maps.final_map()))?;
         for (word, file) in wanted.also(&listed.name) {
-            at(&file, wanted.also.write(word, &staged(&file), &outcome).map(drop))?;
+            self.named(&file, wanted.also.write(word, &staged(&file), &outcome))?;
         }
         files.output = Some(map);
         let found = MatchRecord::new(&files, &matched, time, sign);
@@ -346,24 +321,23 @@ impl Batch<'_> {
         let input = listed.read(&self.base, self.reader, wanted.also.take_cameras())?;
         let (pair, range) = (&input.pair, input.range);
         // The folder is there, so what can be wrong is the range.
-        let check = |file: &str, result: Result<()>| result.map_err(|e| e.at(&self.args.folder.join(file)));
         let map = wanted.map(&listed.name);
-        let place = claim.folder().join(&map);
-        check(&map, write::check_disparity_path(&place, range.min, range.max).map_err(Failure::from))?;
+        self.named(&map, write::check_disparity_path(&claim.folder().join(&map), range.min, range.max))?;
         for (word, file) in wanted.also(&listed.name) {
-            check(&file, word.check(&claim.folder().join(&file), range).map_err(Failure::from))?;
+            self.named(&file, word.check(&claim.folder().join(&file), range))?;
         }
         let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
         let start = Instant::now();
         let matched = matcher.job(pair, range).on_progress(|_| stop::go_on()).run()?;
         let time = start.elapsed();
         warnings.extend(check::clipped(&matched.maps, range));
-        Ok((
-            input,
-            matched,
-            time,
-            warnings.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)).collect(),
-        ))
+        let warnings = warnings.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)).collect();
+        Ok((input, matched, time, warnings))
+    }
+
+    /// The user knows a file by its place in the output folder.
+    fn named<T, E: Into<Failure>>(&self, file: &str, result: Result<T, E>) -> Result<T> {
+        result.map_err(|e| e.into().at(&self.args.folder.join(file)))
     }
 
     /// Puts `outputs` in their place, and then the record. Without a record the pair is not complete, so the old record is removed

@@ -105,13 +105,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let method = args.also.made_by(args.method.method()?)?;
     let execution = args.execution.execution();
     let cameras = args.also.take_cameras();
-    if args.rectification.alpha.is_some() && !args.rectify {
-        let reason = "is of a rectification; add --rectify, or leave --alpha out";
-        return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
-    }
+    let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
-    let options = args.rectification.options();
-    let input = args.pair.read(args.sign, cameras.is_some(), args.rectify.then_some(&options))?;
+    let input = args.pair.read(args.sign, cameras.is_some(), rectifying.as_ref())?;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign);
@@ -138,7 +134,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     // Outputs take memory too.
     drop(matcher);
     let files = args.pair.files(&input, Some(&args.output));
-    let unit = input.calibration().map(|(file, _)| file.display().to_string());
+    let calibration = input.calibration().map(|(file, _)| file.display().to_string());
     let georeferences = input.pair.georeferences();
     let rectifying = input.rectifying;
     let pair = Some(input.pair).filter(|_| args.also.show_left());
@@ -148,7 +144,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
     let said = write_outputs(args, &also, &outcome, &record)?;
-    if let Some(file) = unit.filter(|_| !args.quiet && !said.is_empty()) {
+    if let Some(file) = calibration.filter(|_| !args.quiet && !said.is_empty()) {
         console::say(&format!("{}; unit: that of the baseline in {file}", said.join("; ")));
     }
     Ok(())
@@ -206,7 +202,7 @@ fn write_outputs(
     }
     // What is printed cannot be taken back, so it comes last.
     if files::is_printed(output) {
-        console::print_data(&pfm::encode(&map()))?;
+        console::print_data(&pfm::encode(&map()), "map")?;
     }
     written.keep();
     if let Some((_, text)) = json.filter(|(path, _)| files::is_printed(path)) {

@@ -9,7 +9,7 @@ use mrfgs::calibration;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::DisparityRange;
-use mrfgs::rectification::Rectification;
+use mrfgs::rectification::{Options, Rectification};
 use mrfgs::{Error, Matcher};
 
 use crate::args::execution::ExecutionArgs;
@@ -107,16 +107,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         args.maps.also.check(args.rectify)?;
     }
     let method = args.maps.also.made_by(args.method.method()?)?;
-    if args.rectification.alpha.is_some() && !args.rectify {
-        let reason = "is of a rectification; add --rectify, or leave --alpha out";
-        return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
-    }
+    let rectifying = args.rectification.options_if(args.rectify)?;
     let mut frames = open(args)?;
     check_output(args, &frames)?;
     let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
     let mut first = frames.next().ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
-    let (by, calibration) = calibrated(args, &mut first.pair)?;
+    let (by, calibration) = calibrated(args, rectifying.as_ref(), &mut first.pair)?;
     let known = calibration.as_ref().map(|calibration| (args.calib[0].as_path(), calibration));
     let range = range(args, &first.pair, known)?;
     let rig = args.maps.also.take_cameras();
@@ -133,14 +130,17 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Rectifies the first pair where that is wanted. Returns what rectifies all others, and the calibration of rectified pairs.
-fn calibrated(args: &Args, first: &mut Pair) -> Result<(Option<Rectification>, Option<Calibration>)> {
-    if !args.rectify {
+fn calibrated(
+    args: &Args,
+    rectifying: Option<&Options>,
+    first: &mut Pair,
+) -> Result<(Option<Rectification>, Option<Calibration>)> {
+    let Some(options) = rectifying else {
         let known = !args.calib.is_empty();
         let calibration = known.then(|| input::of_rectified_images(&args.calib)).transpose()?;
         return Ok((None, calibration));
-    }
-    let (read, options) = (calibration::read(&args.calib)?, args.rectification.options());
-    let (mut by, pair) = raw::rectify(&read, &args.calib, first, &options)?;
+    };
+    let (mut by, pair) = raw::rectify(&calibration::read(&args.calib)?, &args.calib, first, options)?;
     by.keep_places()?;
     *first = pair;
     let calibration = by.calibration()?;

@@ -1,7 +1,6 @@
 //! Where the maps of a sequence go.
 
 use std::fs;
-use std::io::ErrorKind;
 use std::path::Path;
 
 use mrfgs::Error;
@@ -14,7 +13,7 @@ use mrfgs::options::DisparityRange;
 use crate::args::sign::Sign;
 use crate::failure::Result;
 use crate::outputs::also::{Outcome, View};
-use crate::outputs::files::{Written, is_printed};
+use crate::outputs::files::{self, Written, is_printed};
 use crate::outputs::film::Film;
 use crate::outputs::maps::MapArgs;
 use crate::sequences::FrameRate;
@@ -63,23 +62,17 @@ impl<'a> Writer<'a> {
     /// # Errors
     /// Where it cannot be made, or a map cannot be stored in its format.
     pub(super) fn begin_folder(self) -> Result<Sink<'a>> {
-        match fs::create_dir(self.output) {
-            Err(e) if e.kind() != ErrorKind::AlreadyExists => return Err(Error::write(self.output, e).into()),
-            made => {
-                let name = "000000";
-                let map = self.output.join(self.wanted.map(name));
-                let checked =
-                    write::check_disparity_path(&map, self.range.min, self.range.max).and_then(|()| {
-                        let mut also = self.wanted.also(name);
-                        also.try_for_each(|(word, file)| word.check(&self.output.join(file), self.range))
-                    });
-                if checked.is_err() && made.is_ok() {
-                    // It is empty.
-                    let _ = fs::remove_dir(self.output);
-                }
-                checked?;
-            }
+        let is_new = files::create_folder(self.output).map_err(|e| Error::write(self.output, e))?;
+        let name = "000000";
+        let map = self.output.join(self.wanted.map(name));
+        let checked = write::check_disparity_path(&map, self.range.min, self.range.max).and_then(|()| {
+            let mut also = self.wanted.also(name);
+            also.try_for_each(|(word, file)| word.check(&self.output.join(file), self.range))
+        });
+        if checked.is_err() && is_new {
+            let _ = fs::remove_dir(self.output);
         }
+        checked?;
         Ok(Sink { writer: self, film: None })
     }
 }

@@ -1,0 +1,40 @@
+//! What Python is told where something goes wrong.
+
+use std::ffi::CString;
+
+use mrfgs::Error;
+use mrfgs::check::Warning;
+use pyo3::exceptions::{
+    PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyUserWarning, PyValueError,
+};
+use pyo3::prelude::*;
+
+use crate::words;
+
+pyo3::create_exception!(
+    mrfgs,
+    MatchWarning,
+    PyUserWarning,
+    "What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."
+);
+
+/// The exception that says what went wrong, in the words of Python.
+pub(crate) fn exception(error: Error) -> PyErr {
+    let text = words::error(&error);
+    match error {
+        Error::Memory(_) => PyMemoryError::new_err(text),
+        Error::Device(_) => PyRuntimeError::new_err(text),
+        Error::Write { .. } => PyOSError::new_err(text),
+        Error::Interrupted => PyKeyboardInterrupt::new_err(()),
+        _ => PyValueError::new_err(text),
+    }
+}
+
+/// Says what is probably wrong, at the line of Python that called.
+pub(crate) fn warn(py: Python, warnings: impl IntoIterator<Item = Warning>) -> PyResult<()> {
+    for warning in warnings {
+        let text = CString::new(words::warning(&warning))?;
+        PyErr::warn(py, &py.get_type::<MatchWarning>(), &text, 1)?;
+    }
+    Ok(())
+}

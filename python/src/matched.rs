@@ -1,0 +1,111 @@
+//! The maps of a pair, and what made them.
+
+use mrfgs::Matched;
+use numpy::{PyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyTuple, PyType};
+
+use crate::{arrays, words};
+
+/// The maps of a pair, and what made them. All maps have the shape (height, width) of the images.
+#[pyclass(name = "Matched", frozen, get_all, module = "mrfgs")]
+pub(crate) struct PyMatched {
+    /// Disparity in pixels, float32, +inf where there is none.
+    pub(crate) disparity: Py<PyArray2<f32>>,
+    /// Disparity before post-processing in pixels, float32, +inf where the left image is masked.
+    raw: Py<PyArray2<f32>>,
+    /// How far the best runner-up is behind, in 1/8 nat, uint8; 0 where there is no measurement.
+    pub(crate) confidence: Py<PyArray2<u8>>,
+    /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
+    /// confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured and trusted.
+    pub(crate) validity: Py<PyArray2<u8>>,
+    /// Disparity of the right view in pixels, float32, +inf where there is none: right (x, y) with disparity d is seen at left
+    /// (x + d, y). None unless the option "right-map" asks for it.
+    right: Option<Py<PyArray2<f32>>>,
+    /// Smallest disparity that was searched, in pixels.
+    min_disparity: i32,
+    /// Largest disparity that was searched, in pixels.
+    max_disparity: i32,
+    /// Iterations done, of all phases together.
+    iterations: u32,
+    /// Tiles that the image was matched in.
+    tiles: usize,
+    /// What ran it.
+    ran_on: String,
+    /// Why that is not the device that was hoped for, where that is so; else None.
+    note: Option<String>,
+}
+
+impl PyMatched {
+    pub(crate) fn of(py: Python, matched: Matched) -> PyResult<Self> {
+        let range = matched.plan.range;
+        let right = matched.maps.right_map().map(|map| arrays::map(py, map)).transpose()?;
+        Ok(Self {
+            right: right.map(Bound::unbind),
+            disparity: arrays::map(py, matched.maps.final_map())?.unbind(),
+            raw: arrays::map(py, matched.maps.raw_map())?.unbind(),
+            confidence: arrays::map(py, matched.maps.confidence)?.unbind(),
+            validity: arrays::map(py, matched.maps.validity)?.unbind(),
+            min_disparity: range.min,
+            max_disparity: range.max,
+            iterations: matched.iterations,
+            tiles: matched.tiles.count(),
+            ran_on: matched.ran_on,
+            note: matched.note.as_ref().map(words::error),
+        })
+    }
+}
+
+#[pymethods]
+impl PyMatched {
+    #[new]
+    #[allow(clippy::too_many_arguments, reason = "what it is made of")]
+    fn new(
+        disparity: Py<PyArray2<f32>>,
+        raw: Py<PyArray2<f32>>,
+        confidence: Py<PyArray2<u8>>,
+        validity: Py<PyArray2<u8>>,
+        right: Option<Py<PyArray2<f32>>>,
+        min_disparity: i32,
+        max_disparity: i32,
+        iterations: u32,
+        tiles: usize,
+        ran_on: String,
+        note: Option<String>,
+    ) -> Self {
+        Self {
+            disparity,
+            raw,
+            confidence,
+            validity,
+            right,
+            min_disparity,
+            max_disparity,
+            iterations,
+            tiles,
+            ran_on,
+            note,
+        }
+    }
+
+    /// How `pickle` and `copy` make another one.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
+        let maps =
+            (self.disparity.bind(py), self.raw.bind(py), self.confidence.bind(py), self.validity.bind(py));
+        let (d, r, c, v) = maps;
+        let Self { min_disparity, max_disparity, iterations, tiles, ran_on, note, .. } = self;
+        let right = self.right.as_ref().map(|right| right.bind(py));
+        let all =
+            (d, r, c, v, right, min_disparity, max_disparity, iterations, tiles, ran_on, note.as_deref());
+        Ok((py.get_type::<Self>(), all.into_pyobject(py)?))
+    }
+
+    fn __repr__(&self, py: Python) -> String {
+        let shape = self.disparity.bind(py).shape();
+        let (height, width) = (shape[0], shape[1]);
+        let Self { min_disparity, max_disparity, ran_on, .. } = self;
+        format!(
+            "<mrfgs.Matched: {width} x {height}, disparities {min_disparity} to {max_disparity}, on {ran_on}>"
+        )
+    }
+}

@@ -1,0 +1,186 @@
+//! The matcher.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use mrfgs::options::Execution;
+use mrfgs::{Matched, Matcher, check};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{self, Image};
+use crate::exceptions::{self, exception};
+use crate::matched::PyMatched;
+use crate::sequence::{PATIENCE, PyMatchedSequence, Settings, Shared};
+use crate::{options, range};
+
+/// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
+///
+/// device: "auto" takes a GPU where there is one, else the CPU; "cpu" takes the CPU; "gpu" takes a GPU or any Vulkan or Metal
+///     driver, and raises RuntimeError where there is none; anything else is the index of a device, such as "0", or a part of its
+///     name, as `mrfgs devices` lists them. The maps are the same, bit for bit.
+/// threads: those of the CPU path; None takes one a core.
+#[pyclass(name = "Matcher", frozen, module = "mrfgs")]
+pub(crate) struct PyMatcher(Shared);
+
+#[pymethods]
+impl PyMatcher {
+    #[new]
+    #[pyo3(signature = (*, device="auto", threads=None))]
+    fn new(py: Python, device: &str, threads: Option<usize>) -> PyResult<Self> {
+        let execution = Execution { device: device.into(), threads, ..Execution::default() };
+        let matcher = py.detach(|| Matcher::builder().execution(execution).build()).map_err(exception)?;
+        let matcher = Arc::new(Mutex::new(matcher));
+        Ok(Self(Shared { matcher, taken: Arc::new(AtomicBool::new(false)) }))
+    }
+
+    /// Matches a rectified pair, and returns its maps as a Matched.
+    ///
+    /// left, right: arrays of shape (height, width) or (height, width, channels): grey, grey and alpha, RGB or RGBA, of uint8,
+    ///     uint16, float32 or float64, in any layout. Left (x, y) with disparity d is seen at right (x - d, y). 8 bits are taken as
+    ///     they are; 16 bits fill their range with the largest value of both; floats run from the least to the largest value of
+    ///     both. Ignored are pixels of alpha 0, values that are not finite, and what a masked array masks.
+    /// max_disparity, min_disparity: the range to search in pixels, both ends included. Without max_disparity sparse matches
+    ///     find the range; min_disparity is 0 where max_disparity is given alone.
+    /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
+    /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
+    /// preset: "default", "accurate", "fast", "paper" or "fgs".
+    /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
+    ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
+    /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of
+    ///     the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
+    ///
+    /// Other threads run meanwhile; Ctrl-C ends it. Raises ValueError for what makes no sense, TypeError for other arrays,
+    /// RuntimeError where the wanted device fails, and MemoryError where it does not fit.
+    #[pyo3(
+        name = "match",
+        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
+                     options=None, warn=true)
+    )]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn run(
+        &self,
+        py: Python,
+        left: &Bound<PyAny>,
+        right: &Bound<PyAny>,
+        max_disparity: Option<i32>,
+        min_disparity: Option<i32>,
+        mask: Option<&Bound<PyAny>>,
+        no_data: Option<f64>,
+        preset: &str,
+        options: Option<&Bound<PyDict>>,
+        warn: bool,
+    ) -> PyResult<PyMatched> {
+        self.0.check()?;
+        let method = options::method(preset, options)?;
+        let (left, right) = (Image::of("left", left)?, Image::of("right", right)?);
+        let pair = arrays::pair(&left, &right, mask, no_data)?;
+        let given = range::given(max_disparity, min_disparity)?;
+        let range = range::searched(py, &pair, given, min_disparity)?;
+        if warn {
+            exceptions::warn(py, py.detach(|| check::warnings(&pair, given)))?;
+        }
+        let matched = py.detach(|| {
+            interruptible(|stop| {
+                let mut matcher = self.0.matcher.lock().unwrap_or_else(PoisonError::into_inner);
+                matcher.job(&pair, range).method(&method).cancel(stop).run()
+            })
+        })?;
+        if warn {
+            exceptions::warn(py, check::clipped(&matched.maps, range))?;
+        }
+        PyMatched::of(py, matched)
+    }
+
+    /// Matches pair after pair, and returns an iterator that yields the Matched of each, in order. While a device is at one pair the next
+    /// one goes up and the maps of the last one come down.
+    ///
+    /// pairs: an iterable of pairs (left, right) of arrays as `match` takes them, such as a list, a generator, or
+    ///     map(rectification.apply, lefts, rights). Up to three pairs are under way at a time, so a result comes when two more pairs
+    ///     have been taken. The arrays of a pair may be used again for the next one.
+    ///
+    /// The other arguments are those of `match`, for all pairs; masked arrays tell what to ignore in each. The pairs are taken, and
+    /// exceptions raised, in the thread that asks for results. An exception of `pairs`, or of a pair that makes no sense, comes after the
+    /// results of the pairs before it; messages count pairs from 0. Ctrl-C ends the sequence. So does `close()` of the iterator, which
+    /// happens by itself when nothing refers to it any more. Until its end, the Matcher raises RuntimeError for other matches.
+    #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, preset="default", options=None, warn=true))]
+    #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn match_all(
+        &self,
+        pairs: &Bound<PyAny>,
+        max_disparity: Option<i32>,
+        min_disparity: Option<i32>,
+        no_data: Option<f64>,
+        preset: &str,
+        options: Option<&Bound<PyDict>>,
+        warn: bool,
+    ) -> PyResult<PyMatchedSequence> {
+        let method = options::method(preset, options)?;
+        let range = range::given(max_disparity, min_disparity)?;
+        let pairs = pairs.try_iter().map_err(|_| {
+            PyTypeError::new_err("pairs: give an iterable of pairs of arrays, such as zip(lefts, rights)")
+        })?;
+        let settings = Settings { method, range, min_disparity, no_data, warn };
+        Ok(PyMatchedSequence::new(self.0.clone(), settings, pairs))
+    }
+}
+
+/// Matches one rectified pair, and returns its maps as a Matched.
+///
+/// It takes the arguments of Matcher.match, and those of Matcher; see help(mrfgs.Matcher). To match many pairs, keep a Matcher:
+/// it opens the device once.
+#[pyfunction]
+#[pyo3(
+    name = "match",
+    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
+                 options=None, warn=true, device="auto", threads=None)
+)]
+#[allow(clippy::too_many_arguments, reason = "keywords in Python")]
+pub(crate) fn match_(
+    py: Python,
+    left: &Bound<PyAny>,
+    right: &Bound<PyAny>,
+    max_disparity: Option<i32>,
+    min_disparity: Option<i32>,
+    mask: Option<&Bound<PyAny>>,
+    no_data: Option<f64>,
+    preset: &str,
+    options: Option<&Bound<PyDict>>,
+    warn: bool,
+    device: &str,
+    threads: Option<usize>,
+) -> PyResult<PyMatched> {
+    let matcher = PyMatcher::new(py, device, threads)?;
+    matcher.run(py, left, right, max_disparity, min_disparity, mask, no_data, preset, options, warn)
+}
+
+/// Does `run` on a thread of its own, while this one, to which alone Python tells of Ctrl-C, looks for that.
+fn interruptible(run: impl FnOnce(&AtomicBool) -> mrfgs::Result<Matched> + Send) -> PyResult<Matched> {
+    let stop = AtomicBool::new(false);
+    let (sender, receiver) = mpsc::channel();
+    thread::scope(|scope| {
+        let stop = &stop;
+        // The sender goes with the thread, however that ends.
+        scope.spawn(move || {
+            // Somebody waits for it until it is here.
+            let _ = sender.send(run(stop));
+        });
+        let mut signal = Ok(());
+        loop {
+            match receiver.recv_timeout(PATIENCE) {
+                Ok(matched) => return signal.and_then(|()| matched.map_err(exception)),
+                Err(RecvTimeoutError::Timeout) if signal.is_ok() => {
+                    signal = Python::attach(|py| py.check_signals());
+                    stop.store(signal.is_err(), Ordering::Relaxed);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PyRuntimeError::new_err("the match panicked, which is a defect of mrfgs"));
+                }
+            }
+        }
+    })
+}
