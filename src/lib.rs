@@ -105,6 +105,8 @@ pub mod options;
 mod pause;
 mod plan;
 pub mod rectification;
+#[doc(hidden)]
+pub mod remedy;
 mod roofline;
 mod solver;
 mod text;

@@ -1,7 +1,7 @@
 //! Text from outside: small files, such as calibrations, config files and lists, and what messages quote of them.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -12,12 +12,8 @@ use crate::error::{Error, Result};
 /// [`Error::Read`] when it cannot be read or is larger.
 pub fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes)).map_err(|e| {
-        match e.kind() {
-            ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-            _ => Error::read(path, e),
-        }
-    })?;
+    let read = File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes));
+    read.map_err(|e| Error::opening(path, e))?;
     if bytes.len() as u64 > most {
         return Err(Error::read(path, format!("larger than any {what}; is it one?")));
     }

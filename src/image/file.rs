@@ -36,10 +36,7 @@ pub(super) fn load(
 ) -> Result<Vec<u8>> {
     let max_bytes = most_bytes(max_pixels);
     let error = |reason: &str| Err(Error::read(path, reason));
-    let io = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-        _ => Error::read(path, e),
-    };
+    let io = |e| Error::opening(path, e);
     let metadata = fs::metadata(path).map_err(io)?;
     if metadata.is_dir() {
         return error("is a folder; give the image file");

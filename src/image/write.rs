@@ -65,7 +65,8 @@ impl Writer {
             Format::Tiff => {
                 let size = png_or_tiff_size(path, map.size())?;
                 let map = map.map(|&d| if d.is_finite() { d } else { f32::NAN });
-                tiff::encode(&map, size, self.georeference.as_ref()).map_err(|e| Error::write(path, e))
+                tiff::encode(&map, size, self.georeference.as_ref())
+                    .map_err(|e| Error::write(path, e.to_string()))
             }
         }
     }
@@ -290,7 +291,8 @@ pub(super) fn png(
 ) -> Result<Vec<u8>> {
     let (w, h) = png_or_tiff_size(path, size)?;
     let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes).write_image(samples, w, h, kind).map_err(|e| Error::write(path, e))?;
+    let written = PngEncoder::new(&mut bytes).write_image(samples, w, h, kind);
+    written.map_err(|e| Error::write(path, e.to_string()))?;
     Ok(bytes)
 }
 
