@@ -45,6 +45,28 @@ pub struct Words {
     pub no_data: Option<&'static str>,
 }
 
+impl Words {
+    /// Of a front end that calls everything as the library does, and lacks the rest. [`Words::cpu`] is for each to say.
+    pub const PLAIN: Self = Self {
+        key: ["", ""],
+        keys: None,
+        preset: "preset",
+        min: "min",
+        max: "max",
+        range: None,
+        device: "device",
+        devices: None,
+        cpu: "",
+        driver: ["install the driver of the GPU", "update its driver"],
+        threads: "threads",
+        memory: None,
+        mask: None,
+        max_pixels: None,
+        truth_scale: None,
+        no_data: None,
+    };
+}
+
 /// An error with its remedy.
 #[must_use]
 pub fn error(error: &Error, words: &Words) -> String {

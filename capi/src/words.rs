@@ -6,21 +6,13 @@ use mrfgs::remedy::{self, Words};
 
 const WORDS: Words = Words {
     key: ["option \"", "\""],
-    keys: None,
-    preset: "preset",
     min: "range.min",
     max: "range.max",
     range: Some("range"),
-    device: "device",
-    devices: None,
     cpu: "set mrfgs_options_device(options, \"cpu\")",
-    driver: ["install the driver of the GPU", "update its driver"],
-    threads: "threads",
     memory: Some(["option \"memory\"", ""]),
     mask: Some("give alpha 0 to what is no image"),
-    max_pixels: None,
-    truth_scale: None,
-    no_data: None,
+    ..Words::PLAIN
 };
 
 /// An error with its remedy.

@@ -6,21 +6,12 @@ use mrfgs::remedy::{self, Words};
 
 const WORDS: Words = Words {
     key: ["options[\"", "\"]"],
-    keys: None,
-    preset: "preset",
     min: "min_disparity",
     max: "max_disparity",
-    range: None,
-    device: "device",
-    devices: None,
     cpu: "use device=\"cpu\"",
-    driver: ["install the driver of the GPU", "update its driver"],
-    threads: "threads",
     memory: Some(["options[\"memory\"]", ""]),
     mask: Some("give a mask of what is no image"),
-    max_pixels: None,
-    truth_scale: None,
-    no_data: None,
+    ..Words::PLAIN
 };
 
 /// An error with its remedy.

@@ -14,7 +14,7 @@ use crate::error::{Error, ReadError, Result};
 use crate::memory::Claim;
 use crate::text::one_line;
 
-/// The same for uncompressed files, whose smallest pixel is one bit.
+/// As [`MAX_PIXELS_PER_BYTE`], for uncompressed files, whose smallest pixel is one bit.
 const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;
 
 /// The bytes of a file that begins like an image and is not too large for an image of `max_pixels` pixels.

@@ -143,15 +143,6 @@ pub fn check_depth_path(path: &Path) -> Result<()> {
     Target::of(path)?.check(path)
 }
 
-/// Checks before any computation that [`cloud`] will be able to write points to `path`.
-///
-/// # Errors
-/// [`Error::Write`] when the extension is neither `.ply` nor `.pcd`, the path is a folder, or its folder is not writable.
-pub fn check_cloud_path(path: &Path) -> Result<()> {
-    cloud_encoder(path)?;
-    Target::of(path)?.check(path)
-}
-
 /// Checks before any computation that a PNG picture can be written to `path`.
 ///
 /// # Errors
@@ -341,7 +332,6 @@ mod tests {
         // No point is a cloud, too.
         for (name, end) in [("a.PLY", &b"end_header\n"[..]), ("a.pcd", b"DATA binary\n")] {
             let path = folder.path().join(name);
-            check_cloud_path(&path).unwrap();
             cloud(&path, &Cloud::default()).unwrap();
             assert!(fs::read(path).unwrap().ends_with(end), "{name}");
         }

@@ -5,22 +5,12 @@ use mrfgs::check::Warning;
 use mrfgs::remedy::{self, Words};
 
 const WORDS: Words = Words {
-    key: ["", ""],
-    keys: None,
-    preset: "preset",
     min: "the lower end",
     max: "the upper end",
     range: Some("disparity range"),
-    device: "device",
-    devices: None,
     cpu: "use the program in place of the browser",
     driver: ["take one that has WebGPU", "update its driver or the browser"],
-    threads: "threads",
-    memory: None,
-    mask: None,
-    max_pixels: None,
-    truth_scale: None,
-    no_data: None,
+    ..Words::PLAIN
 };
 
 /// What is thrown for an error of the library.

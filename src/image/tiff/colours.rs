@@ -1,11 +1,16 @@
 //! The meaning of the samples of a TIFF file: grey, colours, palettes, inks and alpha.
 
+use tiff::tags::Tag;
+
 use super::directory::Directory;
-use super::tag;
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 use crate::image::raster::Samples;
 use crate::memory;
+
+const INK_SET: Tag = Tag::Unknown(332);
+const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
+const REFERENCE_BLACK_WHITE: Tag = Tag::Unknown(532);
 
 /// The colour model of a pixel.
 enum Model {
@@ -50,21 +55,21 @@ impl Colours {
     /// # Errors
     /// A description of what is not supported.
     pub(super) fn of(directory: &Directory) -> Result<Self, ReadError> {
-        let samples = directory.first(tag::SAMPLES, 1)? as usize;
-        let bits = directory.equal(tag::BITS, 1, "depths")?;
+        let samples = directory.first(Tag::SamplesPerPixel, 1)? as usize;
+        let bits = directory.equal(Tag::BitsPerSample, 1, "depths")?;
         if samples == 0 || samples > usize::from(u16::MAX) || !(1..=64).contains(&bits) {
             return Err(damaged(format!("the TIFF directory claims {samples} samples of {bits} bits")));
         }
         let bits = bits as u32;
-        let extra = directory.unsigned(tag::EXTRA_SAMPLES)?;
+        let extra = directory.unsigned(Tag::ExtraSamples)?;
         // The tag is required, but some programs forget it.
         let guess = if samples >= 3 { 2 } else { 1 };
-        let photometric = directory.first(tag::PHOTOMETRIC, guess)?;
+        let photometric = directory.first(Tag::PhotometricInterpretation, guess)?;
         let model = match photometric {
             0 | 1 => Model::Grey { white_is_zero: photometric == 0 },
             2 => Model::Rgb,
             3 => Model::Palette(palette(directory, bits)?),
-            5 => match directory.first(tag::INK_SET, 1)? {
+            5 => match directory.first(INK_SET, 1)? {
                 1 if matches!(bits, 8 | 16) => Model::Cmyk,
                 1 => return Err(unsupported(format!("holds inks of {bits} bits"))),
                 _ => return Err(unsupported("holds inks other than cyan, magenta, yellow and black")),
@@ -96,7 +101,7 @@ impl Colours {
         }
         let subsampling = match model {
             Model::YCbCr { .. } => {
-                let values = directory.unsigned(tag::YCBCR_SUBSAMPLING)?;
+                let values = directory.unsigned(Tag::ChromaSubsampling)?;
                 match values.as_deref().unwrap_or(&[2, 2]) {
                     [across @ (1 | 2 | 4), down @ (1 | 2 | 4), ..] => {
                         Some((*across as usize, *down as usize))
@@ -207,9 +212,9 @@ impl Model {
     }
 
     fn ycbcr(directory: &Directory) -> Result<Self, ReadError> {
-        let coefficients = directory.reals(tag::YCBCR_COEFFICIENTS)?;
+        let coefficients = directory.reals(YCBCR_COEFFICIENTS)?;
         let coefficients = coefficients.as_deref().and_then(|values| values.first_chunk().copied());
-        let black_white = directory.reals(tag::REFERENCE_BLACK_WHITE)?;
+        let black_white = directory.reals(REFERENCE_BLACK_WHITE)?;
         let black_white = black_white.as_deref().and_then(|values| values.first_chunk().copied());
         let (coefficients, black_white): ([f64; 3], [f64; 6]) = (
             coefficients.unwrap_or([0.299, 0.587, 0.114]),
@@ -228,7 +233,7 @@ fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, ReadError> 
     if bits > 16 {
         return Err(unsupported(format!("holds indices of {bits} bits into a palette")));
     }
-    let map = directory.unsigned(tag::COLOUR_MAP)?;
+    let map = directory.unsigned(Tag::ColorMap)?;
     let count = 1 << bits;
     let Some(map) = map.filter(|map| map.len() >= 3 * count) else {
         return Err(damaged("the TIFF palette is missing, or too short"));

@@ -45,7 +45,7 @@ fn annotate<W: Write + Seek, K: TiffKind>(
 ) -> TiffResult<()> {
     for field in georeference.iter().flat_map(|georeference| georeference.fields.iter()) {
         let entry = directory.write_entry_bytes(field.kind, &field.bytes)?;
-        directory.extend_from(&[(Tag::from_u16_exhaustive(field.tag), entry)].into_iter().collect());
+        directory.extend_from(&[(field.tag, entry)].into_iter().collect());
         align(directory, field.bytes.len())?;
     }
     // GDAL's tag, which the programs based on GDAL read too.

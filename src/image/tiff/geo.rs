@@ -1,19 +1,18 @@
 //! The georeference of a TIFF file.
 
-use tiff::tags::Type;
+use tiff::tags::{Tag, Type};
 
 use super::directory::{Directory, Order, size_of_kind};
-use super::tag;
 use crate::image::georeference::{Field, Georeference};
 
 /// The tags of GeoTIFF and their types.
-const TAGS: [(u16, Type); 6] = [
-    (tag::MODEL_PIXEL_SCALE, Type::DOUBLE),
-    (tag::MODEL_TIEPOINT, Type::DOUBLE),
-    (tag::MODEL_TRANSFORMATION, Type::DOUBLE),
-    (tag::GEO_KEY_DIRECTORY, Type::SHORT),
-    (tag::GEO_DOUBLE_PARAMS, Type::DOUBLE),
-    (tag::GEO_ASCII_PARAMS, Type::ASCII),
+const TAGS: [(Tag, Type); 6] = [
+    (Tag::ModelPixelScaleTag, Type::DOUBLE),
+    (Tag::ModelTiepointTag, Type::DOUBLE),
+    (Tag::ModelTransformationTag, Type::DOUBLE),
+    (Tag::GeoKeyDirectoryTag, Type::SHORT),
+    (Tag::GeoDoubleParamsTag, Type::DOUBLE),
+    (Tag::GeoAsciiParamsTag, Type::ASCII),
 ];
 /// Most bytes of a tag: room for twenty thousand tie points.
 const MOST: usize = 1 << 20;
@@ -26,7 +25,7 @@ pub(super) fn georeference(directory: &Directory) -> Option<Georeference> {
     (!fields.is_empty()).then(|| Georeference { fields: fields.into() })
 }
 
-fn field(directory: &Directory, tag: u16, kind: Type) -> Option<Field> {
+fn field(directory: &Directory, tag: Tag, kind: Type) -> Option<Field> {
     let (stored, values) = directory.values(tag).ok()??;
     if stored != kind.to_u16() || values.is_empty() || values.len() > MOST {
         return None;

@@ -9,13 +9,13 @@ mod colours;
 mod directory;
 mod encode;
 mod geo;
-mod tag;
 
 pub(super) use encode::encode;
 
 use std::borrow::Cow;
 
 use half::f16;
+use tiff::tags::Tag;
 
 use self::chunks::Packing;
 use self::colours::Colours;
@@ -76,7 +76,7 @@ pub(super) fn decode(
 
 /// The no-data value that GDAL's tag declares.
 fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
-    let Some(text) = directory.text(tag::NO_DATA)? else { return Ok(None) };
+    let Some(text) = directory.text(Tag::GdalNodata)? else { return Ok(None) };
     match text.parse() {
         Ok(value) => Ok(Some(value)),
         // Some programs write it like this.
@@ -92,12 +92,13 @@ impl<'a> Layout<'a> {
         file_bytes: usize,
         max_pixels: u64,
     ) -> Result<Self, ReadError> {
-        let size = (directory.required(tag::WIDTH, "width")?, directory.required(tag::HEIGHT, "height")?);
+        let size =
+            (directory.required(Tag::ImageWidth, "width")?, directory.required(Tag::ImageLength, "height")?);
         check_claim(size, max_pixels, MAX_PIXELS_PER_BYTE, file_bytes)?;
         let (width, height) = (size.0 as usize, size.1 as usize);
 
         let bits = colours.bits;
-        let format = match directory.equal(tag::SAMPLE_FORMAT, 1, "formats")? {
+        let format = match directory.equal(Tag::SampleFormat, 1, "formats")? {
             // 4 is undefined: there are bits, and unsigned is the best guess.
             1 | 4 => Format::Unsigned,
             2 => Format::Signed,
@@ -109,14 +110,14 @@ impl<'a> Layout<'a> {
             return Err(unsupported(format!("holds samples of {bits} bits")));
         }
 
-        let planar = match directory.first(tag::PLANAR_CONFIGURATION, 1)? {
+        let planar = match directory.first(Tag::PlanarConfiguration, 1)? {
             1 => false,
             2 => colours.samples > 1,
             other => {
                 return Err(damaged(format!("the TIFF planes are in the unknown configuration {other}")));
             }
         };
-        let compression = directory.first(tag::COMPRESSION, chunks::UNCOMPRESSED)?;
+        let compression = directory.first(Tag::Compression, chunks::UNCOMPRESSED)?;
         let read = match compression {
             chunks::JPEG => bits == 8,
             chunks::FAX4 => bits == 1 && colours.samples == 1,
@@ -139,7 +140,7 @@ impl<'a> Layout<'a> {
             );
             return Err(unsupported(reason));
         }
-        let predictor = match directory.first(tag::PREDICTOR, 1)? {
+        let predictor = match directory.first(Tag::Predictor, 1)? {
             1 => 1,
             _ if compression == chunks::JPEG => 1,
             // Some readers ignore the predictor then, as libtiff does, and others do not.
@@ -152,7 +153,7 @@ impl<'a> Layout<'a> {
                 return Err(unsupported(format!("holds samples of {bits} bits with the predictor {other}")));
             }
         };
-        let reversed = match directory.first(tag::FILL_ORDER, 1)? {
+        let reversed = match directory.first(Tag::FillOrder, 1)? {
             1 => false,
             2 => true,
             other => return Err(damaged(format!("the TIFF bits are in the unknown order {other}"))),
@@ -162,25 +163,23 @@ impl<'a> Layout<'a> {
             return Err(unsupported("holds chroma samples that are stored more sparsely, in planes"));
         }
 
-        let tiled = directory.has(tag::TILE_WIDTH);
+        let tiled = directory.has(Tag::TileWidth);
         let (chunk, offsets, byte_counts) = if tiled {
             let side = |tag, what| Ok::<_, ReadError>(directory.required(tag, what)?.max(1));
-            let chunk = (
-                side(tag::TILE_WIDTH, "width of its tiles")?,
-                side(tag::TILE_HEIGHT, "height of its tiles")?,
-            );
-            (chunk, tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS)
+            let chunk =
+                (side(Tag::TileWidth, "width of its tiles")?, side(Tag::TileLength, "height of its tiles")?);
+            (chunk, Tag::TileOffsets, Tag::TileByteCounts)
         } else {
-            let rows = directory.first(tag::ROWS_PER_STRIP, size.1)?.clamp(1, size.1);
-            ((size.0, rows), tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS)
+            let rows = directory.first(Tag::RowsPerStrip, size.1)?.clamp(1, size.1);
+            ((size.0, rows), Tag::StripOffsets, Tag::StripByteCounts)
         };
         // Some programs use the tags of strips for their tiles.
         let either =
             |tag, other| if directory.has(tag) { directory.unsigned(tag) } else { directory.unsigned(other) };
-        let offsets = either(offsets, tag::STRIP_OFFSETS)?;
+        let offsets = either(offsets, Tag::StripOffsets)?;
         let offsets =
             offsets.ok_or_else(|| damaged("the TIFF directory does not say where the pixels are"))?;
-        let byte_counts = either(byte_counts, tag::STRIP_BYTE_COUNTS)?;
+        let byte_counts = either(byte_counts, Tag::StripByteCounts)?;
 
         // Samples of a pixel in a row.
         let samples = if planar { 1 } else { colours.samples };
@@ -214,7 +213,7 @@ impl<'a> Layout<'a> {
             compression,
             predictor,
             reversed,
-            jpeg_tables: directory.bytes(tag::JPEG_TABLES)?,
+            jpeg_tables: directory.bytes(Tag::JPEGTables)?,
             order: directory.order,
             bits,
             samples,
