@@ -527,9 +527,9 @@ mod tests {
             (Error::read("a", denied()), io::ErrorKind::PermissionDenied),
             (Error::write("a", denied()), io::ErrorKind::PermissionDenied),
             (Error::write("a", Reason::of(denied(), "other words")), io::ErrorKind::PermissionDenied),
-            (crate::image::read::mask(&missing).unwrap_err(), io::ErrorKind::NotFound),
+            (crate::image::read::grey8(&missing).unwrap_err(), io::ErrorKind::NotFound),
             (crate::text::read(&missing, 1, "file").unwrap_err(), io::ErrorKind::NotFound),
-            (crate::image::read::mask(&below).unwrap_err(), io::ErrorKind::NotADirectory),
+            (crate::image::read::grey8(&below).unwrap_err(), io::ErrorKind::NotADirectory),
         ] {
             let found = sources(&error).into_iter().find_map(|error| error.downcast_ref::<io::Error>());
             assert_eq!(found.map(io::Error::kind), Some(kind), "{error}");

@@ -48,7 +48,7 @@ pub struct Raster<'a> {
 }
 
 /// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
-pub trait Sample: Copy {
+pub trait Sample: Copy + 'static {
     /// The same number in double precision.
     fn double(self) -> f64;
 
@@ -132,7 +132,12 @@ impl<'a> Raster<'a> {
                 "{count} samples for {width} x {height} pixels of {channels} channels: an image has pixels of 1 to 4 channels"
             )));
         }
-        Ok(Self { width, height, channels, samples, no_data: None, georeference: None })
+        Ok(Self::of((width, height), channels, samples))
+    }
+
+    /// As [`Raster::new`], of samples that are known to fit.
+    pub(super) fn of((width, height): (usize, usize), channels: usize, samples: Samples<'a>) -> Self {
+        Self { width, height, channels, samples, no_data: None, georeference: None }
     }
 
     /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.

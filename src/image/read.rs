@@ -214,14 +214,6 @@ pub fn pair(left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
     Reader::default().pair(left, right, mask)
 }
 
-/// [`Reader::mask`] with the default settings.
-///
-/// # Errors
-/// Those of [`Reader::mask`].
-pub fn mask(path: &Path) -> Result<Plane<bool>> {
-    Reader::default().mask(path)
-}
-
 /// [`Reader::grey8`] with the default settings.
 ///
 /// # Errors
@@ -236,14 +228,6 @@ pub fn grey8(path: &Path) -> Result<Plane<u8>> {
 /// Those of [`Reader::disparity`].
 pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
     Reader::default().disparity(path)
-}
-
-/// [`Reader::scaled_disparity`] with the default settings.
-///
-/// # Errors
-/// Those of [`Reader::scaled_disparity`].
-pub fn scaled_disparity(path: &Path, scale: f32) -> Result<Plane<f32>> {
-    Reader::default().scaled_disparity(path, scale)
 }
 
 #[cfg(test)]

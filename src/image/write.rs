@@ -108,14 +108,6 @@ impl Plane<f32> {
     }
 }
 
-/// [`Writer::depth`] with the default settings.
-///
-/// # Errors
-/// Those of [`Writer::depth`].
-pub fn depth(path: &Path, map: &Plane<f32>) -> Result<()> {
-    Writer::default().depth(path, map)
-}
-
 /// Checks before any computation that [`disparity`] will be able to write a map with disparities from
 /// `min_disparity` to `max_disparity` (pixels, both inclusive) to `path`. An existing file stays untouched.
 ///
@@ -133,7 +125,7 @@ pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32)
     Target::of(path)?.check(path)
 }
 
-/// Checks before any computation that [`depth`] will be able to write a map to `path`.
+/// Checks before any computation that [`Writer::depth`] will be able to write a map to `path`.
 ///
 /// # Errors
 /// [`Error::Write`] when the extension is none of `.pfm`, `.tif` and `.tiff`, the path is a folder, or its

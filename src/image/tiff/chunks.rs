@@ -103,7 +103,7 @@ impl Packing<'_> {
             strip.write_tag(Tag::StripOffsets, place)?;
             strip.write_tag(Tag::RowsPerStrip, height)?;
             strip.write_tag(Tag::StripByteCounts, length)?;
-            if let Some(tables) = self.jpeg_tables {
+            if let Some(tables) = self.jpeg_tables.filter(|tables| !tables.is_empty()) {
                 strip.write_tag(Tag::JPEGTables, tables)?;
             }
             strip.finish()

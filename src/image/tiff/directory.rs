@@ -8,7 +8,7 @@ use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 
 /// Largest number of directories that are read: a file with more is endless.
-const MOST: usize = 1 << 12;
+const MAX_DIRECTORIES: usize = 1 << 12;
 
 /// How numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ impl<'a> Directory<'a> {
         }
         let mut seen = HashSet::from([place]);
         place = first.next;
-        while place != 0 && seen.insert(place) && seen.len() < MOST {
+        while place != 0 && seen.insert(place) && seen.len() < MAX_DIRECTORIES {
             let Ok(other) = Self::read(file, order, big, place) else { break };
             if other.is_image()? {
                 return Ok(other);

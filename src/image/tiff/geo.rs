@@ -15,10 +15,10 @@ const TAGS: [(Tag, Type); 6] = [
     (Tag::GeoAsciiParamsTag, Type::ASCII),
 ];
 /// Most bytes of a tag: room for twenty thousand tie points.
-const MOST: usize = 1 << 20;
+const MAX_BYTES: usize = 1 << 20;
 
 /// The georeference that the directory declares. One with a tag of another type, of no value, beyond the end of the file, or of
-/// more than [`MOST`] bytes is none: the rest of it would place the image elsewhere.
+/// more than [`MAX_BYTES`] bytes is none: the rest of it would place the image elsewhere.
 pub(super) fn georeference(directory: &Directory) -> Option<Georeference> {
     let there = TAGS.iter().filter(|(tag, _)| directory.has(*tag));
     let fields: Vec<Field> = there.map(|&(tag, kind)| field(directory, tag, kind)).collect::<Option<_>>()?;
@@ -27,7 +27,7 @@ pub(super) fn georeference(directory: &Directory) -> Option<Georeference> {
 
 fn field(directory: &Directory, tag: Tag, kind: Type) -> Option<Field> {
     let (stored, values) = directory.values(tag).ok()??;
-    if stored != kind.to_u16() || values.is_empty() || values.len() > MOST {
+    if stored != kind.to_u16() || values.is_empty() || values.len() > MAX_BYTES {
         return None;
     }
     let mut bytes = values.to_vec();

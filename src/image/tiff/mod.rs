@@ -21,7 +21,7 @@ use self::chunks::Packing;
 use self::colours::Colours;
 use self::directory::{Directory, Order};
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
-use super::raster::{Raster, Samples, holding};
+use super::raster::{Raster, Sample, Samples, holding};
 use crate::error::ReadError;
 use crate::memory;
 use crate::text::quoted;
@@ -71,7 +71,7 @@ pub(super) fn decode(
     let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
     let (channels, samples) = colours.levels(samples)?;
     let georeference = geo::georeference(&directory);
-    Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data, georeference })
+    Ok(Raster { no_data, georeference, ..Raster::of((layout.width, layout.height), channels, samples) })
 }
 
 /// The no-data value that GDAL's tag declares.
@@ -192,8 +192,8 @@ impl<'a> Layout<'a> {
         };
         let row_bytes = row_bits.div_ceil(8);
         // Sixteen samples of the widest kind per pixel, and room for a tile of a small picture.
-        let most = u128::from(size.0 * size.1) * 128 + (1 << 26);
-        if row_bytes * u128::from(chunk.1) > most {
+        let max_bytes = u128::from(size.0 * size.1) * 128 + (1 << 26);
+        if row_bytes * u128::from(chunk.1) > max_bytes {
             return Err(damaged(format!(
                 "the TIFF directory claims {samples} samples in strips or tiles of {} x {} pixels for an image of \
                  {width} x {height}",
@@ -230,57 +230,43 @@ impl<'a> Layout<'a> {
         let size = bits as usize / 8;
         let number = |row: &[u8], i: usize| order.number(&row[i * size..(i + 1) * size]);
         let signed = |row: &[u8], i: usize| (number(row, i) << (64 - bits)) as i64 >> (64 - bits);
-        Ok(match (self.format, bits) {
-            (Format::Unsigned, 8) => {
-                Samples::Byte(self.assembled(file, missing as u8, |row, i| row[i])?.into())
-            }
+        let float = missing as f32;
+        match (self.format, bits) {
+            (Format::Unsigned, 8) => self.assembled(file, missing as u8, |row, i| row[i]),
             (Format::Unsigned, 16) => {
                 let word = match order {
                     Order::Little => u16::from_le_bytes,
                     Order::Big => u16::from_be_bytes,
                 };
-                let read = |row: &[u8], i: usize| word([row[2 * i], row[2 * i + 1]]);
-                Samples::Word(self.assembled(file, missing as u16, read)?.into())
+                self.assembled(file, missing as u16, |row, i| word([row[2 * i], row[2 * i + 1]]))
             }
-            (Format::Unsigned, 1..8) => Samples::Byte(
-                self.assembled(file, missing as u8, |row, i| packed(row, i, bits) as u8)?.into(),
-            ),
-            (Format::Unsigned, 9..16) => Samples::Word(
-                self.assembled(file, missing as u16, |row, i| packed(row, i, bits) as u16)?.into(),
-            ),
-            (Format::Unsigned, 24 | 32 | 64) => {
-                Samples::Double(self.assembled(file, missing, |row, i| number(row, i) as f64)?.into())
+            (Format::Unsigned, 1..8) => {
+                self.assembled(file, missing as u8, |row, i| packed(row, i, bits) as u8)
             }
-            (Format::Unsigned, _) => {
-                Samples::Double(self.assembled(file, missing, |row, i| packed(row, i, bits) as f64)?.into())
+            (Format::Unsigned, 9..16) => {
+                self.assembled(file, missing as u16, |row, i| packed(row, i, bits) as u16)
             }
-            (Format::Signed, 8 | 16) => {
-                Samples::Float(self.assembled(file, missing as f32, |row, i| signed(row, i) as f32)?.into())
-            }
-            (Format::Signed, _) => {
-                Samples::Double(self.assembled(file, missing, |row, i| signed(row, i) as f64)?.into())
-            }
+            (Format::Unsigned, 24 | 32 | 64) => self.assembled(file, missing, |row, i| number(row, i) as f64),
+            (Format::Unsigned, _) => self.assembled(file, missing, |row, i| packed(row, i, bits) as f64),
+            (Format::Signed, 8 | 16) => self.assembled(file, float, |row, i| signed(row, i) as f32),
+            (Format::Signed, _) => self.assembled(file, missing, |row, i| signed(row, i) as f64),
             (Format::Float, 16) => {
-                let read = |row: &[u8], i: usize| f16::from_bits(number(row, i) as u16).to_f32();
-                Samples::Float(self.assembled(file, missing as f32, read)?.into())
+                self.assembled(file, float, |row, i| f16::from_bits(number(row, i) as u16).to_f32())
             }
             (Format::Float, 32) => {
-                let read = |row: &[u8], i: usize| f32::from_bits(number(row, i) as u32);
-                Samples::Float(self.assembled(file, missing as f32, read)?.into())
+                self.assembled(file, float, |row, i| f32::from_bits(number(row, i) as u32))
             }
-            (Format::Float, _) => Samples::Double(
-                self.assembled(file, missing, |row, i| f64::from_bits(number(row, i)))?.into(),
-            ),
-        })
+            (Format::Float, _) => self.assembled(file, missing, |row, i| f64::from_bits(number(row, i))),
+        }
     }
 
     /// Assembles strips or tiles; `read` extracts sample `i` of a row.
-    fn assembled<S: Copy>(
+    fn assembled<S: Sample>(
         &self,
         file: &[u8],
         missing: S,
         read: impl Fn(&[u8], usize) -> S,
-    ) -> Result<Vec<S>, ReadError> {
+    ) -> Result<Samples<'static>, ReadError> {
         let mut out = memory::filled(self.width * self.height * self.read, missing)?;
         let (across, down) = (self.width.div_ceil(self.chunk.0), self.height.div_ceil(self.chunk.1));
         let (in_row, samples) = if self.planar { (1, 1) } else { (self.read, self.packing.samples) };
@@ -322,7 +308,7 @@ impl<'a> Layout<'a> {
                 }
             }
         }
-        Ok(out)
+        Ok(S::samples(out.into()))
     }
 }
 
