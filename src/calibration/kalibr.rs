@@ -56,18 +56,10 @@ fn lens(camera: &Entries) -> Result<Lens> {
     let [fu, fv, pu, pv] = entry.numbers(INTRINSICS)?;
     let expected = "radtan, equidistant or none";
     let model = camera.require("distortionmodel", "distortion_model", expected)?;
-    let coefficients = || {
-        let entry = camera.require("distortioncoeffs", "distortion_coeffs", "4 coefficients")?;
-        entry.list("4 coefficients").map(|list| (entry, list))
-    };
     let distortion = match model.word()? {
-        "radtan" => {
-            let (entry, list) = coefficients()?;
-            Distortion::radial_tangential(&list).map_err(|expected| entry.wrong(expected))?
-        }
-        "equidistant" => {
-            let (entry, list) = coefficients()?;
-            opencv::equidistant(&entry, &list)?
+        word @ ("radtan" | "equidistant") => {
+            let entry = camera.require("distortioncoeffs", "distortion_coeffs", "4 coefficients")?;
+            opencv::distortion(&entry, "4 coefficients", word == "equidistant")?
         }
         "none" => Distortion::NONE,
         _ => return Err(model.wrong(expected)),

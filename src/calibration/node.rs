@@ -95,8 +95,8 @@ impl<'a> Entries<'a> {
         };
         self.files.iter().find_map(|(path, node)| {
             let Node::Map(entries) = node else { return None };
-            let (name, node) =
-                entries.iter().find(|(name, _)| names.split(' ').any(|known| known == plain(name)))?;
+            let is_one = |name: String| names.split(' ').any(|known| known == name);
+            let (name, node) = entries.iter().find(|(name, _)| is_one(plain(name)))?;
             Some(Entry { path, name: format!("{}{name}", self.group), node })
         })
     }

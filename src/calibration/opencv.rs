@@ -68,12 +68,7 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
     let called = ["D1", "D2"][view];
     let expected = "the distortion of the lens, 0 0 0 0 for none";
     let entry = entries.require(DISTORTION[view], called, expected)?;
-    let coefficients = entry.list("the coefficients of the distortion")?;
-    let distortion = if is_fisheye(entries)? {
-        equidistant(&entry, &coefficients)?
-    } else {
-        Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))?
-    };
+    let distortion = distortion(&entry, "the coefficients of the distortion", is_fisheye(entries)?)?;
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
@@ -87,9 +82,14 @@ fn is_fisheye(entries: &Entries) -> Result<bool> {
     }
 }
 
-pub(super) fn equidistant(entry: &Entry, coefficients: &[f64]) -> Result<Distortion> {
-    let four = coefficients.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
-    Ok(Distortion::Equidistant(four))
+/// The distortion that the coefficients in `entry` describe.
+pub(super) fn distortion(entry: &Entry, expected: &str, fisheye: bool) -> Result<Distortion> {
+    let coefficients = entry.list(expected)?;
+    if fisheye {
+        let four = coefficients.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
+        return Ok(Distortion::Equidistant(four));
+    }
+    Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))
 }
 
 /// Focal length and principal point of a camera matrix.

@@ -1,7 +1,7 @@
 //! ROS's `camera_info`, one file for each camera, as `camera_calibration` saves it or as `rostopic echo` prints it.
 
 use super::cameras::StereoCalibration;
-use super::lens::{Distortion, Lens};
+use super::lens::Lens;
 use super::matrix::Matrix;
 use super::node::{Entries, Entry};
 use super::opencv::{self, Projection};
@@ -69,14 +69,12 @@ fn info(entries: &Entries) -> Result<Info> {
     // Older files do not say it.
     let model = entries.find("distortionmodel");
     let entry = entries.require(DISTORTION, "distortion_coefficients", "those of the lens")?;
-    let coefficients = entry.list("the coefficients of the distortion")?;
-    let distortion = match model.as_ref().map_or(Ok("plumb_bob"), Entry::word)? {
-        "plumb_bob" | "rational_polynomial" => {
-            Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))?
-        }
-        "equidistant" | "fisheye" => opencv::equidistant(&entry, &coefficients)?,
+    let fisheye = match model.as_ref().map_or(Ok("plumb_bob"), Entry::word)? {
+        "plumb_bob" | "rational_polynomial" => false,
+        "equidistant" | "fisheye" => true,
         _ => return Err(model.as_ref().unwrap_or(&entry).wrong(expected)),
     };
+    let distortion = opencv::distortion(&entry, "the coefficients of the distortion", fisheye)?;
     let lens = Lens::new(focal_length, principal_point, distortion);
     let rotation = entries.require(RECTIFICATION, "rectification_matrix", "a rotation of 3 x 3")?;
     let projection = entries.require(PROJECTION, "projection_matrix", "a matrix of 3 x 4")?;

@@ -307,7 +307,8 @@ pub(super) fn joined<'a>(
         )));
     }
     // The pixels and the mask of both views.
-    memory::check(2 * (width * height * (size_of::<Pixel>() + 1)) as u64, Purpose::Image)?;
+    let pixels = width as u64 * height as u64;
+    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
     let mut masks = images.map(Raster::masked);
     if let Some(ignored) = mask()? {
         if ignored.size() != left.size() {
