@@ -266,18 +266,18 @@ fn ticks(min: f64, max: f64, width: usize, s: usize) -> Vec<(f64, String)> {
     Vec::new()
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`, and the number of decimals that
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `min`, and the number of decimals that
 /// it needs.
-fn round_step(least: f64) -> (f64, usize) {
+fn round_step(min: f64) -> (f64, usize) {
     let (mut power, mut decimals) = (1.0, 0);
-    while power * 10.0 <= least {
+    while power * 10.0 <= min {
         power *= 10.0;
     }
-    while power > least && decimals < 40 {
+    while power > min && decimals < 40 {
         decimals += 1;
         power = 10.0_f64.powi(-(decimals as i32));
     }
-    let step = [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|v| *v >= least);
+    let step = [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|v| *v >= min);
     match step {
         Some(step) => (step, decimals),
         None => (10.0 * power, decimals.saturating_sub(1)),

@@ -4,7 +4,10 @@
 //! of the front end that was used, which this library does not know: a front end matches on the cause, and adds its
 //! own words.
 
+use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What can go wrong.
 ///
@@ -19,6 +22,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
+        #[source]
         cause: ReadError,
     },
     /// A file could not be written; nothing of it is left behind.
@@ -27,7 +31,8 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What went wrong.
-        reason: String,
+        #[source]
+        reason: Reason,
     },
     /// A key of a [`Method`](crate::options::Method) has a value that makes no sense, or does not exist.
     #[error("{key}: {cause}")]
@@ -35,6 +40,7 @@ pub enum Error {
         /// The key, such as `levels`.
         key: String,
         /// What is wrong with it.
+        #[source]
         cause: OptionError,
     },
     /// There is no preset of this name.
@@ -47,13 +53,13 @@ pub enum Error {
     },
     /// The range of disparities makes no sense, or none can be found.
     #[error("disparity range: {0}")]
-    Range(RangeError),
+    Range(#[from] RangeError),
     /// What should run the match makes no sense, or is not there.
-    #[error("{0}")]
-    Execution(ExecutionError),
+    #[error(transparent)]
+    Execution(#[from] ExecutionError),
     /// The memory that the method grants to a match is too little for what is asked.
-    #[error("{0}")]
-    Budget(BudgetError),
+    #[error(transparent)]
+    Budget(#[from] BudgetError),
     /// A calibration lacks what depth needs, or makes no sense.
     #[error("the calibration {0}")]
     Calibration(String),
@@ -61,11 +67,11 @@ pub enum Error {
     #[error("{0}")]
     Mismatch(String),
     /// There is no device, or the one that there is failed.
-    #[error("{0}")]
-    Device(DeviceError),
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     /// The machine or the device has not enough memory.
-    #[error("{0}")]
-    Memory(MemoryError),
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// The caller asked to stop.
     #[error("interrupted")]
     Interrupted,
@@ -107,8 +113,8 @@ pub enum ReadError {
         value: String,
     },
     /// There is not enough memory to read it.
-    #[error("{0}")]
-    Memory(MemoryError),
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// It is a file of options, one of which makes no sense.
     #[error("{}{key}: {cause}", line.map_or(String::new(), |line| format!("line {line}: ")))]
     Option {
@@ -120,8 +126,72 @@ pub enum ReadError {
         cause: OptionError,
     },
     /// Anything else, in words that say what to do where there is something to do.
-    #[error("{0}")]
-    Other(String),
+    #[error(transparent)]
+    Other(Reason),
+}
+
+/// What went wrong, in words; its [source](std::error::Error::source) is the error of the system behind them, if there is one.
+#[derive(Clone, Debug)]
+pub struct Reason {
+    text: String,
+    io: Option<Arc<io::Error>>,
+}
+
+impl Reason {
+    /// Other words for an error of the system.
+    pub fn of(error: io::Error, words: impl Into<String>) -> Self {
+        Self { text: words.into(), io: Some(error.into()) }
+    }
+
+    /// The same error in the words that `f` makes of its own.
+    #[must_use]
+    pub fn reworded(self, f: impl FnOnce(&str) -> String) -> Self {
+        Self { text: f(&self.text), ..self }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl std::error::Error for Reason {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.io.as_deref().map(|error| error as _)
+    }
+}
+
+/// By their words.
+impl PartialEq for Reason {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl From<String> for Reason {
+    fn from(text: String) -> Self {
+        Self { text, io: None }
+    }
+}
+
+impl From<&str> for Reason {
+    fn from(text: &str) -> Self {
+        text.to_owned().into()
+    }
+}
+
+impl From<io::Error> for Reason {
+    fn from(error: io::Error) -> Self {
+        let text = error.to_string();
+        Self::of(error, text)
+    }
+}
+
+impl<T: Into<Reason>> From<T> for ReadError {
+    fn from(reason: T) -> Self {
+        Self::Other(reason.into())
+    }
 }
 
 /// What is wrong with a key of a [`Method`](crate::options::Method).
@@ -276,7 +346,8 @@ pub enum BudgetError {
 #[non_exhaustive]
 pub enum DeviceError {
     /// The machine has no driver for any device.
-    #[error("no Vulkan or Metal driver found")]
+    #[cfg_attr(not(target_arch = "wasm32"), error("no Vulkan or Metal driver found"))]
+    #[cfg_attr(target_arch = "wasm32", error("this browser shows no GPU"))]
     NoDriver,
     /// The device gets a small test pair wrong.
     #[error("{name} disagrees with the CPU path on the self-test")]
@@ -378,68 +449,24 @@ impl Error {
         Self::Read { path: path.as_ref().to_owned(), cause: cause.into() }
     }
 
+    /// An [`Error::Read`] for the file `path` that the user has named.
+    pub(crate) fn opening(path: &Path, error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::NotFound => {
+                Self::read(path, Reason::of(error, "there is no such file; check the name"))
+            }
+            _ => Self::read(path, error),
+        }
+    }
+
     /// An [`Error::Write`] for `path`.
-    pub fn write(path: impl AsRef<Path>, reason: impl ToString) -> Self {
-        Self::Write { path: path.as_ref().to_owned(), reason: reason.to_string() }
+    pub fn write(path: impl AsRef<Path>, reason: impl Into<Reason>) -> Self {
+        Self::Write { path: path.as_ref().to_owned(), reason: reason.into() }
     }
 
     /// An [`Error::Option`] for `key`.
     pub fn option(key: impl Into<String>, cause: OptionError) -> Self {
         Self::Option { key: key.into(), cause }
-    }
-}
-
-impl From<RangeError> for Error {
-    fn from(cause: RangeError) -> Self {
-        Self::Range(cause)
-    }
-}
-
-impl From<ExecutionError> for Error {
-    fn from(cause: ExecutionError) -> Self {
-        Self::Execution(cause)
-    }
-}
-
-impl From<BudgetError> for Error {
-    fn from(cause: BudgetError) -> Self {
-        Self::Budget(cause)
-    }
-}
-
-impl From<DeviceError> for Error {
-    fn from(cause: DeviceError) -> Self {
-        Self::Device(cause)
-    }
-}
-
-impl From<MemoryError> for Error {
-    fn from(cause: MemoryError) -> Self {
-        Self::Memory(cause)
-    }
-}
-
-impl From<MemoryError> for ReadError {
-    fn from(cause: MemoryError) -> Self {
-        Self::Memory(cause)
-    }
-}
-
-impl From<String> for ReadError {
-    fn from(reason: String) -> Self {
-        Self::Other(reason)
-    }
-}
-
-impl From<&str> for ReadError {
-    fn from(reason: &str) -> Self {
-        Self::Other(reason.into())
-    }
-}
-
-impl From<std::io::Error> for ReadError {
-    fn from(error: std::io::Error) -> Self {
-        Self::Other(error.to_string())
     }
 }
 
@@ -456,85 +483,9 @@ fn size(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::front::check::Warning;
     use std::fs;
 
-    /// An error of every cause.
-    fn every() -> Vec<Error> {
-        let name = || "device".to_owned();
-        let read = |cause: ReadError| Error::read("a.png", cause);
-        let option = |cause| Error::option("levels", cause);
-        let wrong_kind = OptionError::WrongKind { expected: "levels, 1 to 16".into(), found: "2.5".into() };
-        let machine = |available, purpose| MemoryError::Machine { needed: 3 << 30, available, purpose };
-        vec![
-            read(ReadError::TooManyPixels { width: 9, height: 9, limit: 80 }),
-            read(ReadError::TooManyBytes { limit: 80 }),
-            read(ReadError::UnknownScale),
-            read(ReadError::NeedlessScale),
-            read(ReadError::NoData { value: "`none`".into() }),
-            read(machine(None, Purpose::Image).into()),
-            read(ReadError::Option { line: Some(3), key: "levels".into(), cause: OptionError::Unknown }),
-            read(ReadError::Other("is empty".into())),
-            Error::write("a.png", "disk full"),
-            option(OptionError::Unknown),
-            option(wrong_kind),
-            option(OptionError::OutOfRange { value: 99.0, low: 1.0, high: 16.0 }),
-            option(OptionError::NotOdd { value: 4 }),
-            Error::Preset { name: "best".into(), known: vec!["default", "paper"] },
-            RangeError::Empty { min: 5, max: 4 }.into(),
-            RangeError::TooFar { disparity: 1 << 21, limit: 1 << 20 }.into(),
-            RangeError::TooManyLabels { min: i32::MIN, max: i32::MAX, limit: 16_384 }.into(),
-            RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
-            RangeError::NotFound.into(),
-            ExecutionError::NoSuchDevice { wanted: name(), present: vec!["0: other".into()] }.into(),
-            ExecutionError::NoThreads.into(),
-            ExecutionError::Threads("limit reached".into()).into(),
-            BudgetError::NoTileFits { memory: 1, width: 60, height: 40, labels: 9, needed: 7 }.into(),
-            BudgetError::Steps { needed: 70 }.into(),
-            Error::Calibration("does not say baseline".into()),
-            Error::Mismatch("the sizes differ".into()),
-            DeviceError::NoDriver.into(),
-            DeviceError::WrongMaps { name: name() }.into(),
-            DeviceError::TooLargeForShader {
-                width: 9,
-                height: 5,
-                labels: 9000,
-                neighbours: 3,
-                shader: "flood",
-            }
-            .into(),
-            DeviceError::Failed { name: name(), reason: "it is lost".into() }.into(),
-            machine(None, Purpose::Match).into(),
-            machine(Some(1 << 20), Purpose::Match).into(),
-            MemoryError::Device { name: name(), needed: 2 << 20, available: 1 << 20 }.into(),
-            MemoryError::Buffer { name: name(), what: "the costs".into(), needed: 2 << 10, allowed: 9 }
-                .into(),
-            MemoryError::Exhausted { name: name() }.into(),
-            Error::Interrupted,
-        ]
-    }
-
     /// A library user knows no flags, and no program.
-    #[test]
-    fn no_message_names_a_flag_or_the_program() {
-        let warnings = [
-            Warning::Identical,
-            Warning::Plain { view: "left" },
-            Warning::Contrast { percent: 12 },
-            Warning::Saturated { percent: [1, 37] },
-            Warning::Turned { how: "upside down" },
-            Warning::NotRectified { offset: 512 },
-            Warning::Swapped { percent: 97 },
-            Warning::Clipped { end: 63, upper: true, percent: 9 },
-            Warning::Clipped { end: 0, upper: false, percent: 9 },
-        ];
-        let errors = every().into_iter().map(|error| error.to_string());
-        for said in errors.chain(warnings.map(|warning| warning.to_string())) {
-            assert!(!said.contains("--") && !said.contains("mrfgs") && !said.contains('\n'), "{said}");
-        }
-    }
-
-    /// Nor do the texts that are passed on as they are.
     #[test]
     fn no_text_in_the_source_names_a_flag_or_the_program() {
         let mut folders = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
@@ -559,6 +510,34 @@ mod tests {
             }
         }
         assert!(files > 20, "{files}");
+    }
+
+    /// The errors behind an error, nearest first.
+    fn sources(error: &Error) -> Vec<&(dyn std::error::Error + 'static)> {
+        std::iter::successors(std::error::Error::source(error), |error| error.source()).collect()
+    }
+
+    #[test]
+    fn the_error_of_the_system_is_the_source() {
+        let denied = || io::Error::from(io::ErrorKind::PermissionDenied);
+        let folder = tempfile::tempdir().unwrap();
+        let (missing, below) = (folder.path().join("a.png"), folder.path().join("none/a.png"));
+        fs::write(folder.path().join("none"), "").unwrap();
+        for (error, kind) in [
+            (Error::read("a", denied()), io::ErrorKind::PermissionDenied),
+            (Error::write("a", denied()), io::ErrorKind::PermissionDenied),
+            (Error::write("a", Reason::of(denied(), "other words")), io::ErrorKind::PermissionDenied),
+            (crate::image::read::grey8(&missing).unwrap_err(), io::ErrorKind::NotFound),
+            (crate::text::read(&missing, 1, "file").unwrap_err(), io::ErrorKind::NotFound),
+            (crate::image::read::grey8(&below).unwrap_err(), io::ErrorKind::NotADirectory),
+        ] {
+            let found = sources(&error).into_iter().find_map(|error| error.downcast_ref::<io::Error>());
+            assert_eq!(found.map(io::Error::kind), Some(kind), "{error}");
+            assert_eq!(error, error.clone());
+        }
+        // Controls: what no system has said.
+        assert_eq!(sources(&Error::write("a", "no")).len(), 1);
+        assert_eq!(sources(&MemoryError::Exhausted { name: "a".into() }.into()).len(), 0);
     }
 
     #[test]

@@ -106,6 +106,8 @@ mod pause;
 mod plan;
 mod program;
 pub mod rectification;
+#[doc(hidden)]
+pub mod remedy;
 mod roofline;
 mod stage;
 mod text;

@@ -102,12 +102,12 @@ mod tests {
     #[test]
     fn claims_add_up() {
         let Some(free) = available() else { return };
-        let most = free / 3 * 2;
-        let first = Claim::new(most).unwrap();
-        assert!(Claim::new(most).is_err(), "both together are too much");
+        let share = free / 3 * 2;
+        let first = Claim::new(share).unwrap();
+        assert!(Claim::new(share).is_err(), "both together are too much");
         assert!(Claim::new(u64::MAX).is_err());
         drop(first);
         assert_eq!(CLAIMED.load(Ordering::Relaxed), 0);
-        drop(Claim::new(most).unwrap());
+        drop(Claim::new(share).unwrap());
     }
 }

@@ -1,24 +1,20 @@
 //! Text from outside: small files, such as calibrations, config files and lists, and what messages quote of them.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Reads a whole file of at most `most` bytes; `what` says what it should be: "config file".
+/// Reads a whole file of at most `max_bytes`; `what` says what it should be: "config file".
 ///
 /// # Errors
 /// [`Error::Read`] when it cannot be read or is larger.
-pub fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
+pub fn read(path: &Path, max_bytes: u64, what: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes)).map_err(|e| {
-        match e.kind() {
-            ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-            _ => Error::read(path, e),
-        }
-    })?;
-    if bytes.len() as u64 > most {
+    let read = File::open(path).and_then(|file| file.take(max_bytes + 1).read_to_end(&mut bytes));
+    read.map_err(|e| Error::opening(path, e))?;
+    if bytes.len() as u64 > max_bytes {
         return Err(Error::read(path, format!("larger than any {what}; is it one?")));
     }
     Ok(bytes)
@@ -27,10 +23,10 @@ pub fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
 /// A text as a message may quote it: in one line, not longer than a glance, and nothing that moves a cursor.
 #[must_use]
 pub fn one_line(text: &str) -> String {
-    const MOST: usize = 160;
+    const MAX_LENGTH: usize = 160;
     let words = text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
     let line = words.collect::<Vec<_>>().join(" ");
-    match line.char_indices().nth(MOST) {
+    match line.char_indices().nth(MAX_LENGTH) {
         Some((end, _)) => format!("{}...", &line[..end]),
         None => line,
     }
@@ -39,9 +35,9 @@ pub fn one_line(text: &str) -> String {
 /// What a user gave, as a message may quote it: not longer than a glance, and without what a terminal would obey.
 #[must_use]
 pub fn quoted(text: &str) -> String {
-    const MOST: usize = 60;
+    const MAX_LENGTH: usize = 60;
     let mut characters = text.escape_debug();
-    let shown: String = characters.by_ref().take(MOST).collect();
+    let shown: String = characters.by_ref().take(MAX_LENGTH).collect();
     let more = if characters.next().is_some() { "..." } else { "" };
     format!("`{shown}{more}`")
 }

@@ -52,11 +52,11 @@ impl Failure {
         }
     }
 
-    /// In one line, where the ends of the range are called `ends`.
-    pub(crate) fn message(&self, ends: &remedy::Ends) -> String {
+    /// In one line, with what helps in these `words`.
+    pub(crate) fn message(&self, words: &remedy::Words) -> String {
         match self {
             Self::Usage(text) | Self::Failed(text) | Self::Stopped(text) => single_line(text),
-            Self::Error(error) => single_line(&remedy::error(error, ends)),
+            Self::Error(error) => single_line(&remedy::error(error, words)),
         }
     }
 }

@@ -1,262 +1,169 @@
-//! The program's words for what the library reports: each cause, and the flag, the key or the column that helps.
+//! The program's words for what helps: flags, and the columns of a list.
 
-use mrfgs::Error;
-use mrfgs::check::Warning;
-use mrfgs::error::{
-    BudgetError, DeviceError, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
-};
-
-/// What the ends of the range are called where the user gives them.
-pub(crate) struct Ends {
-    min: &'static str,
-    max: &'static str,
-}
+pub(crate) use mrfgs::remedy::{Words, error, warning};
 
 /// On the command line.
-pub(crate) const FLAGS: Ends = Ends { min: "--min-disparity", max: "--max-disparity" };
+pub(crate) const FLAGS: Words = Words {
+    key: ["--set ", ""],
+    keys: Some("`mrfgs presets` lists the keys"),
+    preset: "--method",
+    min: "--min-disparity",
+    max: "--max-disparity",
+    device: "--device",
+    devices: Some("see `mrfgs devices`"),
+    cpu: "use --device cpu",
+    driver: ["install the driver of the GPU, or a software one (Mesa's lavapipe)", "update its driver"],
+    threads: "--threads",
+    memory: Some(["--memory", "MiB"]),
+    mask: Some("--mask what is no image"),
+    max_pixels: Some("--max-pixels"),
+    truth_scale: Some("--truth-scale"),
+    no_data: Some("--no-data"),
+    ..Words::PLAIN
+};
+
 /// In a list of pairs.
-pub(crate) const COLUMNS: Ends = Ends { min: "min_disparity", max: "max_disparity" };
-
-/// An error with its remedy.
-pub(crate) fn error(error: &Error, ends: &Ends) -> String {
-    match error {
-        Error::Option { key, cause } => format!("--set {key}: {cause}{}", of_key(cause)),
-        Error::Preset { .. } => format!("--method: {error}"),
-        Error::Range(cause) => range(cause, ends),
-        Error::Execution(cause) => execution(cause),
-        Error::Budget(cause) => budget(cause),
-        Error::Read { cause, .. } => format!("{error}{}", reading(cause)),
-        Error::Device(cause) => format!("{error}{}", device(cause)),
-        Error::Memory(cause) => format!("{error}{}", memory(cause)),
-        _ => error.to_string(),
-    }
-}
-
-/// A warning with its remedy.
-pub(crate) fn warning(warning: &Warning, Ends { min, max }: &Ends) -> String {
-    match warning {
-        Warning::Saturated { .. } => format!("{warning}: expose both alike, or --mask what is no image"),
-        Warning::Swapped { .. } => {
-            format!("{warning}: exchange the two images, or give a negative {min} if the cameras converge")
-        }
-        Warning::Clipped { upper: true, .. } => format!("{warning}: raise {max}"),
-        Warning::Clipped { upper: false, .. } => format!("{warning}: lower {min}"),
-        _ => warning.to_string(),
-    }
-}
-
-fn of_key(cause: &OptionError) -> &'static str {
-    match cause {
-        OptionError::Unknown => "; `mrfgs presets` lists the keys",
-        _ => "",
-    }
-}
-
-fn range(cause: &RangeError, Ends { min, max }: &Ends) -> String {
-    match cause {
-        RangeError::Empty { .. } => format!("{max}: {cause}: raise it or lower {min}"),
-        RangeError::TooFar { disparity, .. } if *disparity < 0 => format!("{min}: {cause}"),
-        RangeError::TooManyLabels { .. } => format!("{max}: {cause}: narrow the range"),
-        RangeError::OutsideImages { .. } => format!("{max}: {cause}: give a range that fits the pair"),
-        RangeError::NotFound => format!("{cause}: give {max}"),
-        _ => format!("{max}: {cause}"),
-    }
-}
-
-fn execution(cause: &ExecutionError) -> String {
-    match cause {
-        ExecutionError::NoSuchDevice { .. } => format!("--device: {cause}; see `mrfgs devices`"),
-        _ => format!("--threads: {cause}"),
-    }
-}
-
-fn budget(cause: &BudgetError) -> String {
-    match cause {
-        BudgetError::NoTileFits { needed, .. } => {
-            format!("--memory: {cause}; give at least {needed}MiB, or a smaller image or range")
-        }
-        BudgetError::Steps { needed } => {
-            format!("DIR: {cause}; give --memory {needed}MiB")
-        }
-        _ => format!("--memory: {cause}"),
-    }
-}
-
-fn reading(cause: &ReadError) -> &'static str {
-    match cause {
-        ReadError::TooManyPixels { .. } => "; if that is true, raise --max-pixels or crop it",
-        ReadError::TooManyBytes { .. } => "; raise --max-pixels or crop it",
-        ReadError::UnknownScale => "; of a ground truth, give the scale by --truth-scale",
-        ReadError::NeedlessScale => "; remove --truth-scale",
-        ReadError::NoData { .. } => "; give one by --no-data",
-        ReadError::Option { cause, .. } => of_key(cause),
-        ReadError::Memory(cause) => memory(cause),
-        _ => "",
-    }
-}
-
-fn device(cause: &DeviceError) -> &'static str {
-    match cause {
-        DeviceError::NoDriver => {
-            ": install the driver of the GPU, or a software one (Mesa's lavapipe), or use --device cpu"
-        }
-        DeviceError::WrongMaps { .. } => ": update its driver, or use --device cpu",
-        DeviceError::TooLargeForShader { .. } => ": use --device cpu",
-        _ => "; use another --device or --device cpu",
-    }
-}
-
-fn memory(cause: &MemoryError) -> &'static str {
-    match cause {
-        MemoryError::Machine { purpose: Purpose::Match, .. } => {
-            ": allow less by --memory, or use a smaller image, a narrower range (--min-disparity, --max-disparity) or \
-             fewer neighbours (a higher --set percentile)"
-        }
-        MemoryError::Machine { .. } => ": use a smaller image, or a part of it",
-        MemoryError::Device { .. } => ": use --device cpu, or a smaller --memory, image or range",
-        MemoryError::Exhausted { .. } => ": use --device cpu, another --device, or a smaller image or range",
-        _ => ": use --device cpu, or a smaller image or range",
-    }
-}
+pub(crate) const COLUMNS: Words = Words { min: "min_disparity", max: "max_disparity", ..FLAGS };
 
 #[cfg(test)]
 mod tests {
+    use mrfgs::Error;
+    use mrfgs::check::Warning;
+    use mrfgs::error::{
+        BudgetError, DeviceError, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
+    };
+
     use super::*;
 
-    fn said(cause: impl Into<Error>) -> String {
-        error(&cause.into(), &FLAGS)
-    }
-
-    /// Whoever meets one of these reads what is wrong, the flag and the remedy, in one line.
-    #[test]
-    fn every_cause_has_a_remedy() {
+    /// Every cause, and the words with which it is told, in their order.
+    fn every() -> Vec<(Error, &'static str)> {
         let name = || "a device".to_owned();
-        let read = |cause: ReadError| Error::read("a.png", cause);
-        let machine = |purpose| MemoryError::Machine { needed: 3 << 30, available: None, purpose };
+        let option = |key: &str, cause| Error::option(key, cause);
+        let kind = |expected: &str, found: &str| OptionError::WrongKind {
+            expected: expected.into(),
+            found: found.into(),
+        };
+        let out_of_range = OptionError::OutOfRange { value: 17.0, low: 1.0, high: 16.0 };
+        let in_group = OptionError::InGroup { key: "cost.sad-window".into() };
+        let is_group = OptionError::IsGroup { keys: vec!["sad-window".into()] };
+        let preset = Error::Preset { name: "best".into(), known: vec!["default", "paper"] };
+        let labels = |min, max| Error::from(RangeError::TooManyLabels { min, max, limit: 16_384 });
+        let far = |disparity| Error::from(RangeError::TooFar { disparity, limit: 9 });
+        let no_device =
+            ExecutionError::NoSuchDevice { wanted: "x".into(), present: vec!["0: llvmpipe".into()] };
         let too_small = BudgetError::NoTileFits { memory: 1, width: 60, height: 40, labels: 9, needed: 7 };
-        let many = DeviceError::TooLargeForShader {
+        let read = |cause: ReadError| Error::read("a.png", cause);
+        let unknown = |line| ReadError::Option { line, key: "colour".into(), cause: OptionError::Unknown };
+        let too_large = DeviceError::TooLargeForShader {
             width: 9,
             height: 5,
             labels: 9_000,
             neighbours: 3,
             shader: "flood",
         };
-        let unknown = |line| ReadError::Option { line, key: "colour".into(), cause: OptionError::Unknown };
-        let found = || vec!["0: llvmpipe".to_owned()];
-        for (said, words) in [
+        let failed = DeviceError::Failed { name: name(), reason: "lost".into() };
+        let machine = |available, purpose| MemoryError::Machine { needed: 3 << 30, available, purpose };
+        let on_device = MemoryError::Device { name: name(), needed: 2 << 20, available: 1 << 20 };
+        let buffer =
+            MemoryError::Buffer { name: name(), what: "messages".into(), needed: 2048, allowed: 1024 };
+        vec![
             (
-                said(Error::option("colour", OptionError::Unknown)),
-                ["--set colour: there is no such key", "`mrfgs presets`"],
+                option("colour", OptionError::Unknown),
+                "--set colour: there is no such key ... `mrfgs presets`",
             ),
+            (option("levels", out_of_range), "--set levels: 17 ... 1 to 16"),
+            (option("cost", kind("sad | census", "\"ncc\"")), "--set cost ... sad | census"),
+            (option("levels", kind("levels, 1 to 16", "2.5")), "--set levels ... not 2.5"),
+            (option("sad-window", OptionError::NotOdd { value: 4 }), "--set sad-window ... take 3 or 5"),
+            (option("sad-window", in_group), "--set sad-window ... it is `cost.sad-window`"),
+            (option("cost", is_group), "--set cost ... one of its keys: sad-window"),
+            (option("cost", OptionError::Repeated { line: 2 }), "--set cost ... line 2"),
+            (preset, "--method ... default, paper"),
             (
-                said(Error::option("levels", OptionError::OutOfRange { value: 17.0, low: 1.0, high: 16.0 })),
-                ["--set levels: 17", "1 to 16"],
+                RangeError::Empty { min: 5, max: 4 }.into(),
+                "--max-disparity: 4 is below ... lower --min-disparity",
             ),
+            (far(9_999_999), "--max-disparity ... within 9 px"),
+            (far(-9_999_999), "--min-disparity ... within 9"),
+            (labels(0, 20_000), "--max-disparity: 0 to 20000 are 20001 labels ... narrow the range"),
+            (labels(i32::MIN, i32::MAX), "4294967296 labels"),
             (
-                said(Error::option(
-                    "cost",
-                    OptionError::WrongKind { expected: "sad | census".into(), found: "\"ncc\"".into() },
-                )),
-                ["--set cost", "sad | census"],
+                RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
+                "--max-disparity ... give a range",
             ),
+            (RangeError::NotFound.into(), "too few matches ... give --max-disparity"),
+            (no_device.into(), "--device ... 0: llvmpipe ... `mrfgs devices`"),
+            (ExecutionError::NoThreads.into(), "--threads ... at least 1"),
+            (ExecutionError::Threads("limit".into()).into(), "--threads ... limit"),
+            (too_small.into(), "--memory: 1 MiB ... give at least 7MiB"),
+            (BudgetError::Steps { needed: 70 }.into(), "show its steps ... --memory 70MiB"),
             (
-                said(Error::option("sad-window", OptionError::NotOdd { value: 4 })),
-                ["--set sad-window", "take 3 or 5"],
+                read(ReadError::TooManyPixels { width: 9, height: 9, limit: 5 }),
+                "a.png ... raise --max-pixels",
             ),
-            (
-                said(Error::Preset { name: "best".into(), known: vec!["default", "paper"] }),
-                ["--method", "default, paper"],
-            ),
-            (
-                said(RangeError::Empty { min: 5, max: 4 }),
-                ["--max-disparity: 4 is below", "lower --min-disparity"],
-            ),
-            (said(RangeError::TooFar { disparity: 9_999_999, limit: 9 }), ["--max-disparity", "within 9 px"]),
-            (said(RangeError::TooFar { disparity: -9_999_999, limit: 9 }), ["--min-disparity", "within 9"]),
-            (
-                said(RangeError::TooManyLabels { min: 0, max: 20_000, limit: 16_384 }),
-                ["--max-disparity: 0 to 20000 are 20001 labels", "narrow the range"],
-            ),
-            (
-                said(RangeError::OutsideImages { min: 60, max: 70, width: 60 }),
-                ["--max-disparity", "give a range"],
-            ),
-            (said(RangeError::NotFound), ["too few matches", "give --max-disparity"]),
-            (
-                said(ExecutionError::NoSuchDevice { wanted: "x".into(), present: found() }),
-                ["--device", "`mrfgs devices`"],
-            ),
-            (said(ExecutionError::NoThreads), ["--threads", "at least 1"]),
-            (said(ExecutionError::Threads("limit".into())), ["--threads", "limit"]),
-            (said(too_small), ["--memory: 1 MiB", "give at least 7MiB"]),
-            (said(BudgetError::Steps { needed: 70 }), ["DIR", "--memory 70MiB"]),
-            (
-                said(read(ReadError::TooManyPixels { width: 9, height: 9, limit: 5 })),
-                ["a.png", "raise --max-pixels"],
-            ),
-            (said(read(ReadError::TooManyBytes { limit: 5 })), ["5 pixels", "raise --max-pixels"]),
-            (said(read(ReadError::UnknownScale)), ["8-bit", "--truth-scale"]),
-            (said(read(ReadError::NeedlessScale)), ["8-bit", "remove --truth-scale"]),
-            (said(read(ReadError::NoData { value: "`none`".into() })), ["`none`", "--no-data"]),
-            (said(read(unknown(Some(2)))), ["line 2: colour", "`mrfgs presets`"]),
-            (said(read(unknown(None))), ["a.png: colour", "`mrfgs presets`"]),
-            (said(read(machine(Purpose::Image).into())), ["3.0 GiB", "smaller image"]),
-            (said(DeviceError::NoDriver), ["install the driver", "--device cpu"]),
-            (said(DeviceError::WrongMaps { name: name() }), ["update its driver", "--device cpu"]),
-            (said(many), ["9000 labels", "--device cpu"]),
-            (
-                said(DeviceError::Failed { name: name(), reason: "lost".into() }),
-                ["another --device", "--device cpu"],
-            ),
-            (said(machine(Purpose::Match)), ["3.0 GiB", "by --memory"]),
-            (said(machine(Purpose::Image)), ["3.0 GiB", "smaller image"]),
-            (
-                said(MemoryError::Device { name: name(), needed: 2 << 20, available: 1 << 20 }),
-                ["2 MiB", "--device cpu"],
-            ),
-            (
-                said(MemoryError::Buffer {
-                    name: name(),
-                    what: "messages".into(),
-                    needed: 2048,
-                    allowed: 1024,
-                }),
-                ["2 KiB", "--device cpu"],
-            ),
-            (said(MemoryError::Exhausted { name: name() }), ["another --device", "--device cpu"]),
-        ] {
-            assert!(words.iter().all(|word| said.contains(word)) && !said.contains('\n'), "{said}");
-        }
+            (read(ReadError::TooManyBytes { limit: 5 }), "5 pixels ... raise --max-pixels"),
+            (read(ReadError::UnknownScale), "8-bit ... --truth-scale"),
+            (read(ReadError::NeedlessScale), "8-bit ... remove --truth-scale"),
+            (read(ReadError::NoData { value: "`none`".into() }), "`none` ... --no-data"),
+            (read(unknown(Some(2))), "line 2: colour ... `mrfgs presets`"),
+            (read(unknown(None)), "a.png: colour ... `mrfgs presets`"),
+            (read(machine(None, Purpose::Image).into()), "3.0 GiB ... smaller image"),
+            (read("is empty".into()), "cannot read a.png: is empty"),
+            (Error::write("a.png", "disk full"), "cannot write a.png: disk full"),
+            (Error::Calibration("does not say baseline".into()), "the calibration does not say baseline"),
+            (Error::Mismatch("the sizes differ".into()), "the sizes differ"),
+            (DeviceError::NoDriver.into(), "install the driver ... --device cpu"),
+            (DeviceError::WrongMaps { name: name() }.into(), "update its driver ... --device cpu"),
+            (too_large.into(), "9000 labels ... --device cpu"),
+            (failed.into(), "another --device ... --device cpu"),
+            (machine(None, Purpose::Match).into(), "3.0 GiB ... by --memory"),
+            (machine(Some(1 << 20), Purpose::Match).into(), "1 MiB are free ... --set percentile"),
+            (machine(None, Purpose::Image).into(), "3.0 GiB ... smaller image"),
+            (on_device.into(), "2 MiB ... --device cpu ... smaller --memory"),
+            (buffer.into(), "2 KiB ... --device cpu"),
+            (MemoryError::Exhausted { name: name() }.into(), "--device cpu ... another --device"),
+            (Error::Interrupted, "interrupted"),
+        ]
     }
 
+    /// Every warning, and what is said of it.
+    const WARNINGS: [(Warning, &str); 9] = [
+        (Warning::Identical, "give the right view"),
+        (Warning::Plain { view: "left" }, "the left view"),
+        (Warning::Contrast { percent: 12 }, "12 %"),
+        (Warning::Saturated { percent: [1, 37] }, ", or --mask"),
+        (Warning::Turned { how: "upside down" }, "upside down"),
+        (Warning::NotRectified { offset: 512 }, "2.0 px"),
+        (Warning::Swapped { percent: 97 }, "lower --min-disparity below 0"),
+        (Warning::Clipped { end: 63, upper: true, percent: 9 }, ": raise --max-disparity"),
+        (Warning::Clipped { end: -5, upper: false, percent: 9 }, ": lower --min-disparity"),
+    ];
+
+    /// Whoever meets one of these reads what is wrong, the flag and the remedy, in one line. A user of the library knows no flags,
+    /// and no program.
     #[test]
-    fn warnings_name_the_flag() {
-        for (warning, words) in [
-            (Warning::Saturated { percent: [1, 37] }, "--mask"),
-            (Warning::Swapped { percent: 97 }, "negative --min-disparity"),
-            (Warning::Clipped { end: 63, upper: true, percent: 9 }, ": raise --max-disparity"),
-            (Warning::Clipped { end: -5, upper: false, percent: 9 }, ": lower --min-disparity"),
-        ] {
-            let said = self::warning(&warning, &FLAGS);
-            assert!(said.contains(words) && !said.contains('\n'), "{said}");
+    fn every_cause_has_a_remedy() {
+        let errors =
+            every().into_iter().map(|(cause, words)| (cause.to_string(), error(&cause, &FLAGS), words));
+        let warnings = WARNINGS.map(|(cause, words)| (cause.to_string(), warning(&cause, &FLAGS), words));
+        for (plain, said, words) in errors.chain(warnings) {
+            let mut rest = said.as_str();
+            for word in words.split(" ... ") {
+                let at = rest.find(word).unwrap_or_else(|| panic!("no {word}: {said}"));
+                rest = &rest[at + word.len()..];
+            }
+            assert!(!said.contains('\n'), "{said}");
+            assert!(!plain.contains("--") && !plain.contains("mrfgs") && !plain.contains('\n'), "{plain}");
         }
     }
 
     #[test]
     fn a_list_has_columns_and_no_flags() {
-        for cause in [
-            RangeError::Empty { min: 5, max: 4 },
-            RangeError::TooFar { disparity: -9_999_999, limit: 9 },
-            RangeError::TooManyLabels { min: 0, max: 20_000, limit: 16_384 },
-            RangeError::OutsideImages { min: 60, max: 70, width: 60 },
-            RangeError::NotFound,
-        ] {
-            let said = error(&cause.into(), &COLUMNS);
-            assert!(said.contains("_disparity") && !said.contains("--"), "{said}");
-        }
-        for upper in [false, true] {
-            let said = warning(&Warning::Clipped { end: 63, upper, percent: 9 }, &COLUMNS);
-            assert!(said.contains("_disparity") && !said.contains("--"), "{said}");
-        }
+        let ranges = every().into_iter().filter(|(cause, _)| matches!(cause, Error::Range(_)));
+        let errors = ranges.map(|(cause, _)| error(&cause, &COLUMNS));
+        let clipped = WARNINGS.iter().filter(|(cause, _)| matches!(cause, Warning::Clipped { .. }));
+        let said: Vec<String> = errors.chain(clipped.map(|(cause, _)| warning(cause, &COLUMNS))).collect();
+        assert_eq!(said.len(), 9);
+        assert!(said.iter().all(|said| said.contains("_disparity") && !said.contains("--")), "{said:?}");
     }
 }

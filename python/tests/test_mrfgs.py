@@ -956,7 +956,7 @@ class Sequences(Folder):
         left, right = pair()
         for error, words, bad in (
             (TypeError, "pair 1: left: give an array of uint8", (left.astype(np.int64), right)),
-            (ValueError, "pair 1: the left image is 80 x 60 and the right one 79 x 60", (left, right[:, 1:])),
+            (ValueError, "pair 1: the left image is 80 x 60 and the right one is 79 x 60", (left, right[:, 1:])),
             (TypeError, "pair 1: give two arrays, left and right", left),
             (TypeError, "pair 1: give two arrays, left and right", None),
             (TypeError, "pair 1: give two arrays, left and right", {"left": left, "right": right}),

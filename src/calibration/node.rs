@@ -88,20 +88,21 @@ impl<'a> Entries<'a> {
         Self { files, group: String::new() }
     }
 
-    /// The first entry that has one of `names`, which are in lower case and without `_`, `-` and blanks.
-    pub(super) fn find(&self, names: &[&str]) -> Option<Entry<'a>> {
+    /// The first entry that has one of `names`: words in lower case, without `_` and `-`.
+    pub(super) fn find(&self, names: &str) -> Option<Entry<'a>> {
         let plain = |name: &str| {
             name.chars().filter(|c| !['_', '-', ' '].contains(c)).collect::<String>().to_lowercase()
         };
         self.files.iter().find_map(|(path, node)| {
             let Node::Map(entries) = node else { return None };
-            let (name, node) = entries.iter().find(|(name, _)| names.contains(&plain(name).as_str()))?;
+            let is_one = |name: String| names.split(' ').any(|known| known == name);
+            let (name, node) = entries.iter().find(|(name, _)| is_one(plain(name)))?;
             Some(Entry { path, name: format!("{}{name}", self.group), node })
         })
     }
 
     /// As [`Entries::find`]; the error says that it is missing and what was `expected`, calling it `called`.
-    pub(super) fn require(&self, names: &[&str], called: &str, expected: &str) -> Result<Entry<'a>> {
+    pub(super) fn require(&self, names: &str, called: &str, expected: &str) -> Result<Entry<'a>> {
         self.find(names).ok_or_else(|| {
             Error::read(self.path(), format!("{}{called} is missing: expected {expected}", self.group))
         })

@@ -8,53 +8,23 @@ use crate::error::Result;
 use crate::image::calib::Camera;
 
 // In lower case and without `_`, as `Entries::find` takes them.
-const CAMERA: [&[&str]; 2] = [
-    &["k1", "m1", "cameramatrix1", "cameramatrixleft", "leftcameramatrix", "kleft", "kl", "leftk", "mleft"],
-    &[
-        "k2",
-        "m2",
-        "cameramatrix2",
-        "cameramatrixright",
-        "rightcameramatrix",
-        "kright",
-        "kr",
-        "rightk",
-        "mright",
-    ],
+const CAMERA: [&str; 2] = [
+    "k1 m1 cameramatrix1 cameramatrixleft leftcameramatrix kleft kl leftk mleft",
+    "k2 m2 cameramatrix2 cameramatrixright rightcameramatrix kright kr rightk mright",
 ];
-const DISTORTION: [&[&str]; 2] = [
-    &[
-        "d1",
-        "distcoeffs1",
-        "distortioncoefficients1",
-        "dist1",
-        "distcoeffsleft",
-        "leftdistcoeffs",
-        "dleft",
-        "dl",
-    ],
-    &[
-        "d2",
-        "distcoeffs2",
-        "distortioncoefficients2",
-        "dist2",
-        "distcoeffsright",
-        "rightdistcoeffs",
-        "dright",
-        "dr",
-    ],
+const DISTORTION: [&str; 2] = [
+    "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl",
+    "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr",
 ];
-const ROTATION: &[&str] = &["r", "rotation", "rotationmatrix", "stereor"];
-const TRANSLATION: &[&str] = &["t", "translation", "translationvector", "trans", "stereot"];
-const RECTIFICATION: [&[&str]; 2] =
-    [&["r1", "rectification1", "rleft", "rl"], &["r2", "rectification2", "rright", "rr"]];
-const PROJECTION: [&[&str]; 2] =
-    [&["p1", "projection1", "pleft", "pl"], &["p2", "projection2", "pright", "pr"]];
-const SIZE: &[&str] = &["imagesize", "size", "imgsize", "resolution"];
-const WIDTH: &[&str] = &["imagewidth", "width"];
-const HEIGHT: &[&str] = &["imageheight", "height"];
-const FISHEYE: &[&str] = &["fisheye", "fisheyemodel", "usefisheye"];
-const UNIT: &[&str] = &["unit", "units"];
+const ROTATION: &str = "r rotation rotationmatrix stereor";
+const TRANSLATION: &str = "t translation translationvector trans stereot";
+const RECTIFICATION: [&str; 2] = ["r1 rectification1 rleft rl", "r2 rectification2 rright rr"];
+const PROJECTION: [&str; 2] = ["p1 projection1 pleft pl", "p2 projection2 pright pr"];
+const SIZE: &str = "imagesize size imgsize resolution";
+const WIDTH: &str = "imagewidth width";
+const HEIGHT: &str = "imageheight height";
+const FISHEYE: &str = "fisheye fisheyemodel usefisheye";
+const UNIT: &str = "unit units";
 
 /// Whether these entries are OpenCV's: whether there is any camera.
 pub(super) fn is(entries: &Entries) -> bool {
@@ -69,7 +39,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     } else {
         calibration.unit = crate::image::calib::Unit::Unknown;
     }
-    let has = |names: &[&str]| entries.find(names).is_some();
+    let has = |names: &str| entries.find(names).is_some();
     let stored = PROJECTION.iter().any(|names| has(names));
     if CAMERA.iter().any(|names| has(names)) || !stored {
         calibration.lenses = Some([lens(entries, 0)?, lens(entries, 1)?]);
@@ -98,12 +68,7 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
     let called = ["D1", "D2"][view];
     let expected = "the distortion of the lens, 0 0 0 0 for none";
     let entry = entries.require(DISTORTION[view], called, expected)?;
-    let coefficients = entry.list("the coefficients of the distortion")?;
-    let distortion = if is_fisheye(entries)? {
-        equidistant(&entry, &coefficients)?
-    } else {
-        Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))?
-    };
+    let distortion = distortion(&entry, "the coefficients of the distortion", is_fisheye(entries)?)?;
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
@@ -117,9 +82,14 @@ fn is_fisheye(entries: &Entries) -> Result<bool> {
     }
 }
 
-pub(super) fn equidistant(entry: &Entry, coefficients: &[f64]) -> Result<Distortion> {
-    let four = coefficients.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
-    Ok(Distortion::Equidistant(four))
+/// The distortion that the coefficients in `entry` describe.
+pub(super) fn distortion(entry: &Entry, expected: &str, fisheye: bool) -> Result<Distortion> {
+    let coefficients = entry.list(expected)?;
+    if fisheye {
+        let four = coefficients.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
+        return Ok(Distortion::Equidistant(four));
+    }
+    Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))
 }
 
 /// Focal length and principal point of a camera matrix.

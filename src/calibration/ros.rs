@@ -1,22 +1,22 @@
 //! ROS's `camera_info`, one file for each camera, as `camera_calibration` saves it or as `rostopic echo` prints it.
 
 use super::cameras::StereoCalibration;
-use super::lens::{Distortion, Lens};
+use super::lens::Lens;
 use super::matrix::Matrix;
 use super::node::{Entries, Entry};
 use super::opencv::{self, Projection};
 use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 
-const CAMERA: &[&str] = &["cameramatrix", "k"];
-const DISTORTION: &[&str] = &["distortioncoefficients", "d"];
-const RECTIFICATION: &[&str] = &["rectificationmatrix", "r"];
-const PROJECTION: &[&str] = &["projectionmatrix", "p"];
+const CAMERA: &str = "cameramatrix k";
+const DISTORTION: &str = "distortioncoefficients d";
+const RECTIFICATION: &str = "rectificationmatrix r";
+const PROJECTION: &str = "projectionmatrix p";
 
 /// Whether these entries are those of one camera.
 pub(super) fn is(entries: &Entries) -> bool {
     entries.find(CAMERA).is_some()
-        && (entries.find(PROJECTION).is_some() || entries.find(&["distortionmodel"]).is_some())
+        && (entries.find(PROJECTION).is_some() || entries.find("distortionmodel").is_some())
 }
 
 struct Info {
@@ -67,27 +67,22 @@ fn info(entries: &Entries) -> Result<Info> {
     let (focal_length, principal_point) = opencv::camera(&matrix)?;
     let expected = "plumb_bob, rational_polynomial or equidistant";
     // Older files do not say it.
-    let model = entries.find(&["distortionmodel"]);
+    let model = entries.find("distortionmodel");
     let entry = entries.require(DISTORTION, "distortion_coefficients", "those of the lens")?;
-    let coefficients = entry.list("the coefficients of the distortion")?;
-    let distortion = match model.as_ref().map_or(Ok("plumb_bob"), Entry::word)? {
-        "plumb_bob" | "rational_polynomial" => {
-            Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))?
-        }
-        "equidistant" | "fisheye" => opencv::equidistant(&entry, &coefficients)?,
+    let fisheye = match model.as_ref().map_or(Ok("plumb_bob"), Entry::word)? {
+        "plumb_bob" | "rational_polynomial" => false,
+        "equidistant" | "fisheye" => true,
         _ => return Err(model.as_ref().unwrap_or(&entry).wrong(expected)),
     };
+    let distortion = opencv::distortion(&entry, "the coefficients of the distortion", fisheye)?;
     let lens = Lens::new(focal_length, principal_point, distortion);
     let rotation = entries.require(RECTIFICATION, "rectification_matrix", "a rotation of 3 x 3")?;
     let projection = entries.require(PROJECTION, "projection_matrix", "a matrix of 3 x 4")?;
-    let count = |names: &[&str], called| entries.require(names, called, "a number of pixels")?.count();
+    let count = |names: &str, called| entries.require(names, called, "a number of pixels")?.count();
     Ok(Info {
         lens: lens.map_err(|_| matrix.wrong("a camera with its lens"))?,
         rotation: rotation.rotation(&rotation.matrix()?)?,
         projection: opencv::projection(&projection)?,
-        size: (
-            count(&["imagewidth", "width"], "image_width")?,
-            count(&["imageheight", "height"], "image_height")?,
-        ),
+        size: (count("imagewidth width", "image_width")?, count("imageheight height", "image_height")?),
     })
 }

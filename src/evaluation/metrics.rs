@@ -4,7 +4,7 @@
 //! known (finite) and it lies in the requested region. An estimate that is infinite or NaN is *invalid*: it
 //! counts as bad at every threshold and is left out of all averages and quantiles.
 
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::image::Plane;
@@ -18,7 +18,7 @@ pub(super) const VISIBLE: u8 = 255;
 /// The errors of one map over one region.
 ///
 /// In JSON the shares of bad pixels carry their thresholds: `bad0.5`, `bad1.0`, `bad2.0`, `bad4.0`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// Pixels of the region whose truth is known.
     pub pixels: u64,
@@ -32,6 +32,7 @@ pub struct Metrics {
     /// map, where it is infinite.
     pub psnr: Option<f64>,
     /// Share of `pixels` in percent whose error is above each of [`THRESHOLDS`], or whose estimate is invalid.
+    #[serde(flatten, serialize_with = "by_threshold")]
     pub bad: [f64; 4],
     /// Median of the absolute errors of the valid pixels; `None` when there are none.
     ///
@@ -46,28 +47,15 @@ pub struct Metrics {
     pub a99: Option<f64>,
 }
 
-impl Serialize for Metrics {
-    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let mut out = serializer.serialize_struct("Metrics", 13)?;
-        out.serialize_field("pixels", &self.pixels)?;
-        out.serialize_field("density", &self.density)?;
-        out.serialize_field("avg", &self.avg)?;
-        out.serialize_field("rms", &self.rms)?;
-        out.serialize_field("psnr", &self.psnr)?;
-        out.serialize_field("bad0.5", &self.bad[0])?;
-        out.serialize_field("bad1.0", &self.bad[1])?;
-        out.serialize_field("bad2.0", &self.bad[2])?;
-        out.serialize_field("bad4.0", &self.bad[3])?;
-        out.serialize_field("a50", &self.a50)?;
-        out.serialize_field("a90", &self.a90)?;
-        out.serialize_field("a95", &self.a95)?;
-        out.serialize_field("a99", &self.a99)?;
-        out.end()
-    }
+/// The shares of bad pixels, each by the name of its threshold.
+fn by_threshold<S: Serializer>(bad: &[f64; 4], serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_map(
+        THRESHOLDS.iter().zip(bad).map(|(threshold, share)| (format!("bad{threshold:.1}"), share)),
+    )
 }
 
 /// The errors of one map.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Over every pixel whose truth is known.
     pub all: Metrics,

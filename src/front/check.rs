@@ -6,7 +6,6 @@ use crate::error::Result;
 use crate::image::{Image, Pair};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
-use std::fmt;
 
 /// Fewer matches than this give no statistics.
 const MIN_MATCHES: usize = 30;
@@ -80,42 +79,71 @@ pub fn range(pair: &Pair) -> Result<Option<DisparityRange>> {
 
 /// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
 /// an argument of the front end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
     /// Both views hold the same pixels.
+    #[error("the two images are the same, so they show no depth: give the right view as the second")]
     Identical,
     /// A view has next to no contrast anywhere.
+    #[error(
+        "the {view} view is all one colour, so nothing in it can be matched: check that it is the right image and well \
+         exposed"
+    )]
     Plain {
         /// Name of the view: "left" or "right".
         view: &'static str,
     },
     /// One view has far less contrast than the other.
+    #[error(
+        "the exposures are far apart: one view has {percent} % of the other's contrast: expose both alike, or give them \
+         with 16 bits"
+    )]
     Contrast {
         /// Its contrast in percent of the other's.
         percent: usize,
     },
     /// One view has far more black or white pixels than the other.
+    #[error(
+        "the exposures are far apart: {} % of the left view and {} % of the right one are black or white, where nothing \
+         can be matched",
+        percent[0],
+        percent[1]
+    )]
     Saturated {
         /// Black and white pixels of the left and the right view, in percent of all.
         percent: [usize; 2],
     },
     /// One view is turned or mirrored relative to the other.
+    #[error(
+        "one of the views is {how}, because the other one matches it only that way: turn it back, so that both views have \
+         the same orientation"
+    )]
     Turned {
         /// How: "upside down", "mirrored" or "turned by half a turn".
         how: &'static str,
     },
     /// Matches do not lie on the same row.
+    #[error(
+        "the pair is not rectified: matches lie {:.1} px above or below their row: rectify it first, by the calibration \
+         of the cameras",
+        f64::from(*offset) / f64::from(FRACTION)
+    )]
     NotRectified {
         /// The median of |dy| over the matches, in 1/256 px.
         offset: u32,
     },
     /// Nearly everything lies further right in the right view.
+    #[error("the views seem to be swapped: {percent} % of the matches have negative disparities")]
     Swapped {
         /// Matches with negative disparities, in percent of all.
         percent: usize,
     },
     /// Many disparities are at an end of the range.
+    #[error(
+        "{percent} % of the measured pixels are at disparity {end}, an end of the range, which probably cuts off part of \
+         the scene"
+    )]
     Clipped {
         /// The end, in pixels of disparity.
         end: i32,
@@ -124,54 +152,6 @@ pub enum Warning {
         /// Pixels at that end, in percent of all measured ones.
         percent: usize,
     },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Identical => {
-                write!(
-                    f,
-                    "the two images are the same, so they show no depth: give the right view as the second"
-                )
-            }
-            Self::Plain { view } => write!(
-                f,
-                "the {view} view is all one colour, so nothing in it can be matched: check that it is the right image and \
-                 well exposed"
-            ),
-            Self::Contrast { percent } => write!(
-                f,
-                "the exposures are far apart: one view has {percent} % of the other's contrast: expose both alike, or give \
-                 them with 16 bits"
-            ),
-            Self::Saturated { percent: [left, right] } => write!(
-                f,
-                "the exposures are far apart: {left} % of the left view and {right} % of the right one are black or white, \
-                 where nothing can be matched"
-            ),
-            Self::Turned { how } => write!(
-                f,
-                "one of the views is {how}, because the other one matches it only that way: turn it back, so that both views \
-                 have the same orientation"
-            ),
-            Self::NotRectified { offset } => write!(
-                f,
-                "the pair is not rectified: matches lie {:.1} px above or below their row: rectify it first, by the \
-                 calibration of the cameras",
-                f64::from(*offset) / f64::from(FRACTION)
-            ),
-            Self::Swapped { percent } => write!(
-                f,
-                "the views seem to be swapped: {percent} % of the matches have negative disparities"
-            ),
-            Self::Clipped { end, percent, .. } => write!(
-                f,
-                "{percent} % of the measured pixels are at disparity {end}, an end of the range, which probably cuts off \
-                 part of the scene"
-            ),
-        }
-    }
 }
 
 /// The probable mistakes in `pair`, the likeliest cause first. Empty where all seems well or there are too

@@ -160,9 +160,9 @@ fn peak(
     // Of equal scores the last one; the runner-up test then rejects it.
     let (mut score, mut at) = (f64::NEG_INFINITY, None);
     for (v, row) in scores.iter().enumerate() {
-        let most = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if most >= score {
-            (score, at) = (most, row.iter().rposition(|other| *other >= most).map(|u| (u, v)));
+        let best = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if best >= score {
+            (score, at) = (best, row.iter().rposition(|other| *other >= best).map(|u| (u, v)));
         }
     }
     let (u, v) = at?;

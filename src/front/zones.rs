@@ -29,7 +29,7 @@ const UNITS: f64 = 64.0;
 const REACH: f64 = 8.0;
 /// Smaller standard deviations are raised to this fraction of an 8-bit level. Below it, a response is
 /// rounding error, not texture, and must not be scaled up to the size of the others.
-const LEAST_DEVIATION: f64 = 1.0 / 64.0;
+const MIN_DEVIATION: f64 = 1.0 / 64.0;
 /// Approximate number of pixels that are clustered, on a square grid: every sixth in x and y on Middlebury's
 /// Teddy, every ninth on Motorcycle. The paper clusters all pixels, but neighbours have nearly the same
 /// smoothed features, and K-means needs only their distribution. All other pixels are assigned to the nearest
@@ -150,7 +150,7 @@ impl Features {
             });
             let scaled = |Response { nodes, .. }: &Response| {
                 let nearby = |&(x, y): &(usize, usize)| nodes[(across[x].node, down[y].node)];
-                let scale = Scale::new(samples.iter().map(nearby), LEAST_DEVIATION);
+                let scale = Scale::new(samples.iter().map(nearby), MIN_DEVIATION);
                 let mut scaled = vec![0; nodes.data().len()];
                 apply_all(scale, nodes.data(), &mut scaled);
                 scaled
@@ -243,12 +243,12 @@ struct Scale {
 }
 
 impl Scale {
-    /// The scale of `values`, with a standard deviation of at least `least`.
-    fn new(values: impl Iterator<Item = f64> + Clone, least: f64) -> Self {
+    /// The scale of `values`, with a standard deviation of at least `min_deviation`.
+    fn new(values: impl Iterator<Item = f64> + Clone, min_deviation: f64) -> Self {
         let count = values.clone().count() as f64;
         let mean = values.clone().sum::<f64>() / count;
         let variance = values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / count;
-        Self { mean, factor: UNITS / variance.sqrt().max(least) }
+        Self { mean, factor: UNITS / variance.sqrt().max(min_deviation) }
     }
 
     #[inline(always)]

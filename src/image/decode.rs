@@ -7,14 +7,14 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, most_bytes, unsupported};
+use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, max_bytes_of, unsupported};
 use super::raster::{Raster, Samples};
 use super::{jpeg, pfm, tiff};
 use crate::error::{Error, ReadError, Result};
 use crate::memory::Claim;
 use crate::text::one_line;
 
-/// The same for uncompressed files, whose smallest pixel is one bit.
+/// As [`MAX_PIXELS_PER_BYTE`], for uncompressed files, whose smallest pixel is one bit.
 const MAX_PLAIN_PIXELS_PER_BYTE: u64 = 8;
 
 /// The bytes of a file that begins like an image and is not too large for an image of `max_pixels` pixels.
@@ -109,18 +109,11 @@ fn guarded<T>(decode: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadEr
 }
 
 fn decode_pfm(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, ReadError> {
-    let (width, height, channels, samples) = match pfm::decode(bytes, max_pixels)? {
-        pfm::Pfm::Grey(p) => (p.width(), p.height(), 1, p.into_data()),
-        pfm::Pfm::Colour(p) => (p.width(), p.height(), 3, p.into_data().into_flattened()),
+    let (size, channels, samples) = match pfm::decode(bytes, max_pixels)? {
+        pfm::Pfm::Grey(p) => (p.size(), 1, p.into_data()),
+        pfm::Pfm::Colour(p) => (p.size(), 3, p.into_data().into_flattened()),
     };
-    Ok(Raster {
-        width,
-        height,
-        channels,
-        samples: Samples::Float(samples.into()),
-        no_data: None,
-        georeference: None,
-    })
+    Ok(Raster::of(size, channels, Samples::Float(samples.into())))
 }
 
 /// The error of the general decoder.
@@ -153,7 +146,7 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(most_bytes(claimed));
+    limits.max_alloc = Some(max_bytes_of(claimed));
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(coded_reason)?;
     let (width, height) = decoder.dimensions();
@@ -180,14 +173,7 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
             );
         }
     };
-    Ok(Raster {
-        width: width as usize,
-        height: height as usize,
-        channels,
-        samples,
-        no_data: None,
-        georeference: None,
-    })
+    Ok(Raster::of((width as usize, height as usize), channels, samples))
 }
 
 /// (width, height) that a PNG file claims, from the header that must come first.

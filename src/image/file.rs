@@ -22,7 +22,7 @@ const PIXEL_BYTES: u64 = 32;
 const EXTRA_BYTES: u64 = 1 << 26;
 
 /// Largest number of bytes that `pixels` pixels take, in a file or decoded, with everything else in the file.
-pub(super) fn most_bytes(pixels: u64) -> u64 {
+pub(super) fn max_bytes_of(pixels: u64) -> u64 {
     pixels.saturating_mul(PIXEL_BYTES).saturating_add(EXTRA_BYTES)
 }
 
@@ -34,12 +34,9 @@ pub(super) fn load(
     max_pixels: u64,
     refused: impl FnOnce(&[u8]) -> Option<String>,
 ) -> Result<Vec<u8>> {
-    let max_bytes = most_bytes(max_pixels);
+    let max_bytes = max_bytes_of(max_pixels);
     let error = |reason: &str| Err(Error::read(path, reason));
-    let io = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => Error::read(path, "there is no such file; check the name"),
-        _ => Error::read(path, e),
-    };
+    let io = |e| Error::opening(path, e);
     let metadata = fs::metadata(path).map_err(io)?;
     if metadata.is_dir() {
         return error("is a folder; give the image file");

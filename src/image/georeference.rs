@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use tiff::tags::Type;
+use tiff::tags::{Tag, Type};
 
 /// Where the pixels of an image lie on the ground: the tags of GeoTIFF, which are copied and not interpreted. Clones share them.
 #[derive(Clone, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub struct Georeference {
 /// A tag of GeoTIFF.
 #[derive(Clone, PartialEq, Eq)]
 pub(super) struct Field {
-    pub(super) tag: u16,
+    pub(super) tag: Tag,
     pub(super) kind: Type,
     /// The values, in the byte order of the machine.
     pub(super) bytes: Vec<u8>,

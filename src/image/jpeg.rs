@@ -39,8 +39,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     let _claim = Claim::new(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64)?;
     let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
-    let samples = Samples::Byte(samples.into());
-    Ok(Raster { width: size.0, height: size.1, channels, samples, no_data: None, georeference: None })
+    Ok(Raster::of(size, channels, Samples::Byte(samples.into())))
 }
 
 /// The error of the decoder, which prints some values in Rust's debug format.

@@ -27,6 +27,10 @@ impl Samples<'_> {
     pub(super) fn is_float(&self) -> bool {
         matches!(self, Self::Float(_) | Self::Double(_))
     }
+
+    pub(super) fn len(&self) -> usize {
+        of_any!(self, v => v.len())
+    }
 }
 
 /// An image as stored, in a file or in memory.
@@ -44,36 +48,44 @@ pub struct Raster<'a> {
 }
 
 /// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
-pub trait Sample: Copy {
+pub trait Sample: Copy + 'static {
+    /// The same number in double precision.
+    fn double(self) -> f64;
+
     /// Samples of this type.
     fn samples(values: Cow<[Self]>) -> Samples
     where
         [Self]: ToOwned<Owned = Vec<Self>>;
 }
 
-impl Sample for u8 {
-    fn samples(values: Cow<[Self]>) -> Samples {
-        Samples::Byte(values)
-    }
+macro_rules! kinds {
+    ($($type:ty: $kind:ident),*) => {
+        $(impl Sample for $type {
+            fn double(self) -> f64 {
+                self.into()
+            }
+
+            fn samples(values: Cow<[Self]>) -> Samples {
+                Samples::$kind(values)
+            }
+        })*
+    };
 }
 
-impl Sample for u16 {
-    fn samples(values: Cow<[Self]>) -> Samples {
-        Samples::Word(values)
-    }
-}
+kinds!(u8: Byte, u16: Word, f32: Float, f64: Double);
 
-impl Sample for f32 {
-    fn samples(values: Cow<[Self]>) -> Samples {
-        Samples::Float(values)
-    }
+/// An expression for samples of any type.
+macro_rules! of_any {
+    ($samples:expr, $values:ident => $result:expr) => {
+        match $samples {
+            Samples::Byte($values) => $result,
+            Samples::Word($values) => $result,
+            Samples::Float($values) => $result,
+            Samples::Double($values) => $result,
+        }
+    };
 }
-
-impl Sample for f64 {
-    fn samples(values: Cow<[Self]>) -> Samples {
-        Samples::Double(values)
-    }
-}
+pub(super) use of_any;
 
 impl<'a> Raster<'a> {
     /// Borrows a frame of `width` x `height` pixels with `channels` samples each. Rows begin `stride` samples
@@ -113,19 +125,19 @@ impl<'a> Raster<'a> {
     /// [`Error::Mismatch`] when it has no pixel or another number of channels, or the number of `samples`
     /// does not match.
     pub fn new(width: usize, height: usize, channels: usize, samples: Samples<'a>) -> Result<Self> {
-        let count = match &samples {
-            Samples::Byte(v) => v.len(),
-            Samples::Word(v) => v.len(),
-            Samples::Float(v) => v.len(),
-            Samples::Double(v) => v.len(),
-        };
+        let count = samples.len();
         let wanted = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(channels));
         if count == 0 || !(1..=4).contains(&channels) || wanted != Some(count) {
             return Err(Error::Mismatch(format!(
                 "{count} samples for {width} x {height} pixels of {channels} channels: an image has pixels of 1 to 4 channels"
             )));
         }
-        Ok(Self { width, height, channels, samples, no_data: None, georeference: None })
+        Ok(Self::of((width, height), channels, samples))
+    }
+
+    /// As [`Raster::new`], of samples that are known to fit.
+    pub(super) fn of((width, height): (usize, usize), channels: usize, samples: Samples<'a>) -> Self {
+        Self { width, height, channels, samples, no_data: None, georeference: None }
     }
 
     /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.
@@ -137,8 +149,7 @@ impl<'a> Raster<'a> {
     }
 
     pub(super) fn marked(self, value: f64) -> Result<Self, MemoryError> {
-        let colours = if self.channels < 3 { 1 } else { 3 };
-        let no_data = Some(holding(&self.samples, self.channels, colours, value)?);
+        let no_data = Some(holding(&self.samples, self.channels, self.colours(), value)?);
         Ok(Self { no_data, ..self })
     }
 
@@ -186,73 +197,45 @@ impl<'a> Raster<'a> {
             )));
         }
         let (of, n) = (self.width, self.channels);
-        let samples = match &self.samples {
-            Samples::Byte(v) => Samples::Byte(rows(v, of, part, n)?.into()),
-            Samples::Word(v) => Samples::Word(rows(v, of, part, n)?.into()),
-            Samples::Float(v) => Samples::Float(rows(v, of, part, n)?.into()),
-            Samples::Double(v) => Samples::Double(rows(v, of, part, n)?.into()),
-        };
+        let samples = of_any!(&self.samples, v => Sample::samples(rows(v, of, part, n)?.into()));
         let no_data = self.no_data.as_ref().map(|marked| rows(marked, of, part, 1)).transpose()?;
         Ok(Raster { no_data, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
     }
 
     /// `f` applied to the grey or colour samples of each pixel.
     pub(super) fn plane<S, T>(&self, samples: &[S], f: impl Fn(&[S]) -> T) -> Plane<T> {
-        let colours = if self.channels < 3 { 1 } else { 3 };
+        let colours = self.colours();
         let values = samples.chunks_exact(self.channels).map(|pixel| f(&pixel[..colours])).collect();
         Plane::new(self.width, self.height, values)
     }
 
     /// `true` where alpha is 0 or a value is not finite.
     pub(super) fn masked(&self) -> Plane<bool> {
-        fn masked<S: Copy>(
-            raster: &Raster<'_>,
-            samples: &[S],
-            clear: impl Fn(S) -> bool,
-            ok: impl Fn(S) -> bool,
-        ) -> Plane<bool> {
-            let n = raster.channels;
-            let colours = if n < 3 { 1 } else { 3 };
-            let pixel = |p: &[S]| (n > colours && clear(p[colours])) || !p[..colours].iter().all(|&v| ok(v));
-            Plane::new(raster.width, raster.height, samples.chunks_exact(n).map(pixel).collect())
-        }
-        let mut plane = match &self.samples {
-            Samples::Byte(v) => masked(self, v, |a| a == 0, |_| true),
-            Samples::Word(v) => masked(self, v, |a| a == 0, |_| true),
-            Samples::Float(v) => masked(self, v, |a| a == 0.0, f32::is_finite),
-            Samples::Double(v) => masked(self, v, |a| a == 0.0, f64::is_finite),
-        };
+        let n = self.channels;
+        let colours = self.colours();
+        let mut plane = of_any!(&self.samples, v => {
+            let masked = v.chunks_exact(n).map(|p| {
+                n > colours && p[colours].double() == 0.0
+                    || !p[..colours].iter().all(|&v| v.double().is_finite())
+            });
+            Plane::new(self.width, self.height, masked.collect())
+        });
         for (masked, no_data) in plane.data_mut().iter_mut().zip(self.no_data.iter().flatten()) {
             *masked |= no_data;
         }
         plane
     }
 
-    /// Calls `f` with the grey or colour samples of every unmasked pixel.
-    pub(super) fn each<S: Copy>(&self, samples: &[S], masked: &Plane<bool>, mut f: impl FnMut(S)) {
-        let colours = if self.channels < 3 { 1 } else { 3 };
-        for (pixel, _) in samples.chunks_exact(self.channels).zip(masked.data()).filter(|(_, m)| !**m) {
-            pixel[..colours].iter().for_each(|&v| f(v));
-        }
+    /// Samples of grey or of a colour.
+    fn colours(&self) -> usize {
+        if self.channels < 3 { 1 } else { 3 }
     }
 
-    pub(super) fn each_word(&self, masked: &Plane<bool>, f: impl FnMut(u16)) {
-        match &self.samples {
-            Samples::Byte(v) => {
-                let mut f = f;
-                self.each(v, masked, |v| f(stretched(v)));
-            }
-            Samples::Word(v) => self.each(v, masked, f),
-            Samples::Float(_) | Samples::Double(_) => {}
-        }
-    }
-
-    pub(super) fn each_double(&self, masked: &Plane<bool>, mut f: impl FnMut(f64)) {
-        match &self.samples {
-            Samples::Float(v) => self.each(v, masked, |v| f(v as f64)),
-            Samples::Double(v) => self.each(v, masked, f),
-            Samples::Byte(_) | Samples::Word(_) => {}
-        }
+    /// The grey or colour samples, all `values`, of every unmasked pixel.
+    fn unmasked<'b, S>(&self, values: &'b [S], masked: &'b Plane<bool>) -> impl Iterator<Item = &'b S> {
+        let colours = self.colours();
+        let pixels = values.chunks_exact(self.channels).zip(masked.data()).filter(|(_, masked)| !**masked);
+        pixels.flat_map(move |(pixel, _)| &pixel[..colours])
     }
 }
 
@@ -265,23 +248,14 @@ pub(super) fn holding(
     colours: usize,
     value: f64,
 ) -> Result<Vec<bool>, MemoryError> {
-    fn all<S: Copy>(
-        samples: &[S],
-        n: usize,
-        colours: usize,
-        is: impl Fn(S) -> bool,
-    ) -> Result<Vec<bool>, MemoryError> {
-        let mut out = memory::reserved(samples.len() / n)?;
-        out.extend(samples.chunks_exact(n).map(|pixel| pixel[..colours].iter().all(|&v| is(v))));
-        Ok(out)
-    }
-    match samples {
-        Samples::Byte(v) => all(v, n, colours, |v| f64::from(v) == value),
-        Samples::Word(v) => all(v, n, colours, |v| f64::from(v) == value),
-        // The value may have been written with fewer digits; it then stands for the nearest float.
-        Samples::Float(v) => all(v, n, colours, |v| v == value as f32 || v.is_nan() && value.is_nan()),
-        Samples::Double(v) => all(v, n, colours, |v| v == value || v.is_nan() && value.is_nan()),
-    }
+    let mut out = memory::reserved(samples.len() / n)?;
+    // The value may have been written with fewer digits; it then stands for the nearest float.
+    let value = if matches!(samples, Samples::Float(_)) { f64::from(value as f32) } else { value };
+    let holds = |v: f64| v == value || v.is_nan() && value.is_nan();
+    of_any!(samples, v => {
+        out.extend(v.chunks_exact(n).map(|pixel| pixel[..colours].iter().all(|&v| holds(v.double()))));
+    });
+    Ok(out)
 }
 
 /// An 8-bit level on the 16-bit scale.
@@ -308,21 +282,39 @@ impl Pair {
 ///
 /// [`Reader::pair`]: super::read::Reader::pair
 pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Result<Pair> {
+    let names = ["the left image", "the right one", "the mask"];
+    joined([left, right], names, || Ok(ignored.map(Cow::Borrowed)))
+}
+
+/// As [`pair`], of images that errors call by these names, as they call the mask, which is read once they fit.
+pub(super) fn joined<'a>(
+    [left, right]: [Raster; 2],
+    [of_left, of_right, of_mask]: [&str; 3],
+    mask: impl FnOnce() -> Result<Option<Cow<'a, Plane<bool>>>>,
+) -> Result<Pair> {
     let images = [&left, &right];
-    // The pixels and the mask of both views.
-    let pixels = left.width as u64 * left.height as u64;
-    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
-    if left.samples.is_float() != right.samples.is_float() {
-        return Err(Error::Mismatch(
-            "one image holds float values and the other whole ones: give both in one format".into(),
-        ));
+    let ((width, height), (w, h)) = (left.size(), right.size());
+    if (width, height) != (w, h) {
+        return Err(Error::Mismatch(format!(
+            "{of_left} is {width} x {height} and {of_right} is {w} x {h}: both views of a rectified pair have one size"
+        )));
     }
+    let float = images.map(|image| image.samples.is_float());
+    if float[0] != float[1] {
+        let [float, whole] = if float[0] { [of_left, of_right] } else { [of_right, of_left] };
+        return Err(Error::Mismatch(format!(
+            "{float} holds float values and {whole} whole ones: give both in one format"
+        )));
+    }
+    // The pixels and the mask of both views.
+    let pixels = width as u64 * height as u64;
+    memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
     let mut masks = images.map(Raster::masked);
-    if let Some(ignored) = ignored {
+    if let Some(ignored) = mask()? {
         if ignored.size() != left.size() {
-            let ((w, h), (width, height)) = (ignored.size(), left.size());
+            let (w, h) = ignored.size();
             return Err(Error::Mismatch(format!(
-                "the mask is {w} x {h} and the left image {width} x {height}: a mask has the size of the left image"
+                "{of_mask} is {w} x {h} and {of_left} is {width} x {height}: a mask has the size of the left image"
             )));
         }
         for (masked, ignored) in masks[0].data_mut().iter_mut().zip(ignored.data()) {
@@ -351,26 +343,29 @@ enum Scale {
 impl Scale {
     /// The scale that the unmasked samples need.
     fn of(images: [&Raster; 2], masks: &[Plane<bool>; 2]) -> Self {
-        let each = || images.iter().zip(masks);
+        let each = || images.into_iter().zip(masks);
         if images[0].samples.is_float() {
             let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-            each().for_each(|(i, m)| {
-                i.each_double(m, |v| {
-                    min = min.min(v);
-                    max = max.max(v);
-                });
+            each().for_each(|(image, masked)| {
+                of_any!(&image.samples, v => image.unmasked(v, masked).for_each(|&v| {
+                    min = min.min(v.double());
+                    max = max.max(v.double());
+                }));
             });
             return Self::Linear { min, max };
         }
-        if each().all(|(i, _)| matches!(i.samples, Samples::Byte(_))) {
+        if images.iter().all(|image| matches!(image.samples, Samples::Byte(_))) {
             return Self::Level;
         }
         let (mut bits, mut levels) = (0, true);
-        each().for_each(|(i, m)| {
-            i.each_word(m, |v| {
-                bits |= v;
-                levels &= v.is_multiple_of(257);
-            });
+        let mut add = |v: u16| {
+            bits |= v;
+            levels &= v.is_multiple_of(257);
+        };
+        each().for_each(|(image, masked)| match &image.samples {
+            Samples::Byte(v) => image.unmasked(v, masked).for_each(|&v| add(stretched(v))),
+            Samples::Word(v) => image.unmasked(v, masked).for_each(|&v| add(v)),
+            Samples::Float(_) | Samples::Double(_) => {}
         });
         if levels { Self::Level } else { Self::Shift(bits.leading_zeros().min(8)) }
     }

@@ -2,12 +2,13 @@
 //!
 //! The kind of a file is detected from its first bytes, never from its name.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use image::ImageFormat;
 
 use super::decode::{Kind, decode, decode_file, load};
-use super::raster::{self, Raster, Samples};
+use super::raster::{self, Raster, Sample, Samples, of_any};
 use super::{Pair, Plane, grey};
 use crate::error::{Error, ReadError, Result};
 
@@ -95,42 +96,17 @@ impl Reader {
         images: [Raster<'static>; 2],
         mask: Option<&Path>,
     ) -> Result<Pair> {
-        let [l, r] = &images;
-        if l.size() != r.size() {
-            return Err(Error::Mismatch(format!(
-                "{} is {} x {} and {} is {} x {}: both views of a rectified pair have one size",
-                left.display(),
-                l.width,
-                l.height,
-                right.display(),
-                r.width,
-                r.height
-            )));
-        }
-        if l.samples.is_float() != r.samples.is_float() {
-            let (float, whole) = if l.samples.is_float() { (left, right) } else { (right, left) };
-            return Err(Error::Mismatch(format!(
-                "{} holds float values and {} whole ones: give both in one format",
-                float.display(),
-                whole.display()
-            )));
-        }
-        let ignored = mask.map(|path| self.mask(path)).transpose()?;
-        if let (Some(path), Some(ignored)) = (mask, &ignored)
-            && ignored.size() != l.size()
-        {
-            return Err(Error::Mismatch(format!(
-                "the mask {} is {} x {} and {} is {} x {}: a mask has the size of the left image",
-                path.display(),
-                ignored.width(),
-                ignored.height(),
-                left.display(),
-                l.width,
-                l.height
-            )));
-        }
-        let [l, r] = images;
-        raster::pair(l, r, ignored.as_ref())
+        let name = |path: &Path| path.display().to_string();
+        let of_mask = mask.map_or_else(String::new, |path| format!("the mask {}", name(path)));
+        raster::joined(images, [&name(left), &name(right), &of_mask], || {
+            mask.map(|path| self.mask(path).map(Cow::Owned)).transpose()
+        })
+    }
+
+    fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {
+        let bytes = load(path, self.max_pixels)?;
+        let raster = decode(&bytes, self.max_pixels, self.no_data);
+        Ok((Kind::of(&bytes), raster.map_err(|cause| Error::read(path, cause))?))
     }
 
     fn decode(self, path: &Path, no_data: Option<f64>) -> Result<Raster<'static>> {
@@ -143,13 +119,7 @@ impl Reader {
     /// [`Error::Read`] as [`Reader::pair`].
     pub fn mask(self, path: &Path) -> Result<Plane<bool>> {
         let raster = self.decode(path, None)?;
-        let plane = match &raster.samples {
-            Samples::Byte(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0)),
-            Samples::Word(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0)),
-            Samples::Float(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0.0)),
-            Samples::Double(v) => raster.plane(v, |c| c.iter().any(|&v| v != 0.0)),
-        };
-        Ok(plane)
+        Ok(of_any!(&raster.samples, v => raster.plane(v, |c| c.iter().any(|&v| v.double() != 0.0))))
     }
 
     /// Reads 8-bit levels, such as those of Middlebury's visibility masks, from any integer image that
@@ -183,11 +153,7 @@ impl Reader {
     /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these ways.
     pub fn disparity(self, path: &Path) -> Result<Plane<f32>> {
         const REMEDY: &str = "disparity maps are .pfm, float .tif, or 16-bit .png with disparity times 256";
-        let bytes = load(path, self.max_pixels)?;
-        let kind = Kind::of(&bytes);
-        let raster =
-            decode(&bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(path, cause))?;
-        drop(bytes);
+        let (kind, raster) = self.with_kind(path)?;
         let wrong = |what: &str| Err(Error::read(path, format!("{what}; {REMEDY}")));
         if raster.channels != 1 {
             return wrong("has more than one channel");
@@ -219,10 +185,7 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or not a grey 8-bit PNG.
     pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
-        let bytes = load(path, self.max_pixels)?;
-        let kind = Kind::of(&bytes);
-        let raster =
-            decode(&bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(path, cause))?;
+        let (kind, raster) = self.with_kind(path)?;
         match (kind, raster.channels, raster.samples) {
             (Some(Kind::Coded(ImageFormat::Png)), 1, Samples::Byte(v)) => {
                 let disparity = |v| if v == 0 { f32::INFINITY } else { f32::from(v) / scale };
@@ -251,14 +214,6 @@ pub fn pair(left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
     Reader::default().pair(left, right, mask)
 }
 
-/// [`Reader::mask`] with the default settings.
-///
-/// # Errors
-/// Those of [`Reader::mask`].
-pub fn mask(path: &Path) -> Result<Plane<bool>> {
-    Reader::default().mask(path)
-}
-
 /// [`Reader::grey8`] with the default settings.
 ///
 /// # Errors
@@ -273,14 +228,6 @@ pub fn grey8(path: &Path) -> Result<Plane<u8>> {
 /// Those of [`Reader::disparity`].
 pub fn read_disparity(path: &Path) -> Result<Plane<f32>> {
     Reader::default().disparity(path)
-}
-
-/// [`Reader::scaled_disparity`] with the default settings.
-///
-/// # Errors
-/// Those of [`Reader::scaled_disparity`].
-pub fn scaled_disparity(path: &Path, scale: f32) -> Result<Plane<f32>> {
-    Reader::default().scaled_disparity(path, scale)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Reason, Result};
 
 /// Largest number of links that are followed.
 const MAX_LINKS: usize = 40;
@@ -81,7 +81,8 @@ impl Temporary {
             return Ok(Self::Unnamed(file));
         }
         builder().tempfile_in(folder).map(Self::Named).map_err(|e| {
-            Error::write(path, format!("no file can be created in {}: {}", folder.display(), e.kind()))
+            let words = format!("no file can be created in {}: {}", folder.display(), e.kind());
+            Error::write(path, Reason::of(e, words))
         })
     }
 
@@ -230,7 +231,7 @@ pub fn publish(staged: &Path, path: &Path) -> Result<()> {
     match fs::rename(staged, &place) {
         // A link may lead to another disk.
         Err(e) if e.kind() == ErrorKind::CrossesDevices => {
-            save(&place, &fs::read(staged).map_err(error)?).map_err(|e| Error::write(path, e))?;
+            save(path, &fs::read(staged).map_err(error)?)?;
             fs::remove_file(staged).map_err(error)
         }
         moved => moved.map_err(error),

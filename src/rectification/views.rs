@@ -124,11 +124,12 @@ fn scale(
             let point = seen(&lenses[view], &rotations[view], pixel);
             for i in 0..2 {
                 let v = camera.focal_length[i] * point[i] + camera.principal_point[i];
-                outer = [min(outer[0], i, v), max(outer[1], i, v)];
+                outer[0][i] = outer[0][i].min(v);
+                outer[1][i] = outer[1][i].max(v);
                 if at[i] == 0 {
-                    inner[0] = max(inner[0], i, v);
+                    inner[0][i] = inner[0][i].max(v);
                 } else if at[i] == N - 1 {
-                    inner[1] = min(inner[1], i, v);
+                    inner[1][i] = inner[1][i].min(v);
                 }
             }
         }
@@ -140,16 +141,6 @@ fn scale(
         }
     }
     all_known * (1.0 - alpha) + all_kept * alpha
-}
-
-fn min(mut pair: [f64; 2], i: usize, v: f64) -> [f64; 2] {
-    pair[i] = pair[i].min(v);
-    pair
-}
-
-fn max(mut pair: [f64; 2], i: usize, v: f64) -> [f64; 2] {
-    pair[i] = pair[i].max(v);
-    pair
 }
 
 /// The cameras of fisheyes: from the middles of the edges of the images. `balance` is 0 where the nearest of them limits the
@@ -166,15 +157,15 @@ fn fisheye(lenses: &[Lens; 2], rotations: &[Matrix; 2], size: (usize, usize), ba
         });
         let mean = |i: usize| edges.iter().map(|edge| edge[i]).sum::<f64>() / 4.0;
         let centre = [mean(0), mean(1)];
-        let least = |i: usize| edges.iter().map(|edge| edge[i]).fold(f64::INFINITY, f64::min);
-        let most = |i: usize| edges.iter().map(|edge| edge[i]).fold(f64::NEG_INFINITY, f64::max);
+        let smallest = |i: usize| edges.iter().map(|edge| edge[i]).fold(f64::INFINITY, f64::min);
+        let largest = |i: usize| edges.iter().map(|edge| edge[i]).fold(f64::NEG_INFINITY, f64::max);
         let across = width * 0.5;
         let down = height * 0.5 * aspect;
         let lengths = [
-            across / (centre[0] - least(0)),
-            across / (most(0) - centre[0]),
-            down / (centre[1] - least(1)),
-            down / (most(1) - centre[1]),
+            across / (centre[0] - smallest(0)),
+            across / (largest(0) - centre[0]),
+            down / (centre[1] - smallest(1)),
+            down / (largest(1) - centre[1]),
         ];
         let widest = lengths.into_iter().fold(f64::INFINITY, f64::min);
         let narrowest = lengths.into_iter().fold(f64::NEG_INFINITY, f64::max);

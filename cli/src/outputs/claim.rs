@@ -5,6 +5,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use mrfgs::error::Reason;
 use mrfgs::{Error, Result};
 use same_file::Handle;
 
@@ -27,8 +28,10 @@ impl Claim {
     /// it.
     pub(crate) fn new(parent: &Path, name: impl AsRef<OsStr>) -> Result<Option<Self>> {
         let folder = staging(parent, name.as_ref());
-        let failed =
-            |e: io::Error| Error::write(parent, format!("nothing can be created in it: {}", e.kind()));
+        let failed = |e: io::Error| {
+            let words = format!("nothing can be created in it: {}", e.kind());
+            Error::write(parent, Reason::of(e, words))
+        };
         loop {
             if let Err(e) = fs::create_dir(&folder)
                 && e.kind() != ErrorKind::AlreadyExists

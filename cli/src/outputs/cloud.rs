@@ -38,7 +38,8 @@ impl CloudFormat {
                 if u32::try_from(cloud.points.len()).is_err() {
                     return Err(Error::write(path, "LAS 1.2 holds at most 4294967295 points; write PLY"));
                 }
-                let bytes = encode_las(cloud, self == Self::Laz).map_err(|e| Error::write(path, e))?;
+                let bytes = encode_las(cloud, self == Self::Laz);
+                let bytes = bytes.map_err(|e| Error::write(path, e.to_string()))?;
                 write::save(path, &bytes)
             }
         }

@@ -88,7 +88,7 @@ pub(crate) fn json_file(json: Option<&Path>) -> Option<&Path> {
 
 /// The text of a JSON file at `path`.
 pub(crate) fn json_text(path: &Path, findings: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e))?;
+    let text = serde_json::to_string_pretty(findings).map_err(|e| Error::write(path, e.to_string()))?;
     Ok(text + "\n")
 }
 

@@ -27,7 +27,8 @@ impl StagedFolder {
         };
         let staging = Claim::new(beside, last).map_err(|e| match e {
             Error::Write { reason, .. } => {
-                Error::write(name, reason.replacen("in it", &format!("in {}", beside.display()), 1))
+                let place = format!("in {}", beside.display());
+                Error::write(name, reason.reworded(|words| words.replacen("in it", &place, 1)))
             }
             other => other,
         })?;

@@ -63,7 +63,10 @@ fn of_pattern(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     let found =
         glob::glob_with(pattern, options).map_err(|e| Error::read(path, format!("is no pattern: {e}")))?;
     let found = found.collect::<Result<Vec<_>, _>>();
-    let found = found.map_err(|e| Error::read(e.path(), e.error().to_string()))?;
+    let found = found.map_err(|e| {
+        let path = e.path().to_owned();
+        Error::read(path, std::io::Error::from(e))
+    })?;
     Ok(found.into_iter().filter(|file| file.is_file()).collect())
 }
 

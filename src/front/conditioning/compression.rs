@@ -12,7 +12,7 @@ const SMOOTHING: [(f64, f64); 4] = [(2.3, 1.6), (1.55, 1.0), (1.25, 0.7), (1.15,
 /// Side of a block, in pixels.
 const BLOCK: usize = 8;
 /// Steps count up to this many 8-bit levels, so that contours of the scene do not decide.
-const MOST: u16 = 20;
+const MAX_STEP: u16 = 20;
 
 /// The standard deviation of the Gaussian by which both views are to be smoothed; 0 where at least one of them shows no blocks.
 pub(super) fn smoothing(pair: &Pair) -> f64 {
@@ -111,14 +111,14 @@ impl Steps {
     /// The largest mean of any place, and the mean of those of all other places.
     fn means(&self) -> (f64, f64) {
         let means: [f64; BLOCK] = from_fn(|i| self.sums[i] as f64 / self.counts[i].max(1) as f64);
-        let most = means.into_iter().fold(0.0, f64::max);
-        (most, (means.iter().sum::<f64>() - most) / (BLOCK - 1) as f64)
+        let largest = means.into_iter().fold(0.0, f64::max);
+        (largest, (means.iter().sum::<f64>() - largest) / (BLOCK - 1) as f64)
     }
 }
 
 /// The step between two values of grey, in 1/256 of a level.
 fn step(a: u16, b: u16) -> u16 {
-    a.abs_diff(b).min(MOST << 8)
+    a.abs_diff(b).min(MAX_STEP << 8)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Noise: what the two views do not share of their finest detail, because of their sensors or of compression.
 
-use super::rows::FEWEST;
+use super::rows::MIN_MATCHES;
 use crate::front::matches::Match;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
@@ -19,7 +19,7 @@ const REACH: i32 = 3;
 /// Patches are compared where their disparity is this near to a whole number, in pixels: to interpolate is to smooth.
 const NEARLY_WHOLE: f64 = 0.2;
 /// Detail counts up to this many times its median, so that single wrong pixels do not matter: smoothing would spread them.
-const MOST_DETAIL: i32 = 2;
+const MAX_DETAIL: i32 = 2;
 
 /// The standard deviation of the Gaussian by which both views are to be smoothed, from matches at half their size; 0 for none.
 pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
@@ -31,7 +31,7 @@ pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
 /// The correlation of the finest detail of all patches together; `None` where there are too few.
 fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
     let patches: Vec<_> = matches.iter().filter_map(|m| details(pair, m)).collect();
-    if patches.len() < FEWEST {
+    if patches.len() < MIN_MATCHES {
         return None;
     }
     let all = |side: usize| patches.iter().flat_map(move |details| &details[side]);
@@ -53,7 +53,7 @@ fn details(pair: &Pair, m: &Match) -> Option<[[i32; PIXELS]; 2]> {
     let mut details = [left.fine, places[best].fine];
     let mut sizes: Vec<i32> = details.iter().flatten().map(|v| v.abs()).collect();
     let median = *sizes.select_nth_unstable(PIXELS).1;
-    details.iter_mut().flatten().for_each(|v| *v = (*v).clamp(-MOST_DETAIL * median, MOST_DETAIL * median));
+    details.iter_mut().flatten().for_each(|v| *v = (*v).clamp(-MAX_DETAIL * median, MAX_DETAIL * median));
     whole.then_some(details)
 }
 

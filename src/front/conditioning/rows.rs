@@ -7,11 +7,11 @@ use crate::options::DisparityRange;
 /// Approximate number of corners whose matches are looked at.
 const SAMPLE: usize = 600;
 /// Fewer matches than this tell nothing.
-pub(super) const FEWEST: usize = 30;
+pub(super) const MIN_MATCHES: usize = 30;
 /// Rows above and below its own on which a corner is looked for, at half the size.
 const ROWS: usize = 2;
 /// Smallest offset that is corrected, in 1/256 px (open): resampling costs a little sharpness.
-const LEAST: i32 = 16;
+const MIN_OFFSET: i32 = 16;
 
 /// Sparse matches of a pair at half its size, where noise and blur matter less, from a range at full size.
 pub(super) fn matches(halves: &Pair, range: DisparityRange) -> Vec<Match> {
@@ -27,10 +27,10 @@ pub(super) fn offset(matches: &[Match]) -> i32 {
     let deviation = i64::from(median(matches.iter().map(|m| (2 * m.dy - offset).abs())));
     let count = matches.len() as i64;
     let sure = count * i64::from(offset).pow(2) >= 31 * deviation.pow(2);
-    if sure && offset.abs() >= LEAST { offset } else { 0 }
+    if sure && offset.abs() >= MIN_OFFSET { offset } else { 0 }
 }
 
 /// The same, however small. It is the median: moving objects and false matches do not count, and a rotation stays as it is.
 pub(super) fn median_offset(matches: &[Match]) -> i32 {
-    if matches.len() < FEWEST { 0 } else { median(matches.iter().map(|m| 2 * m.dy)) }
+    if matches.len() < MIN_MATCHES { 0 } else { median(matches.iter().map(|m| 2 * m.dy)) }
 }

@@ -8,8 +8,10 @@
 use std::borrow::Cow;
 use std::io::Cursor;
 
-use tiff::TiffError;
 use tiff::decoder::{Decoder, Limits};
+use tiff::encoder::TiffEncoder;
+use tiff::tags::Tag;
+use tiff::{TiffError, TiffResult};
 
 use super::directory::Order;
 use crate::error::ReadError;
@@ -82,43 +84,38 @@ impl Packing<'_> {
             }
         }
         // The fax decoder counts in pixels.
-        let (width, bits) = if self.compression == FAX4 { (self.width, 1) } else { (self.row_bytes, 8) };
-        let tables = self.jpeg_tables.unwrap_or_default();
-        let count = if tables.is_empty() { 9 } else { 10 };
-        let at = 8 + 2 + 12 * count + 4;
+        let (width, bits) = if self.compression == FAX4 { (self.width, 1_u16) } else { (self.row_bytes, 8) };
         let number =
             |n: usize| u32::try_from(n).map_err(|_| unsupported("a TIFF strip or tile is too large"));
-        let place = number(at + tables.len())?;
         let (width, height, length) = (number(width)?, number(rows)?, number(data.len())?);
-        let mut file = b"II*\0\x08\0\0\0".to_vec();
-        file.extend((count as u16).to_le_bytes());
-        let mut entry = |tag: u16, kind: u16, count: u32, value: u32| {
-            file.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
-            file.extend([count.to_le_bytes(), value.to_le_bytes()].concat());
+        // With room for the directory.
+        let room = data.len() + self.jpeg_tables.map_or(0, <[u8]>::len) + 1024;
+        let mut file = Cursor::new(memory::reserved(room)?);
+        let mut write = || -> TiffResult<()> {
+            let mut encoder = TiffEncoder::new(&mut file)?;
+            let mut strip = encoder.image_directory()?;
+            let place = strip.write_data(data)? as u32;
+            strip.write_tag(Tag::ImageWidth, width)?;
+            strip.write_tag(Tag::ImageLength, height)?;
+            strip.write_tag(Tag::BitsPerSample, bits)?;
+            strip.write_tag(Tag::Compression, self.compression as u16)?;
+            strip.write_tag(Tag::PhotometricInterpretation, 1_u16)?;
+            strip.write_tag(Tag::StripOffsets, place)?;
+            strip.write_tag(Tag::RowsPerStrip, height)?;
+            strip.write_tag(Tag::StripByteCounts, length)?;
+            if let Some(tables) = self.jpeg_tables.filter(|tables| !tables.is_empty()) {
+                strip.write_tag(Tag::JPEGTables, tables)?;
+            }
+            strip.finish()
         };
-        entry(256, 4, 1, width);
-        entry(257, 4, 1, height);
-        entry(258, 3, 1, bits);
-        entry(259, 3, 1, self.compression as u32);
-        entry(262, 3, 1, 1);
-        entry(273, 4, 1, place);
-        entry(277, 3, 1, 1);
-        entry(278, 4, 1, height);
-        entry(279, 4, 1, length);
-        if !tables.is_empty() {
-            entry(347, 7, number(tables.len())?, number(at)?);
-        }
-        file.extend([0; 4]);
-        file.extend(tables);
-        file.try_reserve_exact(data.len())
-            .map_err(|_| unsupported("a TIFF strip or tile is too large for the memory"))?;
-        file.extend(data);
-        let mut out = memory::filled(self.row_bytes * rows, 0)?;
         let reason = |e: TiffError| match e {
             TiffError::UnsupportedError(_) => unsupported(e),
             _ => damaged(e),
         };
-        let decoder = Decoder::new(Cursor::new(file)).map_err(reason)?;
+        write().map_err(reason)?;
+        file.set_position(0);
+        let mut out = memory::filled(self.row_bytes * rows, 0)?;
+        let decoder = Decoder::new(file).map_err(reason)?;
         decoder.with_limits(Limits::unlimited()).read_chunk_bytes(0, &mut out).map_err(reason)?;
         Ok(out)
     }

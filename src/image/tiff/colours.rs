@@ -1,11 +1,16 @@
 //! The meaning of the samples of a TIFF file: grey, colours, palettes, inks and alpha.
 
+use tiff::tags::Tag;
+
 use super::directory::Directory;
-use super::tag;
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
-use crate::image::raster::Samples;
+use crate::image::raster::{Sample, Samples};
 use crate::memory;
+
+const INK_SET: Tag = Tag::Unknown(332);
+const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
+const REFERENCE_BLACK_WHITE: Tag = Tag::Unknown(532);
 
 /// The colour model of a pixel.
 enum Model {
@@ -50,21 +55,21 @@ impl Colours {
     /// # Errors
     /// A description of what is not supported.
     pub(super) fn of(directory: &Directory) -> Result<Self, ReadError> {
-        let samples = directory.first(tag::SAMPLES, 1)? as usize;
-        let bits = directory.equal(tag::BITS, 1, "depths")?;
+        let samples = directory.first(Tag::SamplesPerPixel, 1)? as usize;
+        let bits = directory.equal(Tag::BitsPerSample, 1, "depths")?;
         if samples == 0 || samples > usize::from(u16::MAX) || !(1..=64).contains(&bits) {
             return Err(damaged(format!("the TIFF directory claims {samples} samples of {bits} bits")));
         }
         let bits = bits as u32;
-        let extra = directory.unsigned(tag::EXTRA_SAMPLES)?;
+        let extra = directory.unsigned(Tag::ExtraSamples)?;
         // The tag is required, but some programs forget it.
         let guess = if samples >= 3 { 2 } else { 1 };
-        let photometric = directory.first(tag::PHOTOMETRIC, guess)?;
+        let photometric = directory.first(Tag::PhotometricInterpretation, guess)?;
         let model = match photometric {
             0 | 1 => Model::Grey { white_is_zero: photometric == 0 },
             2 => Model::Rgb,
             3 => Model::Palette(palette(directory, bits)?),
-            5 => match directory.first(tag::INK_SET, 1)? {
+            5 => match directory.first(INK_SET, 1)? {
                 1 if matches!(bits, 8 | 16) => Model::Cmyk,
                 1 => return Err(unsupported(format!("holds inks of {bits} bits"))),
                 _ => return Err(unsupported("holds inks other than cyan, magenta, yellow and black")),
@@ -96,7 +101,7 @@ impl Colours {
         }
         let subsampling = match model {
             Model::YCbCr { .. } => {
-                let values = directory.unsigned(tag::YCBCR_SUBSAMPLING)?;
+                let values = directory.unsigned(Tag::ChromaSubsampling)?;
                 match values.as_deref().unwrap_or(&[2, 2]) {
                     [across @ (1 | 2 | 4), down @ (1 | 2 | 4), ..] => {
                         Some((*across as usize, *down as usize))
@@ -125,46 +130,48 @@ impl Colours {
     /// Grey or red, green and blue, with alpha where there is one, and the number of channels. Unsigned
     /// samples of fewer than 8 bits are stretched to all 8-bit levels; those of 9 to 15 bits stay as they
     /// are.
-    pub(super) fn levels(&self, samples: Samples<'static>) -> Result<(usize, Samples<'static>), ReadError> {
+    pub(super) fn levels(
+        &self,
+        mut samples: Samples<'static>,
+    ) -> Result<(usize, Samples<'static>), ReadError> {
         let n = self.read();
         // The value of white.
-        let most = if self.bits < 64 { (1_u64 << self.bits) - 1 } else { u64::MAX };
-        let samples = match samples {
-            Samples::Byte(mut v) if self.bits < 8 && !matches!(self.model, Model::Palette(_)) => {
-                let most = most as u32;
-                v.to_mut().iter_mut().for_each(|v| *v = ((u32::from(*v) * 510 + most) / (2 * most)) as u8);
-                Samples::Byte(v)
-            }
-            other => other,
-        };
+        let white = if self.bits < 64 { (1_u64 << self.bits) - 1 } else { u64::MAX };
+        if let Samples::Byte(v) = &mut samples
+            && self.bits < 8
+            && !matches!(self.model, Model::Palette(_))
+        {
+            let white = white as u32;
+            v.to_mut().iter_mut().for_each(|v| *v = ((u32::from(*v) * 510 + white) / (2 * white)) as u8);
+        }
         let (channels, mut samples) = match (&self.model, samples) {
-            (Model::Grey { white_is_zero: true }, samples) => (1, inverted(samples, n, most)),
+            (Model::Grey { white_is_zero: true }, samples) => (1, inverted(samples, n, white)),
             (Model::Grey { .. }, samples) => (1, samples),
             (Model::Rgb, samples) => (3, samples),
             (Model::Palette(colours), Samples::Byte(v)) => {
                 let rgb = |p: &[u8]| colours.get(usize::from(p[0])).copied();
-                (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+                (3, self.replaced(&v, rgb, |alpha| alpha)?)
             }
             (Model::Palette(colours), Samples::Word(v)) => {
                 // Alpha is scaled to the bits of the colours.
-                let alpha = |a: u16| (u64::from(a) * 255 / most) as u8;
+                let alpha = |a: u16| (u64::from(a) * 255 / white) as u8;
                 let rgb = |p: &[u16]| colours.get(usize::from(p[0])).copied();
-                (3, Samples::Byte(self.replaced(&v, rgb, alpha)?.into()))
+                (3, self.replaced(&v, rgb, alpha)?)
             }
             (Model::Cmyk, Samples::Byte(v)) => {
                 let ink = |a: u8, b: u8| (u16::from(255 - a) * u16::from(255 - b) / 255) as u8;
                 let rgb = |p: &[u8]| Some([0, 1, 2].map(|i| ink(p[i], p[3])));
-                (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+                (3, self.replaced(&v, rgb, |alpha| alpha)?)
             }
             (Model::Cmyk, Samples::Word(v)) => {
                 let ink =
                     |a: u16, b: u16| (u32::from(u16::MAX - a) * u32::from(u16::MAX - b) / 65_535) as u16;
                 let rgb = |p: &[u16]| Some([0, 1, 2].map(|i| ink(p[i], p[3])));
-                (3, Samples::Word(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+                (3, self.replaced(&v, rgb, |alpha| alpha)?)
             }
             (Model::YCbCr { coefficients, black_white }, Samples::Byte(v)) => {
                 let rgb = |p: &[u8]| Some(rgb_of(p, coefficients, black_white));
-                (3, Samples::Byte(self.replaced(&v, rgb, |alpha| alpha)?.into()))
+                (3, self.replaced(&v, rgb, |alpha| alpha)?)
             }
             _ => return Err(unsupported("holds colours in samples of another kind")),
         };
@@ -172,19 +179,19 @@ impl Colours {
             return Ok((channels, samples));
         }
         if self.alpha == Alpha::Premultiplied {
-            divide(&mut samples, channels + 1, most);
+            divide(&mut samples, channels + 1, white);
         }
         Ok((channels + 1, samples))
     }
 
     /// Replaces the colour of each pixel by red, green and blue, and keeps alpha; `rgb` returns `None` for an
     /// index beyond the palette.
-    fn replaced<S: Copy, T>(
+    fn replaced<S: Copy, T: Sample>(
         &self,
         samples: &[S],
         rgb: impl Fn(&[S]) -> Option<[T; 3]>,
         alpha: impl Fn(S) -> T,
-    ) -> Result<Vec<T>, ReadError> {
+    ) -> Result<Samples<'static>, ReadError> {
         let (n, has_alpha) = (self.read(), self.alpha != Alpha::None);
         let count = samples.len() / n * (3 + usize::from(has_alpha));
         let mut out = memory::reserved(count)?;
@@ -192,7 +199,7 @@ impl Colours {
             out.extend(rgb(pixel).ok_or_else(|| damaged("an index is beyond the end of the palette"))?);
             out.extend(has_alpha.then(|| alpha(pixel[n - 1])));
         }
-        Ok(out)
+        Ok(T::samples(out.into()))
     }
 }
 
@@ -207,9 +214,9 @@ impl Model {
     }
 
     fn ycbcr(directory: &Directory) -> Result<Self, ReadError> {
-        let coefficients = directory.reals(tag::YCBCR_COEFFICIENTS)?;
+        let coefficients = directory.reals(YCBCR_COEFFICIENTS)?;
         let coefficients = coefficients.as_deref().and_then(|values| values.first_chunk().copied());
-        let black_white = directory.reals(tag::REFERENCE_BLACK_WHITE)?;
+        let black_white = directory.reals(REFERENCE_BLACK_WHITE)?;
         let black_white = black_white.as_deref().and_then(|values| values.first_chunk().copied());
         let (coefficients, black_white): ([f64; 3], [f64; 6]) = (
             coefficients.unwrap_or([0.299, 0.587, 0.114]),
@@ -228,7 +235,7 @@ fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, ReadError> 
     if bits > 16 {
         return Err(unsupported(format!("holds indices of {bits} bits into a palette")));
     }
-    let map = directory.unsigned(tag::COLOUR_MAP)?;
+    let map = directory.unsigned(Tag::ColorMap)?;
     let count = 1 << bits;
     let Some(map) = map.filter(|map| map.len() >= 3 * count) else {
         return Err(damaged("the TIFF palette is missing, or too short"));
@@ -239,44 +246,34 @@ fn palette(directory: &Directory, bits: u32) -> Result<Vec<[u8; 3]>, ReadError> 
 }
 
 /// Inverts black and white, and leaves alpha as it is.
-fn inverted(samples: Samples<'static>, n: usize, most: u64) -> Samples<'static> {
+fn inverted(mut samples: Samples<'static>, n: usize, white: u64) -> Samples<'static> {
     fn each<S: Copy>(samples: &mut [S], n: usize, f: impl Fn(S) -> S) {
         samples.iter_mut().step_by(n).for_each(|v| *v = f(*v));
     }
-    match samples {
-        Samples::Byte(mut v) => {
-            each(v.to_mut(), n, |v| 255 - v);
-            Samples::Byte(v)
-        }
-        Samples::Word(mut v) => {
-            each(v.to_mut(), n, |v| most as u16 - v);
-            Samples::Word(v)
-        }
+    match &mut samples {
+        Samples::Byte(v) => each(v.to_mut(), n, |v| 255 - v),
+        Samples::Word(v) => each(v.to_mut(), n, |v| white as u16 - v),
         // Floats are scaled from their smallest to their largest value anyway.
-        Samples::Float(mut v) => {
-            each(v.to_mut(), n, |v| -v);
-            Samples::Float(v)
-        }
-        Samples::Double(mut v) => {
-            each(v.to_mut(), n, |v| -v);
-            Samples::Double(v)
-        }
+        Samples::Float(v) => each(v.to_mut(), n, |v| -v),
+        Samples::Double(v) => each(v.to_mut(), n, |v| -v),
     }
+    samples
 }
 
 /// Divides the colours by the alpha that they were multiplied by; pixels with alpha 0 stay as they are.
-fn divide(samples: &mut Samples<'static>, n: usize, most: u64) {
+fn divide(samples: &mut Samples<'static>, n: usize, white: u64) {
     fn each<S: Copy>(samples: &mut [S], n: usize, f: impl Fn(S, S) -> S) {
         for pixel in samples.chunks_exact_mut(n) {
             let alpha = pixel[n - 1];
             pixel[..n - 1].iter_mut().for_each(|v| *v = f(*v, alpha));
         }
     }
-    let quotient =
-        |v: u32, alpha: u32, most: u32| (v * most + alpha / 2).checked_div(alpha).map_or(v, |v| v.min(most));
+    let quotient = |v: u32, alpha: u32, white: u32| {
+        (v * white + alpha / 2).checked_div(alpha).map_or(v, |v| v.min(white))
+    };
     match samples {
         Samples::Byte(v) => each(v.to_mut(), n, |v, a| quotient(v.into(), a.into(), 255) as u8),
-        Samples::Word(v) => each(v.to_mut(), n, |v, a| quotient(v.into(), a.into(), most as u32) as u16),
+        Samples::Word(v) => each(v.to_mut(), n, |v, a| quotient(v.into(), a.into(), white as u32) as u16),
         Samples::Float(v) => each(v.to_mut(), n, |v, a| if a == 0.0 { v } else { v / a }),
         Samples::Double(v) => each(v.to_mut(), n, |v, a| if a == 0.0 { v } else { v / a }),
     }
@@ -306,9 +303,9 @@ pub(super) fn spread(
 
 /// Red, green and blue by section 21 of TIFF 6.0.
 fn rgb_of(pixel: &[u8], [red, green, blue]: &[f64; 3], black_white: &[f64; 6]) -> [u8; 3] {
-    let level = |i: usize, most: f64| {
+    let level = |i: usize, max: f64| {
         let (black, white) = (black_white[2 * i], black_white[2 * i + 1]);
-        (f64::from(pixel[i]) - black) * most / (white - black)
+        (f64::from(pixel[i]) - black) * max / (white - black)
     };
     let (y, cb, cr) = (level(0, 255.0), level(1, 127.0), level(2, 127.0));
     let r = y + cr * (2.0 - 2.0 * red);

@@ -2,12 +2,13 @@
 
 use std::collections::HashSet;
 
-use super::tag;
+use tiff::tags::Tag;
+
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 
 /// Largest number of directories that are read: a file with more is endless.
-const MOST: usize = 1 << 12;
+const MAX_DIRECTORIES: usize = 1 << 12;
 
 /// How numbers are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,14 +69,14 @@ impl<'a> Directory<'a> {
         }
         let mut seen = HashSet::from([place]);
         place = first.next;
-        while place != 0 && seen.insert(place) && seen.len() < MOST {
+        while place != 0 && seen.insert(place) && seen.len() < MAX_DIRECTORIES {
             let Ok(other) = Self::read(file, order, big, place) else { break };
             if other.is_image()? {
                 return Ok(other);
             }
             place = other.next;
         }
-        if first.has(tag::SUB_DIRECTORIES) {
+        if first.has(Tag::SubIfd) {
             return Err(
                 "holds a reduced copy, and the image itself in a directory below; convert it to PNG".into()
             );
@@ -110,17 +111,19 @@ impl<'a> Directory<'a> {
     /// Whether it belongs to an image in full size.
     fn is_image(&self) -> Result<bool, ReadError> {
         // Bit 0 marks a reduced copy, bit 2 a mask. The older tag has 2 for a reduced copy.
-        Ok(self.first(tag::NEW_SUBFILE_TYPE, 0)? & 5 == 0 && self.first(tag::SUBFILE_TYPE, 1)? != 2)
+        Ok(self.first(Tag::NewSubfileType, 0)? & 5 == 0 && self.first(Tag::SubfileType, 1)? != 2)
     }
 
     /// Whether the tag is there.
-    pub(super) fn has(&self, tag: u16) -> bool {
-        self.entries.iter().any(|entry| entry.tag == tag)
+    pub(super) fn has(&self, tag: Tag) -> bool {
+        self.entries.iter().any(|entry| entry.tag == tag.to_u16())
     }
 
     /// The values of a tag as stored, with their type.
-    pub(super) fn values(&self, tag: u16) -> Result<Option<(u16, &'a [u8])>, ReadError> {
-        let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };
+    pub(super) fn values(&self, tag: Tag) -> Result<Option<(u16, &'a [u8])>, ReadError> {
+        let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag.to_u16()) else {
+            return Ok(None);
+        };
         let bytes = entry.count.checked_mul(size_of_kind(entry.kind) as u64);
         let range = bytes.and_then(|bytes| Some(entry.place..entry.place.checked_add(bytes)?));
         let values = range.and_then(|range| {
@@ -137,7 +140,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The value of a tag that has one for every sample, where all are equal.
-    pub(super) fn equal(&self, tag: u16, default: u64, what: &str) -> Result<u64, ReadError> {
+    pub(super) fn equal(&self, tag: Tag, default: u64, what: &str) -> Result<u64, ReadError> {
         let values = self.unsigned(tag)?.unwrap_or_default();
         let first = values.first().copied().unwrap_or(default);
         if values.iter().any(|value| *value != first) {
@@ -147,32 +150,32 @@ impl<'a> Directory<'a> {
     }
 
     /// The values of a tag that holds whole numbers; `None` where there is none.
-    pub(super) fn unsigned(&self, tag: u16) -> Result<Option<Vec<u64>>, ReadError> {
+    pub(super) fn unsigned(&self, tag: Tag) -> Result<Option<Vec<u64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
-            return Err(damaged(format!("the TIFF tag {tag} holds no whole numbers")));
+            return Err(damaged(format!("the TIFF tag {} holds no whole numbers", tag.to_u16())));
         }
         Ok(Some(values.chunks_exact(size_of_kind(kind)).map(|value| self.order.number(value)).collect()))
     }
 
     /// The first value of a tag, or `default`.
-    pub(super) fn first(&self, tag: u16, default: u64) -> Result<u64, ReadError> {
+    pub(super) fn first(&self, tag: Tag, default: u64) -> Result<u64, ReadError> {
         Ok(self.unsigned(tag)?.and_then(|values| values.first().copied()).unwrap_or(default))
     }
 
     /// The first value of a required tag.
-    pub(super) fn required(&self, tag: u16, what: &str) -> Result<u64, ReadError> {
+    pub(super) fn required(&self, tag: Tag, what: &str) -> Result<u64, ReadError> {
         let value = self.unsigned(tag)?.and_then(|values| values.first().copied());
         value.ok_or_else(|| damaged(format!("the TIFF directory does not say the {what}")))
     }
 
     /// The bytes of a tag of any type.
-    pub(super) fn bytes(&self, tag: u16) -> Result<Option<&'a [u8]>, ReadError> {
+    pub(super) fn bytes(&self, tag: Tag) -> Result<Option<&'a [u8]>, ReadError> {
         Ok(self.values(tag)?.map(|(_, values)| values))
     }
 
     /// The values of a tag that holds fractions of unsigned numbers, or floats.
-    pub(super) fn reals(&self, tag: u16) -> Result<Option<Vec<f64>>, ReadError> {
+    pub(super) fn reals(&self, tag: Tag) -> Result<Option<Vec<f64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         let real = |value: &[u8]| match kind {
             5 => self.order.number(&value[..4]) as f64 / self.order.number(&value[4..]) as f64,
@@ -184,7 +187,7 @@ impl<'a> Directory<'a> {
     }
 
     /// The text of a tag, up to its end.
-    pub(super) fn text(&self, tag: u16) -> Result<Option<String>, ReadError> {
+    pub(super) fn text(&self, tag: Tag) -> Result<Option<String>, ReadError> {
         let text = self.bytes(tag)?.and_then(|bytes| bytes.split(|byte| *byte == 0).next());
         Ok(text.map(|bytes| String::from_utf8_lossy(bytes).trim().to_owned()))
     }

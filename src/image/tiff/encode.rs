@@ -13,10 +13,10 @@ use crate::image::Plane;
 use crate::image::georeference::Georeference;
 
 /// Most pixels of a plain map. Few programs cannot read tiles and Deflate, and small maps need neither.
-const MOST_PLAIN: usize = 1 << 22;
+const MAX_PLAIN: usize = 1 << 22;
 /// Offsets in plain TIFF end at 4 GiB; this leaves room for the tags. Few programs read BigTIFF, so it is used only where it is
 /// needed.
-const MOST_BYTES: usize = u32::MAX as usize - (1 << 25);
+const MAX_BYTES: usize = u32::MAX as usize - (1 << 25);
 /// Width and height of a tile.
 const SIDE: usize = 256;
 
@@ -27,13 +27,13 @@ pub(in crate::image) fn encode(
     georeference: Option<&Georeference>,
 ) -> TiffResult<Vec<u8>> {
     let mut file = Cursor::new(Vec::new());
-    if map.data().len() <= MOST_PLAIN {
+    if map.data().len() <= MAX_PLAIN {
         let mut encoder = TiffEncoder::new(&mut file)?;
         let mut image = encoder.new_image::<Gray32Float>(size.0, size.1)?;
         annotate(image.encoder(), georeference)?;
         image.write_data(map.data())?;
     } else {
-        write_tiles(&mut file, size, &packed_tiles(map)?, georeference, MOST_BYTES)?;
+        write_tiles(&mut file, size, &packed_tiles(map)?, georeference, MAX_BYTES)?;
     }
     Ok(file.into_inner())
 }
@@ -45,7 +45,7 @@ fn annotate<W: Write + Seek, K: TiffKind>(
 ) -> TiffResult<()> {
     for field in georeference.iter().flat_map(|georeference| georeference.fields.iter()) {
         let entry = directory.write_entry_bytes(field.kind, &field.bytes)?;
-        directory.extend_from(&[(Tag::from_u16_exhaustive(field.tag), entry)].into_iter().collect());
+        directory.extend_from(&[(field.tag, entry)].into_iter().collect());
         align(directory, field.bytes.len())?;
     }
     // GDAL's tag, which the programs based on GDAL read too.
@@ -63,15 +63,15 @@ fn align<W: Write + Seek, K: TiffKind>(
     Ok(())
 }
 
-/// Writes a file of tiles; BigTIFF where they take more than `most` bytes.
+/// Writes a file of tiles; BigTIFF where they take more than `max_bytes`.
 fn write_tiles(
     file: &mut Cursor<Vec<u8>>,
     size: (u32, u32),
     tiles: &[Vec<u8>],
     georeference: Option<&Georeference>,
-    most: usize,
+    max_bytes: usize,
 ) -> TiffResult<()> {
-    if tiles.iter().map(Vec::len).sum::<usize>() > most {
+    if tiles.iter().map(Vec::len).sum::<usize>() > max_bytes {
         write_directory(TiffEncoder::new_big(file)?, size, tiles, georeference)
     } else {
         write_directory(TiffEncoder::new(file)?, size, tiles, georeference)
@@ -172,9 +172,9 @@ mod tests {
             let map = map(width, height);
             let bits: Vec<u32> = map.data().iter().map(|v| v.to_bits()).collect();
             let tiles = packed_tiles(&map).unwrap();
-            for (most, big) in [(MOST_BYTES, false), (0, true)] {
+            for (max_bytes, big) in [(MAX_BYTES, false), (0, true)] {
                 let mut file = Cursor::new(Vec::new());
-                write_tiles(&mut file, (width as u32, height as u32), &tiles, None, most).unwrap();
+                write_tiles(&mut file, (width as u32, height as u32), &tiles, None, max_bytes).unwrap();
                 assert_eq!(read(file.get_ref()), (bits.clone(), big), "{width} x {height}");
                 let raster = super::super::decode(file.get_ref(), 1 << 20, None).unwrap();
                 let crate::image::raster::Samples::Float(values) = raster.samples else { panic!("float") };
@@ -191,7 +191,7 @@ mod tests {
             assert_eq!(read(&file).0, map.data().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
             file.len()
         };
-        assert!(size(2048) > 4 * MOST_PLAIN);
-        assert!(size(2049) < 4 * MOST_PLAIN / 2);
+        assert!(size(2048) > 4 * MAX_PLAIN);
+        assert!(size(2049) < 4 * MAX_PLAIN / 2);
     }
 }

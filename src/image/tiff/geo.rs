@@ -1,34 +1,33 @@
 //! The georeference of a TIFF file.
 
-use tiff::tags::Type;
+use tiff::tags::{Tag, Type};
 
 use super::directory::{Directory, Order, size_of_kind};
-use super::tag;
 use crate::image::georeference::{Field, Georeference};
 
 /// The tags of GeoTIFF and their types.
-const TAGS: [(u16, Type); 6] = [
-    (tag::MODEL_PIXEL_SCALE, Type::DOUBLE),
-    (tag::MODEL_TIEPOINT, Type::DOUBLE),
-    (tag::MODEL_TRANSFORMATION, Type::DOUBLE),
-    (tag::GEO_KEY_DIRECTORY, Type::SHORT),
-    (tag::GEO_DOUBLE_PARAMS, Type::DOUBLE),
-    (tag::GEO_ASCII_PARAMS, Type::ASCII),
+const TAGS: [(Tag, Type); 6] = [
+    (Tag::ModelPixelScaleTag, Type::DOUBLE),
+    (Tag::ModelTiepointTag, Type::DOUBLE),
+    (Tag::ModelTransformationTag, Type::DOUBLE),
+    (Tag::GeoKeyDirectoryTag, Type::SHORT),
+    (Tag::GeoDoubleParamsTag, Type::DOUBLE),
+    (Tag::GeoAsciiParamsTag, Type::ASCII),
 ];
 /// Most bytes of a tag: room for twenty thousand tie points.
-const MOST: usize = 1 << 20;
+const MAX_BYTES: usize = 1 << 20;
 
 /// The georeference that the directory declares. One with a tag of another type, of no value, beyond the end of the file, or of
-/// more than [`MOST`] bytes is none: the rest of it would place the image elsewhere.
+/// more than [`MAX_BYTES`] bytes is none: the rest of it would place the image elsewhere.
 pub(super) fn georeference(directory: &Directory) -> Option<Georeference> {
     let there = TAGS.iter().filter(|(tag, _)| directory.has(*tag));
     let fields: Vec<Field> = there.map(|&(tag, kind)| field(directory, tag, kind)).collect::<Option<_>>()?;
     (!fields.is_empty()).then(|| Georeference { fields: fields.into() })
 }
 
-fn field(directory: &Directory, tag: u16, kind: Type) -> Option<Field> {
+fn field(directory: &Directory, tag: Tag, kind: Type) -> Option<Field> {
     let (stored, values) = directory.values(tag).ok()??;
-    if stored != kind.to_u16() || values.is_empty() || values.len() > MOST {
+    if stored != kind.to_u16() || values.is_empty() || values.len() > MAX_BYTES {
         return None;
     }
     let mut bytes = values.to_vec();

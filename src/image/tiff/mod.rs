@@ -9,19 +9,19 @@ mod colours;
 mod directory;
 mod encode;
 mod geo;
-mod tag;
 
 pub(super) use encode::encode;
 
 use std::borrow::Cow;
 
 use half::f16;
+use tiff::tags::Tag;
 
 use self::chunks::Packing;
 use self::colours::Colours;
 use self::directory::{Directory, Order};
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
-use super::raster::{Raster, Samples, holding};
+use super::raster::{Raster, Sample, Samples, holding};
 use crate::error::ReadError;
 use crate::memory;
 use crate::text::quoted;
@@ -71,12 +71,12 @@ pub(super) fn decode(
     let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
     let (channels, samples) = colours.levels(samples)?;
     let georeference = geo::georeference(&directory);
-    Ok(Raster { width: layout.width, height: layout.height, channels, samples, no_data, georeference })
+    Ok(Raster { no_data, georeference, ..Raster::of((layout.width, layout.height), channels, samples) })
 }
 
 /// The no-data value that GDAL's tag declares.
 fn no_data_of(directory: &Directory) -> Result<Option<f64>, ReadError> {
-    let Some(text) = directory.text(tag::NO_DATA)? else { return Ok(None) };
+    let Some(text) = directory.text(Tag::GdalNodata)? else { return Ok(None) };
     match text.parse() {
         Ok(value) => Ok(Some(value)),
         // Some programs write it like this.
@@ -92,12 +92,13 @@ impl<'a> Layout<'a> {
         file_bytes: usize,
         max_pixels: u64,
     ) -> Result<Self, ReadError> {
-        let size = (directory.required(tag::WIDTH, "width")?, directory.required(tag::HEIGHT, "height")?);
+        let size =
+            (directory.required(Tag::ImageWidth, "width")?, directory.required(Tag::ImageLength, "height")?);
         check_claim(size, max_pixels, MAX_PIXELS_PER_BYTE, file_bytes)?;
         let (width, height) = (size.0 as usize, size.1 as usize);
 
         let bits = colours.bits;
-        let format = match directory.equal(tag::SAMPLE_FORMAT, 1, "formats")? {
+        let format = match directory.equal(Tag::SampleFormat, 1, "formats")? {
             // 4 is undefined: there are bits, and unsigned is the best guess.
             1 | 4 => Format::Unsigned,
             2 => Format::Signed,
@@ -109,14 +110,14 @@ impl<'a> Layout<'a> {
             return Err(unsupported(format!("holds samples of {bits} bits")));
         }
 
-        let planar = match directory.first(tag::PLANAR_CONFIGURATION, 1)? {
+        let planar = match directory.first(Tag::PlanarConfiguration, 1)? {
             1 => false,
             2 => colours.samples > 1,
             other => {
                 return Err(damaged(format!("the TIFF planes are in the unknown configuration {other}")));
             }
         };
-        let compression = directory.first(tag::COMPRESSION, chunks::UNCOMPRESSED)?;
+        let compression = directory.first(Tag::Compression, chunks::UNCOMPRESSED)?;
         let read = match compression {
             chunks::JPEG => bits == 8,
             chunks::FAX4 => bits == 1 && colours.samples == 1,
@@ -139,7 +140,7 @@ impl<'a> Layout<'a> {
             );
             return Err(unsupported(reason));
         }
-        let predictor = match directory.first(tag::PREDICTOR, 1)? {
+        let predictor = match directory.first(Tag::Predictor, 1)? {
             1 => 1,
             _ if compression == chunks::JPEG => 1,
             // Some readers ignore the predictor then, as libtiff does, and others do not.
@@ -152,7 +153,7 @@ impl<'a> Layout<'a> {
                 return Err(unsupported(format!("holds samples of {bits} bits with the predictor {other}")));
             }
         };
-        let reversed = match directory.first(tag::FILL_ORDER, 1)? {
+        let reversed = match directory.first(Tag::FillOrder, 1)? {
             1 => false,
             2 => true,
             other => return Err(damaged(format!("the TIFF bits are in the unknown order {other}"))),
@@ -162,25 +163,23 @@ impl<'a> Layout<'a> {
             return Err(unsupported("holds chroma samples that are stored more sparsely, in planes"));
         }
 
-        let tiled = directory.has(tag::TILE_WIDTH);
+        let tiled = directory.has(Tag::TileWidth);
         let (chunk, offsets, byte_counts) = if tiled {
             let side = |tag, what| Ok::<_, ReadError>(directory.required(tag, what)?.max(1));
-            let chunk = (
-                side(tag::TILE_WIDTH, "width of its tiles")?,
-                side(tag::TILE_HEIGHT, "height of its tiles")?,
-            );
-            (chunk, tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS)
+            let chunk =
+                (side(Tag::TileWidth, "width of its tiles")?, side(Tag::TileLength, "height of its tiles")?);
+            (chunk, Tag::TileOffsets, Tag::TileByteCounts)
         } else {
-            let rows = directory.first(tag::ROWS_PER_STRIP, size.1)?.clamp(1, size.1);
-            ((size.0, rows), tag::STRIP_OFFSETS, tag::STRIP_BYTE_COUNTS)
+            let rows = directory.first(Tag::RowsPerStrip, size.1)?.clamp(1, size.1);
+            ((size.0, rows), Tag::StripOffsets, Tag::StripByteCounts)
         };
         // Some programs use the tags of strips for their tiles.
         let either =
             |tag, other| if directory.has(tag) { directory.unsigned(tag) } else { directory.unsigned(other) };
-        let offsets = either(offsets, tag::STRIP_OFFSETS)?;
+        let offsets = either(offsets, Tag::StripOffsets)?;
         let offsets =
             offsets.ok_or_else(|| damaged("the TIFF directory does not say where the pixels are"))?;
-        let byte_counts = either(byte_counts, tag::STRIP_BYTE_COUNTS)?;
+        let byte_counts = either(byte_counts, Tag::StripByteCounts)?;
 
         // Samples of a pixel in a row.
         let samples = if planar { 1 } else { colours.samples };
@@ -193,8 +192,8 @@ impl<'a> Layout<'a> {
         };
         let row_bytes = row_bits.div_ceil(8);
         // Sixteen samples of the widest kind per pixel, and room for a tile of a small picture.
-        let most = u128::from(size.0 * size.1) * 128 + (1 << 26);
-        if row_bytes * u128::from(chunk.1) > most {
+        let max_bytes = u128::from(size.0 * size.1) * 128 + (1 << 26);
+        if row_bytes * u128::from(chunk.1) > max_bytes {
             return Err(damaged(format!(
                 "the TIFF directory claims {samples} samples in strips or tiles of {} x {} pixels for an image of \
                  {width} x {height}",
@@ -214,7 +213,7 @@ impl<'a> Layout<'a> {
             compression,
             predictor,
             reversed,
-            jpeg_tables: directory.bytes(tag::JPEG_TABLES)?,
+            jpeg_tables: directory.bytes(Tag::JPEGTables)?,
             order: directory.order,
             bits,
             samples,
@@ -231,57 +230,43 @@ impl<'a> Layout<'a> {
         let size = bits as usize / 8;
         let number = |row: &[u8], i: usize| order.number(&row[i * size..(i + 1) * size]);
         let signed = |row: &[u8], i: usize| (number(row, i) << (64 - bits)) as i64 >> (64 - bits);
-        Ok(match (self.format, bits) {
-            (Format::Unsigned, 8) => {
-                Samples::Byte(self.assembled(file, missing as u8, |row, i| row[i])?.into())
-            }
+        let float = missing as f32;
+        match (self.format, bits) {
+            (Format::Unsigned, 8) => self.assembled(file, missing as u8, |row, i| row[i]),
             (Format::Unsigned, 16) => {
                 let word = match order {
                     Order::Little => u16::from_le_bytes,
                     Order::Big => u16::from_be_bytes,
                 };
-                let read = |row: &[u8], i: usize| word([row[2 * i], row[2 * i + 1]]);
-                Samples::Word(self.assembled(file, missing as u16, read)?.into())
+                self.assembled(file, missing as u16, |row, i| word([row[2 * i], row[2 * i + 1]]))
             }
-            (Format::Unsigned, 1..8) => Samples::Byte(
-                self.assembled(file, missing as u8, |row, i| packed(row, i, bits) as u8)?.into(),
-            ),
-            (Format::Unsigned, 9..16) => Samples::Word(
-                self.assembled(file, missing as u16, |row, i| packed(row, i, bits) as u16)?.into(),
-            ),
-            (Format::Unsigned, 24 | 32 | 64) => {
-                Samples::Double(self.assembled(file, missing, |row, i| number(row, i) as f64)?.into())
+            (Format::Unsigned, 1..8) => {
+                self.assembled(file, missing as u8, |row, i| packed(row, i, bits) as u8)
             }
-            (Format::Unsigned, _) => {
-                Samples::Double(self.assembled(file, missing, |row, i| packed(row, i, bits) as f64)?.into())
+            (Format::Unsigned, 9..16) => {
+                self.assembled(file, missing as u16, |row, i| packed(row, i, bits) as u16)
             }
-            (Format::Signed, 8 | 16) => {
-                Samples::Float(self.assembled(file, missing as f32, |row, i| signed(row, i) as f32)?.into())
-            }
-            (Format::Signed, _) => {
-                Samples::Double(self.assembled(file, missing, |row, i| signed(row, i) as f64)?.into())
-            }
+            (Format::Unsigned, 24 | 32 | 64) => self.assembled(file, missing, |row, i| number(row, i) as f64),
+            (Format::Unsigned, _) => self.assembled(file, missing, |row, i| packed(row, i, bits) as f64),
+            (Format::Signed, 8 | 16) => self.assembled(file, float, |row, i| signed(row, i) as f32),
+            (Format::Signed, _) => self.assembled(file, missing, |row, i| signed(row, i) as f64),
             (Format::Float, 16) => {
-                let read = |row: &[u8], i: usize| f16::from_bits(number(row, i) as u16).to_f32();
-                Samples::Float(self.assembled(file, missing as f32, read)?.into())
+                self.assembled(file, float, |row, i| f16::from_bits(number(row, i) as u16).to_f32())
             }
             (Format::Float, 32) => {
-                let read = |row: &[u8], i: usize| f32::from_bits(number(row, i) as u32);
-                Samples::Float(self.assembled(file, missing as f32, read)?.into())
+                self.assembled(file, float, |row, i| f32::from_bits(number(row, i) as u32))
             }
-            (Format::Float, _) => Samples::Double(
-                self.assembled(file, missing, |row, i| f64::from_bits(number(row, i)))?.into(),
-            ),
-        })
+            (Format::Float, _) => self.assembled(file, missing, |row, i| f64::from_bits(number(row, i))),
+        }
     }
 
     /// Assembles strips or tiles; `read` extracts sample `i` of a row.
-    fn assembled<S: Copy>(
+    fn assembled<S: Sample>(
         &self,
         file: &[u8],
         missing: S,
         read: impl Fn(&[u8], usize) -> S,
-    ) -> Result<Vec<S>, ReadError> {
+    ) -> Result<Samples<'static>, ReadError> {
         let mut out = memory::filled(self.width * self.height * self.read, missing)?;
         let (across, down) = (self.width.div_ceil(self.chunk.0), self.height.div_ceil(self.chunk.1));
         let (in_row, samples) = if self.planar { (1, 1) } else { (self.read, self.packing.samples) };
@@ -323,7 +308,7 @@ impl<'a> Layout<'a> {
                 }
             }
         }
-        Ok(out)
+        Ok(S::samples(out.into()))
     }
 }
 

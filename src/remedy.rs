@@ -1,0 +1,207 @@
+//! What helps about an error or a warning, in the words of a front end.
+//!
+//! The library names causes; what to do about them is often a flag, an argument or a field that only the front end knows. There is
+//! one row for each cause here, and [`Words`] has what a front end calls the few things that help.
+
+use crate::error::{
+    BudgetError, DeviceError, Error, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
+};
+use crate::front::check::Warning;
+
+/// What a front end calls what helps. `None` is what it does not have.
+#[derive(Clone, Copy, Debug)]
+pub struct Words {
+    /// What stands before and after the name of a key of the method.
+    pub key: [&'static str; 2],
+    /// What lists the keys.
+    pub keys: Option<&'static str>,
+    /// The preset.
+    pub preset: &'static str,
+    /// The smallest disparity.
+    pub min: &'static str,
+    /// The largest disparity.
+    pub max: &'static str,
+    /// Both together, where they are one thing.
+    pub range: Option<&'static str>,
+    /// The device.
+    pub device: &'static str,
+    /// What lists the devices.
+    pub devices: Option<&'static str>,
+    /// What to do where no device serves.
+    pub cpu: &'static str,
+    /// What to do where there is no driver, and where it computes nonsense.
+    pub driver: [&'static str; 2],
+    /// The number of threads.
+    pub threads: &'static str,
+    /// The memory that is granted to a match, and the unit that follows its number.
+    pub memory: Option<[&'static str; 2]>,
+    /// What to do about pixels that are no image.
+    pub mask: Option<&'static str>,
+    /// The maximum of pixels.
+    pub max_pixels: Option<&'static str>,
+    /// The scale of the values of a ground truth.
+    pub truth_scale: Option<&'static str>,
+    /// The value that stands for no data.
+    pub no_data: Option<&'static str>,
+}
+
+impl Words {
+    /// Of a front end that calls everything as the library does, and lacks the rest. [`Words::cpu`] is for each to say.
+    pub const PLAIN: Self = Self {
+        key: ["", ""],
+        keys: None,
+        preset: "preset",
+        min: "min",
+        max: "max",
+        range: None,
+        device: "device",
+        devices: None,
+        cpu: "",
+        driver: ["install the driver of the GPU", "update its driver"],
+        threads: "threads",
+        memory: None,
+        mask: None,
+        max_pixels: None,
+        truth_scale: None,
+        no_data: None,
+    };
+}
+
+/// An error with its remedy.
+#[must_use]
+pub fn error(error: &Error, words: &Words) -> String {
+    match error {
+        Error::Option { key, cause } => format!("{}: {cause}{}", words.key(key), words.of_key(cause)),
+        Error::Preset { .. } => format!("{}: {error}", words.preset),
+        Error::Range(cause) => words.range(cause),
+        Error::Execution(cause) => words.execution(cause),
+        Error::Budget(cause) => words.budget(cause),
+        Error::Read { cause, .. } => format!("{error}{}", words.reading(cause)),
+        Error::Device(cause) => format!("{error}{}", words.device(cause)),
+        Error::Memory(cause) => format!("{error}{}", words.memory(cause)),
+        _ => error.to_string(),
+    }
+}
+
+/// A warning with its remedy.
+#[must_use]
+pub fn warning(warning: &Warning, Words { min, max, mask, .. }: &Words) -> String {
+    let remedy = match warning {
+        Warning::Saturated { .. } => format!(": expose both alike{}", and(", or ", *mask)),
+        Warning::Swapped { .. } => {
+            format!(": exchange the two images, or lower {min} below 0 if the cameras converge")
+        }
+        Warning::Clipped { upper: true, .. } => format!(": raise {max}"),
+        Warning::Clipped { upper: false, .. } => format!(": lower {min}"),
+        _ => String::new(),
+    };
+    format!("{warning}{remedy}")
+}
+
+/// `word` after what joins it; nothing without it.
+fn and(joint: &str, word: Option<&str>) -> String {
+    word.map_or_else(String::new, |word| format!("{joint}{word}"))
+}
+
+impl Words {
+    fn key(&self, key: &str) -> String {
+        let [before, after] = self.key;
+        format!("{before}{key}{after}")
+    }
+
+    fn of_key(&self, cause: &OptionError) -> String {
+        match cause {
+            OptionError::Unknown => and("; ", self.keys),
+            _ => String::new(),
+        }
+    }
+
+    fn range(&self, cause: &RangeError) -> String {
+        let Self { min, max, range, .. } = *self;
+        let (end, remedy) = match cause {
+            RangeError::Empty { .. } => {
+                (max, format!(": raise {} or lower {min}", range.map_or("it", |_| max)))
+            }
+            RangeError::TooFar { disparity, .. } if *disparity < 0 => (min, String::new()),
+            RangeError::TooManyLabels { .. } => (max, ": narrow the range".into()),
+            RangeError::OutsideImages { .. } => (max, ": give a range that fits the pair".into()),
+            RangeError::NotFound => {
+                return format!("{cause}: give {}", range.map_or(max.into(), |range| format!("the {range}")));
+            }
+            RangeError::TooFar { .. } => (max, String::new()),
+        };
+        format!("{}: {cause}{remedy}", range.unwrap_or(end))
+    }
+
+    fn execution(&self, cause: &ExecutionError) -> String {
+        match cause {
+            ExecutionError::NoSuchDevice { .. } => {
+                format!("{}: {cause}{}", self.device, and("; ", self.devices))
+            }
+            _ => format!("{}: {cause}", self.threads),
+        }
+    }
+
+    fn budget(&self, cause: &BudgetError) -> String {
+        let Some([memory, unit]) = self.memory else {
+            return format!("{cause}; use a smaller image or range");
+        };
+        match cause {
+            BudgetError::NoTileFits { needed, .. } => {
+                format!("{memory}: {cause}; give at least {needed}{unit}, or a smaller image or range")
+            }
+            BudgetError::Steps { needed } => format!("{cause}; give {memory} {needed}{unit}"),
+        }
+    }
+
+    fn reading(&self, cause: &ReadError) -> String {
+        let raised = || self.max_pixels.map_or_else(String::new, |pixels| format!("raise {pixels} or "));
+        match cause {
+            ReadError::TooManyPixels { .. } => format!("; if that is true, {}crop it", raised()),
+            ReadError::TooManyBytes { .. } => format!("; {}crop it", raised()),
+            ReadError::UnknownScale => and("; of a ground truth, give the scale by ", self.truth_scale),
+            ReadError::NeedlessScale => and("; remove ", self.truth_scale),
+            ReadError::NoData { .. } => and("; give one by ", self.no_data),
+            ReadError::Option { cause, .. } => self.of_key(cause),
+            ReadError::Memory(cause) => self.memory(cause),
+            ReadError::Other(_) => String::new(),
+        }
+    }
+
+    fn device(&self, cause: &DeviceError) -> String {
+        let Self { device, cpu, driver: [install, update], .. } = self;
+        match cause {
+            DeviceError::NoDriver => format!(": {install}, or {cpu}"),
+            DeviceError::WrongMaps { .. } => format!(": {update}, or {cpu}"),
+            DeviceError::TooLargeForShader { .. } => format!(": {cpu}"),
+            DeviceError::Failed { .. } => format!("; use another {device}, or {cpu}"),
+        }
+    }
+
+    fn memory(&self, cause: &MemoryError) -> String {
+        let Self { min, max, device, cpu, .. } = self;
+        match cause {
+            MemoryError::Machine { purpose: Purpose::Match, .. } => {
+                let Some([memory, _]) = self.memory else {
+                    return format!(": {cpu}, or use a smaller image or a narrower range");
+                };
+                format!(
+                    ": allow less by {memory}, or use a smaller image, a narrower range ({min}, {max}) or fewer \
+                     neighbours (a higher {})",
+                    self.key("percentile")
+                )
+            }
+            MemoryError::Machine { purpose: Purpose::Image, .. } => {
+                ": use a smaller image, or a part of it".into()
+            }
+            MemoryError::Device { .. } => {
+                let memory = self.memory.map_or_else(String::new, |[memory, _]| format!("{memory}, "));
+                format!(": {cpu}, or use a smaller {memory}image or range")
+            }
+            MemoryError::Buffer { .. } => format!(": {cpu}, or use a smaller image or range"),
+            MemoryError::Exhausted { .. } => {
+                format!(": {cpu}, or use another {device}, or a smaller image or range")
+            }
+        }
+    }
+}
