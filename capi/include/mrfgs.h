@@ -80,7 +80,7 @@ enum mrfgs_flag
   MRFGS_FLAG_OUTSIDE = 1,
   // The right view disagrees: occluded, or mistaken.
   MRFGS_FLAG_OCCLUDED = 2,
-  // The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
+  // The pixel is in a region too small to be trusted.
   MRFGS_FLAG_SPECKLE = 4,
   // The confidence is low; the disparity stays.
   MRFGS_FLAG_LOW_CONFIDENCE = 8,
@@ -88,6 +88,10 @@ enum mrfgs_flag
   MRFGS_FLAG_FILLED = 16,
   // The pixel is ignored, and has no disparity.
   MRFGS_FLAG_MASKED = 32,
+  // Two labels match equally well.
+  MRFGS_FLAG_TIE = 64,
+  // The pixels around it outvote the disparity, and it is filled in from them.
+  MRFGS_FLAG_OUTVOTED = 128,
 };
 #ifndef __cplusplus
 typedef uint8_t mrfgs_flag;
