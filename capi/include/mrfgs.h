@@ -175,7 +175,10 @@ struct mrfgs_options *mrfgs_options_new(void);
 // Frees options; they may be null.
 void mrfgs_options_free(struct mrfgs_options *options);
 
-// Takes all options of a preset: "default", "accurate", "fast", "paper" or "fgs".
+// The name of the preset with this index, from 0 on; null past the last one. It stays as it is.
+const char *mrfgs_preset_name(uint32_t index);
+
+// Takes all options of the preset with this name; mrfgs_preset_name() lists them.
 enum mrfgs_status mrfgs_options_preset(struct mrfgs_options *options, const char *name);
 
 // Sets an option: "fill" or "refinement.fill" to "none", "memory" (in MiB) to "2048". `mrfgs presets` lists all, with their values.

@@ -221,7 +221,7 @@ impl PyMatcher {
     ///     find the range; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
-    /// preset: "default", "accurate", "fast", "paper" or "fgs".
+    /// preset: the name of a preset; mrfgs.presets() lists them, and tells what each is for.
     /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
     ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
     /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of
@@ -337,7 +337,7 @@ fn match_(
 /// takes: the unit and the range of its values,
 /// words: the words that it takes, with what each means; empty where it takes no words,
 /// source: the section of the paper that it comes from, or other work; "open" where the paper leaves the choice open,
-/// default, accurate, fast, paper, fgs: its value in each preset.
+/// and, by the name of each preset, its value in that preset.
 #[pyfunction]
 fn options(py: Python) -> PyResult<Bound<PyDict>> {
     let groups = PyDict::new(py);
@@ -349,6 +349,16 @@ fn options(py: Python) -> PyResult<Bound<PyDict>> {
         groups.set_item(group.name, keys)?;
     }
     Ok(groups)
+}
+
+/// Lists the presets: a dict from the name of each to what it is for.
+#[pyfunction]
+fn presets(py: Python) -> PyResult<Bound<PyDict>> {
+    let presets = PyDict::new(py);
+    for preset in PRESETS {
+        presets.set_item(preset.name, preset.about)?;
+    }
+    Ok(presets)
 }
 
 /// Describes an option.
@@ -363,12 +373,12 @@ fn option<'py>(py: Python<'py>, group: &str, key: &Key) -> PyResult<Bound<'py, P
     option.set_item("takes", key.to_string())?;
     option.set_item("words", words)?;
     option.set_item("source", key.source)?;
-    for (preset, _) in PRESETS {
-        match &Method::preset(preset).map_err(exception)?.table()[group][key.name()] {
-            toml::Value::Boolean(value) => option.set_item(preset, value)?,
-            toml::Value::Integer(value) => option.set_item(preset, value)?,
-            toml::Value::Float(value) => option.set_item(preset, value)?,
-            value => option.set_item(preset, value.as_str())?,
+    for preset in PRESETS {
+        match &preset.method().table()[group][key.name()] {
+            toml::Value::Boolean(value) => option.set_item(preset.name, value)?,
+            toml::Value::Integer(value) => option.set_item(preset.name, value)?,
+            toml::Value::Float(value) => option.set_item(preset.name, value)?,
+            value => option.set_item(preset.name, value.as_str())?,
         }
     }
     Ok(option)
@@ -434,6 +444,7 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("MatchWarning", module.py().get_type::<MatchWarning>())?;
     module.add_function(wrap_pyfunction!(match_, module)?)?;
     module.add_function(wrap_pyfunction!(options, module)?)?;
+    module.add_function(wrap_pyfunction!(presets, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;
     module.add_class::<calibration::PyCalibration>()?;
     module.add_class::<PyMatched>()?;

@@ -208,7 +208,7 @@ fn tables_stand_beside_the_papers() {
     copy("thin", &at("thin"));
     let presets: Vec<&str> = ["fgs", "paper", "default"]
         .into_iter()
-        .filter(|name| options::PRESETS.iter().any(|preset| preset.0 == *name))
+        .filter(|name| options::PRESETS.iter().any(|preset| preset.name == *name))
         .collect();
 
     let text = evaluated(folder.path(), &["paper", "Teddy", "Cones", "--json", "out.json"]);
