@@ -27,8 +27,8 @@ pub(crate) fn plans() -> Vec<Plan> {
         keys.flat_map(|key| values(key).into_iter().map(|value| (key.name(), value))).collect();
     let range = DisparityRange::new(-20, 43).expect("a range");
     let mut plans = Vec::new();
-    for (name, _) in PRESETS {
-        let preset = Method::preset(name).expect("a preset");
+    for preset in PRESETS {
+        let preset = preset.method();
         let mut add =
             |method: &Method| plans.push(Plan::new(101, 67, range, method).expect("a valid method"));
         add(&preset);

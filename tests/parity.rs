@@ -51,8 +51,8 @@ fn differences(a: &Solution, b: &Solution) -> Vec<&'static str> {
 
 /// Presets whose matches are at the pair's own size alone. At twice the size a match needs more of a device.
 fn presets_at_one_size() -> impl Iterator<Item = &'static str> {
-    let all = PRESETS.iter().map(|(name, _)| *name);
-    all.filter(|name| !Method::preset(name).unwrap().refinement.double_size)
+    let all = PRESETS.iter().filter(|preset| !preset.method().refinement.double_size);
+    all.map(|preset| preset.name)
 }
 
 /// The part of an image in these columns and rows.
@@ -68,8 +68,8 @@ fn presets_on_rendered_scenes() {
     let Some(mut gpu) = devices::gpu() else { return };
     for scene in ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"] {
         let (pair, range) = load(&Path::new("testdata").join(scene));
-        for (preset, _) in PRESETS {
-            let method = Method::preset(preset).unwrap();
+        for preset in PRESETS {
+            let (preset, method) = (preset.name, preset.method());
             let expected = matched(&mut Cpu::default(), &pair, range, &method);
             let actual = matched(&mut gpu, &pair, range, &method);
             assert!(
@@ -310,14 +310,14 @@ fn volumes_of_a_real_pair() {
 }
 
 /// Real pairs, with all limits of the device and with the least that WebGPU promises. Only the default
-/// preset, or both presets where `MRFGS_PARITY` is `all`.
+/// preset, or every preset where `MRFGS_PARITY` is `all`.
 #[test]
 fn maps_of_real_pairs() {
     let everything = std::env::var("MRFGS_PARITY").is_ok_and(|v| v == "all");
     for folder in real_pairs() {
         let (pair, range) = load(&folder);
-        for (preset, _) in PRESETS.iter().filter(|(name, _)| everything || *name == "default") {
-            let method = Method::preset(preset).unwrap();
+        for preset in PRESETS.iter().filter(|preset| everything || preset.name == "default") {
+            let (preset, method) = (preset.name, preset.method());
             let expected = matched(&mut Cpu::default(), &pair, range, &method);
             for faults in [FaultInjection::default(), minimum()] {
                 let Some(mut gpu) = devices::open(faults) else { return };

@@ -91,8 +91,7 @@ fn cores_share_out_the_image_and_crops_hold_what_they_need() {
         let labels = random.log_within(1.0, most) as i32;
         let min = (lowest * f64::from(random.within(0, 100)) / 100.0) as i32;
         let range = DisparityRange::new(min, min + labels - 1).unwrap();
-        let (preset, _) = random.pick(PRESETS);
-        let mut method = Method::preset(preset).unwrap();
+        let mut method = random.pick(PRESETS).method();
         method.graph.levels = random.pick(&[1, 2, 3, 6, 6, 6, 9, 16]);
         method.tiles.memory = random.log_within(1.0, 4096.0) as u32;
         let plan = Plan::new(size.0, size.1, range, &method).unwrap();
@@ -176,8 +175,8 @@ fn every_backend_leaves_the_same_maps() {
     let Some(mut gpu) = devices::gpu() else { return };
     let (pair, range) = load(Path::new("testdata/thin"));
     // At twice the size there are other tiles; `double_size.rs` has a test of these.
-    for (preset, _) in PRESETS.iter().filter(|(name, _)| *name != "accurate") {
-        let method = Method::preset(preset).unwrap();
+    for preset in PRESETS.iter().filter(|preset| !preset.method().refinement.double_size) {
+        let (preset, method) = (preset.name, preset.method());
         let whole = plan(pair.size(), range, &method, 4096);
         let plan = plan(pair.size(), range, &method, (streamed(&whole).bytes() >> 20) as u32 * 3 / 4);
         let tiles = Tiles::new(&plan).unwrap();

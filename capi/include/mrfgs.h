@@ -80,7 +80,7 @@ enum mrfgs_flag
   MRFGS_FLAG_OUTSIDE = 1,
   // The right view disagrees: occluded, or mistaken.
   MRFGS_FLAG_OCCLUDED = 2,
-  // The pixel is in a region too small to be trusted, two labels tie there, or the pixels around it outvote it.
+  // The pixel is in a region too small to be trusted.
   MRFGS_FLAG_SPECKLE = 4,
   // The confidence is low; the disparity stays.
   MRFGS_FLAG_LOW_CONFIDENCE = 8,
@@ -88,6 +88,10 @@ enum mrfgs_flag
   MRFGS_FLAG_FILLED = 16,
   // The pixel is ignored, and has no disparity.
   MRFGS_FLAG_MASKED = 32,
+  // Two labels match equally well.
+  MRFGS_FLAG_TIE = 64,
+  // The pixels around it outvote the disparity, and it is filled in from them.
+  MRFGS_FLAG_OUTVOTED = 128,
 };
 #ifndef __cplusplus
 typedef uint8_t mrfgs_flag;
@@ -171,7 +175,10 @@ struct mrfgs_options *mrfgs_options_new(void);
 // Frees options; they may be null.
 void mrfgs_options_free(struct mrfgs_options *options);
 
-// Takes all options of a preset: "default", "accurate", "fast", "paper" or "fgs".
+// The name of the preset with this index, from 0 on; null past the last one. It stays as it is.
+const char *mrfgs_preset_name(uint32_t index);
+
+// Takes all options of the preset with this name; mrfgs_preset_name() lists them.
 enum mrfgs_status mrfgs_options_preset(struct mrfgs_options *options, const char *name);
 
 // Sets an option: "fill" or "refinement.fill" to "none", "memory" (in MiB) to "2048". `mrfgs presets` lists all, with their values.

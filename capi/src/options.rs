@@ -1,9 +1,11 @@
 //! What a matcher is to do, and where.
 
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
+use std::ptr;
+use std::sync::LazyLock;
 
-use mrfgs::options::{Execution, Method};
+use mrfgs::options::{Execution, Method, PRESETS};
 
 use crate::status::{Failure, Status, call};
 
@@ -54,7 +56,15 @@ pub unsafe extern "C" fn mrfgs_options_free(options: *mut Options) {
     }
 }
 
-/// Takes all options of a preset: "default", "accurate", "fast", "paper" or "fgs".
+/// The name of the preset with this index, from 0 on; null past the last one. It stays as it is.
+#[unsafe(no_mangle)]
+pub extern "C" fn mrfgs_preset_name(index: u32) -> *const c_char {
+    static NAMES: LazyLock<Vec<CString>> =
+        LazyLock::new(|| PRESETS.iter().flat_map(|preset| CString::new(preset.name)).collect());
+    NAMES.get(index as usize).map_or(ptr::null(), |name| name.as_ptr())
+}
+
+/// Takes all options of the preset with this name; mrfgs_preset_name() lists them.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_options_preset(options: *mut Options, name: *const c_char) -> Status {
     let set = |options: &mut Options| {

@@ -93,6 +93,19 @@ static void warnings(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_r
     free((void *)right.data);
 }
 
+/* Every preset has a name by which it is taken. */
+static void presets(void) {
+    mrfgs_options *options = mrfgs_options_new();
+    uint32_t count = 0, fast = 0;
+    for (const char *name; (name = mrfgs_preset_name(count)) != NULL; count++) {
+        CHECK(mrfgs_options_preset(options, name) == MRFGS_STATUS_OK);
+        fast += strcmp(name, "fast") == 0;
+    }
+    CHECK(fast == 1 && count > 2 && strcmp(mrfgs_preset_name(0), "default") == 0);
+    CHECK(mrfgs_preset_name(count + 1) == NULL && mrfgs_preset_name(UINT32_MAX) == NULL);
+    mrfgs_options_free(options);
+}
+
 static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struct pnm frames[2]) {
     const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
     refused(wrong, mrfgs_options_preset(NULL, "fast"), "options", "null");
@@ -159,6 +172,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
 int main(int argc, char **argv) {
     if (argc != 7) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
+    presets();
     struct pnm frames[2] = {pnm_read(argv[1]), pnm_read(argv[2])};
     struct pnm maps[3] = {pnm_read(argv[4]), pnm_read(argv[5]), pnm_read(argv[6])};
     mrfgs_options *options = mrfgs_options_new();

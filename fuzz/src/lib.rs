@@ -115,8 +115,8 @@ pub fn list(bytes: &[u8]) {
 /// A method in TOML; also the value of a key on the command line.
 pub fn config(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
-    for (preset, _) in PRESETS {
-        let before = Method::preset(preset).expect("it is listed");
+    for preset in PRESETS {
+        let before = preset.method();
         let kept = |method: &Method, changed: Option<()>| match changed {
             Some(()) => {
                 let table = method.table().to_string();

@@ -6,7 +6,7 @@ Give `match` a rectified pair as arrays; it returns a `Matched`:
 >>> matched.disparity                      # float32, pixels; +inf where there is none
 
 Left (x, y) with disparity d is seen at right (x - d, y). A `Matcher` keeps device, shaders and buffers from pair to pair;
-help(mrfgs.Matcher) explains every argument, `options()` every option of the method. What is probably wrong with a pair is told as a
+help(mrfgs.Matcher) explains every argument, `presets()` lists the presets, `options()` every option of the method. What is probably wrong with a pair is told as a
 `MatchWarning`.
 
 Images as the cameras took them are rectified by a calibration of OpenCV, ROS, Kalibr or Middlebury, which also gives depth and points:
@@ -34,6 +34,7 @@ from ._mrfgs import (
     evaluate,
     match,
     options,
+    presets,
 )
 
 __all__ = [
@@ -49,4 +50,5 @@ __all__ = [
     "evaluate",
     "match",
     "options",
+    "presets",
 ]

@@ -238,17 +238,10 @@ def match(
 ) -> Matched:
     """Matches one rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
 
-class _Option(TypedDict):
-    meaning: str
-    takes: str
-    words: dict[str, str]
-    source: str
-    default: bool | int | float | str
-    fast: bool | int | float | str
-    paper: bool | int | float | str
-    fgs: bool | int | float | str
+def presets() -> dict[str, str]:
+    """Lists the presets: a dict from the name of each to what it is for."""
 
-def options() -> dict[str, dict[str, _Option]]:
+def options() -> dict[str, dict[str, dict[str, Any]]]:
     """Describes the options: a dict from each group to a dict from each of its keys to what it does, which values it takes, where
     it comes from, and its value in each preset."""
 

@@ -21,6 +21,7 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("MatchWarning", module.py().get_type::<exceptions::MatchWarning>())?;
     module.add_function(wrap_pyfunction!(matcher::match_, module)?)?;
     module.add_function(wrap_pyfunction!(options::options, module)?)?;
+    module.add_function(wrap_pyfunction!(options::presets, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;
     module.add_class::<calibration::PyCalibration>()?;
     module.add_class::<matched::PyMatched>()?;

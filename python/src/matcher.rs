@@ -47,7 +47,7 @@ impl PyMatcher {
     ///     find the range; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
-    /// preset: "default", "accurate", "fast", "paper" or "fgs".
+    /// preset: the name of a preset; mrfgs.presets() lists them, and tells what each is for.
     /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
     ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
     /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of

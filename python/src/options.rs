@@ -39,7 +39,7 @@ fn as_written(value: &Bound<PyAny>) -> PyResult<String> {
 /// takes: the unit and the range of its values,
 /// words: the words that it takes, with what each means; empty where it takes no words,
 /// source: the section of the paper that it comes from, or other work; "open" where the paper leaves the choice open,
-/// default, accurate, fast, paper, fgs: its value in each preset.
+/// and, by the name of each preset, its value in that preset.
 #[pyfunction]
 pub(crate) fn options(py: Python) -> PyResult<Bound<PyDict>> {
     let groups = PyDict::new(py);
@@ -51,6 +51,16 @@ pub(crate) fn options(py: Python) -> PyResult<Bound<PyDict>> {
         groups.set_item(group.name, keys)?;
     }
     Ok(groups)
+}
+
+/// Lists the presets: a dict from the name of each to what it is for.
+#[pyfunction]
+pub(crate) fn presets(py: Python) -> PyResult<Bound<PyDict>> {
+    let presets = PyDict::new(py);
+    for preset in PRESETS {
+        presets.set_item(preset.name, preset.about)?;
+    }
+    Ok(presets)
 }
 
 /// Describes an option.
@@ -65,12 +75,12 @@ fn option<'py>(py: Python<'py>, group: &str, key: &Key) -> PyResult<Bound<'py, P
     option.set_item("takes", key.to_string())?;
     option.set_item("words", words)?;
     option.set_item("source", key.source)?;
-    for (preset, _) in PRESETS {
-        match &Method::preset(preset).map_err(exception)?.table()[group][key.name()] {
-            toml::Value::Boolean(value) => option.set_item(preset, value)?,
-            toml::Value::Integer(value) => option.set_item(preset, value)?,
-            toml::Value::Float(value) => option.set_item(preset, value)?,
-            value => option.set_item(preset, value.as_str())?,
+    for preset in PRESETS {
+        match &preset.method().table()[group][key.name()] {
+            toml::Value::Boolean(value) => option.set_item(preset.name, value)?,
+            toml::Value::Integer(value) => option.set_item(preset.name, value)?,
+            toml::Value::Float(value) => option.set_item(preset.name, value)?,
+            value => option.set_item(preset.name, value.as_str())?,
         }
     }
     Ok(option)

@@ -323,6 +323,9 @@ class Match(unittest.TestCase):
 
     def test_options_are_described(self):
         described = mrfgs.options()
+        self.assertEqual(mrfgs.presets()["default"], "few errors in little time: for most pairs")
+        for option in (option for keys in described.values() for option in keys.values()):
+            self.assertEqual({*mrfgs.presets(), "meaning", "takes", "words", "source"}, set(option))
         window = described["cost"]["sad-window"]
         self.assertEqual((window["takes"], window["source"], window["default"]), ("pixels, odd, 1 to 31", "section 3.1: 7", 7))
         self.assertIn("census", described["cost"]["matching"]["words"])

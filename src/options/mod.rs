@@ -30,7 +30,7 @@ pub use front::{FrontOptions, Illumination, ZoneExtent};
 pub use graph::GraphOptions;
 pub use messages::{Agreement, MessageOptions, Potential};
 pub use method::{GROUPS, Method};
-pub use presets::PRESETS;
+pub use presets::{PRESETS, Preset};
 pub use range::{DisparityRange, MAX_DISPARITY, MAX_LABELS};
 pub use refinement::{Fill, LeftRightCheck, Median, Nearer, RefinementOptions};
 pub use row::{Group, Key, Takes, Word};

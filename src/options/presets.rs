@@ -7,16 +7,47 @@ use super::{
 use crate::error::{Error, Result};
 use crate::text::one_line;
 
-/// Names of the presets, with what each is for.
-pub const PRESETS: &[(&str, &str)] = &[
-    ("default", "few errors in little time: for most pairs"),
-    (
-        "accurate",
-        "nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too",
-    ),
-    ("fast", "nine tenths of the default's time for a few more errors: for video and robots"),
-    ("paper", "the paper's whole method, with its choices wherever it states them"),
-    ("fgs", "the paper's predecessor: one resolution, and a left-right check by a second matching"),
+/// A preset: its row in [`PRESETS`].
+#[derive(Clone, Copy, Debug)]
+pub struct Preset {
+    /// Its name, as users write it.
+    pub name: &'static str,
+    /// What it is for.
+    pub about: &'static str,
+    make: fn() -> Method,
+}
+
+impl Preset {
+    /// The method that it stands for.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        (self.make)()
+    }
+}
+
+/// Every preset. The program, Python, C, the page and the tests take them from here.
+pub const PRESETS: &[Preset] = &[
+    Preset { name: "default", about: "few errors in little time: for most pairs", make: Method::default },
+    Preset {
+        name: "accurate",
+        about: "nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too",
+        make: Method::accurate,
+    },
+    Preset {
+        name: "fast",
+        about: "nine tenths of the default's time for a few more errors: for video and robots",
+        make: Method::fast,
+    },
+    Preset {
+        name: "paper",
+        about: "the paper's whole method, with its choices wherever it states them",
+        make: Method::paper,
+    },
+    Preset {
+        name: "fgs",
+        about: "the paper's predecessor: one resolution, and a left-right check by a second matching",
+        make: Method::fgs,
+    },
 ];
 
 impl Method {
@@ -25,17 +56,11 @@ impl Method {
     /// # Errors
     /// [`Error::Preset`] when there is no such preset.
     pub fn preset(name: &str) -> Result<Self> {
-        match name {
-            "default" => Ok(Self::default()),
-            "accurate" => Ok(Self::accurate()),
-            "fast" => Ok(Self::fast()),
-            "paper" => Ok(Self::paper()),
-            "fgs" => Ok(Self::fgs()),
-            _ => {
-                let known = PRESETS.iter().map(|p| p.0).collect();
-                Err(Error::Preset { name: one_line(name), known })
-            }
-        }
+        let preset = PRESETS.iter().find(|preset| preset.name == name);
+        preset.map(Preset::method).ok_or_else(|| Error::Preset {
+            name: one_line(name),
+            known: PRESETS.iter().map(|preset| preset.name).collect(),
+        })
     }
 
     /// Nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too.
@@ -124,9 +149,7 @@ impl Method {
         }
     }
 
-    /// The paper's predecessor: one resolution, and a left-right check by a second matching.
-    #[must_use]
-    pub fn fgs() -> Self {
+    fn fgs() -> Self {
         let paper = Self::paper();
         Self {
             graph: GraphOptions { levels: 1, ..paper.graph },
@@ -145,13 +168,17 @@ mod tests {
 
     #[test]
     fn presets_are_what_their_names_say() {
-        let presets = [Method::default(), Method::accurate(), Method::fast(), Method::paper(), Method::fgs()];
-        for ((name, _), expected) in PRESETS.iter().zip(presets) {
-            let preset = Method::preset(name).unwrap();
-            assert_eq!(preset, expected);
-            assert_eq!(preset.clone().validated().unwrap(), preset, "{name} is within every range");
+        for (i, preset) in PRESETS.iter().enumerate() {
+            let (name, method) = (preset.name, preset.method());
+            assert_eq!(Method::preset(name).unwrap(), method);
+            assert_eq!(method.clone().validated().unwrap(), method, "{name} is within every range");
+            for other in &PRESETS[..i] {
+                assert!(other.name != name && other.method() != method, "{name} and {}", other.name);
+            }
         }
+        assert_eq!(Method::preset("default").unwrap(), Method::default());
         let error = Method::preset("best").unwrap_err().to_string();
-        assert_eq!(error, "there is no preset `best`; the presets are default, accurate, fast, paper, fgs");
+        let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
+        assert_eq!(error, format!("there is no preset `best`; the presets are {}", names.join(", ")));
     }
 }

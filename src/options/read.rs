@@ -246,11 +246,11 @@ mod tests {
     fn every_preset_survives_a_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("method.toml");
-        for (name, _) in PRESETS {
-            let preset = Method::preset(name).unwrap();
+        for preset in PRESETS {
+            let preset = preset.method();
             std::fs::write(&path, preset.table().to_string()).unwrap();
-            for (other, _) in PRESETS {
-                let mut method = Method::preset(other).unwrap();
+            for other in PRESETS {
+                let mut method = other.method();
                 method.load(&path).unwrap();
                 assert_eq!(method, preset);
             }

@@ -32,6 +32,8 @@ pub struct Key {
     /// Where it comes from: a section of the paper, with the paper's value, or other work. `open` means that the paper
     /// leaves the choice open.
     pub source: &'static str,
+    /// Whether only another reading of the paper turns it: lists of options leave it out unless it is asked for.
+    pub of_readings: bool,
 }
 
 impl Key {
@@ -152,14 +154,16 @@ pub struct Word {
 
 /// Declares a group of options: a struct with one field a row, its defaults, and `GROUP`, which describes it.
 ///
-/// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`.
+/// A row reads: `/// meaning`, then `key: type = default, takes range, unit "..." (if any), source "...";`. `of readings` at its end
+/// says that only another reading of the paper turns it.
 macro_rules! options {
     (
         $(#[doc = $about:literal])+
         $name:literal $group:ident {
             $(
                 $(#[doc = $meaning:literal])+
-                $field:ident: $type:ty = $default:expr, takes $takes:expr, $(unit $unit:literal,)? source $source:literal;
+                $field:ident: $type:ty = $default:expr, takes $takes:expr, $(unit $unit:literal,)? source $source:literal
+                    $(, of $readings:ident)?;
             )+
         }
     ) => {
@@ -196,6 +200,7 @@ macro_rules! options {
                         unit: concat!($($unit)?),
                         meaning: concat!($($meaning),+).trim_ascii(),
                         source: $source,
+                        of_readings: !concat!($(stringify!($readings))?).is_empty(),
                     },
                 )+ ],
             };

@@ -17,7 +17,7 @@ options! {
     /// The order and number of iterations.
     "schedule" ScheduleOptions {
         /// The order in which levels exchange messages.
-        order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together";
+        order: Order = Order::CoarseFirst, takes one_of(Order::WORDS), source "algorithm 1: together", of readings;
         /// Iterations of all levels together; with coarse-first, iterations after each level but the finest
         /// has joined.
         iterations: u32 = 3, takes whole(1..=1000), unit "iterations", source "section 3: 20 to 30";
@@ -25,6 +25,6 @@ options! {
         /// those of the coarser levels. Only coarse-first uses it.
         final_iterations: u32 = 1, takes whole(0..=1000), unit "iterations", source "not in the paper";
         /// Stop when the RMS change of the finest map from one iteration to the next is at most this; 0 runs all iterations.
-        tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1";
+        tolerance: f64 = 0.0, takes real(0.0..=1e6), unit "pixels", source "algorithm 1", of readings;
     }
 }

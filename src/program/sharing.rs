@@ -59,9 +59,10 @@ mod tests {
 
     #[test]
     fn presets_share_and_free() {
-        for (preset, _) in PRESETS {
-            let method = Method::preset(preset).unwrap();
-            let mut plan = Plan::new(80, 60, DisparityRange::new(0, 20).unwrap(), &method).unwrap();
+        for preset in PRESETS {
+            let range = DisparityRange::new(0, 20).unwrap();
+            let mut plan = Plan::new(80, 60, range, &preset.method()).unwrap();
+            let preset = preset.name;
             let steps = schedule::steps(&plan);
             let shared = pass(&mut plan, steps.clone());
             assert!(plan.shares, "{preset}");

@@ -456,21 +456,21 @@ pub fn finest(random: &mut Random, plan: &Plan, filled: bool) -> Finest {
 /// Flags that may occur before the fill or, where `filled`, after it.
 fn flags(random: &mut Random, width: usize, height: usize, filled: bool) -> Plane<i32> {
     let density = random.pick(&[1, 2, 3, 10, 1000]);
-    Plane::from_fn(width, height, |_, _| {
+    Plane::from_fn(width, height, |x, y| {
         let validity = if !random.one_in(density) {
             random.pick(&[0, 0, flag::LOW_CONFIDENCE])
         } else if random.one_in(6) {
             flag::MASKED
         } else {
-            let reason =
-                random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE, flag::TIE, flag::OUTVOTED]);
-            // Only the votes, after the fill, outvote a pixel, and fill it in at once.
-            match (filled, reason) {
-                (true, flag::OUTVOTED) => flag::OUTVOTED | flag::FILLED,
-                (false, flag::OUTVOTED) => flag::TIE,
-                (true, _) if !random.one_in(4) => reason | flag::FILLED,
+            let reason = random.pick(&[flag::OUTSIDE, flag::OCCLUDED, flag::SPECKLE]);
+            let filled = filled && !random.one_in(4);
+            let reason = match (reason, (x + y) % 3) {
+                (flag::SPECKLE, 1) => flag::TIE,
+                // The votes fill what they outvote.
+                (flag::SPECKLE, 2) if filled => flag::OUTVOTED,
                 _ => reason,
-            }
+            };
+            if filled { reason | flag::FILLED } else { reason }
         };
         validity.into()
     })

@@ -10,7 +10,7 @@ use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::options::{Agreement, MatchingCost, Method, Order, PRESETS, Potential};
+use mrfgs::options::{Agreement, MatchingCost, Order, PRESETS, Potential};
 use pollster::block_on;
 use std::collections::HashSet;
 
@@ -194,9 +194,9 @@ pub(super) fn whole_flood(plan: &Plan, pair: &Pair) -> u32 {
 
 #[test]
 fn floods_of_the_presets() {
-    for (i, (preset, _)) in PRESETS.iter().enumerate() {
+    for (i, preset) in PRESETS.iter().enumerate() {
         let mut random = Random::new(i as u64);
-        let mut method = Method::preset(preset).unwrap();
+        let mut method = preset.method();
         method.schedule.iterations = method.schedule.iterations.min(8);
         method.schedule.tolerance = 0.0;
         let pair = random::pair(&mut random, 45, 27);

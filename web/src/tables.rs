@@ -23,7 +23,7 @@ pub fn version() -> String {
 pub fn presets() -> Array {
     PRESETS
         .iter()
-        .map(|(name, about)| object(&[("name", (*name).into()), ("about", (*about).into())]))
+        .map(|preset| object(&[("name", preset.name.into()), ("about", preset.about.into())]))
         .collect()
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::options::{Method, PRESETS};
+use mrfgs::options::{Method, PRESETS, Preset};
 
 use crate::args::sizes::mebibytes;
 use crate::failure::{Failure, Result};
@@ -32,8 +32,8 @@ fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 /// The preset that `--method` names, if it names one.
-fn preset(word: &Path) -> Option<&'static str> {
-    PRESETS.iter().map(|(name, _)| *name).find(|name| word == Path::new(name))
+fn preset(word: &Path) -> Option<&'static Preset> {
+    PRESETS.iter().find(|preset| word == Path::new(preset.name))
 }
 
 impl MethodArgs {
@@ -46,16 +46,17 @@ impl MethodArgs {
     pub(crate) fn on(&self, base: &str) -> Result<Method> {
         let mut method = Method::preset(base)?;
         for (i, word) in self.method.iter().enumerate() {
-            if let Some(name) = preset(word) {
+            if let Some(preset) = preset(word) {
                 if i > 0 {
+                    let name = preset.name;
                     let reason = format!("the preset {name} would replace all keys before it; give it first");
                     return Err(Failure::Usage(format!("{}: {reason}", "--method")));
                 }
-                method = Method::preset(name)?;
+                method = preset.method();
             } else if word.extension().is_some_and(|extension| extension == "toml") || word.exists() {
                 method.load(word)?;
             } else {
-                let names: Vec<_> = PRESETS.iter().map(|(name, _)| *name).collect();
+                let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
                 let reason = format!(
                     "there is no preset `{}`, and no such file; give one of {}, or a TOML file",
                     word.display(),

@@ -1,11 +1,13 @@
 //! `mrfgs presets`.
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
-use mrfgs::options::{GROUPS, Key, Method, PRESETS, Takes, Word};
+use mrfgs::options::{GROUPS, Key, Method, PRESETS, Preset, Takes, Word};
+use serde::Serialize;
 
-use crate::console;
 use crate::failure::Result;
+use crate::outputs::files;
 use crate::table::Table;
 use crate::text::wrapped;
 
@@ -15,6 +17,7 @@ const WIDTH: usize = 100;
 const EXAMPLES: &str = "\
 Examples:
   mrfgs presets
+  mrfgs presets --all
   mrfgs presets default > mine.toml   # edit it, and give it to --method
   mrfgs match left.png right.png out.pfm --max-disparity 63 --method mine.toml";
 
@@ -22,22 +25,47 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Print this preset alone, as a TOML file with comments which --method takes
+    /// List also the options that only other readings of the paper turn
+    #[arg(long)]
+    all: bool,
+    /// Print this preset alone, with all its options, as a TOML file with comments which --method takes
     name: Option<String>,
+    /// Writes the presets as JSON; `-` prints it instead of the text
+    ///
+    /// It holds `presets`: for each one `name`, `about` and `method`, a table of values for each group.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// A preset in JSON.
+#[derive(Serialize)]
+struct Row {
+    name: &'static str,
+    about: &'static str,
+    method: Method,
+}
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct Findings {
+    presets: Vec<Row>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    Ok(console::print(&match &args.name {
-        Some(name) => file(name)?,
-        None => listing()?,
-    })?)
+    let (text, shown) = match &args.name {
+        Some(name) => (file(name)?, PRESETS.iter().filter(|preset| preset.name == name).collect()),
+        None => (listing(args.all), PRESETS.iter().collect::<Vec<_>>()),
+    };
+    let row = |preset: &Preset| Row { name: preset.name, about: preset.about, method: preset.method() };
+    let findings = Findings { presets: shown.into_iter().map(row).collect() };
+    files::deliver(args.json.as_deref(), &findings, &text, |_| Ok(()))
 }
 
 /// One preset as a TOML file.
 fn file(name: &str) -> Result<String> {
     let table = Method::preset(name)?.table();
     let mut out = String::new();
-    let about = PRESETS.iter().find(|p| p.0 == name).map_or("", |p| p.1);
+    let about = PRESETS.iter().find(|preset| preset.name == name).map_or("", |preset| preset.about);
     let _ = writeln!(out, "# The preset `{name}` of mrfgs {}: {about}.", env!("CARGO_PKG_VERSION"));
     for group in GROUPS {
         let _ = writeln!(out, "\n{}\n[{}]", wrapped(group.meaning, WIDTH, "# "), group.name);
@@ -49,22 +77,21 @@ fn file(name: &str) -> Result<String> {
     Ok(out)
 }
 
-/// All keys with the values of all presets.
-fn listing() -> Result<String> {
+/// The keys with the values of all presets; those of readings of the paper only where `all` are asked for.
+fn listing(all: bool) -> String {
     let mut presets = Table::new("ll");
-    for (name, about) in PRESETS {
-        presets.row([format!("{name} "), (*about).to_owned()]);
+    for preset in PRESETS {
+        presets.row([format!("{} ", preset.name), preset.about.to_owned()]);
     }
-    let values =
-        PRESETS.iter().map(|(name, _)| Ok(Method::preset(name)?.table())).collect::<Result<Vec<_>>>()?;
+    let values: Vec<_> = PRESETS.iter().map(|preset| preset.method().table()).collect();
     // One column for each preset.
     let mut table = Table::new(&"l".repeat(1 + PRESETS.len()));
     let cells =
         |key: &str, values: Vec<String>| std::iter::once(key.to_owned()).chain(values).collect::<Vec<_>>();
-    table.row(cells("key", PRESETS.iter().map(|p| p.0.to_owned()).collect()));
+    table.row(cells("key", PRESETS.iter().map(|preset| preset.name.to_owned()).collect()));
     for group in GROUPS {
         table.text(format!("\n[{}] {}", group.name, group.meaning));
-        for key in group.keys {
+        for key in group.keys.iter().filter(|key| all || !key.of_readings) {
             let name = key.name();
             let values = values.iter().map(|values| values[group.name][&name].to_string().replace('"', ""));
             table.text("");
@@ -72,7 +99,12 @@ fn listing() -> Result<String> {
             table.text(format!("{}{}", wrapped(&meaning(key), WIDTH, "    "), words(key, "      ")));
         }
     }
-    Ok(format!("{presets}\n{table}"))
+    let more = if all {
+        ""
+    } else {
+        "\n`mrfgs presets --all` lists what only other readings of the paper turn, too.\n"
+    };
+    format!("{presets}\n{table}{more}")
 }
 
 /// What a key does, where it comes from, and which numbers it takes; words have lines of their own.

@@ -34,7 +34,7 @@ use std::time::{Duration, Instant};
 
 use mrfgs::low_level::backend::gpu;
 use mrfgs::maps::REASONS;
-use mrfgs::options::{self, Method, Takes};
+use mrfgs::options::{self, Takes};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -347,18 +347,31 @@ fn the_later_word_counts() {
 #[test]
 fn presets_can_be_pasted_into_a_file() {
     let folder = Folder::new();
-    for (name, _) in options::PRESETS {
+    for preset in options::PRESETS {
+        let name = preset.name;
         let told = run(&folder, &["presets", name]).succeeded();
         let path = folder.join("pasted.toml");
         fs::write(&path, &told.stdout).unwrap();
-        for (other, _) in options::PRESETS {
-            let mut method = Method::preset(other).unwrap();
+        for other in options::PRESETS {
+            let mut method = other.method();
             method.load(&path).unwrap();
-            assert_eq!(method, Method::preset(name).unwrap(), "{name} over {other}");
+            assert_eq!(method, preset.method(), "{name} over {}", other.name);
         }
     }
-    let listing = run(&folder, &["presets"]).succeeded().stdout;
+    let told = run(&folder, &["presets", "--json", "-"]).succeeded().json();
+    let listed = told["presets"].as_array().unwrap();
+    assert_eq!(listed.len(), options::PRESETS.len());
+    for (row, preset) in listed.iter().zip(options::PRESETS) {
+        let expected =
+            serde_json::json!({"name": preset.name, "about": preset.about, "method": preset.method()});
+        assert_eq!(*row, expected);
+    }
+    let listing = run(&folder, &["presets", "--all"]).succeeded().stdout;
+    let short = run(&folder, &["presets"]).succeeded().stdout;
+    let names =
+        |text: &str, key: &options::Key| text.lines().any(|l| l.split(' ').next() == Some(&key.name()));
     for group in options::GROUPS {
+        assert!(group.keys.iter().all(|key| names(&short, key) != key.of_readings), "{}", group.name);
         assert!(listing.lines().any(|l| l.starts_with(&format!("[{}] ", group.name))), "{}", group.name);
         for key in group.keys {
             let mut lines = listing.lines().skip_while(|l| l.split(' ').next() != Some(&key.name()));
@@ -370,8 +383,8 @@ fn presets_can_be_pasted_into_a_file() {
                 about.join(" ").ends_with(&format!("[{key}]"))
             };
             assert!(range, "{about:?}");
-            for (name, _) in options::PRESETS {
-                let table = Method::preset(name).unwrap().table();
+            for preset in options::PRESETS {
+                let table = preset.method().table();
                 let value = table[group.name][key.name()].to_string().replace('"', "");
                 assert!(line.split_whitespace().any(|word| word == value), "{value} in {line}");
             }
