@@ -7,7 +7,7 @@ use crate::stage::Stage;
 #[must_use]
 pub fn first(program: Program) -> Program {
     let Program { mut frames, steps } = program;
-    let enter = steps.iter().position(|step| matches!(step, Step::Enter(_))).expect("a frame to match");
+    let enter = steps.iter().position(|step| matches!(step, Step::Enter(_))).unwrap_or(steps.len());
     let is_of_maps = |step: &Step| step.stage().is_some_and(Stage::is_of_maps);
     let end = steps.iter().position(is_of_maps).unwrap_or(steps.len());
     let mirrored = frames.len();

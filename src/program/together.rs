@@ -286,7 +286,7 @@ mod tests {
                 Step::Run(Run { stage: s, part: Some(part), .. }) if *s == stage => Some(part.sent),
                 _ => None,
             });
-            if first { parts.next().unwrap() } else { parts.last().unwrap() }
+            if first { parts.next().unwrap() } else { parts.next_back().unwrap() }
         };
         assert!(!sent(Stage::Dependency(0), true).dependency);
         assert!(sent(Stage::Belief(1), true).dependency && sent(Stage::Belief(1), true).below);

@@ -3,9 +3,9 @@
 //! Floor, a label: 6 bytes moved and asked for, 20 operations for four; beside that the graph: 8 bytes a pixel, and 4 a member.
 
 use super::buffers::Shared;
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
 use super::rows::{Binding, HALO, Rows, with_halo};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use std::ops::Range;

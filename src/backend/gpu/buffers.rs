@@ -278,10 +278,12 @@ impl Buffers {
         }
         levels.reverse();
         if plan.shares {
-            let mut volumes: Vec<_> = levels.iter().flat_map(LevelBuffers::dead_volumes).cloned().collect();
-            let mut seen = std::collections::HashSet::new();
-            volumes.retain(|buffer| seen.insert(buffer.clone()));
-            a.spare = volumes;
+            // Levels share buffers, and so do parts that take turns.
+            for buffer in levels.iter().flat_map(LevelBuffers::dead_volumes) {
+                if !a.spare.contains(buffer) {
+                    a.spare.push(buffer.clone());
+                }
+            }
         }
         let fine = levels[0].params;
         let whole = [0, fine.height];

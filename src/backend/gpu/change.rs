@@ -1,8 +1,8 @@
 //! How much the label map changed, and whether it has settled: see [`Stage::Change`](crate::backend::Stage::Change).
 
+use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::Binding;
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::Plan;
 

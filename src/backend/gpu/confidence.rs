@@ -1,7 +1,7 @@
 //! Confidence: see [`Stage::Confidence`](crate::backend::Stage::Confidence).
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 
 shader! {

@@ -3,9 +3,9 @@
 //! Floor: `census` moves 52 bytes a pixel at 2,500 operations, and asks for 2,000, the 63 places of the window in both images;
 //! `ad_census` moves 1 byte a label at 100 operations for four, and asks for 32, the right row once a label.
 
+use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::with_halo;
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::options::MatchingCost;
 use crate::plan::{

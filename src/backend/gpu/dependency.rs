@@ -4,9 +4,9 @@
 //! minimum), 50 operations for four labels.
 
 use super::buffers::Shared;
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
 use super::rows::{Binding, HALO, with_halo};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::graph::NO_MEMBER;
 use crate::plan::{GRAPH_WINDOW, TruncationRule};

@@ -2,9 +2,9 @@
 //!
 //! Floor, a label: 3 bytes moved, 4 asked for (the costs twice, for their minimum), 25 operations for four.
 
+use super::commands::Recorder;
 use super::cost;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::COST_FRACTION_BITS;
 

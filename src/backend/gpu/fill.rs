@@ -1,8 +1,8 @@
 //! Disparities for what is invalid: see [`Stage::Fill`](crate::backend::Stage::Fill).
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
 use super::rows::Binding;
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::options::Nearer;
 

@@ -1,6 +1,6 @@
 //! Planes through the disparities of filled pixels: see [`Stage::FillPlane`](crate::backend::Stage::FillPlane).
 
-use super::steps::Recorder;
+use super::commands::Recorder;
 use super::{Kernel, median, plane};
 use crate::error::Result;
 use crate::plan::Plan;

@@ -4,7 +4,7 @@
 //! shader of its own.
 
 use super::Kernel;
-use super::steps::Recorder;
+use super::commands::Recorder;
 use crate::error::Result;
 use crate::plan::Plan;
 

@@ -1,9 +1,9 @@
 //! The graph of a level: see [`Stage::Graph`](crate::backend::Stage::Graph).
 
 use super::buffers::Shared;
+use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::{Binding, HALO, with_halo};
-use super::steps::Recorder;
 use super::uniform::LevelParams;
 use crate::error::Result;
 use crate::graph::{NO_KEY, NO_MEMBER, RANK_BITS, by_distance, code, spatial_weight};

@@ -1,7 +1,7 @@
 //! Costs outside the label range of their pixel: see [`Stage::LabelRange`](crate::backend::Stage::LabelRange).
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::{COST_FRACTION_BITS, COST_MAX};
 

@@ -2,9 +2,9 @@
 //!
 //! Windows that hold all labels are there from the start.
 
+use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::{HALO, with_halo};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::{LABEL_BLOCK, Plan, WINDOW_MARGIN, WINDOW_REACH, WINDOW_RUN, WINDOW_SLACK, WINDOW_STEP};
 

@@ -1,7 +1,7 @@
 //! What the right view says of each pixel: see [`Stage::LeftRightCheck`](crate::backend::Stage::LeftRightCheck).
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::options::LeftRightCheck;
 use crate::stage::NO_LABEL;

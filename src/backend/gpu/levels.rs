@@ -1,7 +1,7 @@
 //! Which stages can go over several levels in one dispatch, where these share buffers.
 
 use super::buffers::Shared;
-use super::steps::Recorder;
+use super::commands::Recorder;
 use super::{belief, dependency, graph, resolution};
 use crate::backend::Stage;
 use crate::error::Result;

@@ -2,10 +2,10 @@
 //!
 //! Floor, a pixel: 28 bytes moved; in each of up to nine passes 3,000 bytes asked for (the 105 places) and 2,500 operations.
 
+use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::{Binding, with_halo};
 use super::shader::Shader;
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::options::Median;
 use crate::weights::MedianWeights;

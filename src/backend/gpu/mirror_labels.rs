@@ -1,7 +1,7 @@
 //! The labels of the mirrored pair: see [`Stage::MirrorLabels`](crate::backend::Stage::MirrorLabels).
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 
 shader! {

@@ -11,16 +11,16 @@
 mod adapters;
 mod allocator;
 mod buffers;
+mod commands;
 mod convergence;
 mod device;
+mod fit;
 mod kernel;
 mod levels;
 mod probe;
 mod queue;
 mod rows;
 mod shader;
-mod steps;
-mod streaming;
 mod timer;
 mod uniform;
 mod upload;
@@ -41,6 +41,7 @@ pub use adapters::{DeviceInfo, has_automatic_async, may_have_gpu};
 #[cfg(not(target_arch = "wasm32"))]
 pub use adapters::{devices, has_automatic};
 use buffers::{Buffers, LevelBuffers};
+use commands::{Command, Pipelines, Recorder};
 use convergence::Convergence;
 use device::Device;
 pub use device::FaultInjection;
@@ -52,7 +53,6 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
-use steps::{Pipelines, Recorder, Step};
 use timer::Timer;
 pub use uniform::UniformLayout;
 use words::{image_words, label_range_words, narrow_words};
@@ -115,16 +115,16 @@ pub struct Gpu {
     requests: Requests<RequestedMaps>,
 }
 
-/// The steps of each run.
-type Steps = HashMap<Run, Arc<[Step]>>;
+/// The commands of each run.
+type Commands = HashMap<Run, Arc<[Command]>>;
 
 /// Everything that belongs to one plan.
 struct State {
     plan: Plan,
     buffers: Buffers,
-    steps: Steps,
+    commands: Commands,
     /// Those of [`upload`].
-    upload: Arc<[Step]>,
+    upload: Arc<[Command]>,
     /// Words of an image on their way up.
     words: Vec<u32>,
 }
@@ -133,7 +133,7 @@ impl Gpu {
     /// Opens the device that `wanted` names, by its index or a part of its name, or the best there is.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Option`] when no device has
+    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Execution`] when no device has
     /// that name.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn new(wanted: Option<&str>) -> Result<Self> {
@@ -152,7 +152,7 @@ impl Gpu {
     /// As `with_faults`, for a browser.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Option`] when no device has
+    /// [`crate::Error::Device`] when there is no driver or the device cannot be opened, [`crate::Error::Execution`] when no device has
     /// that name.
     pub async fn open_async(wanted: Option<&str>, faults: FaultInjection) -> Result<Self> {
         Ok(Self {
@@ -167,9 +167,9 @@ impl Gpu {
         })
     }
 
-    /// The steps of all stages, at single levels and where these share buffers at several together.
-    fn all_steps(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Steps> {
-        let mut steps = HashMap::new();
+    /// The commands of all stages, at single levels and where these share buffers at several together.
+    fn all_commands(&mut self, plan: &Plan, buffers: &mut Buffers) -> Result<Commands> {
+        let mut commands = HashMap::new();
         let mut endings = Vec::new();
         let runs_whole = |stage: &Stage| plan.holds_all_rows() || !stage.needs_level_0(plan);
         for stage in Stage::all(plan).into_iter().filter(|s| *s != Stage::Change).filter(runs_whole) {
@@ -185,22 +185,22 @@ impl Gpu {
             for levels in 1..=most {
                 let run = Run { levels, ..stage.into() };
                 let recorded = self.recorded(&run, plan, buffers, ends.then_some(&mut endings))?;
-                steps.insert(run, recorded);
+                commands.insert(run, recorded);
             }
         }
         // This stage makes the dispatches of messages empty: it comes when these are known.
         buffers.end_when_settled(&mut self.device, &endings)?;
-        Ok(steps)
+        Ok(commands)
     }
 
-    /// The steps of `run`.
+    /// The commands of `run`.
     fn recorded(
         &mut self,
         run: &Run,
         plan: &Plan,
         buffers: &Buffers,
         endings: Option<&mut Vec<[u32; 3]>>,
-    ) -> Result<Arc<[Step]>> {
+    ) -> Result<Arc<[Command]>> {
         let level = run.stage.level().unwrap_or(0);
         self.recorded_at(level, plan, buffers, endings, |recorder| {
             recorder.only = run.part.as_ref().map(|part| part.rows.start as u32..part.rows.end as u32);
@@ -213,7 +213,7 @@ impl Gpu {
         })
     }
 
-    /// The steps that `record` records at `level`.
+    /// The commands that `record` records at `level`.
     fn recorded_at<'a>(
         &'a mut self,
         level: usize,
@@ -221,12 +221,12 @@ impl Gpu {
         buffers: &'a Buffers,
         endings: Option<&'a mut Vec<[u32; 3]>>,
         record: impl FnOnce(&mut Recorder<'a>) -> Result<()>,
-    ) -> Result<Arc<[Step]>> {
+    ) -> Result<Arc<[Command]>> {
         let Self { device, pipelines, .. } = self;
         let mut recorder =
-            Recorder { device, pipelines, plan, buffers, level, only: None, endings, steps: Vec::new() };
+            Recorder { device, pipelines, plan, buffers, level, only: None, endings, commands: Vec::new() };
         record(&mut recorder)?;
-        Ok(recorder.steps.into())
+        Ok(recorder.commands.into())
     }
 
     fn state(&self) -> &State {
@@ -340,7 +340,7 @@ impl Backend for Gpu {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
                     state.plan = plan.clone();
-                    state.steps.retain(|run, _| run.stage != Stage::RightView);
+                    state.commands.retain(|run, _| run.stage != Stage::RightView);
                 }
                 state
             }
@@ -351,11 +351,11 @@ impl Backend for Gpu {
                     memory::check(plan.bytes(), Purpose::Match)?;
                 }
                 let mut buffers = Buffers::new(&mut self.device, plan)?;
-                let steps = self.all_steps(plan, &mut buffers)?;
+                let commands = self.all_commands(plan, &mut buffers)?;
                 let upload =
                     self.recorded_at(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
                 let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
-                State { plan: plan.clone(), buffers, steps, upload, words: vec![0; words] }
+                State { plan: plan.clone(), buffers, commands, upload, words: vec![0; words] }
             }
         };
         self.load(&mut state, &prepared)?;
@@ -382,12 +382,12 @@ impl Backend for Gpu {
             }
             return parts.iter().try_for_each(|part| self.perform(part));
         }
-        let steps = self.steps_of(run)?;
+        let commands = self.commands_of(run)?;
         (0..run.levels).for_each(|_| self.device.count_stage());
         if let Some(timer) = &mut self.timer {
             timer.begin(run.stage);
         }
-        self.record(&steps)
+        self.record(&commands)
     }
 
     fn keep_up(&mut self) -> Promise<'_, ()> {

@@ -2,8 +2,8 @@
 //!
 //! Floor, a pixel: that of the median, and in each of two rounds 1,500 bytes asked for (53 places) and 2,500 operations.
 
+use super::commands::Recorder;
 use super::shader::Shader;
-use super::steps::Recorder;
 use super::{Kernel, median};
 use crate::error::Result;
 use crate::plan::Plan;

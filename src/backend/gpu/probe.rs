@@ -106,11 +106,11 @@ impl Probe for Gpu {
             }
         }
         here.members.write(&mut self.device, &words)?;
-        let steps = self.recorded_at(level, &state.plan, &state.buffers, None, |recorder| {
+        let commands = self.recorded_at(level, &state.plan, &state.buffers, None, |recorder| {
             graph::record_transposed(recorder)
         })?;
         self.state = Some(state);
-        self.record(&steps)
+        self.record(&commands)
     }
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {

@@ -2,10 +2,10 @@
 //!
 //! Floor, for a fine label of level 1: 1 + 2/8 bytes moved, 31 asked for (the 5 x 5 window), 100 operations for four labels.
 
+use super::commands::Recorder;
 use super::cost;
 use super::kernel::{Kernel, shader};
 use super::rows::with_halo;
-use super::steps::Recorder;
 use super::uniform::LevelParams;
 use crate::error::Result;
 

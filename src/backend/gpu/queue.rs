@@ -1,7 +1,7 @@
-//! Puts commands in the queue of the device: records the steps of stages, submits them, and asks for what they leave.
+//! Puts commands in the queue of the device: records the commands of stages, submits them, and asks for what they leave.
 
+use super::commands::{Command, Groups};
 use super::rows::Rows;
-use super::steps::{Groups, Step};
 use super::timer::{PASSES_PER_SUBMIT, Timer};
 use super::{Gpu, device};
 use crate::error::Result;
@@ -22,21 +22,21 @@ impl Gpu {
         Ok(self.encoder.as_mut().expect("just made"))
     }
 
-    /// Records steps, and submits whenever enough is recorded.
-    pub(super) fn record(&mut self, steps: &[Step]) -> Result<()> {
-        let mut rest = steps;
+    /// Records commands, and submits whenever enough is recorded.
+    pub(super) fn record(&mut self, commands: &[Command]) -> Result<()> {
+        let mut rest = commands;
         while let Some(first) = rest.first() {
             let mut recorded = 1;
             match first {
-                Step::Copy(copy) => {
+                Command::Copy(copy) => {
                     let (from, to) = (&copy.from, &copy.to);
                     self.encoder()?.copy_buffer_to_buffer(&from.0, from.1, &to.0, to.1, copy.bytes);
                 }
-                Step::Clear(buffer, bytes) => {
+                Command::Clear(buffer, bytes) => {
                     let size = bytes.end - bytes.start;
                     self.encoder()?.clear_buffer(buffer, bytes.start, Some(size));
                 }
-                Step::Dispatch(_) => {
+                Command::Dispatch(_) => {
                     let mut timer = self.timer.take();
                     let writes = timer.as_mut().and_then(Timer::pass);
                     let (mut work, most) = (self.work, self.device.work_per_submit);
@@ -47,7 +47,7 @@ impl Gpu {
                             timestamp_writes: writes,
                         });
                         recorded = 0;
-                        while let Some(Step::Dispatch(dispatch)) = rest.get(recorded) {
+                        while let Some(Command::Dispatch(dispatch)) = rest.get(recorded) {
                             pass.set_pipeline(&dispatch.pipeline);
                             pass.set_bind_group(0, &dispatch.bind_group, &[]);
                             match &dispatch.groups {

@@ -4,9 +4,9 @@
 //! for four labels.
 
 use super::buffers::Shared;
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
 use super::rows::Binding;
-use super::steps::Recorder;
 use super::uniform::LevelParams;
 use crate::error::Result;
 use crate::plan::TruncationRule;

@@ -2,8 +2,8 @@
 //!
 //! Floor, a label: 1 byte moved, 4 asked for (words of four labels of which it wants one), 20 operations for four.
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 
 shader! {

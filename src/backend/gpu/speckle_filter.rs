@@ -2,9 +2,9 @@
 //!
 //! Regions are found anew in every band, among its rows and so many around it that a region which leaves them is large enough.
 
+use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::{Rows, with_halo};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::plan::Plan;
 use std::ops::Range;

@@ -1,9 +1,9 @@
 //! Disparities between the labels: see [`Stage::SubPixel`](crate::backend::Stage::SubPixel).
 
+use super::commands::Recorder;
 use super::cost;
 use super::kernel::{Kernel, shader};
 use super::rows::with_halo;
-use super::steps::Recorder;
 use crate::error::Result;
 
 shader! {

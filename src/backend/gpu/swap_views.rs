@@ -2,8 +2,8 @@
 //!
 //! Floor: 88 bytes moved and asked for a pixel.
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::stage::NO_RUNNER_UP;
 

@@ -1,7 +1,7 @@
 //! The pair on its way to the device: images of whole 8-bit levels go up in one word a pixel, and the device takes these apart.
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 
 shader! {

@@ -2,9 +2,9 @@
 //!
 //! The sums of a band of half-size rows are there at a time, with those of the rows around it that its columns reach.
 
+use super::commands::{Command, Recorder};
 use super::kernel::{Bindings, Kernel, shader};
 use super::rows::{Binding, with_halo};
-use super::steps::{Recorder, Step};
 use crate::error::Result;
 use crate::options::Nearer;
 use crate::plan::votes::{
@@ -62,7 +62,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         ..Uniform::default()
     };
     let shown = &b.spare_flags;
-    r.steps.extend(shown.held().map(|(buffer, bytes)| Step::Clear(buffer.clone(), bytes)));
+    r.commands.extend(shown.held().map(|(buffer, bytes)| Command::Clear(buffer.clone(), bytes)));
     r.rows(&show(plan, 0), &own, l.width, |rows| Show {
         flags: b.flags.bind(rows),
         optima: b.optima.bind(rows),

@@ -2,8 +2,8 @@
 //!
 //! Floor, a label: 1 byte moved, 2 asked for (the beliefs again, for the runner-up), 15 operations for four.
 
+use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::steps::Recorder;
 use crate::error::Result;
 use crate::stage::NO_RUNNER_UP;
 

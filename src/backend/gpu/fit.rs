@@ -1,6 +1,6 @@
-//! How a list goes on a device: which rows of level 0 it holds, and the steps of each run.
+//! How a list goes on a device: which rows of level 0 it holds, and the commands of each run.
 
-use super::{Gpu, Step};
+use super::{Command, Gpu};
 use crate::error::{Purpose, Result};
 use crate::memory;
 use crate::plan::Plan;
@@ -23,17 +23,17 @@ impl Gpu {
                 && (!self.device.software || memory::check(bytes, Purpose::Match).is_ok())
     }
 
-    /// The steps of `run`, recorded on first use.
-    pub(super) fn steps_of(&mut self, run: &Run) -> Result<Arc<[Step]>> {
+    /// The commands of `run`, recorded on first use.
+    pub(super) fn commands_of(&mut self, run: &Run) -> Result<Arc<[Command]>> {
         let mut state = self.state.take().expect("prepare comes before every stage");
-        let steps = match state.steps.get(run) {
-            Some(steps) => Ok(Arc::clone(steps)),
+        let commands = match state.commands.get(run) {
+            Some(commands) => Ok(Arc::clone(commands)),
             None => self.recorded(run, &state.plan, &state.buffers, None),
         };
-        if let Ok(steps) = &steps {
-            state.steps.entry(run.clone()).or_insert_with(|| Arc::clone(steps));
+        if let Ok(commands) = &commands {
+            state.commands.entry(run.clone()).or_insert_with(|| Arc::clone(commands));
         }
         self.state = Some(state);
-        steps
+        commands
     }
 }

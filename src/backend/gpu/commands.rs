@@ -12,7 +12,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
 /// The commands of a stage, in order.
-pub(super) enum Step {
+pub(super) enum Command {
     Dispatch(Dispatch),
     Copy(Copy),
     /// Makes a range of bytes 0.
@@ -68,7 +68,7 @@ pub(super) struct Recorder<'a> {
     pub(super) only: Option<Range<u32>>,
     /// Where the workgroups of dispatches go that end when the label map has settled.
     pub(super) endings: Option<&'a mut Vec<[u32; 3]>>,
-    pub(super) steps: Vec<Step>,
+    pub(super) commands: Vec<Command>,
 }
 
 impl<'a> Recorder<'a> {
@@ -125,7 +125,7 @@ impl<'a> Recorder<'a> {
 
     /// Records a copy.
     pub(super) fn copies(&mut self, copies: impl IntoIterator<Item = Copy>) {
-        self.steps.extend(copies.into_iter().map(Step::Copy));
+        self.commands.extend(copies.into_iter().map(Command::Copy));
     }
 
     /// The rows to record.
@@ -141,7 +141,8 @@ impl<'a> Recorder<'a> {
     /// Makes the rows of `volume` 0, halos included.
     pub(super) fn clear(&mut self, volume: &Rows) {
         let rows = self.own_rows();
-        self.steps.extend(volume.within(&rows).map(|(buffer, bytes)| Step::Clear(buffer.clone(), bytes)));
+        self.commands
+            .extend(volume.within(&rows).map(|(buffer, bytes)| Command::Clear(buffer.clone(), bytes)));
         self.renew(volume);
     }
 
@@ -293,7 +294,7 @@ impl<'a> Recorder<'a> {
                 Groups::UntilSettled(endings.len() - 1)
             }
         };
-        self.steps.push(Step::Dispatch(Dispatch {
+        self.commands.push(Command::Dispatch(Dispatch {
             pipeline: pipeline.inner,
             bind_group,
             groups,
