@@ -207,10 +207,10 @@ fn computes_nothing() {
     let (pair, range) = scene();
     // It does not even report an error.
     assert!(on(&mut gpu().unwrap(), &pair, range).unwrap().maps != expected(&pair, range));
-    assert_falls_back(gpu(), "test pair");
+    assert_falls_back(gpu(), "self-test");
     let mut matcher = Matcher::on(gpu(), false, &Execution::default()).unwrap();
     let error = run(&mut matcher, &pair, range).unwrap_err();
-    assert!(matches!(&error, Error::Device(e) if says(e, "test pair")), "{error}");
+    assert!(matches!(&error, Error::Device(e) if says(e, "self-test")), "{error}");
 }
 
 /// Times are recorded with and without timestamps on the device, and add up to more than 0.

@@ -1,0 +1,33 @@
+//! From plan and tiles to the list: the schedule, and the passes for what is computed.
+
+use super::tiles::Tiles;
+use super::{Frame, Program, double_size, right_view, schedule, second_match, tiled};
+use crate::error::Result;
+use crate::options::LeftRightCheck;
+
+impl Program {
+    /// The match of an image that is cut into `tiles`, and at twice its size where its method asks for it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Range`] and [`crate::Error::Budget`] when the match at twice the size does not fit.
+    pub fn new(tiles: &Tiles) -> Result<Self> {
+        let own = Self::at_one_size(tiles);
+        match tiles.whole().doubled()? {
+            Some(double) => Ok(double_size::follow(own, Self::at_one_size(&Tiles::new(&double)?))),
+            None => Ok(own),
+        }
+    }
+
+    fn at_one_size(tiles: &Tiles) -> Self {
+        let whole = tiles.whole();
+        let refinement = &whole.method.refinement;
+        let mut program = Self { frames: vec![Frame::whole(whole)], steps: schedule::steps(whole) };
+        if refinement.left_right_check == LeftRightCheck::SecondMatch {
+            program = second_match::first(program);
+        }
+        if refinement.right_map {
+            program.steps = right_view::follow(program.steps);
+        }
+        if tiles.count() > 1 { tiled::cut(&program, tiles) } else { program }
+    }
+}
