@@ -182,6 +182,7 @@ mod tests {
             ("evaluate submission", 9),
             ("bench", 10),
             ("inspect", 12),
+            ("presets", 2),
         ];
         let program = Cli::command();
         let count =
