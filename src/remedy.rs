@@ -35,6 +35,8 @@ pub struct Words {
     pub threads: &'static str,
     /// The memory that is granted to a match, and the unit that follows its number.
     pub memory: Option<[&'static str; 2]>,
+    /// What asks for the steps of a match.
+    pub steps: Option<&'static str>,
     /// What to do about pixels that are no image.
     pub mask: Option<&'static str>,
     /// The maximum of pixels.
@@ -60,6 +62,7 @@ impl Words {
         driver: ["install the driver of the GPU", "update its driver"],
         threads: "threads",
         memory: None,
+        steps: None,
         mask: None,
         max_pixels: None,
         truth_scale: None,
@@ -150,7 +153,10 @@ impl Words {
             BudgetError::NoTileFits { needed, .. } => {
                 format!("{memory}: {cause}; give at least {needed}{unit}, or a smaller image or range")
             }
-            BudgetError::Steps { needed } => format!("{cause}; give {memory} {needed}{unit}"),
+            BudgetError::Steps { needed } => {
+                let steps = self.steps.map_or_else(String::new, |steps| format!("{steps}: "));
+                format!("{steps}{cause}; give {memory} {needed}{unit}")
+            }
         }
     }
 

@@ -15,6 +15,7 @@ pub(crate) const FLAGS: Words = Words {
     driver: ["install the driver of the GPU, or a software one (Mesa's lavapipe)", "update its driver"],
     threads: "--threads",
     memory: Some(["--memory", "MiB"]),
+    steps: Some("DIR"),
     mask: Some("--mask what is no image"),
     max_pixels: Some("--max-pixels"),
     truth_scale: Some("--truth-scale"),
@@ -96,7 +97,7 @@ mod tests {
             (ExecutionError::NoThreads.into(), "--threads ... at least 1"),
             (ExecutionError::Threads("limit".into()).into(), "--threads ... limit"),
             (too_small.into(), "--memory: 1 MiB ... give at least 7MiB"),
-            (BudgetError::Steps { needed: 70 }.into(), "show its steps ... --memory 70MiB"),
+            (BudgetError::Steps { needed: 70 }.into(), "DIR: ... show its steps ... --memory 70MiB"),
             (
                 read(ReadError::TooManyPixels { width: 9, height: 9, limit: 5 }),
                 "a.png ... raise --max-pixels",
