@@ -1,6 +1,6 @@
 //! The maps that a match leaves behind, and what a pixel of them means.
 
-use crate::image::Plane;
+use crate::image::{Plane, Rect};
 
 /// Fixed-point units of disparity in one pixel.
 pub const FRACTION: i32 = 256;
@@ -72,6 +72,24 @@ pub fn has_disparity(validity: u8) -> bool {
 }
 
 impl Maps {
+    /// The part of (width, height) from the top left.
+    pub(crate) fn cut_to(self, size: (usize, usize)) -> Self {
+        if self.disparity.size() == size {
+            return self;
+        }
+        let part = Rect::whole(size);
+        Self {
+            disparity: self.disparity.crop(&part),
+            raw: self.raw.crop(&part),
+            confidence: self.confidence.crop(&part),
+            validity: self.validity.crop(&part),
+            right: self.right.map(|right| RightMap {
+                disparity: right.disparity.crop(&part),
+                validity: right.validity.crop(&part),
+            }),
+        }
+    }
+
     /// The final map in pixels, `+inf` where there is none.
     #[must_use]
     pub fn final_map(&self) -> Plane<f32> {

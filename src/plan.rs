@@ -16,7 +16,7 @@ pub mod votes;
 
 use crate::error::Result;
 use crate::options::{
-    Agreement, DisparityRange, LeftRightCheck, MatchingCost, Method, Order, Potential, Pyramid,
+    Agreement, DisparityRange, LeftRightCheck, MatchSize, MatchingCost, Method, Order, Potential, Pyramid,
 };
 use std::ops::Range;
 
@@ -125,13 +125,24 @@ pub struct Phase {
     pub iterations: u32,
 }
 
+/// What is searched in a pair at its full size, where it is matched at half of that.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FullSize {
+    /// (width, height) of both views, in pixels.
+    pub size: (usize, usize),
+    /// The disparities to search, in pixels.
+    pub range: DisparityRange,
+}
+
 /// Everything about a match that is known before it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// The method.
     pub method: Method,
-    /// The disparities to search.
+    /// The disparities to search, at the size of the finest level.
     pub range: DisparityRange,
+    /// The size of the pair and its range, where the finest level has half of that.
+    pub full: Option<FullSize>,
     /// All levels, finest first.
     pub levels: Vec<LevelPlan>,
     /// Neighbours of a dependency factor besides its centre.
@@ -159,12 +170,19 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for images of `width` x `height` pixels.
+    /// The plan for images of `width` x `height` pixels. Where the method matches at half their size, that of the levels is half.
     ///
     /// # Errors
     /// [`crate::Error::Option`] when an option of the method is out of range.
     pub fn new(width: usize, height: usize, range: DisparityRange, method: &Method) -> Result<Self> {
         let method = method.clone().validated()?;
+        let halves = method.schedule.match_size == MatchSize::Half;
+        let full = halves.then_some(FullSize { size: (width, height), range });
+        let (width, height, range) = if halves {
+            (width.div_ceil(2), height.div_ceil(2), range.halved())
+        } else {
+            (width, height, range)
+        };
         let cost_units = method.cost.matching.facts().units;
         let mut levels = Vec::new();
         let mut gain = 1.0;
@@ -225,6 +243,7 @@ impl Plan {
         Ok(Self {
             outside_cost: (method.cost.outside_cost * cost_units + 0.5).floor() as u8,
             range,
+            full,
             levels,
             neighbours,
             dependency,
@@ -249,9 +268,16 @@ impl Plan {
         Self::new(2 * width, 2 * height, self.range.doubled()?, &method).map(Some)
     }
 
-    /// This plan for another image size: same range, method and number of levels.
+    /// (width, height) of the pair, and the disparities to search in it.
+    #[must_use]
+    pub fn of_pair(&self) -> FullSize {
+        self.full.unwrap_or(FullSize { size: self.size(), range: self.range })
+    }
+
+    /// This plan for another size of the finest level: same range, method and number of levels.
     pub(crate) fn resized(&self, width: usize, height: usize) -> Self {
-        let mut plan = Self { core: 0..width, held: height, ..self.clone() };
+        let full = self.full.map(|full| FullSize { size: (2 * width, 2 * height), ..full });
+        let mut plan = Self { core: 0..width, held: height, full, ..self.clone() };
         let mut size = (width, height);
         for level in &mut plan.levels {
             (level.width, level.height) = size;

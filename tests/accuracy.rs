@@ -145,7 +145,7 @@ fn folder_of_pairs() -> Option<String> {
     folder
 }
 
-/// The preset `fast` is a little worse than the default, and no more; `accurate` is better, above all within a pixel.
+/// The preset `fast`, at half the size, loses two points of bad2.0, and no more; `accurate` is better than the default, above all within a pixel.
 #[test]
 fn fast_and_accurate_on_real_pairs() {
     let Some(folder) = folder_of_pairs() else { return };
@@ -162,7 +162,7 @@ fn fast_and_accurate_on_real_pairs() {
         found
     };
     let [fast, default, accurate] = ["fast", "default", "accurate"].map(means);
-    assert!(fast[2] < 5.6 && default[0] < fast[0]);
+    assert!(fast[0] < 0.83 && fast[2] < 7.4 && default[0] < fast[0]);
     assert!(accurate[0] < 0.63 && accurate[1] < 14.0 && accurate[2] < 5.4);
     assert!(accurate.iter().zip(default).all(|(accurate, default)| *accurate < default));
 }

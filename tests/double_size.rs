@@ -10,7 +10,7 @@ use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::maps::{Maps, flag, has_disparity};
-use mrfgs::options::{DisparityRange, Fill, LeftRightCheck};
+use mrfgs::options::{DisparityRange, Fill, LeftRightCheck, MatchSize};
 use mrfgs::{Error, Matcher, Method};
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ fn accurate() -> Method {
 /// The method for the pair of its own size, and that for the pair at twice its size.
 fn both(method: &Method) -> [Method; 2] {
     let mut own = method.clone();
-    own.refinement.double_size = false;
+    own.schedule.match_size = MatchSize::Full;
     let mut double = own.clone();
     for key in ["level-rows", "equal-sharpness", "denoise"] {
         double.set(key, "false").unwrap();

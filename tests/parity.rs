@@ -14,7 +14,7 @@ use mrfgs::low_level::backend::{Backend, Stage, Volume};
 use mrfgs::low_level::engine::Solution;
 use mrfgs::low_level::front::Prepared;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::options::{DisparityRange, Method, PRESETS};
+use mrfgs::options::{DisparityRange, MatchSize, Method, PRESETS};
 use mrfgs::{Conditioning, Error};
 use pollster::block_on;
 use std::io::Write;
@@ -51,7 +51,7 @@ fn differences(a: &Solution, b: &Solution) -> Vec<&'static str> {
 
 /// Presets whose matches are at the pair's own size alone. At twice the size a match needs more of a device.
 fn presets_at_one_size() -> impl Iterator<Item = &'static str> {
-    let all = PRESETS.iter().filter(|preset| !preset.method().refinement.double_size);
+    let all = PRESETS.iter().filter(|preset| preset.method().schedule.match_size != MatchSize::Double);
     all.map(|preset| preset.name)
 }
 

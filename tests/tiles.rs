@@ -16,7 +16,7 @@ use mrfgs::low_level::program::tiles::{OVERLAP, Tiles};
 use mrfgs::low_level::program::together::streamed;
 use mrfgs::low_level::watch::Progress;
 use mrfgs::maps::{Maps, has_disparity};
-use mrfgs::options::{DisparityRange, LeftRightCheck, Method, PRESETS};
+use mrfgs::options::{DisparityRange, LeftRightCheck, MatchSize, Method, PRESETS};
 use mrfgs::{Error, Matcher};
 use std::ops::{ControlFlow, Range};
 use std::path::Path;
@@ -60,10 +60,14 @@ fn check(tiles: &Tiles, overlap: usize) -> Result<(), String> {
         ensure(holds(&crop.y, &core.y, overlap, overlap, height), "the overlap above and below")?;
         ensure(holds(&crop.x, &core.x, overlap + left, overlap + right, width), "overlap and matches")?;
         ensure(bytes(&tile.plan) <= memory, "each tile within the memory")?;
-        let (w, h) = crop.size();
+        // Of a pair that is matched at half its size, a crop has twice the size of what is matched.
+        let scale = if whole.full.is_some() { 2 } else { 1 };
+        let of_pair = whole.of_pair();
+        let in_one_piece = tiles.count() == 1;
+        let (w, h) = if in_one_piece { of_pair.size } else { (scale * crop.size().0, scale * crop.size().1) };
         let mut expected = Plan {
             core: core.x.start - crop.x.start..core.x.end - crop.x.start,
-            ..Plan::new(w, h, range, &whole.method).unwrap()
+            ..Plan::new(w, h, of_pair.range, &whole.method).unwrap()
         };
         if tiles.count() > 1 {
             let pairs = whole.pair_bytes() + whole.conditioning_bytes();
@@ -174,8 +178,8 @@ fn difference(a: &Maps, b: &Maps) -> f64 {
 fn every_backend_leaves_the_same_maps() {
     let Some(mut gpu) = devices::gpu() else { return };
     let (pair, range) = load(Path::new("testdata/thin"));
-    // At twice the size there are other tiles; `double_size.rs` has a test of these.
-    for preset in PRESETS.iter().filter(|preset| !preset.method().refinement.double_size) {
+    // At other sizes there are other tiles; `double_size.rs` and `half_size.rs` have tests of these.
+    for preset in PRESETS.iter().filter(|preset| preset.method().schedule.match_size == MatchSize::Full) {
         let (preset, method) = (preset.name, preset.method());
         let whole = plan(pair.size(), range, &method, 4096);
         let plan = plan(pair.size(), range, &method, (streamed(&whole).bytes() >> 20) as u32 * 3 / 4);

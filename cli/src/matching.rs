@@ -37,7 +37,7 @@ pub(crate) fn run(
         if let Some(note) = &matched.note {
             console::say(&remedy::error(note, &remedy::FLAGS));
         }
-        let (width, height) = matched.plan.size();
+        let (width, height) = matched.maps.disparity.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
         let (labels, iterations) = (range.labels(), matched.iterations);
         let tiles = match matched.tiles.count() {

@@ -38,7 +38,7 @@ pub(crate) struct PyMatched {
 
 impl PyMatched {
     pub(crate) fn of(py: Python, matched: Matched) -> PyResult<Self> {
-        let range = matched.plan.range;
+        let range = matched.range();
         let right = matched.maps.right_map().map(|map| arrays::map(py, map)).transpose()?;
         Ok(Self {
             right: right.map(Bound::unbind),

@@ -107,6 +107,8 @@ pub struct Match {
     /// The frame that was entered last, and whether what the backend did for it is still to be counted.
     frame: usize,
     is_counted: bool,
+    /// The frame of the whole image.
+    whole: usize,
     /// Iterations of the frame, and the most of any at this size.
     iterations: u32,
     most_iterations: u32,
@@ -146,6 +148,7 @@ impl Match {
             part: None,
             frame: 0,
             is_counted: true,
+            whole: 0,
             iterations: 0,
             most_iterations: 0,
             doubled: false,
@@ -223,12 +226,16 @@ impl Match {
                 self.solution.iterations = std::mem::take(&mut self.most_iterations);
             }
             Step::Mosaic(frame) => {
+                self.whole = frame;
                 self.mosaic = Some(Mosaic::new(&self.program.frames[frame].plan, self.pair())?);
             }
             Step::Enter(frame) => {
                 self.leave(backend);
                 self.frame = frame;
                 let frame = &self.program.frames[frame];
+                if frame.tile.is_none() {
+                    self.whole = self.frame;
+                }
                 watch.followed.tile = frame.tile;
                 let pair = part(self.pair(), frame)?;
                 backend.release();
@@ -294,7 +301,7 @@ impl Match {
                 let target = self.target(backend);
                 target.wait().await?;
                 let (maps, idle) = watch.host_async("download", collect(target, tickets)).await?;
-                self.found = Some(maps);
+                self.found = Some(maps.cut_to(self.program.frames[self.whole].plan.of_pair().size));
                 if let Some((mut cpu, _)) = self.gathered.take() {
                     self.solution.mosaic_times.extend(cpu.times().await?);
                 } else {

@@ -37,7 +37,7 @@ impl Mosaic {
         let maps = MapSet {
             right: Plane::filled(width, height, NO_LABEL),
             right_best: Plane::filled(width, height, u16::MAX),
-            ..MapSet::new((width, height))
+            ..MapSet::new(plan)
         };
         let wanted = plan.method.refinement.right_map;
         let right_raw = if wanted { Plane::filled(width, height, 0) } else { Plane::filled(0, 0, 0) };

@@ -63,6 +63,11 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
 }
 
 impl Conditioning {
+    /// The same of a pair at twice the size.
+    pub(super) fn doubled(&self) -> Self {
+        Self { offset: 2 * self.offset, smoothing: self.smoothing.map(|sigma| 2.0 * sigma) }
+    }
+
     /// The pair without what was found in it.
     pub(super) fn apply(&self, pair: &Pair) -> Pair {
         let level =

@@ -45,16 +45,24 @@ impl Prepared {
     }
 }
 
-/// The pair that is matched by `plan` in the place of `pair`, and what was corrected in it.
+/// The pair that is matched by `plan` in the place of `pair`, and what was corrected in that. Where the pair is matched at half its
+/// size, its faults are measured there.
 ///
 /// # Errors
 /// [`Error::Memory`] when the machine cannot hold it, and [`Error::Interrupted`] when the observer breaks.
 pub fn condition(pair: &Pair, plan: &Plan, watch: &mut Watch) -> Result<(Pair, Conditioning)> {
+    memory::check(plan.halving_bytes() + 3 * plan.conditioning_bytes(), Purpose::Match)?;
+    let halved = plan.full.is_some();
+    let pair = if halved { watch.host("half_size", || Ok(pair.halved()))? } else { pair.clone() };
     if plan.conditioning_bytes() == 0 {
-        return Ok((pair.clone(), Conditioning::default()));
+        return Ok((pair, Conditioning::default()));
     }
-    memory::check(3 * plan.conditioning_bytes(), Purpose::Match)?;
-    watch.host("conditioning", || Ok(conditioning::condition(pair, plan.range, &plan.method.front)))
+    watch.host("conditioning", || {
+        let (conditioned, found) = conditioning::condition(&pair, plan.range, &plan.method.front);
+        let Some(full) = pair.full() else { return Ok((conditioned, found)) };
+        let found = found.doubled();
+        Ok((conditioned.with_full(Some(found.apply(full))), found))
+    })
 }
 
 /// `pair` as it is matched, after `conditioning`, at twice its size: a disparity there is twice what it is here.
@@ -84,7 +92,10 @@ pub fn prepare(pair: Pair, plan: &Plan, watch: &mut Watch) -> Result<Prepared> {
     let corrected = match illumination {
         Illumination::None => None,
         Illumination::Homomorphic | Illumination::HomomorphicFirst => {
-            let both = || Pair::new(homomorphic(pair.left()), homomorphic(pair.right()));
+            let both = || {
+                let corrected = Pair::new(homomorphic(pair.left()), homomorphic(pair.right()))?;
+                Ok(corrected.with_full(pair.full().cloned()))
+            };
             Some(watch.host("illumination", both)?)
         }
     };

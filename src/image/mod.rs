@@ -7,6 +7,7 @@ mod decode;
 mod downsampled;
 mod file;
 mod georeference;
+mod halved;
 mod jpeg;
 pub mod pcd;
 pub mod pfm;
@@ -294,6 +295,7 @@ pub struct Pair {
     left: Arc<Image>,
     right: Arc<Image>,
     georeferences: [Option<Georeference>; 2],
+    full: Option<Box<Pair>>,
 }
 
 impl Pair {
@@ -316,7 +318,7 @@ impl Pair {
     }
 
     fn without_georeference(left: Image, right: Image) -> Self {
-        Self { left: Arc::new(left), right: Arc::new(right), georeferences: [None, None] }
+        Self { left: Arc::new(left), right: Arc::new(right), georeferences: [None, None], full: None }
     }
 
     /// The georeferences of the left and the right image, where they are from TIFF files that have one; maps have the pixels
@@ -347,12 +349,24 @@ impl Pair {
     /// stay the same.
     #[must_use]
     pub fn mirrored(&self) -> Self {
-        Self::without_georeference(self.right.mirrored(), self.left.mirrored())
+        let full = self.full.as_ref().map(|full| Box::new(full.mirrored()));
+        Self { full, ..Self::without_georeference(self.right.mirrored(), self.left.mirrored()) }
     }
 
     /// A pair of what `f` makes of each view, of one size.
     pub(crate) fn map(&self, f: impl Fn(&Image) -> Image) -> Self {
-        Self { left: Arc::new(f(&self.left)), right: Arc::new(f(&self.right)), georeferences: [None, None] }
+        Self::without_georeference(f(&self.left), f(&self.right))
+    }
+
+    /// The pair at its full size, where this one is [at half of that](Self::halved).
+    #[must_use]
+    pub fn full(&self) -> Option<&Self> {
+        self.full.as_deref()
+    }
+
+    /// The same pair, at half the size of `full`.
+    pub(crate) fn with_full(self, full: Option<Self>) -> Self {
+        Self { full: full.map(Box::new), ..self }
     }
 
     /// The same pair with another left view of the same size.
@@ -368,7 +382,10 @@ impl Pair {
     /// Both views inside `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
-        Self::without_georeference(self.left.crop(part), self.right.crop(part))
+        let double = |ends: &Range<usize>| 2 * ends.start..2 * ends.end;
+        let larger = Rect { x: double(&part.x), y: double(&part.y) };
+        let full = self.full.as_ref().map(|full| Box::new(full.crop(&larger)));
+        Self { full, ..Self::without_georeference(self.left.crop(part), self.right.crop(part)) }
     }
 
     /// (width, height) of both views.

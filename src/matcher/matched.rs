@@ -102,13 +102,13 @@ impl Matched {
     /// The disparities that were searched.
     #[must_use]
     pub fn range(&self) -> DisparityRange {
-        self.plan.range
+        self.plan.of_pair().range
     }
 
     /// Whether the range probably cuts off a part of the scene.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        check::clipped(&self.maps, self.plan.range)
+        check::clipped(&self.maps, self.range())
     }
 }
 

@@ -34,5 +34,5 @@ pub use presets::{PRESETS, Preset};
 pub use range::{DisparityRange, MAX_DISPARITY, MAX_LABELS};
 pub use refinement::{Fill, LeftRightCheck, Median, Nearer, RefinementOptions};
 pub use row::{Group, Key, Takes, Word};
-pub use schedule::{Order, ScheduleOptions};
+pub use schedule::{MatchSize, Order, ScheduleOptions};
 pub use tiles::{MAX_MEMORY, TileOptions};

@@ -1,8 +1,8 @@
 //! Presets: `default` is what the rows state, the others say what differs.
 
 use super::{
-    Agreement, CostOptions, Fill, FrontOptions, GraphOptions, Illumination, LeftRightCheck, MatchingCost,
-    MessageOptions, Method, Order, Potential, Pyramid, RefinementOptions, ScheduleOptions,
+    Agreement, CostOptions, Fill, FrontOptions, GraphOptions, Illumination, LeftRightCheck, MatchSize,
+    MatchingCost, MessageOptions, Method, Order, Potential, Pyramid, RefinementOptions, ScheduleOptions,
 };
 use crate::error::{Error, Result};
 use crate::text::one_line;
@@ -35,7 +35,7 @@ pub const PRESETS: &[Preset] = &[
     },
     Preset {
         name: "fast",
-        about: "nine tenths of the default's time for a few more errors: for video and robots",
+        about: "matches the pair at half its size, in a quarter of the default's time: for video and robots",
         make: Method::fast,
     },
     Preset {
@@ -66,23 +66,23 @@ impl Method {
     /// Nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too.
     #[must_use]
     pub fn accurate() -> Self {
-        let default = Self::default();
-        Self { refinement: RefinementOptions { double_size: true, ..default.refinement }, ..default }
+        let schedule = ScheduleOptions { match_size: MatchSize::Double, ..ScheduleOptions::default() };
+        Self { schedule, ..Self::default() }
     }
 
     /// This method for a pair at twice the size, where it asks for one. The pair has been conditioned, and the median sees as much of the
     /// scene as in the pair itself.
     pub(crate) fn at_double_size(&self) -> Option<Self> {
         let refinement = &self.refinement;
-        refinement.double_size.then(|| Self {
+        (self.schedule.match_size == MatchSize::Double).then(|| Self {
             front: FrontOptions {
                 level_rows: false,
                 equal_sharpness: false,
                 denoise: false,
                 ..self.front.clone()
             },
+            schedule: ScheduleOptions { match_size: MatchSize::Full, ..self.schedule.clone() },
             refinement: RefinementOptions {
-                double_size: false,
                 median_window: (2 * refinement.median_window + 1).min(31),
                 median_sigma_space: (2.0 * refinement.median_sigma_space).min(100.0),
                 ..refinement.clone()
@@ -91,12 +91,18 @@ impl Method {
         })
     }
 
-    /// Nine tenths of the default's time for a few more errors: for video and robots. The finest level only listens to the
-    /// coarser ones, and the median is smaller.
+    /// Matches the pair at half its size, in a quarter of the default's time: for video and robots. The finest level only listens
+    /// to the coarser ones, and the median is smaller.
     #[must_use]
     pub fn fast() -> Self {
         Self {
-            schedule: ScheduleOptions { iterations: 2, final_iterations: 0, ..ScheduleOptions::default() },
+            schedule: ScheduleOptions {
+                match_size: MatchSize::Half,
+                iterations: 2,
+                final_iterations: 0,
+                ..ScheduleOptions::default()
+            },
+            messages: MessageOptions { temperature: 0.35, ..MessageOptions::default() },
             refinement: RefinementOptions { median_window: 9, ..RefinementOptions::default() },
             ..Self::default()
         }

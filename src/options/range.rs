@@ -70,6 +70,12 @@ impl DisparityRange {
         })
     }
 
+    /// The range that the same surfaces have in a pair of half the size.
+    #[must_use]
+    pub fn halved(self) -> Self {
+        Self { min: self.min.div_euclid(2), max: -((-self.max).div_euclid(2)) }
+    }
+
     /// Number of labels.
     #[must_use]
     pub fn labels(self) -> usize {

@@ -76,10 +76,6 @@ options! {
         median_sigma_range: f64 = 0.1, takes real(1e-3..=10.0), unit "intensity", source "open";
         /// After a median, fit a plane around each pixel that it changes, and take its value there.
         plane: bool = true, takes Takes::Switch, source "not in the paper";
-        /// Also match the pair at twice its size. Where both maps agree within a pixel, their mean is taken.
-        /// Where only the larger pair measures a pixel, its disparity is taken. A match takes 7 times as
-        /// long.
-        double_size: bool = false, takes Takes::Switch, source "not in the paper";
         /// Also make the disparity map of the right view, refined like that of the left one.
         right_map: bool = false, takes Takes::Switch, source "not in the paper";
         /// Pixels with less confidence than this get the validity flag for low confidence.

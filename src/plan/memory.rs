@@ -57,8 +57,11 @@ impl Plan {
         // The maps of the left view, and both views mirrored, while those of the right view are made.
         let right = if self.method.refinement.right_map { 10 + 2 * 9 } else { 0 };
         let (width, height) = self.size();
+        // At full size: the views, their census and the maps, of four times as many pixels.
+        let full = if self.full.is_some() { 4 * (2 * 9 + 2 * 4 + 16) + 16 } else { 0 };
         // Beside them, what a device keeps of each row, and its tables.
-        let maps = (100 + right) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14);
+        let maps =
+            (100 + right + full) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14);
         maps as u64 + self.vote_bytes()
     }
 
@@ -84,6 +87,12 @@ impl Plan {
         (corrected + zones) * self.levels[0].pixels() as u64
     }
 
+    /// Bytes of the pair at half its size, with its full size in whole blocks, where it is matched there.
+    #[must_use]
+    pub fn halving_bytes(&self) -> u64 {
+        if self.full.is_some() { self.pair_bytes() } else { 0 }
+    }
+
     /// Bytes of what the conditioning of the pair leaves, another pair. While it works it takes up to three times as many, before a
     /// match holds anything else.
     #[must_use]
@@ -93,10 +102,11 @@ impl Plan {
         if any { self.pair_bytes() } else { 0 }
     }
 
-    /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks.
+    /// Bytes of the pair: 18 per pixel, for two views of 8 and their masks. Where it is matched at half its size, with the full one.
     #[must_use]
     pub fn pair_bytes(&self) -> u64 {
-        18 * self.levels[0].pixels() as u64
+        let full = if self.full.is_some() { 4 } else { 0 };
+        (1 + full) * 18 * self.levels[0].pixels() as u64
     }
 
     /// Largest number of bytes taken by the maps of an image that is matched tile by tile. A pixel takes 20
@@ -108,7 +118,9 @@ impl Plan {
         let corrected = if self.method.front.illumination == Illumination::None { 0 } else { 9 };
         // Disparities of the right view, its image and its maps.
         let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
-        (20 + 12 + corrected + right) * self.levels[0].pixels() as u64 + self.vote_bytes()
+        // The maps at full size, and a copy.
+        let full = if self.full.is_some() { 4 * 2 * 10 } else { 0 };
+        (20 + 12 + corrected + right + full) * self.levels[0].pixels() as u64 + self.vote_bytes()
     }
 
     /// Bytes taken by all volumes, graphs and maps together.

@@ -26,7 +26,7 @@ impl Program {
             program = second_match::first(program);
         }
         if refinement.right_map {
-            program.steps = right_view::follow(program.steps);
+            program.steps = right_view::follow(whole, program.steps);
         }
         if tiles.count() > 1 { tiled::cut(&program, tiles) } else { program }
     }

@@ -1,19 +1,25 @@
 //! The map of the right view, refined like that of the left one.
 
 use super::{Step, View};
+use crate::plan::Plan;
 use crate::stage::Stage;
 
 /// What makes the right view the left one, between its labels.
-pub const STAGES: [Stage; 3] = [Stage::SwapViews, Stage::Cost, Stage::SubPixel];
+#[must_use]
+pub fn stages(plan: &Plan) -> Vec<Step> {
+    let between_labels: &[_] =
+        if plan.full.is_some() { &[Stage::Refine] } else { &[Stage::Cost, Stage::SubPixel] };
+    [&[Stage::SwapViews], between_labels].concat().into_iter().map(Step::of).collect()
+}
 
 /// `steps`, and then the same for the right view, once the left view's maps have been asked for: the disparities between its
 /// labels, and the stages of maps.
 #[must_use]
-pub fn follow(mut steps: Vec<Step>) -> Vec<Step> {
+pub fn follow(plan: &Plan, mut steps: Vec<Step>) -> Vec<Step> {
     let is_of_maps = |step: &&Step| step.stage().is_some_and(Stage::is_of_maps);
     let refining: Vec<Step> = steps.iter().filter(is_of_maps).cloned().collect();
     let collect = steps.pop();
-    steps.extend(STAGES.map(Step::of));
+    steps.extend(stages(plan));
     steps.extend(refining);
     steps.push(Step::Ask(View::Right));
     steps.extend(collect);
@@ -30,10 +36,10 @@ mod tests {
     fn the_right_view_is_refined_like_the_left_one() {
         let plan = samples::plan(LeftRightCheck::RightView);
         let plain = schedule::steps(&plan);
-        let steps = follow(plain.clone());
+        let steps = follow(&plan, plain.clone());
         let (left, right) = steps.split_at(plain.len() - 1);
         assert_eq!(left, &plain[..plain.len() - 1]);
-        let mut expected: Vec<Step> = STAGES.map(Step::of).into();
+        let mut expected = stages(&plan);
         expected.extend(schedule::post_processing(&plan.method));
         expected.extend([Step::Ask(View::Right), Step::Collect]);
         assert_eq!(right, expected);

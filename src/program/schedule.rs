@@ -1,7 +1,7 @@
 //! The schedule: the only place that knows levels, iterations, convergence and the order of what follows.
 
 use super::{Run, Step};
-use crate::options::{Fill, Median, Method, Order};
+use crate::options::{Fill, MatchSize, Median, Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::program::View;
 use crate::stage::Stage;
@@ -28,7 +28,8 @@ pub fn estimate(plan: &Plan) -> Vec<Step> {
         iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
     });
     let right = plan.reads_right_view().then_some(Stage::RightView);
-    let read_out = iter::once(Stage::WinnerTakesAll).chain(right).chain([Stage::SubPixel]);
+    let between_labels = if plan.full.is_some() { Stage::Refine } else { Stage::SubPixel };
+    let read_out = iter::once(Stage::WinnerTakesAll).chain(right).chain([between_labels]);
     let mut steps: Vec<Step> = graphs.chain(costs).map(Step::of).collect();
     steps.extend(flood(plan, join));
     steps.extend(read_out.map(Step::of));
@@ -106,6 +107,7 @@ pub fn post_processing(method: &Method) -> Vec<Step> {
     if refinement.median != Median::Off {
         stages.push(if refinement.plane { Stage::Plane } else { Stage::Median });
     }
+    stages.extend((method.schedule.match_size == MatchSize::Half).then_some(Stage::Enlarge));
     stages.into_iter().map(Step::of).collect()
 }
 

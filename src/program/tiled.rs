@@ -26,7 +26,7 @@ pub fn cut(program: &Program, tiles: &Tiles) -> Program {
             cut.steps.extend_from_slice(steps);
             cut.steps.push(Step::Place(if mirrored { View::Mirrored } else { View::Left }));
             if !mirrored && right_map && reads_right_view {
-                cut.steps.extend(right_view::STAGES.map(Step::of));
+                cut.steps.extend(right_view::stages(&whole.plan));
                 cut.steps.push(Step::Place(View::Right));
             }
         }
@@ -36,7 +36,7 @@ pub fn cut(program: &Program, tiles: &Tiles) -> Program {
     for step in &program.steps[first..] {
         match step.stage() {
             // The tiles have found the disparities of the right view.
-            Some(Stage::SubPixel) => cut.steps.push(Step::PlaceRight),
+            Some(Stage::SubPixel | Stage::Refine) => cut.steps.push(Step::PlaceRight),
             Some(Stage::Cost) => {}
             _ => cut.steps.push(step.clone()),
         }
@@ -79,7 +79,7 @@ mod tests {
             if twice {
                 whole = second_match::first(whole);
             }
-            whole.steps = right_view::follow(whole.steps);
+            whole.steps = right_view::follow(&plan, whole.steps);
             let program = cut(&whole, &tiles);
             let count = tiles.count() * if twice { 2 } else { 1 };
             assert!(tiles.count() > 1 && program.frames.len() == 1 + count);
@@ -93,7 +93,7 @@ mod tests {
                 let view = if frame.mirrored { View::Mirrored } else { View::Left };
                 assert_eq!(steps.next(), Some(&Step::Place(view)));
                 if !twice {
-                    assert!(right_view::STAGES.into_iter().all(|s| steps.next() == Some(&Step::of(s))));
+                    assert!(right_view::stages(&plan).iter().all(|step| steps.next() == Some(step)));
                     assert_eq!(steps.next(), Some(&Step::Place(View::Right)));
                 }
             }

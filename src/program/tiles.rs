@@ -16,7 +16,7 @@
 use super::together::streamed;
 use crate::error::{BudgetError, Result};
 use crate::image::Rect;
-use crate::plan::Plan;
+use crate::plan::{FullSize, Plan};
 
 use std::ops::Range;
 
@@ -68,7 +68,6 @@ impl Tiles {
     pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
         let (width, height) = whole.size();
         let memory = u64::from(whole.method.tiles.memory) << 20;
-        let all = Rect::whole((width, height));
         if streamed(whole).bytes() <= memory {
             return Ok(Self::in_one_piece(whole));
         }
@@ -90,10 +89,11 @@ impl Tiles {
         let Some((_, (width, height))) = candidates.min_by_key(|&(pixels, _)| pixels) else {
             let least =
                 bytes((across.crop(across.most()), down.crop(down.most()))).min(streamed(whole).bytes());
+            let FullSize { size: (width, height), range } = whole.of_pair();
             return Err(BudgetError::NoTileFits {
                 memory: whole.method.tiles.memory,
-                width: all.x.len(),
-                height: all.y.len(),
+                width,
+                height,
                 labels: range.labels(),
                 needed: least.div_ceil(1 << 20),
             }

@@ -72,11 +72,19 @@ pub enum Map {
     Validity,
     /// Confidence, 0 ..= 255.
     Confidence,
+    /// [`Self::Raw`] at full size, where the pair is matched at half of that.
+    FullRaw,
+    /// [`Self::Disparity`] at full size.
+    FullDisparity,
+    /// [`Self::Validity`] at full size.
+    FullValidity,
+    /// [`Self::Confidence`] at full size.
+    FullConfidence,
 }
 
 impl Map {
-    /// Every map there is.
-    pub const ALL: [Self; 9] = [
+    /// Every map of the size of the finest level.
+    pub const MATCHED: [Self; 9] = [
         Self::Label,
         Self::Best,
         Self::RunnerUp,
@@ -87,6 +95,24 @@ impl Map {
         Self::Validity,
         Self::Confidence,
     ];
+
+    /// Every map of the full size.
+    pub const FULL: [Self; 4] =
+        [Self::FullRaw, Self::FullDisparity, Self::FullValidity, Self::FullConfidence];
+
+    /// Every map that there is under `plan`.
+    #[must_use]
+    pub fn all(plan: &Plan) -> Vec<Self> {
+        let full: &[Self] = if plan.full.is_some() { &Self::FULL } else { &[] };
+        [&Self::MATCHED, full].concat()
+    }
+
+    /// (width, height) under `plan`, in pixels. At full size there are whole blocks of 2 x 2 pixels.
+    #[must_use]
+    pub fn size(self, plan: &Plan) -> (usize, usize) {
+        let (width, height) = plan.size();
+        if Self::FULL.contains(&self) { (2 * width, 2 * height) } else { (width, height) }
+    }
 }
 
 /// What stages read and write.

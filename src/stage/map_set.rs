@@ -3,6 +3,8 @@
 use super::Map;
 use super::data::NO_RUNNER_UP;
 use crate::image::{Plane, Rect};
+use crate::maps::Maps;
+use crate::plan::Plan;
 use std::mem;
 
 /// All maps of a match on its way.
@@ -15,6 +17,8 @@ pub(crate) struct MapSet {
     pub(crate) disparity: Plane<i32>,
     pub(crate) validity: Plane<u8>,
     pub(crate) confidence: Plane<u8>,
+    /// The maps at full size, in whole blocks of 2 x 2 pixels; empty where the pair is matched at that size.
+    pub(crate) full: Maps,
 }
 
 /// The belief of one pixel around its optimum, in units.
@@ -26,8 +30,18 @@ pub(crate) struct Optimum {
 }
 
 impl MapSet {
-    pub(crate) fn new((width, height): (usize, usize)) -> Self {
+    pub(crate) fn new(plan: &Plan) -> Self {
+        let (width, height) = plan.size();
+        let (full_width, full_height) = if plan.full.is_some() { (2 * width, 2 * height) } else { (0, 0) };
+        let full = Maps {
+            disparity: Plane::filled(full_width, full_height, 0),
+            raw: Plane::filled(full_width, full_height, 0),
+            confidence: Plane::filled(full_width, full_height, 0),
+            validity: Plane::filled(full_width, full_height, 0),
+            right: None,
+        };
         Self {
+            full,
             optima: Plane::filled(width, height, Optimum::default()),
             right: Plane::filled(width, height, 0),
             right_best: Plane::filled(width, height, 0),
@@ -35,6 +49,21 @@ impl MapSet {
             disparity: Plane::filled(width, height, 0),
             validity: Plane::filled(width, height, 0),
             confidence: Plane::filled(width, height, 0),
+        }
+    }
+
+    /// What a match leaves behind: the maps at `full` size, or those of the size of the finest level.
+    pub(crate) fn found(&self, full: bool) -> Maps {
+        if full {
+            return self.full.clone();
+        }
+        let Self { disparity, raw, confidence, validity, .. } = self;
+        Maps {
+            disparity: disparity.clone(),
+            raw: raw.clone(),
+            confidence: confidence.clone(),
+            validity: validity.clone(),
+            right: None,
         }
     }
 
@@ -49,11 +78,14 @@ impl MapSet {
             Map::Disparity => self.disparity.clone(),
             Map::Validity => self.validity.map(|&v| v.into()),
             Map::Confidence => self.confidence.map(|&v| v.into()),
+            Map::FullRaw => self.full.raw.clone(),
+            Map::FullDisparity => self.full.disparity.clone(),
+            Map::FullValidity => self.full.validity.map(|&v| v.into()),
+            Map::FullConfidence => self.full.confidence.map(|&v| v.into()),
         }
     }
 
     pub(crate) fn write(&mut self, map: Map, values: &Plane<i32>) {
-        assert_eq!(self.optima.size(), values.size(), "a map of the size of the images");
         self.write_part(map, values, &Rect::whole(values.size()), (0, 0));
     }
 
@@ -80,6 +112,10 @@ impl MapSet {
             Map::Disparity => put(&mut self.disparity, from, |old, v| *old = v),
             Map::Validity => put(&mut self.validity, from, |old, v| *old = v as u8),
             Map::Confidence => put(&mut self.confidence, from, |old, v| *old = v as u8),
+            Map::FullRaw => put(&mut self.full.raw, from, |old, v| *old = v),
+            Map::FullDisparity => put(&mut self.full.disparity, from, |old, v| *old = v),
+            Map::FullValidity => put(&mut self.full.validity, from, |old, v| *old = v as u8),
+            Map::FullConfidence => put(&mut self.full.confidence, from, |old, v| *old = v as u8),
         }
     }
 

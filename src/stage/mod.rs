@@ -23,11 +23,11 @@ macro_rules! for_every_stage {
                 Graph graph; Pyramid pyramid; LabelRange label_range; LabelWindow label_window; Flood flood;
             }
             level_rows { Evidence evidence; Dependency dependency; Resolution resolution; Belief belief; }
-            finest { Cost cost; Change change; SwapViews swap_views; MirrorLabels mirror_labels; }
+            finest { Cost cost; Change change; Refine refine; SwapViews swap_views; MirrorLabels mirror_labels; }
             finest_rows { WinnerTakesAll winner_takes_all; RightView right_view; SubPixel sub_pixel; }
             maps {
                 LeftRightCheck left_right_check; SpeckleFilter speckle_filter; Confidence confidence; Fill fill;
-                VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane;
+                VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane; Enlarge enlarge;
             }
         }
     };
@@ -106,6 +106,7 @@ macro_rules! define {
                 let is_there = |stage: &Self| match stage {
                     Self::Pyramid(z) | Self::Resolution(z) => *z > 0,
                     Self::LabelRange(_) => plan.limits_labels(),
+                    Self::Refine | Self::Enlarge => plan.full.is_some(),
                     _ => true,
                 };
                 let finest = [$( Self::$finest, )* $( Self::$finest_row, )* $( Self::$map ),*];
@@ -136,7 +137,7 @@ macro_rules! define {
                 }
             }
 
-            /// Whether it looks at maps alone, and at the left image.
+            /// Whether it looks at maps alone, and at the left image in the sizes that there are.
             #[must_use]
             pub fn is_of_maps(self) -> bool {
                 matches!(self, $( Self::$map )|*)

@@ -21,13 +21,13 @@ impl Matched {
     /// Width in pixels.
     #[wasm_bindgen(getter)]
     pub fn width(&self) -> usize {
-        self.matched.plan.size().0
+        self.matched.maps.disparity.width()
     }
 
     /// Height in pixels.
     #[wasm_bindgen(getter)]
     pub fn height(&self) -> usize {
-        self.matched.plan.size().1
+        self.matched.maps.disparity.height()
     }
 
     /// The least disparity that was searched.

@@ -57,7 +57,7 @@ pub(crate) struct MatchRecord<'a> {
 impl<'a> MatchRecord<'a> {
     pub(crate) fn new(files: &'a Files, matched: &'a Matched, time: Duration, sign: Sign) -> Self {
         let Matched { maps, plan, .. } = matched;
-        let (width, height) = plan.size();
+        let (width, height) = maps.disparity.size();
         let percent = |count: usize| 100.0 * count as f64 / (width * height) as f64;
         let filled = maps.validity.data().iter().filter(|&v| v & flag::FILLED != 0).count();
         let measured = |validity: u8| has_disparity(validity) && validity & flag::FILLED == 0;
@@ -73,8 +73,8 @@ impl<'a> MatchRecord<'a> {
             width,
             height,
             sign,
-            range: sign.range(plan.range),
-            labels: plan.range.labels(),
+            range: sign.range(matched.range()),
+            labels: matched.range().labels(),
             method: &plan.method,
             ran_on: &matched.ran_on,
             driver: matched.driver.as_deref(),

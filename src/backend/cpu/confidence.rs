@@ -1,11 +1,11 @@
 //! The confidence of each pixel: see [`crate::backend::Stage::Confidence`].
 
-use crate::image::Image;
+use crate::image::Pair;
 use crate::maps::flag;
 use crate::plan::Plan;
 use crate::stage::MapSet;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     let floor = plan.method.refinement.confidence_floor;
     let MapSet { optima, validity, confidence, .. } = maps;
     let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(optima.data());

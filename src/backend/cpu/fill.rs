@@ -1,13 +1,13 @@
 //! Fills invalid pixels from the farther of two neighbours: see [`crate::backend::Stage::Fill`].
 
-use crate::image::Image;
+use crate::image::Pair;
 use crate::maps::flag;
 use crate::options::Nearer;
 use crate::plan::Plan;
 use crate::stage::MapSet;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     let farther = match plan.method.refinement.nearer {
         Nearer::Larger => i32::min,
         Nearer::Smaller => i32::max,

@@ -1,6 +1,6 @@
 //! The left-right check: see [`crate::backend::Stage::LeftRightCheck`].
 
-use crate::image::Image;
+use crate::image::Pair;
 use crate::maps::flag;
 use crate::options::LeftRightCheck;
 use crate::plan::Plan;
@@ -8,7 +8,8 @@ use crate::stage::MapSet;
 use crate::stage::NO_LABEL;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, left: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
+    let left = pair.left();
     let (width, min) = (plan.levels[0].width, i64::from(plan.range.min));
     let MapSet { optima, right, validity, .. } = maps;
     validity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {

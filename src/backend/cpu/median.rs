@@ -7,7 +7,7 @@
 use super::least_squares::Planes;
 use super::places::{LANES, Place, Weighed};
 use super::units::{block, block_mut, each_lane};
-use crate::image::{Image, Plane};
+use crate::image::{Image, Pair, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
 use crate::plan::Plan;
@@ -15,7 +15,8 @@ use crate::stage::MapSet;
 use crate::weights::{MEDIAN_WEIGHT, MedianWeights, WINDOW_ROW_BITS};
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, guide: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
+    let guide = pair.left();
     smooth(&MedianWeights::of(&plan.method), touched(plan), None, guide, maps);
 }
 

@@ -64,7 +64,7 @@ macro_rules! declare {
                 match stage {
                     $( Stage::$level(z) => $level_name::run(self, z), )*
                     $( Stage::$finest => $finest_name::run(self), )*
-                    $( Stage::$map => $map_name::run(&mut self.maps, &self.plan, self.pair.left()), )*
+                    $( Stage::$map => $map_name::run(&mut self.maps, &self.plan, &self.pair), )*
                     by_rows => {
                         let sent = self.begin(stage);
                         let height = self.plan.levels[stage.level().unwrap_or(0)].height;
@@ -193,14 +193,7 @@ impl Backend for Cpu {
     }
 
     fn request_maps(&mut self) -> Result<Ticket> {
-        let MapSet { raw, disparity, validity, confidence, .. } = on_volumes!(self, v => &v.maps);
-        let maps = Maps {
-            disparity: disparity.clone(),
-            raw: raw.clone(),
-            confidence: confidence.clone(),
-            validity: validity.clone(),
-            right: None,
-        };
+        let maps = on_volumes!(self, v => v.maps.found(v.plan.full.is_some()));
         Ok(self.requests.add(maps))
     }
 

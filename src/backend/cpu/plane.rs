@@ -1,13 +1,14 @@
 //! Planes through the disparities, from the median on: see [`crate::backend::Stage::Plane`].
 
 use super::median::{smooth, touched};
-use crate::image::Image;
+use crate::image::Pair;
 use crate::maps::FRACTION;
 use crate::plan::Plan;
 use crate::stage::MapSet;
 use crate::weights::MedianWeights;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, guide: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
+    let guide = pair.left();
     smooth(&MedianWeights::of(&plan.method), touched(plan), Some(limits(plan)), guide, maps);
 }
 

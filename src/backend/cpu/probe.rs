@@ -101,8 +101,8 @@ impl<U: Units> Volumes<U> {
                 messages.fill(U::of(u32::from(wide) & Into::<u32>::into(U::MOST)));
             }
         }
-        for map in Map::ALL {
-            let (width, height) = self.plan.size();
+        for map in Map::all(&self.plan) {
+            let (width, height) = map.size(&self.plan);
             self.maps.write(map, &Plane::filled(width, height, i32::from_ne_bytes([byte; 4])));
         }
     }

@@ -1,11 +1,11 @@
 //! The speckle filter: see [`crate::backend::Stage::SpeckleFilter`].
 
-use crate::image::Image;
+use crate::image::Pair;
 use crate::maps::flag;
 use crate::plan::Plan;
 use crate::stage::MapSet;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     let size = plan.method.refinement.speckle_size as usize;
     let MapSet { optima, validity, .. } = maps;
     let (width, height) = optima.size();

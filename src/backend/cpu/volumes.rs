@@ -89,7 +89,7 @@ impl<U: Units> Volumes<U> {
             .collect::<Result<_>>()?;
         let fine = &plan.levels[0];
         let fine_cost = Pages::new(if plan.holds_all_rows() { fine.pixels() * fine.stride } else { 0 })?;
-        let maps = MapSet::new(plan.size());
+        let maps = MapSet::new(plan);
         let of_maps = Self::of_maps(plan, pair, maps);
         Ok(Self { fine_cost, levels, label_ranges, labels: vec![0; fine.pixels()], ..of_maps })
     }

@@ -1,7 +1,7 @@
 //! Votes on what was filled: see [`crate::backend::Stage::VoteFill`].
 
 use super::units::{block, each_lane};
-use crate::image::{Image, Plane};
+use crate::image::{Image, Pair, Plane};
 use crate::maps::{FRACTION, flag};
 use crate::options::{Fill, Nearer};
 use crate::plan::Plan;
@@ -13,7 +13,8 @@ use crate::stage::MapSet;
 use crate::weights::vote_weights;
 use rayon::prelude::*;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, left: &Image) {
+pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
+    let left = pair.left();
     if plan.method.refinement.fill == Fill::Votes {
         let colours = halved(left);
         let elected = elect(maps, plan, &colours, Votes::of(plan));
@@ -349,7 +350,7 @@ mod tests {
         let colours =
             Plane::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| [noise(x, y, 3) as u8 / 8; 3]);
         let label = |x, y| (noise(x, y, 5) % 12) as u16;
-        let mut maps = MapSet::new((width, height));
+        let mut maps = MapSet::new(&plan);
         maps.optima =
             Plane::from_fn(width, height, |x, y| Optimum { label: label(x, y), ..Optimum::default() });
         maps.disparity = Plane::from_fn(width, height, |x, y| FRACTION * i32::from(label(x, y)));

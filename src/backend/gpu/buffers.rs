@@ -5,6 +5,7 @@
 use super::allocator::{Allocator, USAGE};
 use super::convergence::Convergence;
 use super::device::Device;
+use super::full_buffers::FullBuffers;
 use super::rows::{HALO, Pool, Rows};
 use super::uniform::{ALIGN_WORDS, LevelParams};
 use super::vote_buffers::VoteBuffers;
@@ -74,6 +75,8 @@ pub(super) struct Buffers {
     pub(super) source_rows: wgpu::Buffer,
     /// `None` where the method fills without votes.
     pub(super) votes: Option<VoteBuffers>,
+    /// `None` where the pair is matched at its full size.
+    pub(super) full: Option<FullBuffers>,
     written: Vec<wgpu::Buffer>,
     constant: Vec<wgpu::Buffer>,
 }
@@ -300,8 +303,10 @@ impl Buffers {
         let (speckle_parents, speckle_sizes) = (map("speckle parents", 1)?, map("speckle sizes", 1)?);
         let has_votes = plan.method.refinement.fill == Fill::Votes;
         let votes = has_votes.then(|| VoteBuffers::new(a, plan, &fine)).transpose()?;
+        let full = plan.full.is_some().then(|| FullBuffers::new(a, &fine)).transpose()?;
         let rows = u64::from(fine.height);
         Ok(Self {
+            full,
             median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
             // What distance subtracts is the same for all steps.
             fill_weights: a

@@ -15,6 +15,7 @@ mod commands;
 mod convergence;
 mod device;
 mod fit;
+mod full_buffers;
 mod kernel;
 mod levels;
 mod probe;
@@ -55,7 +56,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use timer::Timer;
 pub use uniform::UniformLayout;
-use words::{image_words, label_range_words, narrow_words};
+use words::{full_words, image_words, label_range_words, narrow_words};
 
 macro_rules! declare {
     (
@@ -250,6 +251,10 @@ impl Gpu {
             buffers.left.write(device, &image_words(pair.left(), pitch))?;
             buffers.right.write(device, &image_words(pair.right(), pitch))?;
         }
+        if let (Some(full), Some(larger)) = (&buffers.full, pair.full()) {
+            full.left.write(device, &full_words(larger.left(), full.pitch))?;
+            full.right.write(device, &full_words(larger.right(), full.pitch))?;
+        }
         for (z, (level, l)) in buffers.levels.iter().zip(&plan.levels).enumerate() {
             if plan.limits_labels() {
                 let words = |ranges: &Plane<_>| label_range_words(ranges, &level.params);
@@ -293,10 +298,13 @@ impl Gpu {
         Ok(Convergence::of(&self.device.collect(requested).await?[0]))
     }
 
-    /// Width, height, and elements in a row of maps.
-    fn map_shape(&self) -> (usize, usize, usize) {
-        let (width, height) = self.state().plan.size();
-        (width, height, self.state().buffers.levels[0].params.pixel_pitch as usize)
+    /// Width, height, and elements in a row of a map.
+    fn map_shape(&self, map: Map) -> (usize, usize, usize) {
+        let State { plan, buffers, .. } = self.state();
+        let (width, height) = map.size(plan);
+        let full = buffers.full.as_ref().filter(|_| Map::FULL.contains(&map));
+        let pitch = full.map_or(buffers.levels[0].params.pixel_pitch, |full| full.pitch);
+        (width, height, pitch as usize)
     }
 }
 
@@ -424,11 +432,12 @@ impl Backend for Gpu {
 
     fn request_maps(&mut self) -> Result<Ticket> {
         let b = &self.state().buffers;
-        let (disparity, raw, flags) = (b.disparity.clone(), b.raw.clone(), b.flags.clone());
-        let mut parts: Vec<_> = [disparity, raw, flags].iter().flat_map(Rows::own).collect();
+        let (full, here) = (b.full.as_ref(), [&b.disparity, &b.raw, &b.flags]);
+        let shape = self.map_shape(full.map_or(Map::Disparity, |_| Map::FullDisparity));
+        let maps = full.map_or(here, |full| [&full.disparity, &full.raw, &full.flags]);
+        let mut parts: Vec<_> = maps.into_iter().flat_map(Rows::own).collect();
         parts.extend(self.state().plan.settled_change().map(|_| self.convergence_at()));
         let parts = self.request(&parts)?;
-        let shape = self.map_shape();
         Ok(self.requests.add(RequestedMaps { parts, shape }))
     }
 

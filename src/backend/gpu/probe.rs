@@ -116,7 +116,7 @@ impl Probe for Gpu {
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
         let (rows, words, word, bit, mask) = self.place_of(map);
         let mut data = block_on(self.rows(&[&rows]))?.remove(0);
-        let (width, height, pitch) = self.map_shape();
+        let (width, height, pitch) = self.map_shape(map);
         assert_eq!(values.size(), (width, height), "a map of the size of the images");
         for y in 0..height {
             for x in 0..width {
@@ -176,7 +176,7 @@ impl Gpu {
     pub(super) async fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
         let (rows, words, word, bit, mask) = self.place_of(map);
         let data = self.rows(&[&rows]).await?.remove(0);
-        let (width, height, pitch) = self.map_shape();
+        let (width, height, pitch) = self.map_shape(map);
         let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
         Ok(Plane::from_fn(width, height, value))
     }
@@ -204,6 +204,7 @@ impl Gpu {
     /// The location of a map: its rows, words per pixel, the word, the lowest bit and the mask.
     fn place_of(&self, map: Map) -> (Rows, usize, usize, u32, u32) {
         let b = &self.state().buffers;
+        let full = || b.full.as_ref().expect("maps at full size");
         let (rows, words, word, bit, mask) = match map {
             Map::Label => (&b.optima, 2, 0, 0, 0xffff),
             Map::Best => (&b.optima, 2, 0, 16, 0xffff),
@@ -214,6 +215,10 @@ impl Gpu {
             Map::Disparity => (&b.disparity, 1, 0, 0, u32::MAX),
             Map::Validity => (&b.flags, 1, 0, 0, 0xff),
             Map::Confidence => (&b.flags, 1, 0, 8, 0xff),
+            Map::FullRaw => (&full().raw, 1, 0, 0, u32::MAX),
+            Map::FullDisparity => (&full().disparity, 1, 0, 0, u32::MAX),
+            Map::FullValidity => (&full().flags, 1, 0, 0, 0xff),
+            Map::FullConfidence => (&full().flags, 1, 0, 8, 0xff),
         };
         (rows.clone(), words, word, bit, mask)
     }

@@ -38,6 +38,21 @@ pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
     words
 }
 
+/// Pixels of a full size as the stages read them: red | green << 8 | blue << 16, each in 8 bits and rounded down, | 1 << 24 if
+/// masked; grey.
+pub(super) fn full_words(image: &Image, pitch: u32) -> Vec<u32> {
+    let pitch = 2 * pitch as usize;
+    let mut words = vec![0; pitch * image.height()];
+    for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
+        let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
+        for (out, (pixel, &masked)) in row.as_chunks_mut().0.iter_mut().zip(pixels) {
+            let [r, g, b, grey] = pixel.map(u32::from);
+            *out = [r >> 8 | g >> 8 << 8 | b >> 8 << 16 | u32::from(masked) << 24, grey];
+        }
+    }
+    words
+}
+
 /// First and last label of each pixel, first | last << 16.
 pub(super) fn label_range_words(label_ranges: &Plane<[u16; 2]>, params: &LevelParams) -> Vec<u32> {
     let pitch = params.pixel_pitch as usize;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::plan::{FullSize, Plan};
 use mrfgs::low_level::program::tiles::Tiles;
 use mrfgs::options::Order;
 
@@ -20,7 +20,7 @@ pub(super) fn describe(plan: &Plan) -> Result<String> {
 fn at_one_size(tiles: &Tiles) -> String {
     let mut out = String::new();
     let plan = &tiles.largest();
-    let ((width, height), range) = (tiles.whole().size(), plan.range);
+    let FullSize { size: (width, height), range } = tiles.whole().of_pair();
     let labels = range.labels();
     let _ = writeln!(
         out,
@@ -29,6 +29,10 @@ fn at_one_size(tiles: &Tiles) -> String {
         range.max,
         plural(labels)
     );
+    if plan.full.is_some() {
+        let (width, height) = tiles.whole().size();
+        let _ = writeln!(out, "matched at half that size, {width} x {height} pixels");
+    }
     if tiles.count() > 1 {
         let (width, height) = plan.size();
         let _ =

@@ -1,0 +1,242 @@
+//! Disparities of half-size pixels by the full size: see [`crate::backend::Stage::Refine`].
+//!
+//! Bands of rows are independent of each other: a thread computes the census of a band and its surroundings, the costs of its pixels
+//! and of one more row on either side, and then the disparities. The costs of a pixel are [`LANES`] bytes, so that neighbours of other
+//! labels find theirs in them, a few bytes further.
+
+use super::units::Units;
+use super::volumes::Volumes;
+use crate::image::{Image, Pair};
+use crate::maps::FRACTION;
+use crate::plan::Plan;
+use crate::stage::refine::{COLUMNS, NEAR, NO_CENSUS, REACH};
+use crate::stage::{MapSet, Optimum};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Half-size rows that are processed together.
+const BAND: usize = 16;
+/// Full-size disparities whose costs are held of each pixel, from [`BEFORE`] below twice that of its label on.
+const LANES: usize = 16;
+const BEFORE: usize = REACH + 1 + 2 * NEAR;
+/// Disparities whose sums are compared, and one more on either side of them.
+const SUMS: usize = 2 * REACH + 3;
+/// Which of them is twice that of the label.
+const OWN: usize = REACH + 1;
+const _: () = assert!(SUMS + 4 * NEAR <= LANES);
+/// How many pixels around it a census sees.
+const RADIUS: usize = 2;
+
+pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
+    let Volumes { plan, pair, maps: MapSet { optima, raw, disparity, .. }, .. } = v;
+    let (width, height) = plan.size();
+    let views = Views::new(plan, pair.full().expect("the pair at full size"));
+    let cells = BAND * width;
+    let bands = raw.data_mut().par_chunks_mut(cells).zip(disparity.data_mut().par_chunks_mut(cells));
+    bands.enumerate().for_each_init(Scratch::default, |scratch, (band, (raw, disparity))| {
+        let rows = band * BAND..height.min((band + 1) * BAND);
+        let seen = rows.start.saturating_sub(1)..height.min(rows.end + 1);
+        scratch.fill(&views, &seen, |y| optima.row(y));
+        for (y, raw) in rows.zip(raw.chunks_exact_mut(width)) {
+            let around = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+            let near = around.map(|y| (optima.row(y), scratch.costs_of(y - seen.start, width)));
+            // At the borders of the image a row is there once.
+            let first = usize::from(y == 0);
+            let end = 3 - usize::from(y + 1 == height);
+            fit_row(&near, first..end, plan.range.min, raw);
+        }
+        disparity.copy_from_slice(raw);
+    });
+}
+
+/// The views at full size, and what is the same for all rows.
+struct Views<'a> {
+    left: &'a Image,
+    right: &'a Image,
+    half_min: i32,
+    /// Columns without a census on either side of a row of the right view.
+    margin: usize,
+}
+
+impl<'a> Views<'a> {
+    fn new(plan: &Plan, full: &'a Pair) -> Self {
+        let range = plan.range;
+        // No label leads farther than this, and none farther than the view.
+        let farthest = 2 * range.min.unsigned_abs().max(range.max.unsigned_abs()) as usize + LANES;
+        let margin = farthest.min(full.size().0 + LANES);
+        Self { left: full.left(), right: full.right(), half_min: range.min, margin }
+    }
+}
+
+/// What a thread works on.
+#[derive(Default)]
+struct Scratch {
+    greys: Vec<u16>,
+    left: Vec<u32>,
+    /// From right to left, with margins.
+    right: Vec<u32>,
+    costs: Vec<[u8; LANES]>,
+}
+
+impl Scratch {
+    /// The costs of these half-size rows.
+    fn fill<'a>(&mut self, views: &Views, rows: &Range<usize>, optima: impl Fn(usize) -> &'a [Optimum]) {
+        let Self { greys, left, right, costs } = self;
+        let (width, margin) = (views.left.width(), views.margin);
+        let full = 2 * rows.start..2 * rows.end;
+        left.resize(full.len() * width, 0);
+        census(views.left, &full, false, greys, (left, 0));
+        right.resize(full.len() * (width + 2 * margin), 0);
+        census(views.right, &full, true, greys, (right, margin));
+        costs.resize(rows.len() * width / 2, [0; LANES]);
+        let blocks = left.chunks_exact(2 * width).zip(right.chunks_exact(2 * (width + 2 * margin)));
+        for ((y, costs), (left, right)) in rows.clone().zip(costs.chunks_exact_mut(width / 2)).zip(blocks) {
+            cost_row(left.split_at(width), right.split_at(right.len() / 2), optima(y), views, costs);
+        }
+    }
+
+    fn costs_of(&self, row: usize, width: usize) -> &[[u8; LANES]] {
+        &self.costs[row * width..][..width]
+    }
+}
+
+/// The census of these rows of a view, from right to left where it is `mirrored`, with so many columns without one on either side.
+fn census(
+    image: &Image,
+    rows: &Range<usize>,
+    mirrored: bool,
+    greys: &mut Vec<u16>,
+    (out, margin): (&mut [u32], usize),
+) {
+    let (width, height) = image.pixels.size();
+    // Greys with the ends of rows and columns repeated, and the masked ones at the largest value: below no other.
+    let pitch = width + 2 * RADIUS;
+    greys.resize((rows.len() + 2 * RADIUS) * pitch, 0);
+    for (y, greys) in (rows.start..).zip(greys.chunks_exact_mut(pitch)) {
+        let y = y.saturating_sub(RADIUS).min(height - 1);
+        let inside = greys[RADIUS..RADIUS + width].iter_mut();
+        let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
+        let grey = |(pixel, &masked): (&[u16; 4], &bool)| if masked { u16::MAX } else { pixel[3] };
+        if mirrored {
+            inside.zip(pixels.rev()).for_each(|(out, pixel)| *out = grey(pixel));
+        } else {
+            inside.zip(pixels).for_each(|(out, pixel)| *out = grey(pixel));
+        }
+        let (first, last) = (greys[RADIUS], greys[RADIUS + width - 1]);
+        greys[..RADIUS].fill(first);
+        greys[RADIUS + width..].fill(last);
+    }
+    for (i, out) in out.chunks_exact_mut(width + 2 * margin).enumerate() {
+        out[..margin].fill(NO_CENSUS);
+        out[margin + width..].fill(NO_CENSUS);
+        let out = &mut out[margin..margin + width];
+        census_row(&greys[i * pitch..][..(2 * RADIUS + 1) * pitch], pitch, mirrored, out);
+        let masked = image.masked.row(rows.start + i);
+        if masked.contains(&true) {
+            let last = width - 1;
+            let is_masked = |x: usize| masked[if mirrored { last - x } else { x }];
+            (0..width).filter(|&x| is_masked(x)).for_each(|x| out[x] = NO_CENSUS);
+        }
+    }
+}
+
+#[pulp::with_simd(census_row = pulp::Arch::new())]
+#[inline(always)]
+fn census_row_on<'a, S: pulp::Simd>(
+    _: S,
+    greys: &'a [u16],
+    pitch: usize,
+    mirrored: bool,
+    out: &'a mut [u32],
+) {
+    let width = out.len();
+    let line = |dy: usize, dx: usize| &greys[dy * pitch + dx..][..width];
+    let centre = line(RADIUS, RADIUS);
+    out.fill(0);
+    for dy in 0..=2 * RADIUS {
+        for dx in (0..=2 * RADIUS).filter(|&dx| (dx, dy) != (RADIUS, RADIUS)) {
+            let other = line(dy, if mirrored { 2 * RADIUS - dx } else { dx });
+            for ((bits, &other), &centre) in out.iter_mut().zip(other).zip(centre) {
+                *bits = *bits << 1 | u32::from(other < centre);
+            }
+        }
+    }
+}
+
+/// The costs of a row of half-size pixels.
+#[pulp::with_simd(cost_row = pulp::Arch::new())]
+#[inline(always)]
+fn cost_row_on<'a, S: pulp::Simd>(
+    _: S,
+    left: (&'a [u32], &'a [u32]),
+    right: (&'a [u32], &'a [u32]),
+    optima: &'a [Optimum],
+    views: &'a Views<'a>,
+    out: &'a mut [[u8; LANES]],
+) {
+    let width = left.0.len();
+    let rows = [(left.0, right.0), (left.1, right.1)];
+    for (x, (optimum, out)) in optima.iter().zip(out).enumerate() {
+        let first = 2 * (i32::from(optimum.label) + views.half_min) - BEFORE as i32;
+        let mut sums = [0u32; LANES];
+        for (left, right) in rows {
+            let most = (right.len() - LANES) as i32;
+            for column in [2 * x, 2 * x + 1] {
+                // The right pixel of a disparity D is at `width` - 1 - `column` + D from the right.
+                let place = (views.margin + width - 1 - column) as i32 + first;
+                let there: &[u32; LANES] =
+                    right[place.clamp(0, most) as usize..].first_chunk().expect("a margin");
+                for (sum, there) in sums.iter_mut().zip(there) {
+                    *sum += (left[column] ^ there).count_ones();
+                }
+            }
+        }
+        *out = sums.map(|sum| sum as u8);
+    }
+}
+
+/// The disparities of a row, from the optima and the costs of the row above, itself and the row below, of which those in `inside`
+/// are there.
+#[pulp::with_simd(fit_row = pulp::Arch::new())]
+#[inline(always)]
+fn fit_row_on<'a, S: pulp::Simd>(
+    _: S,
+    rows: &'a [(&'a [Optimum], &'a [[u8; LANES]]); 3],
+    inside: Range<usize>,
+    half_min: i32,
+    out: &'a mut [i32],
+) {
+    let width = out.len();
+    for (x, out) in out.iter_mut().enumerate() {
+        let label = i32::from(rows[1].0[x].label);
+        let mut sums = [0u16; LANES];
+        for (optima, costs) in &rows[inside.clone()] {
+            for column in x.saturating_sub(COLUMNS)..(x + COLUMNS + 1).min(width) {
+                let above = label - i32::from(optima[column].label) + NEAR as i32;
+                if (0..=2 * NEAR as i32).contains(&above) {
+                    let costs = &costs[column][2 * above as usize..][..SUMS];
+                    for (sum, &cost) in sums.iter_mut().zip(costs) {
+                        *sum += u16::from(cost);
+                    }
+                }
+            }
+        }
+        let mut best = OWN;
+        for k in 1..=REACH {
+            for at in [OWN - k, OWN + k] {
+                if sums[at] < sums[best] {
+                    best = at;
+                }
+            }
+        }
+        let [a, b, c] = [best - 1, best, best + 1].map(|at| i32::from(sums[at]));
+        let slope = a.max(c) - b;
+        let offset = if slope <= 0 {
+            0
+        } else {
+            (FRACTION * (a - c) + slope).div_euclid(2 * slope).clamp(-FRACTION, FRACTION)
+        };
+        let disparity = 2 * (label + half_min) + best as i32 - OWN as i32;
+        *out = (FRACTION * disparity + offset + 1) >> 1;
+    }
+}

@@ -1,0 +1,127 @@
+//! Pairs at half their size, which keep the full one.
+
+use super::{Image, Pair, Pixel, Plane};
+use rayon::prelude::*;
+
+impl Image {
+    /// The image with as many columns and rows as make whole blocks of 2 x 2 pixels: the last ones are there twice where they are
+    /// odd.
+    fn in_blocks(&self) -> Self {
+        let (width, height) = self.pixels.size();
+        let size = (width.next_multiple_of(2), height.next_multiple_of(2));
+        let place = |x: usize, y: usize| (x.min(width - 1), y.min(height - 1));
+        Self {
+            pixels: Plane::from_fn(size.0, size.1, |x, y| self.pixels[place(x, y)]),
+            masked: Plane::from_fn(size.0, size.1, |x, y| self.masked[place(x, y)]),
+        }
+    }
+
+    /// The image, which is in whole blocks, at half its size: a pixel is the mean of the unmasked pixels of its block of 2 x 2,
+    /// rounded to the nearest value, a half up, and masked where all four are.
+    fn halved(&self) -> Self {
+        let (w, h) = (self.width() / 2, self.height() / 2);
+        let mut pixels = vec![[0; 4]; w * h];
+        let mut masked = vec![false; w * h];
+        let any_masked = self.masked.data().contains(&true);
+        let out = pixels.par_chunks_mut(w).zip(masked.par_chunks_mut(w));
+        out.enumerate().for_each(|(y, (pixels, masked))| {
+            let rows = [2 * y, 2 * y + 1];
+            if any_masked {
+                self.means_of_unmasked(rows, pixels, masked);
+            } else {
+                means(rows.map(|y| self.pixels.row(y)), pixels);
+            }
+        });
+        Self { pixels: Plane::new(w, h, pixels), masked: Plane::new(w, h, masked) }
+    }
+
+    fn means_of_unmasked(&self, rows: [usize; 2], out: &mut [Pixel], masked: &mut [bool]) {
+        for (x, (out, masked)) in out.iter_mut().zip(masked).enumerate() {
+            let places = rows.map(|y| [(2 * x, y), (2 * x + 1, y)]);
+            let seen = places.as_flattened().iter().filter(|&&at| !self.masked[at]);
+            let (mut sums, mut count) = ([0; 4], 0);
+            for &at in seen {
+                sums.iter_mut().zip(self.pixels[at]).for_each(|(sum, v)| *sum += u32::from(v));
+                count += 1;
+            }
+            *masked = count == 0;
+            *out = sums.map(|sum| ((2 * sum + count) / (2 * count).max(1)) as u16);
+        }
+    }
+}
+
+#[pulp::with_simd(means = pulp::Arch::new())]
+#[inline(always)]
+fn means_on<'a, S: pulp::Simd>(_: S, rows: [&'a [Pixel]; 2], out: &'a mut [Pixel]) {
+    let [above, below] = rows.map(|row| row.as_chunks::<2>().0);
+    for ((out, above), below) in out.iter_mut().zip(above).zip(below) {
+        let four = [above[0], above[1], below[0], below[1]];
+        let mut sums = [2u32; 4];
+        for pixel in four {
+            sums.iter_mut().zip(pixel).for_each(|(sum, v)| *sum += u32::from(v));
+        }
+        *out = sums.map(|sum| (sum >> 2) as u16);
+    }
+}
+
+impl Pair {
+    /// The pair at half its size, which knows this one, in whole blocks, as its [full](Self::full) size: a pixel is the mean of a
+    /// block, so a disparity is half of what it is there.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let (width, height) = self.size();
+        let full = if width % 2 + height % 2 == 0 { self.clone() } else { self.map(Image::in_blocks) };
+        full.map(Image::halved).with_full(Some(full))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(width: usize, height: usize) -> Image {
+        let pixels = Plane::from_fn(width, height, |x, y| {
+            let noise = (x as u32 * 7919 + y as u32 * 104_729 + 9).wrapping_mul(0x9e37_79b9);
+            [(noise >> 16) as u16, noise as u16, (noise >> 8) as u16, 0xffff]
+        });
+        Image { pixels, masked: Plane::filled(width, height, false) }
+    }
+
+    /// Where nothing is masked, the quick way gives what the other does; a masked pixel does not count.
+    #[test]
+    fn a_pixel_is_the_mean_of_its_block() {
+        for (width, height) in [(36, 22), (2, 2), (2, 8), (40, 2)] {
+            let image = noise(width, height);
+            let quick = image.halved();
+            for y in 0..quick.height() {
+                let (mut row, mut masked) = (vec![[0; 4]; width / 2], vec![false; width / 2]);
+                image.means_of_unmasked([2 * y, 2 * y + 1], &mut row, &mut masked);
+                assert_eq!((&row[..], &masked[..]), (quick.pixels.row(y), quick.masked.row(y)));
+            }
+        }
+        let mut image = noise(4, 2);
+        let before = image.halved();
+        image.masked[(1, 1)] = true;
+        (2..4).for_each(|x| (0..2).for_each(|y| image.masked[(x, y)] = true));
+        let half = image.halved();
+        assert_eq!(half.masked.data(), [false, true]);
+        assert_ne!(half.pixels[(0, 0)], before.pixels[(0, 0)]);
+        image.pixels[(1, 1)] = [1; 4];
+        assert_eq!(image.halved().pixels[(0, 0)], half.pixels[(0, 0)], "a masked pixel does not count");
+    }
+
+    #[test]
+    fn odd_sizes_become_whole_blocks_and_parts_stay_together() {
+        let pair = Pair::new(noise(7, 5), noise(7, 5)).unwrap();
+        let half = pair.halved();
+        let full = half.full().unwrap();
+        assert_eq!((half.size(), full.size()), ((4, 3), (8, 6)));
+        assert_eq!(full.left().pixels[(7, 5)], pair.left().pixels[(6, 4)]);
+        let part = half.crop(&super::super::Rect { x: 1..3, y: 1..2 });
+        assert_eq!(part.full().unwrap().size(), (4, 2));
+        assert_eq!(part.full().unwrap().left().pixels[(0, 0)], full.left().pixels[(2, 2)]);
+        // A mirror image of half the size is half the size of the mirror image.
+        let mirrored = half.mirrored();
+        assert_eq!(mirrored.clone().with_full(None), mirrored.full().unwrap().map(Image::halved));
+    }
+}
