@@ -152,6 +152,8 @@ pub struct Plan {
     /// Rows of level 0 that are held at the same time: all of them, or as many as the stages that go down the image
     /// together need.
     pub held: usize,
+    /// Whether the costs of level 0 are held whole, where its other volumes are not.
+    pub holds_costs: bool,
     /// Memory that the match may take, in MiB: that of the method, or for a tile what is left of it.
     pub memory: u32,
     /// Whether a backend gives what is never needed at the same time the same memory.
@@ -233,6 +235,7 @@ impl Plan {
             phases,
             core: 0..width,
             held: height,
+            holds_costs: false,
             memory: method.tiles.memory,
             shares: false,
             method,
@@ -282,6 +285,12 @@ impl Plan {
     #[must_use]
     pub fn holds_all_rows(&self) -> bool {
         self.held == self.levels[0].height
+    }
+
+    /// Whether all costs of level 0 are stored, and not computed where they are read.
+    #[must_use]
+    pub fn stores_costs(&self) -> bool {
+        self.holds_all_rows() || self.holds_costs
     }
 
     /// (width, height) of the finest level.
