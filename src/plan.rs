@@ -293,6 +293,12 @@ impl Plan {
         self.holds_all_rows() || self.holds_costs
     }
 
+    /// Whether the dependency factors of `level` ever send messages: without, nobody needs its graph.
+    #[must_use]
+    pub fn floods(&self, level: usize) -> bool {
+        self.phases.iter().any(|phase| phase.finest <= level && phase.iterations > 0)
+    }
+
     /// (width, height) of the finest level.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
