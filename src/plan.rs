@@ -163,6 +163,8 @@ pub struct Plan {
     /// Rows of level 0 that are held at the same time: all of them, or as many as the stages that go down the image
     /// together need.
     pub held: usize,
+    /// Whether the costs of level 0 are held whole, where its other volumes are not.
+    pub holds_costs: bool,
     /// Memory that the match may take, in MiB: that of the method, or for a tile what is left of it.
     pub memory: u32,
     /// Whether a backend gives what is never needed at the same time the same memory.
@@ -252,6 +254,7 @@ impl Plan {
             phases,
             core: 0..width,
             held: height,
+            holds_costs: false,
             memory: method.tiles.memory,
             shares: false,
             method,
@@ -308,6 +311,18 @@ impl Plan {
     #[must_use]
     pub fn holds_all_rows(&self) -> bool {
         self.held == self.levels[0].height
+    }
+
+    /// Whether all costs of level 0 are stored, and not computed where they are read.
+    #[must_use]
+    pub fn stores_costs(&self) -> bool {
+        self.holds_all_rows() || self.holds_costs
+    }
+
+    /// Whether the dependency factors of `level` ever send messages: without, nobody needs its graph.
+    #[must_use]
+    pub fn floods(&self, level: usize) -> bool {
+        self.phases.iter().any(|phase| phase.finest <= level && phase.iterations > 0)
     }
 
     /// (width, height) of the finest level.

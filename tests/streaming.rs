@@ -57,7 +57,7 @@ fn method(random: &mut Random) -> Method {
 #[test]
 fn streamed_maps_are_those_of_whole_levels() {
     let mut random = Random::new(17);
-    let (mut held_less, mut differ) = (0, 0);
+    let (mut held_less, mut held_costs, mut differ) = (0, 0, 0);
     for i in 0..50 {
         let size = (random.within(1, 70) as usize, random.within(120, 420) as usize);
         let labels = random.pick(&[1, 16, 17, 40, 40, 70]);
@@ -68,6 +68,10 @@ fn streamed_maps_are_those_of_whole_levels() {
         let held = streamed(&plan);
         held_less += usize::from(!held.holds_all_rows());
         assert!(held.bytes() <= plan.bytes());
+        // With enough memory the CPU path holds all costs.
+        let more = Plan { memory: 4096, ..plan.clone() };
+        held_costs += usize::from(streamed(&more).on_host().holds_costs);
+        assert!(!held.on_host().holds_costs && expected == maps(&mut Cpu::default(), &more, &pair, false));
         // A device takes longer.
         for (name, mut backend) in devices::backends().into_iter().take(if i % 3 == 0 { 2 } else { 1 }) {
             assert!(
@@ -85,6 +89,7 @@ fn streamed_maps_are_those_of_whole_levels() {
         differ += usize::from(expected != maps(&mut Cpu::default(), &plan, &other, false));
     }
     assert!(held_less >= 20, "only {held_less} matches were streamed");
+    assert_eq!(held_costs, held_less);
     assert!(differ >= 30, "only {differ} pairs have maps of their own");
 }
 

@@ -4,6 +4,9 @@ use super::votes::Votes;
 use super::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
 use crate::options::{Fill, Illumination};
 
+/// So many costs of level 0 are held whole, at most, where its other volumes are not.
+const MOST_COSTS: u64 = 1 << 27;
+
 impl Plan {
     /// Parts of a ring, of `part` rows each and with a halo on either side, that hold all rows of level 0 that are needed at the
     /// same time: the first of the next part to be overwritten is that of a halo, and all before it must be done.
@@ -21,8 +24,17 @@ impl Plan {
         if fits { whole } else { self.clone() }
     }
 
+    /// The plan by which the CPU path matches: where not all rows of level 0 are held, its costs are nevertheless, unless they are many
+    /// or do not fit in the memory that the method may take. They are read three times, and to compute them takes longer.
+    #[must_use]
+    pub fn on_host(&self) -> Self {
+        let holding = Self { holds_costs: true, ..self.clone() };
+        let pays = !self.holds_all_rows() && self.levels[0].cells() <= MOST_COSTS;
+        if pays && holding.bytes() <= u64::from(self.memory) << 20 { holding } else { self.clone() }
+    }
+
     /// Largest number of bytes taken by the volumes and the graph of `level`, on the CPU path or on a device; where not all rows of
-    /// level 0 are held, with what its costs are computed from.
+    /// level 0 are held, with its costs, or with what these are computed from.
     #[must_use]
     pub fn level_bytes(&self, level: usize) -> u64 {
         let l = &self.levels[level];
@@ -38,7 +50,13 @@ impl Plan {
         let labels = l.width * l.stride;
         let row =
             (cost + 1 + width * (1 + messages)) * aligned(labels) + width * aligned(self.slots() * labels);
-        let features = if streamed { l.height * (2 * l.width + 24 * (l.width + 2 * l.stride)) } else { 0 };
+        let costs = if !streamed {
+            0
+        } else if self.holds_costs {
+            l.height * aligned(labels)
+        } else {
+            l.height * (2 * l.width + 24 * (l.width + 2 * l.stride))
+        };
         // The member codes, and the transposed table with its row starts, and the guide.
         let on_host = l.width * (self.neighbours + 4 * self.slots() + 4 + 9);
         // A device needs less for these, but keeps candidates and label ranges as well. The guide of level 1 is there twice, and that of
@@ -48,7 +66,7 @@ impl Plan {
         let on_device = maps * aligned(4 * l.width) + aligned(4 * l.width * self.neighbours.div_ceil(4));
         let (runs, window_rows) = l.windows();
         let windows = 2 * aligned(4 * runs * window_rows);
-        (rows * row + features + l.height * on_host.max(on_device) + windows) as u64
+        (rows * row + costs + l.height * on_host.max(on_device) + windows) as u64
     }
 
     /// Largest number of bytes taken by the images and all maps.

@@ -22,7 +22,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
 #[must_use]
 pub fn estimate(plan: &Plan) -> Vec<Step> {
     let levels = 0..plan.levels.len();
-    let graphs = levels.clone().map(Stage::Graph);
+    let graphs = levels.clone().filter(|&z| plan.floods(z)).map(Stage::Graph);
     let costs = levels.flat_map(|z| {
         let cost = if z == 0 { Stage::Cost } else { Stage::Pyramid(z) };
         iter::once(cost).chain(plan.limits_labels().then_some(Stage::LabelRange(z)))
@@ -120,5 +120,24 @@ pub fn split(run: Run) -> Vec<Run> {
             [Stage::Dependency(z), Stage::Belief(z)].map(|stage| Run { stage, ..run.clone() }).into()
         }
         _ => vec![run],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::{DisparityRange, PRESETS};
+
+    #[test]
+    fn levels_have_a_graph_where_their_factors_send_messages() {
+        for preset in PRESETS {
+            let range = DisparityRange::new(0, 20).unwrap();
+            let plan = Plan::new(80, 60, range, &preset.method()).unwrap();
+            let steps = estimate(&plan);
+            let runs = |stage: Stage| steps.contains(&Step::of(stage));
+            for z in 0..plan.levels.len() {
+                assert_eq!(runs(Stage::Graph(z)), runs(Stage::Flood(z)), "{}, level {z}", preset.name);
+            }
+        }
     }
 }

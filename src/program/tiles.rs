@@ -140,11 +140,11 @@ impl Tiles {
         self.tiles.len()
     }
 
-    /// The plan that takes the most memory, as a match follows it that nobody looks into: the plan of the whole image where there
+    /// The plan that takes the most memory, as a match on the CPU path follows it that nobody looks into: the plan of the whole image where there
     /// is one tile.
     #[must_use]
     pub fn largest(&self) -> Plan {
-        let plans = self.tiles.iter().map(|tile| streamed(&tile.plan));
+        let plans = self.tiles.iter().map(|tile| streamed(&tile.plan).on_host());
         plans.max_by_key(Plan::bytes).unwrap_or_else(|| self.whole.clone())
     }
 

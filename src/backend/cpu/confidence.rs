@@ -4,12 +4,16 @@ use crate::image::Pair;
 use crate::maps::flag;
 use crate::plan::Plan;
 use crate::stage::MapSet;
+use rayon::prelude::*;
+
+/// Pixels that are worth a thread.
+const LEAST: usize = 1 << 14;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
     let floor = plan.method.refinement.confidence_floor;
     let MapSet { optima, validity, confidence, .. } = maps;
-    let pixels = confidence.data_mut().iter_mut().zip(validity.data_mut()).zip(optima.data());
-    for ((confidence, flags), optimum) in pixels {
+    let pixels = confidence.data_mut().par_iter_mut().zip(validity.data_mut()).zip(optima.data());
+    pixels.with_min_len(LEAST).for_each(|((confidence, flags), optimum)| {
         let lead = (2 * u32::from(optimum.runner_up - optimum.best)).min(255);
         if *flags & flag::INVALID != 0 {
             *confidence = 0;
@@ -19,5 +23,5 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
                 *flags |= flag::LOW_CONFIDENCE;
             }
         }
-    }
+    });
 }

@@ -14,7 +14,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
     let Volumes { plan, pair, features, fine_cost: out, .. } = v;
     match plan.method.cost.matching {
         MatchingCost::Sad => sad::costs(plan, pair, out),
-        MatchingCost::Census | MatchingCost::AdCensus if plan.holds_all_rows() => census(plan, pair, out),
+        MatchingCost::Census | MatchingCost::AdCensus if plan.stores_costs() => census(plan, pair, out),
         MatchingCost::Census | MatchingCost::AdCensus => features.fill(plan, pair),
     }
 }

@@ -19,7 +19,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, _: Sent, rows: Ra
         rows.for_each(|((evidence, belief), y)| {
             evidence_row(plan, windows, y, Costs::stored(&l.cost, y, plan), evidence, belief);
         });
-    } else if v.plan.holds_all_rows() {
+    } else if v.plan.stores_costs() {
         rows.for_each(|((evidence, belief), y)| {
             evidence_row(plan, windows, y, Costs::stored(&v.fine_cost, y, plan), evidence, belief);
         });

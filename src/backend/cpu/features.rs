@@ -241,6 +241,17 @@ impl Greys {
         }
     }
 
+    /// The greys of all rows of that window, with the columns beyond the border.
+    #[inline(always)]
+    fn rows_around(&self, y: usize) -> impl Iterator<Item = &[u16]> {
+        let (width, height) = self.size;
+        let pitch = width + 2 * CENSUS_X;
+        (-CENSUS_Y..=CENSUS_Y).map(move |dy| {
+            let ny = y.saturating_add_signed(dy).min(height - 1);
+            &self.values[ny * pitch..][..pitch]
+        })
+    }
+
     /// The greys of row `y` itself.
     fn row(&self, y: usize) -> &[u16] {
         let (width, _) = self.size;
@@ -358,11 +369,14 @@ fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, grey
 pub(super) struct Sums {
     greys: Vec<u16>,
     squares: Vec<u32>,
+    /// The same over the columns of the windows.
+    columns: (Vec<u16>, Vec<u32>),
 }
 
 impl Sums {
     pub(super) fn new(width: usize) -> Self {
-        Self { greys: vec![0; width], squares: vec![0; width] }
+        let columns = width + 2 * CENSUS_X;
+        Self { greys: vec![0; width], squares: vec![0; width], columns: (vec![0; columns], vec![0; columns]) }
     }
 }
 
@@ -383,21 +397,31 @@ fn colour_weights_on<'a, S: pulp::Simd>(
         return;
     }
     let centre = greys.row(y);
-    let Sums { greys: sums, squares } = sums;
+    let Sums { greys: sums, squares, columns: (column_sums, column_squares) } = sums;
     sums.fill(0);
     squares.fill(0);
-    let (sums, squares) = (&mut sums[..centre.len()], &mut squares[..centre.len()]);
+    let add = |sum: &mut u16, square: &mut u32, grey: u16| {
+        let grey = grey >> 8;
+        *sum += grey;
+        *square += u32::from(grey * grey);
+    };
+    if greys.masked.is_none() {
+        column_sums.fill(0);
+        column_squares.fill(0);
+        for row in greys.rows_around(y) {
+            let columns = column_sums.iter_mut().zip(column_squares.iter_mut());
+            columns.zip(row).for_each(|((sum, square), &grey)| add(sum, square, grey));
+        }
+        for i in 0..=2 * CENSUS_X {
+            sums.iter_mut().zip(&column_sums[i..]).for_each(|(sum, column)| *sum += column);
+            squares.iter_mut().zip(&column_squares[i..]).for_each(|(square, column)| *square += column);
+        }
+    }
+    // The centre stands for masked pixels, so that no column is the same in two windows.
     greys.around(y, |_, _, others, masked| {
-        let mut add = |i: usize, grey: u16| {
-            let grey = grey >> 8;
-            sums[i] += grey;
-            squares[i] += u32::from(grey * grey);
-        };
-        match masked {
-            None => others.iter().enumerate().for_each(|(i, &grey)| add(i, grey)),
-            Some(masked) => {
-                (0..others.len()).for_each(|i| add(i, others[i] & !masked[i] | centre[i] & masked[i]));
-            }
+        let Some(masked) = masked else { return };
+        for (i, (sum, square)) in sums.iter_mut().zip(squares.iter_mut()).enumerate() {
+            add(sum, square, others[i] & !masked[i] | centre[i] & masked[i]);
         }
     });
     // n / most for n below 2^32, as the upper half of a product (Lemire, Kaser and Kurz 2019): a division takes ten times as long.

@@ -37,24 +37,17 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
 
 /// Fills the invalid pixels of a row that has at least one valid one.
 fn fill_row(disparity: &[i32], flags: &[u8], farther: fn(i32, i32) -> i32) -> Vec<i32> {
-    let nearest = |order: &mut dyn Iterator<Item = usize>| {
-        let mut last = None;
-        let mut out = vec![None; disparity.len()];
-        for x in order {
-            if flags[x] & flag::INVALID == 0 {
-                last = Some(disparity[x]);
-            }
-            out[x] = last;
-        }
-        out
-    };
-    let left = nearest(&mut (0..disparity.len()));
-    let right = nearest(&mut (0..disparity.len()).rev());
-    left.into_iter()
-        .zip(right)
-        .map(|sides| match sides {
-            (Some(l), Some(r)) => farther(l, r),
-            (l, r) => l.or(r).unwrap_or_default(),
-        })
-        .collect()
+    let is_valid = |flags: &u8| flags & flag::INVALID == 0;
+    let mut filled = disparity.to_vec();
+    // Beyond the first and the last valid pixel there is one neighbour, which stands for both.
+    let mut nearest = flags.iter().position(is_valid).map_or(0, |first| disparity[first]);
+    for (value, flags) in filled.iter_mut().zip(flags) {
+        nearest = if is_valid(flags) { *value } else { nearest };
+        *value = nearest;
+    }
+    for (value, flags) in filled.iter_mut().zip(flags).rev() {
+        nearest = if is_valid(flags) { *value } else { nearest };
+        *value = farther(*value, nearest);
+    }
+    filled
 }

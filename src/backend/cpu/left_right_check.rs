@@ -13,10 +13,11 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let (width, min) = (plan.levels[0].width, i64::from(plan.range.min));
     let MapSet { optima, right, validity, .. } = maps;
     validity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        for (x, flags) in row.iter_mut().enumerate() {
-            let label = optima[(x, y)].label;
+        let (optima, right, masked) = (optima.row(y), right.row(y), left.masked.row(y));
+        for (x, ((flags, optimum), &masked)) in row.iter_mut().zip(optima).zip(masked).enumerate() {
+            let label = optimum.label;
             let xr = x as i64 - min - i64::from(label);
-            *flags = if left.masked[(x, y)] {
+            *flags = if masked {
                 flag::MASKED
             } else if label == NO_LABEL {
                 flag::OUTSIDE
@@ -24,7 +25,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
                 0
             } else if xr < 0 || xr >= width as i64 {
                 flag::OUTSIDE
-            } else if right[(xr as usize, y)].abs_diff(label) > 1 {
+            } else if right[xr as usize].abs_diff(label) > 1 {
                 flag::OCCLUDED
             } else {
                 0

@@ -139,6 +139,7 @@ impl Backend for Cpu {
     fn fit(&mut self, program: Program) -> Program {
         program.each_frame(|plan, steps| {
             let steps = together::pass(plan, steps);
+            *plan = plan.on_host();
             sharing::pass(plan, steps)
         })
     }

@@ -91,7 +91,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let out = &mut coarser[0].cost;
     if level > 1 {
         reduce(plan, level, &finer[level - 1].cost, out);
-    } else if plan.holds_all_rows() {
+    } else if plan.stores_costs() {
         reduce(plan, level, &v.fine_cost, out);
     } else {
         let (fine, coarse) = (&plan.levels[0], &plan.levels[1]);

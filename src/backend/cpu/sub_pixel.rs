@@ -32,7 +32,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
                 for (near, y) in near.iter_mut().zip(first..) {
                     near.clear(level.width);
                     if let Some(y) = y.checked_sub(1).filter(|&y| y < level.height) {
-                        if plan.holds_all_rows() {
+                        if plan.stores_costs() {
                             collect(level, fine_cost, y, optima.row(y), words);
                         } else {
                             features.costs_near(plan, y, optima.row(y), words);

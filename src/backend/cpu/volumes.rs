@@ -18,9 +18,9 @@ use std::mem;
 pub(super) struct Volumes<U> {
     pub(super) plan: Plan,
     pub(super) pair: Pair,
-    /// What the matching cost compares, where level 0 is not held whole.
+    /// What the matching cost compares, where the costs of level 0 are not stored.
     pub(super) features: Features,
-    /// Cost of level 0, where that is held whole; the costs of coarser levels are in `levels`.
+    /// Cost of level 0, where it is stored; the costs of coarser levels are in `levels`.
     pub(super) fine_cost: Pages<u8>,
     pub(super) levels: Vec<Level<U>>,
     /// First and last label of each pixel, by level; empty where all labels are allowed.
@@ -88,7 +88,7 @@ impl<U: Units> Volumes<U> {
             })
             .collect::<Result<_>>()?;
         let fine = &plan.levels[0];
-        let fine_cost = Pages::new(if plan.holds_all_rows() { fine.pixels() * fine.stride } else { 0 })?;
+        let fine_cost = Pages::new(if plan.stores_costs() { fine.pixels() * fine.stride } else { 0 })?;
         let maps = MapSet::new(plan);
         let of_maps = Self::of_maps(plan, pair, maps);
         Ok(Self { fine_cost, levels, label_ranges, labels: vec![0; fine.pixels()], ..of_maps })

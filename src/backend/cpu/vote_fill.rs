@@ -99,6 +99,14 @@ fn around(at: usize, count: usize) -> std::ops::Range<usize> {
 fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> Plane<Option<i32>> {
     let asked = asked(maps, votes);
     let [along, across] = vote_weights();
+    // Weights of the steps between each half-size pixel and the one above.
+    let mut steps_down = Plane::filled(votes.width, votes.height, 0);
+    steps_down.data_mut().par_chunks_mut(votes.width).enumerate().skip(1).for_each(|(y, weights)| {
+        for (weight, (&here, &above)) in weights.iter_mut().zip(colours.row(y).iter().zip(colours.row(y - 1)))
+        {
+            *weight = across[difference(here, above)];
+        }
+    });
     let mut elected = Plane::filled(votes.width, votes.height, None);
     // With padding, which nobody votes for.
     let stride = votes.labels.next_multiple_of(BLOCK);
@@ -120,18 +128,14 @@ fn elect(maps: &MapSet, plan: &Plan, colours: &Plane<[u8; 3]>, votes: Votes) -> 
             totals.resize(stride, 0);
             for (x, vote) in out.iter_mut().enumerate().filter(|(x, _)| asked[(*x, y)]) {
                 let at = |row: usize| (row - seen.start) * row_length + x * stride;
-                let step = |row: usize, next: usize| Step {
-                    from: at(row),
-                    weight: across[difference(colours[(x, row)], colours[(x, next)])],
-                };
                 // A step from outside the image has no weight.
                 let mut steps = [[Step::default(); 2]; VOTE_REACH];
                 for (away, [above, below]) in (1..=VOTE_REACH).rev().zip(&mut steps) {
                     if let Some(row) = y.checked_sub(away) {
-                        *above = step(row, row + 1);
+                        *above = Step { from: at(row), weight: steps_down[(x, row + 1)] };
                     }
                     if y + away < votes.height {
-                        *below = step(y + away, y + away - 1);
+                        *below = Step { from: at(y + away), weight: steps_down[(x, y + away)] };
                     }
                 }
                 sum_column(totals, &sums, at(y), &steps);

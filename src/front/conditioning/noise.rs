@@ -93,10 +93,11 @@ impl Patch {
             let pixels = &image.pixels.row(top + j)[columns];
             row.iter_mut().zip(pixels).for_each(|(grey, pixel)| *grey = i32::from(pixel[3] >> 4));
         }
+        let across: [[i32; SIDE]; SIDE + 2] =
+            from_fn(|y| from_fn(|x| grey[y][x] + 2 * grey[y][x + 1] + grey[y][x + 2]));
         let sums: [i32; PIXELS] = from_fn(|at| {
             let (x, y) = (at % SIDE, at / SIDE);
-            let across = |row: &[i32; SIDE + 2]| row[x] + 2 * row[x + 1] + row[x + 2];
-            across(&grey[y]) + 2 * across(&grey[y + 1]) + across(&grey[y + 2])
+            across[y][x] + 2 * across[y + 1][x] + across[y + 2][x]
         });
         let fine = from_fn(|at| grey[at / SIDE + 1][at % SIDE + 1] - sums[at] / 16);
         let mean = sums.iter().sum::<i32>() / PIXELS as i32;
