@@ -6,7 +6,7 @@ use super::kernel::{Bindings, Kernel, MAX_LOOP_ITERATIONS};
 use super::rows::{Binding, Copy, Rows};
 use super::shader::{Shader, WORKGROUP, binding_number};
 use super::uniform::{self, Band, Header, LevelParams};
-use crate::error::{DeviceError, MemoryError, Result};
+use crate::error::{DeviceError, Result};
 use crate::plan::{LevelPlan, Plan};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -42,6 +42,9 @@ pub(super) struct Pipeline {
     /// The binding number of each of its names.
     numbers: Vec<u32>,
 }
+
+/// The least that a dispatch must see.
+pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
 
 /// Compiled kernels.
 pub(super) type Pipelines = HashMap<Shader, Pipeline>;
@@ -80,6 +83,11 @@ impl<'a> Recorder<'a> {
     /// The buffers of the next finer level.
     pub(super) fn finer(&self) -> &'a LevelBuffers {
         &self.buffers.levels[self.level - 1]
+    }
+
+    /// A level of `levels`, whose buffers hold all of them.
+    pub(super) fn shared(&self, levels: &Range<usize>) -> &'a LevelBuffers {
+        &self.buffers.levels[levels.end - 1]
     }
 
     /// The parameters of the level, as the shaders get them.
@@ -193,13 +201,7 @@ impl<'a> Recorder<'a> {
                     break;
                 }
                 if rows == 1 {
-                    return Err(MemoryError::Buffer {
-                        name: self.device.name.clone(),
-                        what: "one row of the image and what it depends on".into(),
-                        needed: most,
-                        allowed: self.device.max_binding,
-                    }
-                    .into());
+                    return Err(self.device.too_large(ONE_ROW, most, self.device.max_binding));
                 }
                 rows -= rows.div_ceil(8).min(rows - 1);
             }
@@ -220,8 +222,7 @@ impl<'a> Recorder<'a> {
         self.dispatch_sections(kernel, &[section], bindings)
     }
 
-    /// Dispatches `kernel` for all rows of `levels` at once, which [share](super::buffers::Shared) their
-    /// buffers. `own` gives the parameters of a level and its number of invocations in a row.
+    /// Dispatches `kernel` for all rows of `levels` at once, which share their buffers. `own` gives the parameters of a level and its number of invocations in a row.
     pub(super) fn levels<B: Bindings>(
         &mut self,
         kernel: &Kernel<B>,
@@ -269,12 +270,8 @@ impl<'a> Recorder<'a> {
         bytes.resize(bytes.len() / sections.len() * kernel.sections, 0);
         let work: u64 = sections.iter().map(|s| u64::from(s.size.0) * u64::from(s.size.1)).sum();
         let device = self.device.inner()?;
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("uniform"),
-            size: bytes.len() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let uniform = self.device.buffer("uniform", bytes.len() as u64, usage)?;
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
         let bindings = bindings.all();
         entries.extend(pipeline.numbers.iter().zip(&bindings).map(|(number, binding)| {

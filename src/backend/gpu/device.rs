@@ -169,6 +169,18 @@ impl Device {
         }
     }
 
+    /// A new buffer of `size` bytes.
+    pub(super) fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        let descriptor =
+            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        Ok(self.inner()?.create_buffer(&descriptor))
+    }
+
+    /// That a buffer for `what`, or what a shader sees of it at once, takes more than this device allows.
+    pub(super) fn too_large(&self, what: impl Into<String>, needed: u64, allowed: u64) -> Error {
+        MemoryError::Buffer { name: self.name.clone(), what: what.into(), needed, allowed }.into()
+    }
+
     pub(super) fn write(&mut self, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {
         self.write_at(buffer, 0, bytes)
     }
