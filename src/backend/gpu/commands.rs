@@ -305,7 +305,7 @@ impl<'a> Recorder<'a> {
         let Kernel { shader, loops, names, .. } = kernel;
         if *loops > MAX_LOOP_ITERATIONS {
             let LevelPlan { width, height, labels, .. } = self.plan.levels[0];
-            let (neighbours, shader) = (self.plan.neighbours, shader.stage());
+            let (neighbours, shader) = (self.plan.neighbours, shader.stage);
             return Err(DeviceError::TooLargeForShader { width, height, labels, neighbours, shader }.into());
         }
         if let Some(pipeline) = self.pipelines.get(shader) {
@@ -316,14 +316,14 @@ impl<'a> Recorder<'a> {
         let numbers = names.iter().map(number).collect();
         let device = self.device.inner()?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(shader.stage()),
+            label: Some(shader.stage),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
         let inner = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(shader.stage()),
+            label: Some(shader.stage),
             layout: None,
             module: &module,
-            entry_point: Some(shader.entry()),
+            entry_point: Some(shader.entry),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
