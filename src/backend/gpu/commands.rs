@@ -1,7 +1,7 @@
 //! Turns stages into dispatches, in bands of rows where a buffer exceeds the device's largest binding.
 
 use super::buffers::{Buffers, LevelBuffers};
-use super::device::Device;
+use super::device::{Device, ONE_ROW};
 use super::kernel::{Bindings, Kernel, MAX_LOOP_ITERATIONS};
 use super::rows::{Binding, Copy, Rows};
 use super::shader::{Shader, WORKGROUP, binding_number};
@@ -42,9 +42,6 @@ pub(super) struct Pipeline {
     /// The binding number of each of its names.
     numbers: Vec<u32>,
 }
-
-/// The least that a dispatch must see.
-pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
 
 /// Compiled kernels.
 pub(super) type Pipelines = HashMap<Shader, Pipeline>;

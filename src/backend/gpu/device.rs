@@ -42,6 +42,9 @@ const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
 /// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late.
 const SUBMISSIONS: usize = 4;
 
+/// The least that a dispatch sees at once.
+pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
+
 /// An open device with its queue and the first failure it reported.
 pub(super) struct Device {
     /// `None` once the device hangs.

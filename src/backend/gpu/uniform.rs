@@ -13,8 +13,8 @@ macro_rules! layout {
         $(#[$about])*
         #[repr(C)]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-        pub(in crate::backend::gpu) struct $name {
-            $( pub(in crate::backend::gpu) $field: $type, )*
+        pub(super) struct $name {
+            $( pub(super) $field: $type, )*
         }
 
         impl $crate::backend::gpu::uniform::Layout for $name {

@@ -1,8 +1,7 @@
 //! The buffers of the votes on filled pixels.
 
 use super::allocator::Allocator;
-use super::commands::ONE_ROW;
-use super::device::Device;
+use super::device::{Device, ONE_ROW};
 use super::rows::Rows;
 use super::uniform::{ALIGN_WORDS, LevelParams};
 use crate::error::Result;
