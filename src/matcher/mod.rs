@@ -186,15 +186,8 @@ impl Matcher {
         if let Some(device) = gpu {
             let served = async || {
                 check(device, &plan.method, checked).await?;
-                timed(
-                    device,
-                    *timings,
-                    &tiles,
-                    pair,
-                    &mut *observer,
-                    inspector.as_mut().map(|inspector| &mut **inspector as _),
-                )
-                .await
+                let inspector = inspector.as_mut().map(|inspector| &mut **inspector as _);
+                timed(device, *timings, &tiles, pair, &mut *observer, inspector).await
             };
             match threads.run(served).await {
                 Err(e) => note = Some(self.without_device(e)?),
