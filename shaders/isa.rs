@@ -134,7 +134,7 @@ fn run(names: &[String]) -> Result<(), String> {
         let figures: Vec<Figures> = kernels
             .par_iter()
             .map(|kernel| {
-                radeon.compile(&kernel.source(), kernel.entry()).map_err(|e| format!("{}: {e}", name(kernel)))
+                radeon.compile(&kernel.source(), kernel.entry).map_err(|e| format!("{}: {e}", name(kernel)))
             })
             .collect::<Result<_, _>>()?;
         let mut rows: BTreeMap<String, (usize, Figures)> = BTreeMap::new();
@@ -176,15 +176,15 @@ fn run(names: &[String]) -> Result<(), String> {
 
 /// The name of a kernel, which its variants share. Arrays of one item a slot make others of it.
 fn name(kernel: &Shader) -> String {
-    let entry = match kernel.entry() {
+    let entry = match kernel.entry {
         "main" => String::new(),
         entry => format!("/{entry}"),
     };
-    let slots = kernel.constants().iter().find_map(|constant| match constant {
+    let slots = kernel.constants.iter().find_map(|constant| match constant {
         ("SLOTS", Constant::U32(slots)) => Some(format!("/{slots}")),
         _ => None,
     });
-    format!("{}{entry}{}", kernel.stage(), slots.unwrap_or_default())
+    format!("{}{entry}{}", kernel.stage, slots.unwrap_or_default())
 }
 
 /// A kernel of which a SIMD holds as many waves as it can.

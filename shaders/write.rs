@@ -13,7 +13,7 @@ fn main() -> Result<()> {
     fs::create_dir_all(folder)?;
     for (number, kernel) in variants::kernels(&variants::plans()).iter().enumerate() {
         let shader = &kernel.shader;
-        let name = format!("{number:03}.{}.{}.wgsl", shader.stage(), shader.entry());
+        let name = format!("{number:03}.{}.{}.wgsl", shader.stage, shader.entry);
         fs::write(Path::new(folder).join(name), shader.source())?;
     }
     Ok(())

@@ -488,25 +488,18 @@ mod tests {
     /// A library user knows no flags, and no program.
     #[test]
     fn no_text_in_the_source_names_a_flag_or_the_program() {
-        let mut folders = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
         let mut files = 0;
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(folder).unwrap() {
-                let path = entry.unwrap().path();
-                if path.is_dir() {
-                    folders.push(path);
-                    continue;
-                }
-                files += 1;
-                let source = fs::read_to_string(&path).unwrap();
-                let source = source.split("#[cfg(test)]").next().unwrap();
-                for line in source.lines().filter(|line| !line.trim_start().starts_with("//")) {
-                    let flag = line
-                        .match_indices("--")
-                        .any(|(at, _)| line[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()));
-                    let tests = path.ends_with("tests.rs");
-                    assert!(tests || !(flag || line.contains("`mrfgs ")), "{}: {line}", path.display());
-                }
+        for path in glob::glob(concat!(env!("CARGO_MANIFEST_DIR"), "/src/**/*.rs")).unwrap() {
+            let path = path.unwrap();
+            files += 1;
+            let source = fs::read_to_string(&path).unwrap();
+            let source = source.split("#[cfg(test)]").next().unwrap();
+            for line in source.lines().filter(|line| !line.trim_start().starts_with("//")) {
+                let flag = line
+                    .match_indices("--")
+                    .any(|(at, _)| line[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()));
+                let tests = path.ends_with("tests.rs");
+                assert!(tests || !(flag || line.contains("`mrfgs ")), "{}: {line}", path.display());
             }
         }
         assert!(files > 20, "{files}");

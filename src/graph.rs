@@ -172,12 +172,6 @@ impl LevelGraph {
         }
     }
 
-    /// The pixel of the member `code` of `factor`, both as raster indices.
-    #[inline]
-    fn pixel(&self, factor: usize, code: u8) -> Option<usize> {
-        self.steps.get(usize::from(code)).map(|&step| factor.wrapping_add_signed(step))
-    }
-
     /// Width of the level in pixels.
     #[must_use]
     pub fn width(&self) -> usize {
@@ -199,10 +193,9 @@ impl LevelGraph {
     /// The pixel in `slot` of `factor`, both as raster indices; `None` where the slot is empty.
     #[must_use]
     pub fn member(&self, factor: usize, slot: usize) -> Option<usize> {
-        match slot {
-            0 => Some(factor),
-            _ => self.pixel(factor, self.codes[factor * self.neighbours + slot - 1]),
-        }
+        let Some(slot) = slot.checked_sub(1) else { return Some(factor) };
+        let code = usize::from(self.codes[factor * self.neighbours + slot]);
+        self.steps.get(code).map(|&step| factor.wrapping_add_signed(step))
     }
 
     /// Codes of the neighbours of the factor at (x, y).

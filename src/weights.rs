@@ -47,12 +47,16 @@ pub fn vote_weights() -> [Vec<u32>; 2] {
 /// and fits in bytes throughout.
 #[derive(Clone, Debug)]
 pub struct MedianWeights {
-    radius: usize,
-    step_bits: [u32; 2],
+    /// Radius of the window, in steps.
+    pub radius: usize,
+    /// Spacing of the window's places along rows and along columns: 2 to this many pixels.
+    pub step_bits: [u32; 2],
     /// By |dy| and by dx from -radius to radius, in steps of the window, \[dy\]\[dx\].
     space: Vec<u8>,
-    scale: u32,
-    doublings: u32,
+    /// Factor of a 16-bit channel, 1 ..= 256; the upper 16 bits of the product are its guide.
+    pub scale: u32,
+    /// Number of times that a sum of guide differences is doubled, 0 ..= 7.
+    pub doublings: u32,
 }
 
 impl MedianWeights {
@@ -90,30 +94,6 @@ impl MedianWeights {
         }
         let scale = (256.0 * slope + 0.5).floor().clamp(1.0, 256.0) as u32;
         Self { radius, step_bits: [0; 2], space, scale, doublings }
-    }
-
-    /// Radius of the window, in steps.
-    #[must_use]
-    pub fn radius(&self) -> usize {
-        self.radius
-    }
-
-    /// Spacing of the window's places along rows and along columns: 2 to this many pixels.
-    #[must_use]
-    pub fn step_bits(&self) -> [u32; 2] {
-        self.step_bits
-    }
-
-    /// Factor of a 16-bit channel, 1 ..= 256; the upper 16 bits of the product are its guide.
-    #[must_use]
-    pub fn scale(&self) -> u32 {
-        self.scale
-    }
-
-    /// Number of times that a sum of guide differences is doubled, 0 ..= 7.
-    #[must_use]
-    pub fn doublings(&self) -> u32 {
-        self.doublings
     }
 
     /// The weight that distance subtracts, by |dy| and |dx|, as the shader reads it.

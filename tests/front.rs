@@ -370,8 +370,7 @@ fn the_method_says_what_is_corrected_and_what_a_zone_is() {
             assert_eq!(matches, matches::find(source, split, Some(range)));
             let ranges = label_range::zonal(range, (&zones.map, zones.count), &matches, 1.0);
             let index = |label: i32| (label - range.min) as u16;
-            let at = |i: usize| [ranges.low.data()[i], ranges.high.data()[i]].map(index);
-            assert!((0..ranges.low.data().len()).all(|i| found.label_ranges[0].data()[i] == at(i)));
+            assert!(found.label_ranges[0] == ranges.map(|ends| ends.map(index)));
             seen.push(found.label_ranges);
         }
     }

@@ -30,7 +30,7 @@ fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
 /// Runs `check` on every kernel, and reports all failures at once.
 fn for_every_kernel(check: impl Fn(&Kernel, &Module, &ModuleInfo) -> Result<(), String>) {
     let entries: HashSet<_> =
-        KERNELS.iter().map(|kernel| (kernel.shader.stage(), kernel.shader.entry())).collect();
+        KERNELS.iter().map(|kernel| (kernel.shader.stage, kernel.shader.entry)).collect();
     assert!(entries.len() > 20 && KERNELS.len() > entries.len(), "only {} kernels", KERNELS.len());
     let failures: Vec<String> = KERNELS
         .iter()
@@ -55,7 +55,7 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
         .unwrap()
         .filter_map(|e| e.unwrap().path().file_name()?.to_str()?.strip_suffix(".wgsl").map(str::to_owned))
         .collect();
-    let kernels: HashSet<String> = KERNELS.iter().map(|kernel| kernel.shader.stage().to_owned()).collect();
+    let kernels: HashSet<String> = KERNELS.iter().map(|kernel| kernel.shader.stage.to_owned()).collect();
     assert_eq!(files, kernels);
     let mut stages: HashSet<&str> = PLANS.iter().flat_map(Stage::all).map(Stage::name).collect();
     // The sweep has no shader of its own. Filled pixels take planes and medians by the shaders of these. The upload is no stage.
@@ -67,9 +67,9 @@ fn every_stage_has_a_shader_and_every_shader_a_stage() {
 #[test]
 fn every_entry_point_is_a_kernel() {
     let used: HashSet<(&str, &str)> =
-        KERNELS.iter().map(|kernel| (kernel.shader.stage(), kernel.shader.entry())).collect();
+        KERNELS.iter().map(|kernel| (kernel.shader.stage, kernel.shader.entry)).collect();
     for_every_kernel(|kernel, module, _| {
-        let unused = module.entry_points.iter().find(|e| !used.contains(&(kernel.shader.stage(), &e.name)));
+        let unused = module.entry_points.iter().find(|e| !used.contains(&(kernel.shader.stage, &e.name)));
         unused.map_or(Ok(()), |e| Err(format!("nothing runs `{}`", e.name)))
     });
 }
@@ -138,7 +138,7 @@ fn a_uniform_of_another_layout_is_noticed() {
 
 /// The index of the kernel's entry point.
 fn entry_point(kernel: &Kernel, module: &Module) -> usize {
-    module.entry_points.iter().position(|e| e.name == kernel.shader.entry()).expect("it compiles")
+    module.entry_points.iter().position(|e| e.name == kernel.shader.entry).expect("it compiles")
 }
 
 /// Compares what `kernel` binds with what its entry point uses of the shader with this `source`.
@@ -227,7 +227,7 @@ fn loops_stay_below_what_drivers_run() {
 #[test]
 fn every_shader_translates_to_spirv_msl_and_hlsl() {
     for_every_kernel(|kernel, module, info| {
-        let entry = (ShaderStage::Compute, kernel.shader.entry().to_owned());
+        let entry = (ShaderStage::Compute, kernel.shader.entry.to_owned());
         let spirv = naga::back::spv::PipelineOptions { shader_stage: entry.0, entry_point: entry.1.clone() };
         let words =
             naga::back::spv::write_vec(module, info, &naga::back::spv::Options::default(), Some(&spirv))

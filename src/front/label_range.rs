@@ -15,15 +15,9 @@ use crate::plan::Plan;
 /// open).
 pub const MIN_MATCHES: usize = 10;
 
-/// An interval of labels for each pixel of one level. Labels are disparities in pixels of that level, not
+/// The smallest and the largest label of each pixel of one level. Labels are disparities in pixels of that level, not
 /// indices: for an index, subtract the level's smallest label.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LabelRanges {
-    /// Smallest label of each pixel.
-    pub low: Plane<i32>,
-    /// Largest label of each pixel, not below `low`.
-    pub high: Plane<i32>,
-}
+pub type LabelRanges = Plane<[i32; 2]>;
 
 /// The label range at level 0: in each zone mu +- `k` sigma of the disparities of its `matches`, rounded
 /// outwards and clipped to `range`. `k` is not negative; the paper uses 1.
@@ -47,10 +41,10 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u32>, usize), matches: &[Matc
             *squares += d * d;
         }
     }
-    let intervals: Vec<(i32, i32)> = sums
+    let full = [range.min, range.max];
+    let intervals: Vec<[i32; 2]> = sums
         .into_iter()
         .map(|(n, sum, squares)| {
-            let full = (range.min, range.max);
             if n < MIN_MATCHES as i64 {
                 return full;
             }
@@ -60,11 +54,10 @@ pub fn zonal(range: DisparityRange, zones: (&Plane<u32>, usize), matches: &[Matc
             let (mu, reach) = (sum as f64 / scale, k * (variance as f64).sqrt() / scale);
             let low = ((mu - reach).floor() as i32).max(range.min);
             let high = ((mu + reach).ceil() as i32).min(range.max);
-            if low <= high { (low, high) } else { full }
+            if low <= high { [low, high] } else { full }
         })
         .collect();
-    let interval = |zone: &u32| intervals.get(*zone as usize).copied().unwrap_or((range.min, range.max));
-    LabelRanges { low: map.map(|zone| interval(zone).0), high: map.map(|zone| interval(zone).1) }
+    map.map(|zone| intervals.get(*zone as usize).copied().unwrap_or(full))
 }
 
 /// First and last label index of each pixel, at every level of `plan`, in the form that backends take.
@@ -75,39 +68,23 @@ pub fn levels(plan: &Plan, zones: &Zones, matches: &[Match]) -> Vec<Plane<[u16; 
     let mut levels = Vec::new();
     for level in &plan.levels {
         if !levels.is_empty() {
-            label_range = label_range.coarser();
+            label_range = coarser(&label_range);
         }
         let index = |label: i32| (label - level.min).clamp(0, level.labels as i32 - 1) as u16;
-        levels.push(Plane::from_fn(level.width, level.height, |x, y| {
-            [index(label_range.low[(x, y)]), index(label_range.high[(x, y)])]
-        }));
+        levels.push(label_range.map(|ends| ends.map(index)));
     }
     levels
 }
 
-impl LabelRanges {
-    /// The label range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2
-    /// children, in coarse labels (floor(low / 2) to ceil(high / 2)).
-    #[must_use]
-    pub fn coarser(&self) -> Self {
-        let (width, height) = self.low.size();
-        let hull = |plane: &Plane<i32>, pick: fn(i32, i32) -> i32, halve: fn(i32) -> i32| {
-            Plane::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| {
-                let right = (2 * x + 1).min(width - 1);
-                let below = (2 * y + 1).min(height - 1);
-                let above = pick(plane[(2 * x, 2 * y)], plane[(right, 2 * y)]);
-                halve(pick(above, pick(plane[(2 * x, below)], plane[(right, below)])))
-            })
-        };
-        Self {
-            low: hull(&self.low, i32::min, |low| low.div_euclid(2)),
-            high: hull(&self.high, i32::max, |high| -(-high).div_euclid(2)),
-        }
-    }
-
-    /// Total number of allowed labels over all pixels.
-    #[must_use]
-    pub fn labels(&self) -> u64 {
-        self.low.data().iter().zip(self.high.data()).map(|(low, high)| (high - low + 1) as u64).sum()
-    }
+/// The label range at the next coarser level: the hull of the intervals of a pixel's up to 2 x 2
+/// children, in coarse labels (floor(low / 2) to ceil(high / 2)).
+#[must_use]
+pub fn coarser(fine: &LabelRanges) -> LabelRanges {
+    let (width, height) = fine.size();
+    Plane::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| {
+        let rows = 2 * y..(2 * y + 2).min(height);
+        let children = rows.flat_map(|v| &fine.row(v)[2 * x..(2 * x + 2).min(width)]);
+        let hull = children.fold([i32::MAX, i32::MIN], |[low, high], [l, h]| [low.min(*l), high.max(*h)]);
+        [hull[0].div_euclid(2), -(-hull[1]).div_euclid(2)]
+    })
 }

@@ -37,12 +37,6 @@ impl Prepared {
     pub fn new(pair: &Pair) -> Self {
         Self { pair: pair.clone(), label_ranges: Vec::new(), zones: None }
     }
-
-    /// The same pair with these label ranges.
-    #[must_use]
-    pub fn within(self, label_ranges: Vec<Plane<[u16; 2]>>) -> Self {
-        Self { label_ranges, ..self }
-    }
 }
 
 /// The pair that is matched by `plan` in the place of `pair`, and what was corrected in that. Where the pair is matched at half its

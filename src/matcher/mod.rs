@@ -186,7 +186,8 @@ impl Matcher {
         if let Some(device) = gpu {
             let served = async || {
                 check(device, &plan.method, checked).await?;
-                timed(device, *timings, &tiles, pair, &mut *observer, again(&mut inspector)).await
+                let inspector = inspector.as_mut().map(|inspector| &mut **inspector as _);
+                timed(device, *timings, &tiles, pair, &mut *observer, inspector).await
             };
             match threads.run(served).await {
                 Err(e) => note = Some(self.without_device(e)?),
@@ -352,12 +353,4 @@ async fn timed(
     let solution = engine::solve(backend, &program, pair, observer, inspector).await?;
     let timings = if timings { summed(&solution, &backend.times().await?) } else { Vec::new() };
     Ok(Matched::new(backend, tiles, solution, timings))
-}
-
-/// The same inspector once more, for a shorter time.
-fn again<'a>(inspector: &'a mut Option<Inspector>) -> Option<Inspector<'a>> {
-    match inspector {
-        Some(inspector) => Some(&mut **inspector),
-        None => None,
-    }
 }

@@ -1,7 +1,7 @@
 //! The schedule: the only place that knows levels, iterations, convergence and the order of what follows.
 
 use super::{Run, Step};
-use crate::options::{Fill, MatchSize, Median, Method, Order};
+use crate::options::{Method, Order};
 use crate::plan::{Phase, Plan};
 use crate::program::View;
 use crate::stage::Stage;
@@ -92,23 +92,11 @@ fn iteration(plan: &Plan, phase: &Phase, i: u32) -> impl Iterator<Item = Stage> 
     (finest + 1..=exchanged).map(Stage::Resolution).chain((finest..=flooded).map(Stage::Flood))
 }
 
-/// What follows the disparities, in order. These stages look at maps alone.
+/// What follows the disparities: the stages that look at maps alone, in the order of their table, where the method takes them.
 #[must_use]
 pub fn post_processing(method: &Method) -> Vec<Step> {
-    let refinement = &method.refinement;
-    let mut stages = vec![Stage::LeftRightCheck];
-    stages.extend((refinement.speckle_size > 0).then_some(Stage::SpeckleFilter));
-    stages.push(Stage::Confidence);
-    match refinement.fill {
-        Fill::None => {}
-        Fill::Row => stages.push(Stage::Fill),
-        Fill::Votes => stages.extend([Stage::Fill, Stage::VoteFill, Stage::FillPlane]),
-    }
-    if refinement.median != Median::Off {
-        stages.push(if refinement.plane { Stage::Plane } else { Stage::Median });
-    }
-    stages.extend((method.schedule.match_size == MatchSize::Half).then_some(Stage::Enlarge));
-    stages.into_iter().map(Step::of).collect()
+    let taken = Stage::OF_MAPS.iter().filter(|stage| (stage.descriptor().taken)(method));
+    taken.copied().map(Step::of).collect()
 }
 
 /// The steps that run at one level alone, each flooding as its two parts: messages, then beliefs. A backend that does not do both in

@@ -34,6 +34,7 @@
 //! [`MASKED`](crate::maps::flag::MASKED) and 0.
 
 use super::{Descriptor, Map, maps};
+use crate::options::MatchSize;
 
 /// What each pixel of the full size that a pixel is away counts as a difference in colour, in 8-bit levels.
 pub const AWAY: i32 = 8;
@@ -43,6 +44,7 @@ pub const NEAR: i32 = 64;
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Raw, Map::Disparity, Map::Validity, Map::Confidence]),
     writes: |_| maps(&Map::FULL),
+    taken: |method| method.schedule.match_size == MatchSize::Half,
     pixel: 60.0,
     ..Descriptor::NONE
 };

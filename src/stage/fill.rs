@@ -15,10 +15,12 @@
 //! Where no pixel at all is valid, nothing is filled.
 
 use super::{Descriptor, Map, maps};
+use crate::options::Fill;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity, Map::Validity]),
+    taken: |method| method.refinement.fill != Fill::None,
     pixel: 4.0,
     ..Descriptor::NONE
 };

@@ -11,10 +11,12 @@
 //! - The weights are those [`of_filled`](crate::weights::MedianWeights::of_filled) pixels.
 
 use super::{Descriptor, Map, maps};
+use crate::options::Fill;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity]),
+    taken: |method| method.refinement.fill == Fill::Votes,
     pixel: 48.0,
     ..Descriptor::NONE
 };

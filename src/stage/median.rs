@@ -18,10 +18,12 @@
 //!    ```
 
 use super::{Descriptor, Map, maps};
+use crate::options::Median;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity]),
+    taken: |method| method.refinement.median != Median::Off && !method.refinement.plane,
     pixel: 60.0,
     ..Descriptor::NONE
 };

@@ -7,13 +7,14 @@
 mod data;
 mod map_set;
 
+use crate::options::Method;
 use crate::plan::Plan;
 pub(crate) use data::PaddedRows;
 pub use data::{Data, Map, NO_LABEL, NO_RUNNER_UP, Volume, volume_shape};
 pub(crate) use map_set::{MapSet, Optimum};
 
 /// Calls the macro `$then` with all rows: the stages that run at a level and those that run on the volumes of level 0, of both kinds
-/// apart the ones that can go row by row, and the stages that look at maps alone.
+/// apart the ones that can go row by row, and the stages that look at maps alone, in the order in which a match runs them.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! for_every_stage {
@@ -44,6 +45,8 @@ pub struct Descriptor {
     pub reach: Option<usize>,
     /// Whether it may run at several levels at once: no level waits for what it does at another.
     pub joins: bool,
+    /// Whether a match by a method runs it. Asked of the stages that look at maps alone.
+    pub taken: fn(&Method) -> bool,
     /// About how long it takes on one thread, in ns: for a pixel of its level.
     pub pixel: f64,
     /// And for a cell of its level: a label of a pixel.
@@ -57,6 +60,7 @@ impl Descriptor {
         writes: |_| Vec::new(),
         reach: None,
         joins: false,
+        taken: |_| true,
         pixel: 0.0,
         cell: 0.0,
     };
@@ -113,6 +117,9 @@ macro_rules! define {
                 of_level.chain(finest).filter(is_there).collect()
             }
 
+            /// The stages that look at maps alone, in order.
+            pub const OF_MAPS: &[Self] = &[$( Self::$map ),*];
+
             /// Its name: that of its files.
             #[must_use]
             pub fn name(self) -> &'static str {
@@ -140,7 +147,7 @@ macro_rules! define {
             /// Whether it looks at maps alone, and at the left image in the sizes that there are.
             #[must_use]
             pub fn is_of_maps(self) -> bool {
-                matches!(self, $( Self::$map )|*)
+                Self::OF_MAPS.contains(&self)
             }
 
             /// The level that it runs at; `None` for what there is at the finest one alone.

@@ -45,10 +45,12 @@
 //! supports.) The limits are in [`planes`](crate::plan::planes).
 
 use super::{Descriptor, Map, maps};
+use crate::options::Median;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity]),
+    taken: |method| method.refinement.median != Median::Off && method.refinement.plane,
     pixel: 130.0,
     ..Descriptor::NONE
 };

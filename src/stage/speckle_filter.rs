@@ -17,6 +17,7 @@ use super::{Descriptor, Map, maps};
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Label, Map::Best, Map::RunnerUp, Map::Validity]),
     writes: |_| maps(&[Map::Validity]),
+    taken: |method| method.refinement.speckle_size > 0,
     pixel: 15.0,
     ..Descriptor::NONE
 };

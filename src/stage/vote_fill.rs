@@ -75,10 +75,12 @@
 //!    and its confidence 0.
 
 use super::{Data, Descriptor, Map, maps};
+use crate::options::Fill;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     writes: |_| [maps(&[Map::Disparity, Map::Validity, Map::Confidence]), vec![Data::Votes]].concat(),
+    taken: |method| method.refinement.fill == Fill::Votes,
     pixel: 60.0,
     ..Descriptor::NONE
 };

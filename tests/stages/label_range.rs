@@ -25,7 +25,7 @@ fn label_range() {
                 })
             })
             .collect();
-        let prepared = Prepared::new(&case.pair).within(label_ranges.clone());
+        let prepared = Prepared { label_ranges: label_ranges.clone(), ..Prepared::new(&case.pair) };
         backend.prepare(&plan, prepared).unwrap();
         for (z, label_range) in label_ranges.iter().enumerate() {
             let cost = random_cost(random, &plan, z);

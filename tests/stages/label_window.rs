@@ -90,7 +90,7 @@ fn windows_within_label_ranges() {
                 })
             })
             .collect();
-        let prepared = Prepared::new(&case.pair).within(ranges.clone());
+        let prepared = Prepared { label_ranges: ranges.clone(), ..Prepared::new(&case.pair) };
         backend.prepare(&plan, prepared).unwrap();
         for (z, ranges) in ranges.iter().enumerate() {
             let expected = twin::label_window::label_window(&plan, z, None, Some(ranges));

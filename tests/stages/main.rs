@@ -30,6 +30,7 @@ use mrfgs::image::{Pair, Plane};
 use mrfgs::low_level::backend::{Backend, Volume};
 use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{COST_MAX, Plan};
+use mrfgs::options::{MatchingCost, Pyramid};
 use std::collections::HashSet;
 use std::ops::Range;
 
@@ -150,7 +151,10 @@ fn the_cases_cover_what_they_should() {
         6
     );
     assert_eq!(seen(&|p| format!("{:?} {:?}", p.volume_width, p.dependency.rule)).len(), 4);
-    assert_eq!(seen(&|p| format!("{:?} {:?}", p.method.cost.matching, p.method.cost.pyramid)).len(), 6);
+    assert_eq!(
+        seen(&|p| format!("{:?} {:?}", p.method.cost.matching, p.method.cost.pyramid)).len(),
+        MatchingCost::ALL.len() * Pyramid::ALL.len()
+    );
     assert_eq!(seen(&|p| p.neighbours.to_string()).len(), NEIGHBOURS.len());
     assert_eq!(seen(&|p| p.levels.len().to_string()).len(), 5);
     assert_eq!(

@@ -97,32 +97,15 @@ fn nothing_valid() {
 
 /// A stage, whether its input has only the flags of the left-right check, its twin, and a change that makes
 /// the twin differ.
-type Control = (Stage, bool, Twin, fn(&mut Plan));
+pub(crate) type Control = (Stage, bool, Twin, fn(&mut Plan));
 
 /// Negative control: every stage detects a parameter that is slightly off, or a value that is.
 #[test]
 fn control_changes_are_found() {
-    let mut random = Random::new(21);
-    let mut method = Method::default();
-    (method.graph.levels, method.graph.percentile, method.refinement.median_window) = (1, 100.0, 5);
-    let plan = random::plan((24, 31), 0, 9, &method);
-    // Faint enough for neighbours to have weight in the median.
-    let faint = Plane::from_fn(24, 31, |_, _| [0; 3].map(|_: i32| random.within(100, 130) as u8));
-    let pair = Pair::new(Image::from_rgb8(&faint), texture(&mut random, 24, 31)).unwrap();
-    let maps = loop {
-        let mut maps = random::finest(&mut random, &plan, true);
-        maps.runner_up = maps.best.map(|best| best + best % 20);
-        let valid = maps.validity.data().iter().filter(|&&f| f & i32::from(flag::INVALID) == 0).count();
-        if valid > 300 && valid < 600 {
-            break maps;
-        }
-    };
-    let mut unflagged = maps.clone();
-    unflagged.validity = unflagged.validity.map(|v| v & i32::from(flag::OCCLUDED));
     let region: Twin = |plan, _, maps| twin::speckle_filter::speckle_filter(plan, maps);
     let confidence: Twin = |plan, _, maps| twin::confidence::confidence(plan, maps);
     let fill: Twin = |plan, _, maps| twin::fill::fill(plan, maps);
-    let changes: &[Control] = &[
+    control(&[
         (Stage::LeftRightCheck, false, twin::left_right_check::left_right_check, |p| p.range.min += 1),
         (Stage::SpeckleFilter, true, region, |p| p.method.refinement.speckle_size += 1),
         (Stage::Fill, false, fill, |p| p.method.refinement.nearer = Nearer::Smaller),
@@ -144,7 +127,28 @@ fn control_changes_are_found() {
         (Stage::Plane, false, twin::plane::plane, |p| p.method.refinement.median_window = 7),
         (Stage::Plane, false, twin::plane::plane, |p| p.method.refinement.median_sigma_range = 0.02),
         (Stage::Plane, false, twin::plane::plane, |p| p.range.max -= 1),
-    ];
+    ]);
+}
+
+/// Runs such controls, each on every backend.
+pub(crate) fn control(changes: &[Control]) {
+    let mut random = Random::new(21);
+    let mut method = Method::default();
+    (method.graph.levels, method.graph.percentile, method.refinement.median_window) = (1, 100.0, 5);
+    let plan = random::plan((24, 31), 0, 9, &method);
+    // Faint enough for neighbours to have weight in the median.
+    let faint = Plane::from_fn(24, 31, |_, _| [0; 3].map(|_: i32| random.within(100, 130) as u8));
+    let pair = Pair::new(Image::from_rgb8(&faint), texture(&mut random, 24, 31)).unwrap();
+    let maps = loop {
+        let mut maps = random::finest(&mut random, &plan, true);
+        maps.runner_up = maps.best.map(|best| best + best % 20);
+        let valid = maps.validity.data().iter().filter(|&&f| f & i32::from(flag::INVALID) == 0).count();
+        if valid > 300 && valid < 600 {
+            break maps;
+        }
+    };
+    let mut unflagged = maps.clone();
+    unflagged.validity = unflagged.validity.map(|v| v & i32::from(flag::OCCLUDED));
     let mut plan = plan;
     plan.method.refinement.speckle_size = 3;
     for (name, mut backend) in backends() {

@@ -51,16 +51,16 @@ fn median_weights() {
         for _ in 0..200 {
             let spread = random.pick(&[300, 5000, 65_535]);
             let [a, b] = [0; 2].map(|_: i32| [0; 4].map(|_: i32| random.within(0, spread) as u16));
-            let guide = |channel: u16| (u32::from(channel) * weights.scale()) >> 16;
+            let guide = |channel: u16| (u32::from(channel) * weights.scale) >> 16;
             let apart: u32 = (0..3).map(|c| guide(a[c]).abs_diff(guide(b[c]))).sum();
             let taken = twin::median::colour(a, b, range);
-            assert_eq!(i64::from(apart << weights.doublings()), taken, "{a:?}, {b:?}; sigma {range}");
+            assert_eq!(i64::from(apart << weights.doublings), taken, "{a:?}, {b:?}; sigma {range}");
             // By the definition: all of the weight at 1270 sigmas in 8-bit levels.
             let levels: f64 = (0..3).map(|c| f64::from(a[c].abs_diff(b[c])) / 256.0).sum();
             let exact = 127.0 * levels / (1270.0 * range);
-            let step = f64::from(1 << weights.doublings());
+            let step = f64::from(1 << weights.doublings);
             let in_range = range > 0.001 && range < 20.0;
-            let error = 3.0 * step + exact * 0.5 / f64::from(weights.scale());
+            let error = 3.0 * step + exact * 0.5 / f64::from(weights.scale);
             assert!(!in_range || (taken as f64 - exact).abs() <= error, "{taken} against {exact}");
         }
     }

@@ -150,7 +150,7 @@ const FAILURES: &[Failure] = &[
         "--max-disparity & 60 to 70 & 60 pixels wide",
     ),
     // The method.
-    ("M out.pfm --method best", 2, "--method & `best` & default, accurate, fast, paper, fgs & TOML file"),
+    ("M out.pfm --method best", 2, "--method & `best` & default, accurate, fast & paper, fgs & TOML file"),
     ("M out.pfm --method none/best.toml", 1, "none/best.toml & no such file"),
     ("M out.pfm --method value.toml --method paper", 1, "value.toml & line 3"),
     ("M out.pfm --method default --method paper", 2, "--method & paper would replace & give it first"),

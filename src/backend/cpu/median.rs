@@ -93,7 +93,7 @@ struct Seen {
 impl Seen {
     fn new(weights: &MedianWeights, guide: &Image, disparity: &Plane<i32>, flags: &Plane<u8>) -> Self {
         let (width, height) = disparity.size();
-        let margin = weights.radius() << weights.step_bits()[0];
+        let margin = weights.radius << weights.step_bits[0];
         let pitch = width + 2 * margin + LANES;
         let bytes = || vec![0; pitch * height];
         let [mut r, mut g, mut b, mut known] = [bytes(), bytes(), bytes(), bytes()];
@@ -103,7 +103,7 @@ impl Seen {
         rows.enumerate().for_each(|(y, ((((r, g), b), known), values))| {
             let inside = margin..margin + width;
             let bytes = [r, g, b, known].map(|row| &mut row[inside.clone()]);
-            seen_row(weights.scale(), guide.pixels.row(y), flags.row(y), bytes);
+            seen_row(weights.scale, guide.pixels.row(y), flags.row(y), bytes);
             values[inside].copy_from_slice(disparity.row(y));
         });
         Self { margin, pitch, height, guides: [r, g, b], known, values }
@@ -164,23 +164,23 @@ struct Bounds {
 impl Window {
     /// Moves to row `y`, whose windows leave out what is above and below the image.
     fn open(&mut self, weights: &MedianWeights, seen: &Seen, y: usize) {
-        let [column_step, row_step] = weights.step_bits().map(|bits| 1 << bits);
+        let [column_step, row_step] = weights.step_bits.map(|bits| 1 << bits);
         // The rows of the window, without those that it skips.
-        let (apart, reach) = (row_step << WINDOW_ROW_BITS, weights.radius() >> WINDOW_ROW_BITS);
+        let (apart, reach) = (row_step << WINDOW_ROW_BITS, weights.radius >> WINDOW_ROW_BITS);
         let first = y - reach.min(y / apart) * apart;
         self.offsets.clear();
         for ny in (first..(y + reach * apart + 1).min(seen.height)).step_by(apart) {
             for (column, &taken) in weights.space_row(ny.abs_diff(y) / row_step).iter().enumerate() {
                 let steps = [
-                    column as i16 - weights.radius() as i16,
-                    ((ny as i32 - y as i32) >> weights.step_bits()[1]) as i16,
+                    column as i16 - weights.radius as i16,
+                    ((ny as i32 - y as i32) >> weights.step_bits[1]) as i16,
                 ];
                 let near = MEDIAN_WEIGHT.saturating_sub(taken);
                 self.offsets.push((ny * seen.pitch + column * column_step, steps, near));
             }
         }
-        self.radius = weights.radius();
-        (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings());
+        self.radius = weights.radius;
+        (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings);
         self.weighed.resize(self.offsets.len(), Weighed::default());
         self.places.resize(self.offsets.len().next_multiple_of(GROUP), Place::default());
     }

@@ -55,17 +55,6 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
     instance.request_adapter(&wanted).await.into_iter().collect()
 }
 
-#[cfg(not(target_arch = "wasm32"))]
-fn kind(device_type: wgpu::DeviceType) -> &'static str {
-    match device_type {
-        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
-        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
-        wgpu::DeviceType::VirtualGpu => "virtual GPU",
-        wgpu::DeviceType::Cpu => "software",
-        wgpu::DeviceType::Other => "other",
-    }
-}
-
 pub(super) fn api(backend: wgpu::Backend) -> &'static str {
     match backend {
         wgpu::Backend::Vulkan => "Vulkan",
@@ -80,15 +69,18 @@ pub(super) fn driver(info: &wgpu::AdapterInfo) -> String {
     format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
-/// Rank of a kind of device; the smallest is preferred.
-fn preference(device_type: wgpu::DeviceType) -> u8 {
-    match device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
+/// The kinds of devices with their names, the preferred ones first.
+const KINDS: [(wgpu::DeviceType, &str); 5] = [
+    (wgpu::DeviceType::DiscreteGpu, "discrete GPU"),
+    (wgpu::DeviceType::IntegratedGpu, "integrated GPU"),
+    (wgpu::DeviceType::VirtualGpu, "virtual GPU"),
+    (wgpu::DeviceType::Other, "other"),
+    (wgpu::DeviceType::Cpu, "software"),
+];
+
+/// Rank of a kind of device in [`KINDS`].
+fn preference(device_type: wgpu::DeviceType) -> usize {
+    KINDS.iter().take_while(|kind| kind.0 != device_type).count()
 }
 
 /// Position of the preferred adapter, the first one on a tie.
@@ -115,7 +107,7 @@ pub fn devices() -> Vec<DeviceInfo> {
             let (info, limits) = (adapter.get_info(), adapter.limits());
             DeviceInfo {
                 index,
-                kind: kind(info.device_type),
+                kind: KINDS[preference(info.device_type)].1,
                 api: api(info.backend),
                 driver: driver(&info),
                 max_buffer: limits.max_buffer_size,

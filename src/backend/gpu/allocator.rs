@@ -3,7 +3,7 @@
 use super::device::Device;
 use super::rows::{HALO, Rows};
 use super::uniform::ALIGN_WORDS;
-use crate::error::{MemoryError, Result};
+use crate::error::Result;
 
 /// What stages and copies do with buffers.
 pub(super) const USAGE: wgpu::BufferUsages =
@@ -55,17 +55,11 @@ impl<'a> Allocator<'a> {
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer> {
         let size = (4 * words).max(4 * ALIGN_WORDS as u64);
-        let (name, largest) = (&self.device.name, self.device.max_buffer);
+        let largest = self.device.max_buffer;
         if size > largest {
-            let (name, what) = (name.clone(), format!("the {label}"));
-            return Err(MemoryError::Buffer { name, what, needed: size, allowed: largest }.into());
+            return Err(self.device.too_large(format!("the {label}"), size, largest));
         }
-        let buffer = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        });
+        let buffer = self.device.buffer(label, size, usage)?;
         self.device.check()?;
         Ok(buffer)
     }

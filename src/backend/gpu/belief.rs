@@ -2,10 +2,9 @@
 //!
 //! Floor, a label: 6 bytes moved and asked for, 20 operations for four; beside that the graph: 8 bytes a pixel, and 4 a member.
 
-use super::buffers::Shared;
 use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::rows::{Binding, HALO, Rows, with_halo};
+use super::rows::{HALO, Rows, with_halo};
 use crate::error::Result;
 use crate::plan::{GRAPH_WINDOW, LABEL_BLOCK, Plan};
 use std::ops::Range;
@@ -40,11 +39,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let own = Uniform::of(plan, level);
     // A level without one kind of messages binds something that is never read.
     let messages = |rows: &Range<u32>, volume: &Rows, there: u32| {
-        if there == 1 {
-            volume.bind(rows)
-        } else {
-            Binding::whole(volume.buffers().next().expect("a buffer of no rows"))
-        }
+        if there == 1 { volume.bind(rows) } else { volume.whole() }
     };
     r.rows(&main(plan, level), &own, l.width * (l.quads / QUADS), |rows| {
         let seen = with_halo(rows, HALO, l.height);
@@ -64,21 +59,21 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 }
 
 /// The same for all of `levels` at once.
-pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
-    let (plan, buffers) = (r.plan, r.buffers);
+pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
+    let (plan, buffers, shared) = (r.plan, r.buffers, r.shared(&levels));
     let own = |z: usize| {
         let l = buffers.levels[z].params;
         (Uniform::of(plan, z), l.width * (l.quads / QUADS))
     };
     let bindings = Main {
-        evidence: Binding::whole(&shared.evidence),
-        dependency: Binding::whole(&shared.dependency),
-        members: Binding::whole(&shared.members),
-        incoming: Binding::whole(&shared.incoming),
-        down: Binding::whole(&shared.down),
-        up: Binding::whole(&shared.up),
-        belief: Binding::whole(&shared.belief),
-        windows: Binding::whole(&shared.windows),
+        evidence: shared.evidence.whole(),
+        dependency: shared.dependency.whole(),
+        members: shared.members.whole(),
+        incoming: shared.incoming.whole(),
+        down: shared.down.whole(),
+        up: shared.up.whole(),
+        belief: shared.belief.whole(),
+        windows: shared.windows.whole(),
     };
     r.levels(&main(plan, levels.start), levels, own, bindings)
 }

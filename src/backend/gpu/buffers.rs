@@ -17,25 +17,10 @@ use crate::plan::{LevelPlan, Plan, RING_PART};
 use crate::weights::MedianWeights;
 use std::array;
 
-/// The buffers that the coarser levels share.
-pub(super) struct Shared {
-    /// The finest of these levels.
-    pub(super) finest: usize,
-    pub(super) evidence: wgpu::Buffer,
-    pub(super) dependency: wgpu::Buffer,
-    pub(super) down: wgpu::Buffer,
-    pub(super) up: wgpu::Buffer,
-    pub(super) belief: wgpu::Buffer,
-    pub(super) windows: wgpu::Buffer,
-    pub(super) guide: wgpu::Buffer,
-    pub(super) members: wgpu::Buffer,
-    pub(super) incoming: wgpu::Buffer,
-}
-
 /// All buffers of a match on a device.
 pub(super) struct Buffers {
-    /// `None` where not even the coarsest level fits.
-    pub(super) shared: Option<Shared>,
+    /// The finest level that shares buffers with all coarser ones; the number of levels where none does.
+    pub(super) finest_shared: usize,
     /// A guide on its way to its level.
     pub(super) next_guide: wgpu::Buffer,
     pub(super) levels: Vec<LevelBuffers>,
@@ -106,7 +91,7 @@ pub(super) struct LevelBuffers {
 }
 
 impl LevelBuffers {
-    /// The parameters of the level where what it [shares](Shared) is bound, and where its volumes and its dependency messages begin there,
+    /// The parameters of the level where what it shares is bound, and where its volumes and its dependency messages begin there,
     /// in quads.
     pub(super) fn shared_params(&self, plan: &Plan) -> (LevelParams, (u32, u32)) {
         let quad = 4 * plan.volume_width.bytes() as u64;
@@ -204,13 +189,8 @@ fn part_starts(device: &Device, plan: &Plan, height: u32, widest: u32, most: u32
     let own = fitting.saturating_sub(2 * u64::from(HALO)).min(u64::from(most)) as u32 & !1;
     if own == 0 {
         let rows = 2 + 2 * HALO;
-        return Err(MemoryError::Buffer {
-            name: device.name.clone(),
-            what: format!("{rows} rows of {} labels", plan.levels[0].labels),
-            needed: 4 * u64::from(rows) * u64::from(widest),
-            allowed: device.max_buffer,
-        }
-        .into());
+        let what = format!("{rows} rows of {} labels", plan.levels[0].labels);
+        return Err(device.too_large(what, 4 * u64::from(rows) * u64::from(widest), device.max_buffer));
     }
     Ok((0..height).step_by(own as usize).chain([height]).collect())
 }
@@ -228,7 +208,8 @@ impl Buffers {
         let mut allocator = Allocator::new(device);
         let a = &mut allocator;
         let last = plan.levels.len() - 1;
-        let (finest, mut shared) = Self::shared(a, plan)?;
+        let finest_shared = Self::finest_shared(a.device, plan);
+        let mut shared = Self::shared(a, plan, finest_shared)?;
         let none = [0, 0];
         let mut levels = Vec::new();
         for (z, level) in plan.levels.iter().enumerate().rev() {
@@ -244,8 +225,8 @@ impl Buffers {
             let in_turns = part_starts(a.device, plan, p.height, wide, most)?;
             let count = if streamed { plan.ring_parts(in_turns[1] as usize) } else { usize::MAX };
             let windows = full_windows(level);
-            let mut rows = |kind: usize, starts: &[u32]| match &mut shared {
-                Some(pools) if z >= finest => Ok(pools[kind].rows(words.in_row[kind], words.rows[kind])),
+            let mut rows = |kind: usize, starts: &[u32]| match shared.get_mut(kind) {
+                Some(pool) if z >= finest_shared => Ok(pool.rows(words.in_row[kind], words.rows[kind])),
                 _ if streamed && VOLUMES.contains(&kind) => {
                     a.ring(SHARED[kind], words.in_row[kind], &in_turns, count)
                 }
@@ -293,25 +274,31 @@ impl Buffers {
         let next_guide = levels.get(1).map_or(0, |l| 4 * u64::from(l.params.pixel_pitch * l.params.height));
         let next_guide = a.buffer("next guide", next_guide)?;
         let mut map = |label: &str, words: u32| a.rows(label, words * fine.pixel_pitch, &whole);
-        let (left, right) = (levels[0].guide.clone(), map("right image", 4)?);
-        let census = [map("left census", 2)?, map("right census", 2)?];
-        let contrast = map("contrast", 1)?;
-        let (labels, squares) = (map("labels", 1)?, map("squares", 1)?);
-        let (optima, right_labels) = (map("optima", 2)?, map("right labels", 1)?);
-        let (raw, disparity, flags) = (map("raw", 1)?, map("disparity", 1)?, map("flags", 1)?);
-        let (spare_disparity, spare_flags) = (map("spare disparity", 1)?, map("spare flags", 1)?);
-        let (speckle_parents, speckle_sizes) = (map("speckle parents", 1)?, map("speckle sizes", 1)?);
         let has_votes = plan.method.refinement.fill == Fill::Votes;
-        let votes = has_votes.then(|| VoteBuffers::new(a, plan, &fine)).transpose()?;
-        let full = plan.full.is_some().then(|| FullBuffers::new(a, &fine)).transpose()?;
+        let full = plan.full.is_some();
         let rows = u64::from(fine.height);
         Ok(Self {
-            full,
+            left: levels[0].guide.clone(),
+            right: map("right image", 4)?,
+            census: [map("left census", 2)?, map("right census", 2)?],
+            contrast: map("contrast", 1)?,
+            labels: map("labels", 1)?,
+            squares: map("squares", 1)?,
+            optima: map("optima", 2)?,
+            right_labels: map("right labels", 1)?,
+            raw: map("raw", 1)?,
+            disparity: map("disparity", 1)?,
+            flags: map("flags", 1)?,
+            spare_disparity: map("spare disparity", 1)?,
+            spare_flags: map("spare flags", 1)?,
+            speckle_parents: map("speckle parents", 1)?,
+            speckle_sizes: map("speckle sizes", 1)?,
+            full: full.then(|| FullBuffers::new(a, &fine)).transpose()?,
+            votes: has_votes.then(|| VoteBuffers::new(a, plan, &fine)).transpose()?,
             median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
             // What distance subtracts is the same for all steps.
             fill_weights: a
                 .constant("fill weights", &MedianWeights::of_filled(&plan.method, [0; 2]).words())?,
-            votes,
             change_sums: a.buffer("change", 2 * rows)?,
             convergence: a.buffer("convergence", size_of::<Convergence>() as u64 / 4)?,
             groups: a.buffer("groups", 0)?,
@@ -319,28 +306,9 @@ impl Buffers {
             endings: 0,
             filled_rows: a.buffer("filled rows", rows)?,
             source_rows: a.buffer("source rows", rows)?,
-            shared: shared.map(|pools| {
-                let [evidence, dependency, down, up, belief, windows, guide, members, incoming] =
-                    pools.map(|pool| pool.buffer);
-                Shared { finest, evidence, dependency, down, up, belief, windows, guide, members, incoming }
-            }),
+            finest_shared,
             next_guide,
             levels,
-            left,
-            right,
-            census,
-            contrast,
-            labels,
-            squares,
-            optima,
-            right_labels,
-            raw,
-            disparity,
-            flags,
-            spare_disparity,
-            spare_flags,
-            speckle_parents,
-            speckle_sizes,
             written: allocator.written,
             constant: allocator.constant,
         })
@@ -364,24 +332,16 @@ impl Buffers {
         finest
     }
 
-    /// The finest level that shares buffers, and these: as many levels as fit in what a shader may see at once.
-    fn shared(a: &mut Allocator, plan: &Plan) -> Result<(usize, Option<[Pool; SHARED.len()]>)> {
-        let finest = Self::finest_shared(a.device, plan);
-        let words = |z: usize| Words::of(plan, z);
-        let mut sizes: [u64; SHARED.len()] =
-            array::from_fn(|kind| (finest..plan.levels.len()).map(|z| words(z).all(kind)).sum());
-        if finest == plan.levels.len() {
-            return Ok((finest, None));
-        }
-        if finest == 0 {
+    /// The buffers that the levels from `finest` on share.
+    fn shared(a: &mut Allocator, plan: &Plan, finest: usize) -> Result<Vec<Pool>> {
+        let levels = finest..plan.levels.len();
+        let words = |kind: usize| {
             // Level 0 has no messages from below.
-            sizes[UP] -= Words::of(plan, 0).all(UP);
-        }
-        let mut pools = Vec::new();
-        for (label, words) in SHARED.iter().zip(sizes) {
-            pools.push(Pool::new(a.buffer(label, words)?));
-        }
-        Ok((finest, pools.try_into().ok()))
+            let levels = levels.clone().filter(|z| (*z, kind) != (0, UP));
+            levels.map(|z| Words::of(plan, z).all(kind)).sum()
+        };
+        let pools = SHARED.iter().enumerate().filter(|_| !levels.is_empty());
+        pools.map(|(kind, label)| Ok(Pool::new(a.buffer(label, words(kind))?))).collect()
     }
 
     /// A guide of these parameters on its way to its level.

@@ -1,12 +1,12 @@
 //! Turns stages into dispatches, in bands of rows where a buffer exceeds the device's largest binding.
 
 use super::buffers::{Buffers, LevelBuffers};
-use super::device::Device;
+use super::device::{Device, ONE_ROW};
 use super::kernel::{Bindings, Kernel, MAX_LOOP_ITERATIONS};
 use super::rows::{Binding, Copy, Rows};
 use super::shader::{Shader, WORKGROUP, binding_number};
 use super::uniform::{self, Band, Header, LevelParams};
-use crate::error::{DeviceError, MemoryError, Result};
+use crate::error::{DeviceError, Result};
 use crate::plan::{LevelPlan, Plan};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -80,6 +80,11 @@ impl<'a> Recorder<'a> {
     /// The buffers of the next finer level.
     pub(super) fn finer(&self) -> &'a LevelBuffers {
         &self.buffers.levels[self.level - 1]
+    }
+
+    /// A level of `levels`, whose buffers hold all of them.
+    pub(super) fn shared(&self, levels: &Range<usize>) -> &'a LevelBuffers {
+        &self.buffers.levels[levels.end - 1]
     }
 
     /// The parameters of the level, as the shaders get them.
@@ -193,13 +198,7 @@ impl<'a> Recorder<'a> {
                     break;
                 }
                 if rows == 1 {
-                    return Err(MemoryError::Buffer {
-                        name: self.device.name.clone(),
-                        what: "one row of the image and what it depends on".into(),
-                        needed: most,
-                        allowed: self.device.max_binding,
-                    }
-                    .into());
+                    return Err(self.device.too_large(ONE_ROW, most, self.device.max_binding));
                 }
                 rows -= rows.div_ceil(8).min(rows - 1);
             }
@@ -220,8 +219,7 @@ impl<'a> Recorder<'a> {
         self.dispatch_sections(kernel, &[section], bindings)
     }
 
-    /// Dispatches `kernel` for all rows of `levels` at once, which [share](super::buffers::Shared) their
-    /// buffers. `own` gives the parameters of a level and its number of invocations in a row.
+    /// Dispatches `kernel` for all rows of `levels` at once, which share their buffers. `own` gives the parameters of a level and its number of invocations in a row.
     pub(super) fn levels<B: Bindings>(
         &mut self,
         kernel: &Kernel<B>,
@@ -269,12 +267,8 @@ impl<'a> Recorder<'a> {
         bytes.resize(bytes.len() / sections.len() * kernel.sections, 0);
         let work: u64 = sections.iter().map(|s| u64::from(s.size.0) * u64::from(s.size.1)).sum();
         let device = self.device.inner()?;
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("uniform"),
-            size: bytes.len() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let uniform = self.device.buffer("uniform", bytes.len() as u64, usage)?;
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
         let bindings = bindings.all();
         entries.extend(pipeline.numbers.iter().zip(&bindings).map(|(number, binding)| {
@@ -308,7 +302,7 @@ impl<'a> Recorder<'a> {
         let Kernel { shader, loops, names, .. } = kernel;
         if *loops > MAX_LOOP_ITERATIONS {
             let LevelPlan { width, height, labels, .. } = self.plan.levels[0];
-            let (neighbours, shader) = (self.plan.neighbours, shader.stage());
+            let (neighbours, shader) = (self.plan.neighbours, shader.stage);
             return Err(DeviceError::TooLargeForShader { width, height, labels, neighbours, shader }.into());
         }
         if let Some(pipeline) = self.pipelines.get(shader) {
@@ -319,14 +313,14 @@ impl<'a> Recorder<'a> {
         let numbers = names.iter().map(number).collect();
         let device = self.device.inner()?;
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(shader.stage()),
+            label: Some(shader.stage),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
         let inner = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(shader.stage()),
+            label: Some(shader.stage),
             layout: None,
             module: &module,
-            entry_point: Some(shader.entry()),
+            entry_point: Some(shader.entry),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });

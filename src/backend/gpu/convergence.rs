@@ -8,8 +8,10 @@ use bytemuck::{Pod, Zeroable};
 pub(super) struct Convergence {
     sum: [u32; 2],
     runs: u32,
-    settled: u32,
-    idle: u32,
+    /// 1 once it has.
+    pub(super) settled: u32,
+    /// How often the map had settled before.
+    pub(super) idle: u32,
 }
 
 impl Convergence {
@@ -21,14 +23,5 @@ impl Convergence {
     /// The last sum of squared changes.
     pub(super) fn sum(self) -> u64 {
         u64::from(self.sum[1]) << 32 | u64::from(self.sum[0])
-    }
-
-    pub(super) fn settled(self) -> bool {
-        self.settled != 0
-    }
-
-    /// How often the map had settled before.
-    pub(super) fn idle(self) -> u32 {
-        self.idle
     }
 }

@@ -3,10 +3,9 @@
 //! Floor, a label and three members: 7 bytes moved, 15 asked for (the beliefs of three members, all of it again after the
 //! minimum), 50 operations for four labels.
 
-use super::buffers::Shared;
 use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::rows::{Binding, HALO, with_halo};
+use super::rows::{HALO, with_halo};
 use crate::error::Result;
 use crate::graph::NO_MEMBER;
 use crate::plan::{GRAPH_WINDOW, TruncationRule};
@@ -44,14 +43,14 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 }
 
 /// The same for all of `levels` at once.
-pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
-    let (plan, buffers) = (r.plan, r.buffers);
+pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
+    let (plan, buffers, shared) = (r.plan, r.buffers, r.shared(&levels));
     let own = |z: usize| (Uniform { tau: plan.dependency.tau.into() }, buffers.levels[z].params.width);
     let bindings = Main {
-        members: Binding::whole(&shared.members),
-        belief: Binding::whole(&shared.belief),
-        messages: Binding::whole(&shared.dependency),
-        windows: Binding::whole(&shared.windows),
+        members: shared.members.whole(),
+        belief: shared.belief.whole(),
+        messages: shared.dependency.whole(),
+        windows: shared.windows.whole(),
     };
     r.levels(&main(plan, levels.start), levels, own, bindings)
 }

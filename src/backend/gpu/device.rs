@@ -42,6 +42,9 @@ const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
 /// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late.
 const SUBMISSIONS: usize = 4;
 
+/// The least that a dispatch sees at once.
+pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
+
 /// An open device with its queue and the first failure it reported.
 pub(super) struct Device {
     /// `None` once the device hangs.
@@ -167,6 +170,18 @@ impl Device {
             Some(Error::Memory(_)) => failure.take().map_or(Ok(()), Err),
             Some(e) => Err(e.clone()),
         }
+    }
+
+    /// A new buffer of `size` bytes.
+    pub(super) fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        let descriptor =
+            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        Ok(self.inner()?.create_buffer(&descriptor))
+    }
+
+    /// That a buffer for `what`, or what a shader sees of it at once, takes more than this device allows.
+    pub(super) fn too_large(&self, what: impl Into<String>, needed: u64, allowed: u64) -> Error {
+        MemoryError::Buffer { name: self.name.clone(), what: what.into(), needed, allowed }.into()
     }
 
     pub(super) fn write(&mut self, buffer: &wgpu::Buffer, bytes: &[u8]) -> Result<()> {

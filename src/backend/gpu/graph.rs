@@ -1,9 +1,8 @@
 //! The graph of a level: see [`Stage::Graph`](crate::backend::Stage::Graph).
 
-use super::buffers::Shared;
 use super::commands::Recorder;
 use super::kernel::{Bindings, Kernel, shader};
-use super::rows::{Binding, HALO, with_halo};
+use super::rows::{HALO, Rows, with_halo};
 use super::uniform::LevelParams;
 use crate::error::Result;
 use crate::graph::{NO_KEY, NO_MEMBER, RANK_BITS, by_distance, code, spatial_weight};
@@ -71,19 +70,18 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 }
 
 /// The same for all of `levels` at once, but for their guides.
-pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
+pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
     for z in levels.clone() {
         r.level = z;
         record_guide(r)?;
     }
-    let (plan, buffers) = (r.plan, r.buffers);
+    let (plan, buffers, shared) = (r.plan, r.buffers, r.shared(&levels));
     if plan.neighbours > 0 {
         let own = |z: usize| {
             let here = &buffers.levels[z];
             (Uniform { guide_at: here.guide_at(), ..Uniform::of(plan) }, here.params.width)
         };
-        let [guide, members, incoming] =
-            [&shared.guide, &shared.members, &shared.incoming].map(Binding::whole);
+        let [guide, members, incoming] = [&shared.guide, &shared.members, &shared.incoming].map(Rows::whole);
         let bindings = Choose { guide, members_out: members.clone() };
         r.levels(&choose(plan, levels.start), levels.clone(), own, bindings)?;
         let bindings = Transpose { members_in: members, incoming };

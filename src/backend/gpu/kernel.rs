@@ -21,13 +21,7 @@ macro_rules! shader {
             $( if $condition:expr )? => $kernel:expr;
         )+
     ) => {
-        #[repr(C)]
-        #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-        pub(super) struct Uniform {
-            $( $field: $type, )*
-        }
-
-        $crate::backend::gpu::uniform::layout!(Uniform: $($field),*);
+        $crate::backend::gpu::uniform::layout!(Uniform { $( $field: $type ),* });
 
         $(
             pub(super) struct $bindings {

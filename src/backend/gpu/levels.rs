@@ -1,6 +1,5 @@
 //! Which stages can go over several levels in one dispatch, where these share buffers.
 
-use super::buffers::Shared;
 use super::commands::Recorder;
 use super::{belief, dependency, graph, resolution};
 use crate::backend::Stage;
@@ -8,7 +7,7 @@ use crate::error::Result;
 use std::ops::Range;
 
 /// Records a stage at several levels at once.
-pub(super) type RecordLevels = fn(&mut Recorder, &Shared, Range<usize>) -> Result<()>;
+pub(super) type RecordLevels = fn(&mut Recorder, Range<usize>) -> Result<()>;
 
 /// The stages that go over levels at once, by name.
 const ALL: [(&str, RecordLevels); 4] = [

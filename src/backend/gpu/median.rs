@@ -26,7 +26,7 @@ pub(super) fn kernel(weights: &MedianWeights) -> Kernel<Main> {
 pub(super) fn over_window(shader: Shader, weights: &MedianWeights, more: usize) -> Kernel<Main> {
     // One pass, and one for every three bits of what the disparities of a window may span.
     let passes = 1 + 8 + more;
-    let window = 2 * weights.radius() + 1;
+    let window = 2 * weights.radius + 1;
     Kernel::of(shader, passes * (window + 1) * window + 8 + more)
 }
 
@@ -52,13 +52,13 @@ pub(super) fn smooth(
     all: bool,
 ) -> Result<()> {
     let (b, l) = (r.buffers, r.params());
-    let [column_bits, row_bits] = weights.step_bits();
+    let [column_bits, row_bits] = weights.step_bits;
     let own = Uniform {
-        radius: weights.radius() as u32,
+        radius: weights.radius as u32,
         column_bits,
         row_bits,
-        scale: weights.scale(),
-        doublings: weights.doublings(),
+        scale: weights.scale,
+        doublings: weights.doublings,
         all: all.into(),
     };
     let reach = own.radius << own.row_bits;

@@ -175,14 +175,8 @@ impl Gpu {
         let runs_whole = |stage: &Stage| plan.holds_all_rows() || !stage.needs_level_0(plan);
         for stage in Stage::all(plan).into_iter().filter(|s| *s != Stage::Change).filter(runs_whole) {
             let ends = stage.passes_messages() && plan.settled_change().is_some();
-            let most = match &buffers.shared {
-                Some(shared)
-                    if stage.finest_level(plan) >= shared.finest && record_levels(stage).is_some() =>
-                {
-                    plan.levels.len() - stage.level().unwrap_or(0)
-                }
-                _ => 1,
-            };
+            let shares = stage.finest_level(plan) >= buffers.finest_shared && record_levels(stage).is_some();
+            let most = if shares { plan.levels.len() - stage.level().unwrap_or(0) } else { 1 };
             for levels in 1..=most {
                 let run = Run { levels, ..stage.into() };
                 let recorded = self.recorded(&run, plan, buffers, ends.then_some(&mut endings))?;
@@ -205,10 +199,8 @@ impl Gpu {
         let level = run.stage.level().unwrap_or(0);
         self.recorded_at(level, plan, buffers, endings, |recorder| {
             recorder.only = run.part.as_ref().map(|part| part.rows.start as u32..part.rows.end as u32);
-            match (&buffers.shared, record_levels(run.stage)) {
-                (Some(shared), Some(record)) if run.levels > 1 => {
-                    record(recorder, shared, level..level + run.levels)
-                }
+            match record_levels(run.stage) {
+                Some(record) if run.levels > 1 => record(recorder, level..level + run.levels),
                 _ => record(recorder, run.stage),
             }
         })
@@ -411,12 +403,12 @@ impl Backend for Gpu {
     fn settled(&mut self, wait: bool) -> Promise<'_, bool> {
         // Where times are kept, idle iterations are not to be among them.
         let asked = wait || self.timer.is_some();
-        Box::pin(async move { Ok(asked && self.convergence().await?.settled()) })
+        Box::pin(async move { Ok(asked && self.convergence().await?.settled != 0) })
     }
 
     fn idle_iterations(&mut self) -> Promise<'_, u32> {
         let may_settle = self.state().plan.settled_change().is_some();
-        Box::pin(async move { if may_settle { Ok(self.convergence().await?.idle()) } else { Ok(0) } })
+        Box::pin(async move { if may_settle { Ok(self.convergence().await?.idle) } else { Ok(0) } })
     }
 
     fn wait(&mut self) -> Promise<'_, ()> {
@@ -451,7 +443,7 @@ impl Backend for Gpu {
                 validity: plane(words[2], shape, |word| word as u8),
                 right: None,
             };
-            (maps, words.get(3).map_or(0, |words| Convergence::of(words).idle()))
+            (maps, words.get(3).map_or(0, |words| Convergence::of(words).idle))
         }))
     }
 

@@ -24,7 +24,7 @@ const LONG_COPY: Duration = Duration::from_millis(100);
 impl Probe for Gpu {
     fn read(&mut self, volume: Volume) -> Result<Vec<u32>> {
         let (buffer, pitch, per_word) = self.volume(volume);
-        let words = block_on(self.rows(&[&buffer]))?.remove(0);
+        let words = block_on(self.words(&buffer))?;
         let plan = &self.state().plan;
         let (rows, labels, _) = volume_shape(plan, volume);
         let (place, bits) = (word_places(plan, volume, per_word), 32 / per_word);
@@ -60,7 +60,7 @@ impl Probe for Gpu {
     fn windows(&mut self, level: usize) -> Result<Plane<[u16; 2]>> {
         let (runs, rows) = self.state().plan.levels[level].windows();
         let windows = self.state().buffers.levels[level].windows.clone();
-        let words = block_on(self.rows(&[&windows]))?.remove(0);
+        let words = block_on(self.words(&windows))?;
         let windows = words[..runs * rows].iter().map(|&word| [word as u16, (word >> 16) as u16]).collect();
         Ok(Plane::new(runs, rows, windows))
     }
@@ -80,7 +80,7 @@ impl Probe for Gpu {
     fn graph(&mut self, level: usize) -> Result<LevelGraph> {
         let here = &self.state().buffers.levels[level];
         let (members, pitch) = (here.members.clone(), here.params.member_pitch as usize);
-        let words = block_on(self.rows(&[&members]))?.remove(0);
+        let words = block_on(self.words(&members))?;
         let plan = &self.state().plan;
         let (neighbours, l) = (plan.neighbours, &plan.levels[level]);
         let code = |x: usize, y: usize, i: usize| {
@@ -115,7 +115,7 @@ impl Probe for Gpu {
 
     fn write_map(&mut self, map: Map, values: &Plane<i32>) -> Result<()> {
         let (rows, words, word, bit, mask) = self.place_of(map);
-        let mut data = block_on(self.rows(&[&rows]))?.remove(0);
+        let mut data = block_on(self.words(&rows))?;
         let (width, height, pitch) = self.map_shape(map);
         assert_eq!(values.size(), (width, height), "a map of the size of the images");
         for y in 0..height {
@@ -144,13 +144,8 @@ impl Gpu {
     /// [`Error::Memory`] when there is no room for two such buffers, [`Error::Device`] when the device fails.
     pub fn copy_rate(&mut self) -> Result<f64> {
         let size = COPIED_BYTES.min(self.device.max_buffer) & !3;
-        let buffer = || {
-            let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some("copy"), size, usage, mapped_at_creation: false };
-            Ok::<_, Error>(self.device.inner()?.create_buffer(&descriptor))
-        };
-        let (from, to) = (buffer()?, buffer()?);
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let (from, to) = (self.device.buffer("copy", size, usage)?, self.device.buffer("copy", size, usage)?);
         let mut time = |copies: u64| {
             let start = Instant::now();
             for _ in 0..copies {
@@ -175,7 +170,7 @@ impl Gpu {
     /// The values of a map, whose words may hold other maps too.
     pub(super) async fn map_values(&mut self, map: Map) -> Result<Plane<i32>> {
         let (rows, words, word, bit, mask) = self.place_of(map);
-        let data = self.rows(&[&rows]).await?.remove(0);
+        let data = self.words(&rows).await?;
         let (width, height, pitch) = self.map_shape(map);
         let value = |x: usize, y: usize| (data[words * (y * pitch + x) + word] >> bit & mask).cast_signed();
         Ok(Plane::from_fn(width, height, value))

@@ -7,12 +7,6 @@ use super::{Gpu, device};
 use crate::error::Result;
 use std::ops::Range;
 
-/// Rows on their way from the device, each in so many parts.
-struct RequestedRows {
-    counts: Vec<usize>,
-    parts: device::Requested,
-}
-
 impl Gpu {
     pub(super) fn encoder(&mut self) -> Result<&mut wgpu::CommandEncoder> {
         if self.encoder.is_none() {
@@ -96,12 +90,8 @@ impl Gpu {
         let mut staged = Vec::new();
         for (buffer, bytes) in ranges {
             let size = bytes.end - bytes.start;
-            let staging = self.device.inner()?.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("staging"),
-                size,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
+            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+            let staging = self.device.buffer("staging", size, usage)?;
             self.encoder()?.copy_buffer_to_buffer(buffer, bytes.start, &staging, 0, size);
             staged.push(staging);
         }
@@ -109,23 +99,9 @@ impl Gpu {
         self.device.request(staged)
     }
 
-    /// Asks for the words of all rows.
-    fn request_rows(&mut self, rows: &[&Rows]) -> Result<RequestedRows> {
-        let parts: Vec<_> = rows.iter().flat_map(|r| r.own()).collect();
-        let counts = rows.iter().map(|r| r.own().len()).collect();
-        Ok(RequestedRows { counts, parts: self.request(&parts)? })
-    }
-
-    /// The words of all rows that were asked for.
-    async fn collect_rows(&mut self, rows: RequestedRows) -> Result<Vec<Vec<u32>>> {
-        let mut words = self.device.collect(rows.parts).await?.into_iter();
-        let joined = |n| words.by_ref().take(n).reduce(|all, part| [all, part].concat()).unwrap_or_default();
-        Ok(rows.counts.into_iter().map(joined).collect())
-    }
-
     /// The words of all rows.
-    pub(super) async fn rows(&mut self, rows: &[&Rows]) -> Result<Vec<Vec<u32>>> {
-        let requested = self.request_rows(rows)?;
-        self.collect_rows(requested).await
+    pub(super) async fn words(&mut self, rows: &Rows) -> Result<Vec<u32>> {
+        let requested = self.request(&rows.own())?;
+        Ok(self.device.collect(requested).await?.concat())
     }
 }

@@ -3,10 +3,8 @@
 //! Floor, for a fine label of level 1: 3 + 3/8 bytes moved, 5.6 asked for (all that is read again after the minimum), 100 operations
 //! for four labels.
 
-use super::buffers::Shared;
 use super::commands::Recorder;
 use super::kernel::{Kernel, shader};
-use super::rows::Binding;
 use super::uniform::LevelParams;
 use crate::error::Result;
 use crate::plan::TruncationRule;
@@ -53,19 +51,19 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
 }
 
 /// The same for all of `levels` at once.
-pub(super) fn record_levels(r: &mut Recorder, shared: &Shared, levels: Range<usize>) -> Result<()> {
+pub(super) fn record_levels(r: &mut Recorder, levels: Range<usize>) -> Result<()> {
     let own = levels.clone().map(|z| {
         let (fine, (fine_at, _)) = r.buffers.levels[z - 1].shared_params(r.plan);
         (Uniform { fine, fine_at, ..Uniform::of(r, z) }, r.buffers.levels[z].params.width)
     });
-    let (own, first): (Vec<_>, _) = (own.collect(), levels.start);
+    let (own, first, shared): (Vec<_>, _, _) = (own.collect(), levels.start, r.shared(&levels));
     let bindings = Main {
-        fine_belief: Binding::whole(&shared.belief),
-        coarse_belief: Binding::whole(&shared.belief),
-        down: Binding::whole(&shared.down),
-        up: Binding::whole(&shared.up),
-        windows: Binding::whole(&shared.windows),
-        fine_windows: Binding::whole(&shared.windows),
+        fine_belief: shared.belief.whole(),
+        coarse_belief: shared.belief.whole(),
+        down: shared.down.whole(),
+        up: shared.up.whole(),
+        windows: shared.windows.whole(),
+        fine_windows: shared.windows.whole(),
     };
     r.levels(&main(r.plan, first), levels, |z| own[z - first], bindings)
 }

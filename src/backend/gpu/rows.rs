@@ -112,6 +112,11 @@ impl Rows {
         Binding { buffer: part.buffer.clone(), bytes: at(rows.start)..at(rows.end) }
     }
 
+    /// All of the buffer of its first part, whatever else that holds.
+    pub(super) fn whole(&self) -> Binding {
+        Binding::whole(&self.parts[0].buffer)
+    }
+
     /// Copies of `written` rows to the halos of the parts that hold them too.
     pub(super) fn exchange(&self, written: &Range<u32>) -> Vec<Copy> {
         let mut copies = Vec::new();

@@ -85,36 +85,21 @@ fn constants_of(name: &str) -> Vec<(&'static str, Constant)> {
 /// An entry point of a stage's shader, with the constants that specialise it. Equal ones are compiled once.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Shader {
-    stage: &'static str,
-    entry: &'static str,
+    /// Name of the stage that it belongs to.
+    pub stage: &'static str,
+    /// The entry point.
+    pub entry: &'static str,
     text: &'static str,
     /// Width of messages and beliefs.
     pub(super) width: Option<VolumeWidth>,
-    pub(super) constants: Vec<(&'static str, Constant)>,
+    /// The constants that specialise it.
+    pub constants: Vec<(&'static str, Constant)>,
 }
 
 impl Shader {
     /// The entry point `entry` of the shader of `stage`, whose file holds `text`.
     pub(super) const fn new(stage: &'static str, entry: &'static str, text: &'static str) -> Self {
         Self { stage, entry, text, width: None, constants: Vec::new() }
-    }
-
-    /// Name of the stage that the shader belongs to.
-    #[must_use]
-    pub fn stage(&self) -> &'static str {
-        self.stage
-    }
-
-    /// The entry point.
-    #[must_use]
-    pub fn entry(&self) -> &'static str {
-        self.entry
-    }
-
-    /// The constants that specialise it.
-    #[must_use]
-    pub fn constants(&self) -> &[(&'static str, Constant)] {
-        &self.constants
     }
 
     /// The source of the shader: constants, then the imported parts, then its own file.

@@ -29,24 +29,22 @@ struct Clock {
 
 const TICKS: u64 = 2 * PASSES_PER_SUBMIT as u64;
 
-impl Timer {
-    pub(super) fn new(device: &Device) -> Result<Self> {
-        if device.tick.is_none() {
-            return Ok(Self { clock: None, began: None, runs: Vec::new() });
-        }
-        let inner = device.inner()?;
-        let queries = inner.create_query_set(&wgpu::QuerySetDescriptor {
+impl Clock {
+    fn new(device: &Device) -> Result<Self> {
+        let queries = device.inner()?.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("times"),
             ty: wgpu::QueryType::Timestamp,
             count: TICKS as u32,
         });
-        let resolved = inner.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("times"),
-            size: 8 * TICKS,
-            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let clock = Some(Clock { queries, resolved, passes: Vec::new(), logs: Vec::new() });
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+        let resolved = device.buffer("times", 8 * TICKS, usage)?;
+        Ok(Self { queries, resolved, passes: Vec::new(), logs: Vec::new() })
+    }
+}
+
+impl Timer {
+    pub(super) fn new(device: &Device) -> Result<Self> {
+        let clock = device.tick.map(|_| Clock::new(device)).transpose()?;
         Ok(Self { clock, began: None, runs: Vec::new() })
     }
 
@@ -91,12 +89,8 @@ impl Timer {
     pub(super) fn submit(&mut self, device: &Device, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
         let Some(clock) = self.clock.as_mut().filter(|c| !c.passes.is_empty()) else { return Ok(()) };
         let passes = std::mem::take(&mut clock.passes);
-        let log = device.inner()?.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("times"),
-            size: 8 * TICKS,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let log = device.buffer("times", 8 * TICKS, usage)?;
         encoder.resolve_query_set(&clock.queries, 0..2 * passes.len() as u32, &clock.resolved, 0);
         encoder.copy_buffer_to_buffer(&clock.resolved, 0, &log, 0, 16 * passes.len() as u64);
         clock.logs.push((passes, log));

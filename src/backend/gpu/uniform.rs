@@ -2,49 +2,53 @@
 //! belongs to the stage.
 
 use crate::plan::{LABEL_BLOCK, LevelPlan, Plan, ROW_ALIGN};
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
 
 /// Rows of every buffer start at a multiple of this many 32-bit words.
 pub(super) const ALIGN_WORDS: usize = ROW_ALIGN / 4;
 
-/// Declares fields with their names and offsets, for the tests that compare them with the shaders.
+/// Declares a struct that a shader reads, with the names and offsets of its fields for the tests that compare both.
 macro_rules! layout {
-    ($type:ident: $($field:ident),*) => {
-        impl $crate::backend::gpu::uniform::Layout for $type {
+    ($(#[$about:meta])* $name:ident { $( $field:ident: $type:ty ),* $(,)? }) => {
+        $(#[$about])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+        pub(super) struct $name {
+            $( pub(super) $field: $type, )*
+        }
+
+        impl $crate::backend::gpu::uniform::Layout for $name {
             const FIELDS: &'static [(&'static str, usize)] =
-                &[$( (stringify!($field), std::mem::offset_of!($type, $field)), )*];
+                &[$( (stringify!($field), std::mem::offset_of!($name, $field)), )*];
         }
     };
 }
 
 pub(super) use layout;
 
-/// Names and offsets of the fields of a struct, in bytes. Fields whose names start with `padding` do not
-/// exist in the shader.
+/// Names and offsets of the fields of a struct, in bytes.
 pub(super) trait Layout: Pod {
     /// Every field.
     const FIELDS: &'static [(&'static str, usize)];
 }
 
-/// `Level` of `shaders/shared/band.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub(super) struct LevelParams {
-    pub(super) width: u32,
-    pub(super) height: u32,
-    pub(super) low: i32,
-    pub(super) labels: u32,
-    pub(super) quads: u32,
-    pub(super) pitch: u32,
-    pub(super) dependency_pitch: u32,
-    pub(super) member_pitch: u32,
-    pub(super) pixel_pitch: u32,
-    pub(super) members_at: u32,
-    pub(super) incoming_at: u32,
-    pub(super) windows_at: u32,
+layout! {
+    /// `Level` of `shaders/shared/band.wgsl`.
+    LevelParams {
+        width: u32,
+        height: u32,
+        low: i32,
+        labels: u32,
+        quads: u32,
+        pitch: u32,
+        dependency_pitch: u32,
+        member_pitch: u32,
+        pixel_pitch: u32,
+        members_at: u32,
+        incoming_at: u32,
+        windows_at: u32,
+    }
 }
-
-layout!(LevelParams: width, height, low, labels, quads, pitch, dependency_pitch, member_pitch, pixel_pitch, members_at, incoming_at, windows_at);
 
 impl LevelParams {
     /// Parameters of `level`.
@@ -67,31 +71,27 @@ impl LevelParams {
     }
 }
 
-/// `Band` of `shaders/shared/band.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub(super) struct Band {
-    pub(super) first_row: u32,
-    pub(super) rows: u32,
-    pub(super) row_groups: u32,
-    pub(super) grid: u32,
-    pub(super) first_group: u32,
-    pub(super) sections: u32,
-    pub(super) volume_at: u32,
-    pub(super) dependency_at: u32,
+layout! {
+    /// `Band` of `shaders/shared/band.wgsl`.
+    Band {
+        first_row: u32,
+        rows: u32,
+        row_groups: u32,
+        grid: u32,
+        first_group: u32,
+        sections: u32,
+        volume_at: u32,
+        dependency_at: u32,
+    }
 }
 
-layout!(Band: first_row, rows, row_groups, grid, first_group, sections, volume_at, dependency_at);
-
-/// The header of every uniform.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub(super) struct Header {
-    pub(super) level: LevelParams,
-    pub(super) band: Band,
+layout! {
+    /// The header of every uniform.
+    Header {
+        level: LevelParams,
+        band: Band,
+    }
 }
-
-layout!(Header: level, band);
 
 /// The layout of a uniform, as a shader declares it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,10 +107,7 @@ impl UniformLayout {
     pub(super) fn of<U: Layout>() -> Self {
         let own = U::FIELDS.iter().map(|(name, offset)| (*name, size_of::<Header>() + offset));
         let all = Header::FIELDS.iter().copied().chain(own);
-        Self {
-            fields: all.filter(|(name, _)| !name.starts_with("padding")).collect(),
-            bytes: (size_of::<Header>() + size_of::<U>()).next_multiple_of(16),
-        }
+        Self { fields: all.collect(), bytes: (size_of::<Header>() + size_of::<U>()).next_multiple_of(16) }
     }
 
     /// Layouts of the structs in the header: `Level` and `Band`.

@@ -1,10 +1,10 @@
 //! The buffers of the votes on filled pixels.
 
 use super::allocator::Allocator;
-use super::device::Device;
+use super::device::{Device, ONE_ROW};
 use super::rows::Rows;
 use super::uniform::{ALIGN_WORDS, LevelParams};
-use crate::error::{MemoryError, Result};
+use crate::error::Result;
 use crate::plan::Plan;
 use crate::plan::votes::{VOTE_REACH, Votes};
 use crate::weights::vote_weights;
@@ -62,13 +62,7 @@ impl VoteBuffers {
         let halved = (most / image_row).saturating_sub(4) / 2;
         let band = summed.min(halved).min(votes.band as u64);
         if band == 0 {
-            return Err(MemoryError::Buffer {
-                name: device.name.clone(),
-                what: "one row of the image and what it depends on".into(),
-                needed: ((1 + around) * row).max(6 * image_row),
-                allowed: most,
-            }
-            .into());
+            return Err(device.too_large(ONE_ROW, ((1 + around) * row).max(6 * image_row), most));
         }
         Ok(band as u32)
     }
