@@ -149,7 +149,7 @@ impl<T> Plane<T> {
 
     /// Row `y`, mutable.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
-        &mut self.data[y * self.width..(y + 1) * self.width]
+        self.rows_mut(y..y + 1)
     }
 
     /// A plane of the same size with `f` applied to each value.
@@ -172,22 +172,15 @@ impl<T: Clone> Plane<T> {
     /// The plane with top and bottom exchanged.
     #[must_use]
     pub fn flipped(&self) -> Self {
-        let mut data = Vec::with_capacity(self.data.len());
-        for row in self.data.chunks(self.width.max(1)).rev() {
-            data.extend_from_slice(row);
-        }
-        Self { width: self.width, height: self.height, data }
+        let rows: Vec<&[T]> = self.data.chunks(self.width.max(1)).rev().collect();
+        Self { width: self.width, height: self.height, data: rows.concat() }
     }
 
     /// The values in `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
-        let (width, height) = part.size();
-        let mut data = Vec::with_capacity(width * height);
-        for y in part.y.clone() {
-            data.extend_from_slice(&self.row(y)[part.x.clone()]);
-        }
-        Self { width, height, data }
+        let rows: Vec<&[T]> = part.y.clone().map(|y| &self.row(y)[part.x.clone()]).collect();
+        Self { width: part.x.len(), height: part.y.len(), data: rows.concat() }
     }
 
     /// A plane that holds `value` everywhere.
@@ -352,7 +345,7 @@ impl Pair {
 
     /// A pair of what `f` makes of each view, of one size.
     pub(crate) fn map(&self, f: impl Fn(&Image) -> Image) -> Self {
-        Self { left: Arc::new(f(&self.left)), right: Arc::new(f(&self.right)), georeferences: [None, None] }
+        Self::without_georeference(f(&self.left), f(&self.right))
     }
 
     /// The same pair with another left view of the same size.
@@ -368,7 +361,7 @@ impl Pair {
     /// Both views inside `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
-        Self::without_georeference(self.left.crop(part), self.right.crop(part))
+        self.map(|view| view.crop(part))
     }
 
     /// (width, height) of both views.
