@@ -4,8 +4,8 @@
 use serde::Serialize;
 use serde::ser::Serializer;
 
-use super::GroundTruth;
-use super::metrics::{Sum, VISIBLE, average, is_bad, nothing_known, percent, same_size};
+use super::dataset::{GroundTruth, same_size};
+use super::metrics::{Sum, VISIBLE, average, is_bad, nothing_known, percent};
 use crate::error::Result;
 use crate::image::{Image, Plane};
 

@@ -6,8 +6,8 @@
 
 use serde::Serialize;
 
-use super::GroundTruth;
-use super::metrics::{average, is_bad, nothing_known, same_size};
+use super::dataset::{GroundTruth, same_size};
+use super::metrics::{average, is_bad, nothing_known};
 use crate::error::Result;
 use crate::image::Plane;
 

@@ -1,7 +1,6 @@
 //! The ground truth that a map is compared with.
 
-use super::metrics::same_size;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::Plane;
 
 /// The true disparities of a pair's reference view. Each kind of comparison with them is in a file of its own.
@@ -16,7 +15,7 @@ impl GroundTruth {
     /// 255 = both views see the pixel, anything else (128 occluded, 0 unknown) = not.
     ///
     /// # Errors
-    /// [`Error::Mismatch`](crate::Error::Mismatch) when the two differ in size.
+    /// [`Error::Mismatch`] when the two differ in size.
     pub fn new(truth: Plane<f32>, mask: Option<Plane<u8>>) -> Result<Self> {
         if let Some(mask) = &mask {
             same_size("mask", mask.size(), truth.size())?;
@@ -35,4 +34,15 @@ impl GroundTruth {
     pub fn mask(&self) -> Option<&Plane<u8>> {
         self.mask.as_ref()
     }
+}
+
+/// Checks that all planes of a comparison have one size.
+pub(super) fn same_size(what: &str, got: (usize, usize), truth: (usize, usize)) -> Result<()> {
+    if got == truth {
+        return Ok(());
+    }
+    Err(Error::Mismatch(format!(
+        "the {what} is {} x {} and the ground truth {} x {}: both must be of the reference view, at one resolution",
+        got.0, got.1, truth.0, truth.1
+    )))
 }

@@ -6,7 +6,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::GroundTruth;
+use super::dataset::{GroundTruth, same_size};
 use crate::error::{Error, Result};
 use crate::image::Plane;
 
@@ -189,17 +189,6 @@ pub(super) fn percent(part: f64, whole: f64) -> Option<f64> {
 
 pub(super) fn nothing_known() -> Error {
     Error::Mismatch("the ground truth holds no known (finite) pixel: nothing to compare with".into())
-}
-
-/// Checks that all planes of a comparison have one size.
-pub(super) fn same_size(what: &str, got: (usize, usize), truth: (usize, usize)) -> Result<()> {
-    if got == truth {
-        return Ok(());
-    }
-    Err(Error::Mismatch(format!(
-        "the {what} is {} x {} and the ground truth {} x {}: both must be of the reference view, at one resolution",
-        got.0, got.1, truth.0, truth.1
-    )))
 }
 
 /// `value` rounded to four decimals, through its exact decimal expansion (ties to even).

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::GroundTruth;
-use super::metrics::{VISIBLE, average, percent, same_size};
+use super::dataset::{GroundTruth, same_size};
+use super::metrics::{VISIBLE, average, percent};
 use crate::error::Result;
 use crate::image::Plane;
 use crate::maps::flag;

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use image::ExtendedColorType;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 
-use super::write::png;
 use super::{Image, Plane};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// What a PNG file shows: 8-bit or 16-bit grey levels, such as depths in millimetres, 8-bit colours (red, green, blue), or an
 /// image that the matcher sees.
@@ -14,7 +14,7 @@ pub trait Picture {
     /// The bytes of the file, which errors call `path`.
     ///
     /// # Errors
-    /// [`Error::Write`](crate::Error::Write) when PNG cannot hold a picture of this size.
+    /// [`Error::Write`] when PNG cannot hold a picture of this size.
     fn png(&self, path: &Path) -> Result<Vec<u8>>;
 }
 
@@ -58,6 +58,29 @@ impl Picture for Image {
             png(path, &bytes, self.pixels.size(), kind)
         } else {
             png(path, bytemuck::cast_slice(&samples), self.pixels.size(), kind)
+        }
+    }
+}
+
+/// A PNG file; 16-bit samples are in the byte order of the machine.
+pub(super) fn png(
+    path: &Path,
+    samples: &[u8],
+    size: (usize, usize),
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>> {
+    let (w, h) = png_or_tiff_size(path, size)?;
+    let mut bytes = Vec::new();
+    let written = PngEncoder::new(&mut bytes).write_image(samples, w, h, kind);
+    written.map_err(|e| Error::write(path, e.to_string()))?;
+    Ok(bytes)
+}
+
+pub(super) fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
+    match (u32::try_from(size.0), u32::try_from(size.1)) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
+        _ => {
+            Err(Error::write(path, format!("the format holds no picture of {} x {} pixels", size.0, size.1)))
         }
     }
 }

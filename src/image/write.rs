@@ -3,11 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 
 use super::cloud::Cloud;
-use super::picture::Picture;
+use super::picture::{Picture, png, png_or_tiff_size};
 use super::save::check;
 use super::{Georeference, Plane, pcd, pfm, ply, tiff};
 use crate::error::{Error, Result};
@@ -214,29 +213,6 @@ fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
         }
     };
     map.data().iter().map(level).collect()
-}
-
-/// A PNG file; 16-bit samples are in the byte order of the machine.
-pub(super) fn png(
-    path: &Path,
-    samples: &[u8],
-    size: (usize, usize),
-    kind: ExtendedColorType,
-) -> Result<Vec<u8>> {
-    let (w, h) = png_or_tiff_size(path, size)?;
-    let mut bytes = Vec::new();
-    let written = PngEncoder::new(&mut bytes).write_image(samples, w, h, kind);
-    written.map_err(|e| Error::write(path, e.to_string()))?;
-    Ok(bytes)
-}
-
-fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
-    match (u32::try_from(size.0), u32::try_from(size.1)) {
-        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
-        _ => {
-            Err(Error::write(path, format!("the format holds no picture of {} x {} pixels", size.0, size.1)))
-        }
-    }
 }
 
 #[cfg(test)]
