@@ -412,16 +412,7 @@ mod tests {
         let drawn: Vec<String> = (0..5)
             .map(|y| (0..7).map(|x| if picture[(x, y)] == WHITE { '#' } else { '.' }).collect())
             .collect();
-        assert_eq!(
-            drawn,
-            [
-                ".....".to_owned() + "#.",
-                "....##.".into(),
-                "###..#.".into(),
-                ".....#.".into(),
-                "....###".into()
-            ]
-        );
+        assert_eq!(drawn, [".....#.", "....##.", "###..#.", ".....#.", "....###"]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::evaluation::{Metrics, Report, evaluate};
+use mrfgs::evaluation::{GroundTruth, Metrics, Report};
 use mrfgs::image::{Pair, Plane, calib::Calibration, pfm, read};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::{Agreement, DisparityRange, Method, Nearer};
@@ -26,7 +26,7 @@ fn pair(folder: &Path) -> (Pair, DisparityRange) {
     let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
     let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
     let range = DisparityRange::new(0, ndisp as i32 - 1).unwrap();
-    (read::pair(&left, &right, None).unwrap(), range)
+    (Pair::open(&left, &right).unwrap(), range)
 }
 
 fn report(folder: &Path, map: &Plane<f32>) -> Report {
@@ -34,7 +34,7 @@ fn report(folder: &Path, map: &Plane<f32>) -> Report {
         panic!("colour truth")
     };
     let mask = read::grey8(&folder.join("mask0nocc.png")).unwrap();
-    evaluate(map, &truth, Some(&mask)).unwrap()
+    GroundTruth::new(truth, Some(mask)).unwrap().evaluate(map).unwrap()
 }
 
 /// A map, and the same map in whole pixels.

@@ -8,7 +8,7 @@ mod common;
 
 use common::devices::open as device;
 use mrfgs::error::{DeviceError, MemoryError};
-use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
+use mrfgs::image::{Image, Pair, Plane, calib::Calibration};
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
@@ -25,7 +25,7 @@ fn scene() -> (Pair, DisparityRange) {
     let folder = Path::new("testdata/slanted");
     let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
     let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
-    (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
+    (Pair::open(&left, &right).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
 }
 
 /// The upper left corner of a pair.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use mrfgs::image::{Image, Pair, Plane, grey, read};
+use mrfgs::image::{Image, Pair, Plane, grey};
 use mrfgs::low_level::front::illumination::homomorphic;
 use mrfgs::low_level::front::zones::regions::connected;
 use mrfgs::low_level::front::zones::{MASKED, Options, Zones, segment};
@@ -17,7 +17,7 @@ const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", 
 /// The left view of a rendered scene.
 fn scene(name: &str) -> Image {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name);
-    let pair = read::pair(&folder.join("im0.png"), &folder.join("im1.png"), None);
+    let pair = Pair::open(&folder.join("im0.png"), &folder.join("im1.png"));
     pair.expect("the scenes are there").left().clone()
 }
 
@@ -349,7 +349,7 @@ fn zones_are_regions_of_clusters() {
 #[test]
 fn the_method_says_what_is_corrected_and_what_a_zone_is() {
     let folder = Path::new("testdata/exposure");
-    let pair = read::pair(&folder.join("im0.png"), &folder.join("im1.png"), None).unwrap();
+    let pair = Pair::open(&folder.join("im0.png"), &folder.join("im1.png")).unwrap();
     let range = DisparityRange::new(0, 31).unwrap();
     let corrected = Pair::new(homomorphic(pair.left()), homomorphic(pair.right())).unwrap();
     let mut seen = Vec::new();

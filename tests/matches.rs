@@ -31,7 +31,7 @@ impl Case {
         };
         Self {
             name: folder.display().to_string(),
-            pair: read::pair(&left, &right, None).unwrap(),
+            pair: Pair::open(&left, &right).unwrap(),
             range: DisparityRange::new(0, ndisp as i32 - 1).unwrap(),
             truth,
             visible: read::grey8(&folder.join("mask0nocc.png")).unwrap(),

@@ -7,7 +7,7 @@ mod common;
 
 use common::devices;
 use mrfgs::error::{DeviceError, MemoryError};
-use mrfgs::image::{Image, Pair, Plane, calib::Calibration, read};
+use mrfgs::image::{Image, Pair, Plane, calib::Calibration};
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::backend::gpu::FaultInjection;
 use mrfgs::low_level::backend::{Backend, Stage, Volume};
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 fn load(folder: &Path) -> (Pair, DisparityRange) {
     let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
     let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
-    (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
+    (Pair::open(&left, &right).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
 }
 
 fn matched(backend: &mut dyn Backend, pair: &Pair, range: DisparityRange, method: &Method) -> Solution {

@@ -7,7 +7,7 @@ mod common;
 use common::devices;
 use common::random::Random;
 use mrfgs::error::BudgetError;
-use mrfgs::image::{Pair, Plane, calib::Calibration, read};
+use mrfgs::image::{Pair, Plane, calib::Calibration};
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::cpu::Cpu;
 use mrfgs::low_level::engine::Solution;
@@ -156,7 +156,7 @@ fn the_shape_with_the_fewest_cropped_pixels_is_taken() {
 fn load(folder: &Path) -> (Pair, DisparityRange) {
     let (left, right) = (folder.join("im0.png"), folder.join("im1.png"));
     let ndisp = Calibration::beside(&left).unwrap().unwrap().ndisp.unwrap();
-    (read::pair(&left, &right, None).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
+    (Pair::open(&left, &right).unwrap(), DisparityRange::new(0, ndisp as i32 - 1).unwrap())
 }
 
 fn in_tiles(backend: &mut dyn Backend, tiles: &Tiles, pair: &Pair) -> Solution {

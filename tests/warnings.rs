@@ -29,7 +29,7 @@ impl Case {
         truths.sort_by(f32::total_cmp);
         Self {
             name: folder.display().to_string(),
-            pair: read::pair(&left, &right, None).unwrap(),
+            pair: Pair::open(&left, &right).unwrap(),
             range: DisparityRange::new(0, ndisp as i32 - 1).unwrap(),
             truths,
         }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use mrfgs::calibration::matrix::Matrix;
-use mrfgs::image::raster::{self, Raster, Samples};
+use mrfgs::image::raster::{Raster, Samples};
 use mrfgs::image::{self, Pair, Plane};
 use numpy::{
     Element, IntoPyArray, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
@@ -144,7 +144,11 @@ pub(crate) fn pair(
         None => Ok(raster),
     });
     let [left, right] = rasters;
-    left.and_then(|left| raster::pair(left, right?, mask.as_ref())).map_err(exception)
+    let left = match mask {
+        Some(mask) => left.and_then(|left| left.masked_by(mask)),
+        None => left,
+    };
+    left.and_then(|left| Pair::of_frames(left, right?)).map_err(exception)
 }
 
 /// How an image is stored in an array.

@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use mrfgs::depth::Rig;
-use mrfgs::image::Plane;
 use mrfgs::image::calib::{Calibration, Camera};
 use mrfgs::image::cloud::{Cloud, Point};
-use mrfgs::image::{raster, write};
+use mrfgs::image::{Pair, Plane, write};
 use mrfgs::maps::{FRACTION, Maps, flag};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -127,7 +126,7 @@ impl PyRig {
         let mut validity = arrays::bytes("matched.validity", matched.validity.bind(py).as_any())?;
         self.check("matched", disparity.size())?;
         let image = Image::of("left", left)?;
-        let pair = raster::pair(image.raster()?, image.raster()?, None).map_err(exception)?;
+        let pair = Pair::of_frames(image.raster()?, image.raster()?).map_err(exception)?;
         let sizes = [confidence.size(), validity.size(), pair.size()];
         if sizes.iter().any(|size| *size != disparity.size()) {
             let ((width, height), (w, h)) = (disparity.size(), pair.size());

@@ -1,6 +1,6 @@
 //! Maps against the truth.
 
-use mrfgs::evaluation::{self, Metrics};
+use mrfgs::evaluation::{self, GroundTruth, Metrics};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -37,7 +37,7 @@ pub(crate) fn evaluate<'py>(
     let (estimate, truth) =
         (arrays::disparities("disparity", disparity)?, arrays::disparities("truth", truth)?);
     let mask = mask.map(arrays::visible).transpose()?;
-    let report = py.detach(|| evaluation::evaluate(&estimate, &truth, mask.as_ref())).map_err(exception)?;
+    let report = py.detach(|| GroundTruth::new(truth, mask)?.evaluate(&estimate)).map_err(exception)?;
     let found = PyDict::new(py);
     found.set_item("all", figures(py, &report.all)?)?;
     found.set_item("nonocc", report.nonocc.map(|metrics| figures(py, &metrics)).transpose()?)?;

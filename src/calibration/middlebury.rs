@@ -25,11 +25,9 @@ pub(super) fn of_text(path: &Path, text: &str) -> Result<StereoCalibration> {
     if let (Some(width), Some(height)) = (benchmark.width, benchmark.height) {
         calibration.size = Some((width as usize, height as usize));
     }
-    if let (Some(left), Some(doffs), Some(baseline)) = (benchmark.camera, benchmark.doffs, benchmark.baseline)
+    if let Some(([left, right], baseline)) = benchmark.cameras()
         && baseline > 0.0
     {
-        let [cx, cy] = left.principal_point;
-        let right = Camera { principal_point: [cx + doffs, cy], ..left };
         let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
         calibration.lenses = Some([lens(left)?, lens(right)?]);
         calibration.pose = Some(Pose { rotation: IDENTITY, translation: [-baseline, 0.0, 0.0] });

@@ -5,17 +5,10 @@ use std::fmt::Write;
 use super::matrix::{IDENTITY, Matrix};
 use crate::image::calib::{Calibration, Camera, Unit};
 
-/// The cameras of a rectified pair and their baseline, where `calibration` has them.
-fn cameras(calibration: &Calibration) -> Option<([Camera; 2], f64)> {
-    let (left, doffs, baseline) = (calibration.camera?, calibration.doffs?, calibration.baseline?);
-    let [cx, cy] = left.principal_point;
-    Some(([left, Camera { principal_point: [cx + doffs, cy], ..left }], baseline))
-}
-
 /// `calib.txt`, in millimetres where the unit is known; else it says that it is not. `None` where a camera is missing.
 #[must_use]
 pub fn middlebury(calibration: &Calibration) -> Option<String> {
-    let (cameras, baseline) = cameras(calibration)?;
+    let (cameras, baseline) = calibration.cameras()?;
     let mut text = String::new();
     for (i, Camera { focal_length: [fx, fy], principal_point: [cx, cy] }) in cameras.iter().enumerate() {
         let _ = writeln!(text, "cam{i}=[{fx} 0 {cx}; 0 {fy} {cy}; 0 0 1]");
@@ -40,7 +33,7 @@ pub fn middlebury(calibration: &Calibration) -> Option<String> {
 /// name for them here. `None` where a camera is missing.
 #[must_use]
 pub fn opencv(calibration: &Calibration, rotations: &[Matrix; 2]) -> Option<String> {
-    let (cameras, baseline) = cameras(calibration)?;
+    let (cameras, baseline) = calibration.cameras()?;
     let mut text = String::from("%YAML:1.0\n---\n");
     if let (Some(width), Some(height)) = (calibration.width, calibration.height) {
         let _ = writeln!(text, "imageSize: [ {width}, {height} ]");

@@ -4,7 +4,8 @@
 use serde::Serialize;
 use serde::ser::Serializer;
 
-use super::metrics::{Sum, VISIBLE, average, is_bad, nothing_known, percent, same_size};
+use super::dataset::{GroundTruth, same_size};
+use super::metrics::{Sum, VISIBLE, average, is_bad, nothing_known, percent};
 use crate::error::Result;
 use crate::image::{Image, Plane};
 
@@ -121,94 +122,84 @@ impl Breakdown {
     }
 }
 
-/// The class of every pixel of the reference view, whose image is `reference`; `None` where `truth` is
-/// unknown (not finite).
-///
-/// # Errors
-/// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
-pub fn classes(
-    truth: &Plane<f32>,
-    mask: Option<&Plane<u8>>,
-    reference: &Image,
-) -> Result<Plane<Option<Class>>> {
-    let (width, height) = truth.size();
-    same_size("reference image", reference.pixels.size(), truth.size())?;
-    if let Some(mask) = mask {
-        same_size("mask", mask.size(), truth.size())?;
-    }
-    let spread = spread(truth);
-    let plain = plain(reference);
-    Ok(Plane::from_fn(width, height, |x, y| {
-        let t = truth[(x, y)];
-        let matched = x as f64 - f64::from(t);
-        if !t.is_finite() {
-            None
-        } else if matched < 0.0 || matched > (width - 1) as f64 {
-            Some(Class::Border)
-        } else if mask.is_some_and(|mask| mask[(x, y)] != VISIBLE) {
-            Some(Class::Occluded)
-        } else if spread[(x, y)] > EDGE {
-            Some(Class::Edge)
-        } else if plain[(x, y)] {
-            Some(Class::Plain)
-        } else if slant(truth, x, y) >= SLANTED {
-            Some(Class::Slanted)
-        } else {
-            Some(Class::Other)
-        }
-    }))
+/// The counts of a class.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    pixels: u64,
+    bad: u64,
+    valid: u64,
+    errors: Sum,
+    squares: Sum,
 }
 
-/// The errors of `estimate` (not finite = invalid) by the classes of [`classes`].
-///
-/// # Errors
-/// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ or no truth is known.
-pub fn breakdown(
-    estimate: &Plane<f32>,
-    truth: &Plane<f32>,
-    mask: Option<&Plane<u8>>,
-    reference: &Image,
-) -> Result<Breakdown> {
-    /// The counts of a class.
-    #[derive(Clone, Copy, Default)]
-    struct Tally {
-        pixels: u64,
-        bad: u64,
-        valid: u64,
-        errors: Sum,
-        squares: Sum,
+impl GroundTruth {
+    /// The class of every pixel of the reference view, whose image is `reference`; `None` where the truth is unknown.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
+    pub fn classes(&self, reference: &Image) -> Result<Plane<Option<Class>>> {
+        let Self { truth, mask } = self;
+        let (width, height) = truth.size();
+        same_size("reference image", reference.pixels.size(), truth.size())?;
+        let spread = spread(truth);
+        let plain = plain(reference);
+        Ok(Plane::from_fn(width, height, |x, y| {
+            let t = truth[(x, y)];
+            let matched = x as f64 - f64::from(t);
+            if !t.is_finite() {
+                None
+            } else if matched < 0.0 || matched > (width - 1) as f64 {
+                Some(Class::Border)
+            } else if mask.as_ref().is_some_and(|mask| mask[(x, y)] != VISIBLE) {
+                Some(Class::Occluded)
+            } else if spread[(x, y)] > EDGE {
+                Some(Class::Edge)
+            } else if plain[(x, y)] {
+                Some(Class::Plain)
+            } else if slant(truth, x, y) >= SLANTED {
+                Some(Class::Slanted)
+            } else {
+                Some(Class::Other)
+            }
+        }))
     }
 
-    same_size("disparity map", estimate.size(), truth.size())?;
-    let mut tallies = [Tally::default(); 6];
-    let classes = classes(truth, mask, reference)?;
-    for ((&d, &t), class) in estimate.data().iter().zip(truth.data()).zip(classes.data()) {
-        let Some(class) = class else { continue };
-        let tally = &mut tallies[*class as usize];
-        tally.pixels += 1;
-        tally.bad += u64::from(is_bad(d, t));
-        if d.is_finite() {
-            let error = (f64::from(d) - f64::from(t)).abs();
-            tally.valid += 1;
-            tally.errors.add(error);
-            tally.squares.add(error * error);
+    /// The errors of `estimate` (not finite = invalid) by class; `reference` is the image of the reference view.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ or no truth is known.
+    pub fn breakdown(&self, estimate: &Plane<f32>, reference: &Image) -> Result<Breakdown> {
+        same_size("disparity map", estimate.size(), self.truth.size())?;
+        let mut tallies = [Tally::default(); 6];
+        let classes = self.classes(reference)?;
+        for ((&d, &t), class) in estimate.data().iter().zip(self.truth.data()).zip(classes.data()) {
+            let Some(class) = class else { continue };
+            let tally = &mut tallies[*class as usize];
+            tally.pixels += 1;
+            tally.bad += u64::from(is_bad(d, t));
+            if d.is_finite() {
+                let error = (f64::from(d) - f64::from(t)).abs();
+                tally.valid += 1;
+                tally.errors.add(error);
+                tally.squares.add(error * error);
+            }
         }
+        let pixels = tallies.iter().map(|t| t.pixels).sum::<u64>() as f64;
+        let bad = tallies.iter().map(|t| t.bad).sum::<u64>() as f64;
+        let squares = tallies.iter().map(|t| t.squares.value()).sum::<f64>();
+        if pixels == 0.0 {
+            return Err(nothing_known());
+        }
+        let parts = tallies.map(|t| Part {
+            share: 100.0 * t.pixels as f64 / pixels,
+            bad: percent(t.bad as f64, t.pixels as f64),
+            avg: (t.valid > 0).then(|| t.errors.value() / t.valid as f64),
+            points: 100.0 * t.bad as f64 / pixels,
+            of_bad: percent(t.bad as f64, bad),
+            of_squares: percent(t.squares.value(), squares),
+        });
+        Ok(Breakdown { parts })
     }
-    let pixels = tallies.iter().map(|t| t.pixels).sum::<u64>() as f64;
-    let bad = tallies.iter().map(|t| t.bad).sum::<u64>() as f64;
-    let squares = tallies.iter().map(|t| t.squares.value()).sum::<f64>();
-    if pixels == 0.0 {
-        return Err(nothing_known());
-    }
-    let parts = tallies.map(|t| Part {
-        share: 100.0 * t.pixels as f64 / pixels,
-        bad: percent(t.bad as f64, t.pixels as f64),
-        avg: (t.valid > 0).then(|| t.errors.value() / t.valid as f64),
-        points: 100.0 * t.bad as f64 / pixels,
-        of_bad: percent(t.bad as f64, bad),
-        of_squares: percent(t.squares.value(), squares),
-    });
-    Ok(Breakdown { parts })
 }
 
 /// The largest minus the smallest known truth of the window around each pixel; negative where none is known.
@@ -256,6 +247,7 @@ fn windows<T: Copy>(values: &Plane<T>, empty: T, join: impl Fn(T, T) -> T) -> Pl
 
 #[cfg(test)]
 mod tests {
+    use super::super::cases::{close, ground, row};
     use super::*;
     use crate::Error;
 
@@ -268,24 +260,10 @@ mod tests {
         }))
     }
 
-    fn close(got: Option<f64>, expected: f64) {
-        let got = got.expect("a value");
-        assert!((got - expected).abs() < 1e-12, "{got} instead of {expected}");
-    }
-
     #[test]
     fn each_class_is_found_and_the_first_one_counts() {
         // 40 x 9: a ramp of 0.5 px per pixel up to x = 9, a step of 5 px before x = 20, little contrast from x = 29 on.
-        let step = |x: usize| {
-            if x < 10 {
-                x as f32 / 2.0
-            } else if x < 20 {
-                4.5
-            } else {
-                9.5
-            }
-        };
-        let mut truth = Plane::from_fn(40, 9, |x, _| step(x));
+        let mut truth = Plane::from_fn(40, 9, |x, _| if x < 20 { x.min(9) as f32 / 2.0 } else { 9.5 });
         truth[(0, 4)] = 0.25; // match at -0.25
         truth[(39, 4)] = -0.25; // match at 39.25
         truth[(5, 8)] = INF;
@@ -294,7 +272,7 @@ mod tests {
         mask[(18, 2)] = 0; // on the edge, and hidden
         mask[(0, 4)] = 128; // outside, and hidden
         let image = chequered(40, 9, |x| if x < 29 { 90 } else { 6 });
-        let found = classes(&truth, Some(&mask), &image).unwrap();
+        let found = ground(&truth, Some(&mask)).classes(&image).unwrap();
         for (at, class) in [
             ((5, 8), None),
             ((0, 4), Some(Class::Border)),
@@ -311,48 +289,53 @@ mod tests {
             ((5, 2), Some(Class::Slanted)),
             ((5, 7), Some(Class::Slanted)), // one neighbour unknown, but along x all are known
             ((12, 2), Some(Class::Other)),
+            ((1, 4), Some(Class::Slanted)), // near the odd values the truths still span less than 4 px
         ] {
             assert_eq!(found[at], class, "{at:?}");
         }
-        // Near the odd values the truths still span less than 4 px.
-        assert_eq!(found[(1, 4)], Some(Class::Slanted));
         // Without a mask, an occluded pixel gets the next class that applies.
-        let found = classes(&truth, None, &image).unwrap();
+        let found = ground(&truth, None).classes(&image).unwrap();
         assert_eq!((found[(15, 2)], found[(18, 2)]), (Some(Class::Other), Some(Class::Edge)));
         // Edge before plain, plain before slanted.
-        let found = classes(&truth, None, &chequered(40, 9, |_| 6)).unwrap();
+        let found = ground(&truth, None).classes(&chequered(40, 9, |_| 6)).unwrap();
         assert_eq!((found[(18, 2)], found[(5, 2)]), (Some(Class::Edge), Some(Class::Plain)));
     }
 
     #[test]
     fn thresholds_are_where_they_are_said_to_be() {
         let image = chequered(9, 9, |_| 200);
-        let one = |truth: Plane<f32>, image: &Image| classes(&truth, None, image).unwrap()[(4, 4)];
+        let flat = |d: f32| Plane::filled(9, 9, d);
         let half = |step: f32| Plane::from_fn(9, 9, |x, _| if x < 4 { -2.0 } else { step - 2.0 });
-        // A span of 4 px is no edge; the central difference is 2.
-        assert_eq!(one(half(4.0), &image), Some(Class::Slanted));
-        assert_eq!(one(half(f32::from_bits(4.0_f32.to_bits() + 2)), &image), Some(Class::Edge));
-        // A match exactly at 0 or width - 1 is inside.
-        assert_eq!(one(Plane::filled(9, 9, 4.0), &image), Some(Class::Other));
-        assert_eq!(one(Plane::filled(9, 9, -4.0), &image), Some(Class::Other));
-        assert_eq!(one(Plane::filled(9, 9, -4.001), &image), Some(Class::Border));
-        // Along y as along x; 0.1875 is less than 0.2, 0.25 is not.
         let ramp = |slope: f32| Plane::from_fn(9, 9, move |_, y| 1.0 + slope * y as f32);
-        assert_eq!(one(ramp(0.1875), &image), Some(Class::Other));
-        assert_eq!(one(ramp(0.25), &image), Some(Class::Slanted));
-        // With an unknown neighbour the slope is unknown.
         let mut broken = ramp(0.25);
         broken[(4, 3)] = f32::NAN;
-        assert_eq!(one(broken, &image), Some(Class::Other));
-        // 24 of 49 pixels at c: the deviation is c sqrt(24 x 25) / 49, which is 4 at c = 8.0017.
-        assert_eq!(one(Plane::filled(9, 9, 2.0), &chequered(9, 9, |_| 8)), Some(Class::Plain));
-        assert_eq!(one(Plane::filled(9, 9, 2.0), &chequered(9, 9, |_| 9)), Some(Class::Other));
-        // A masked pixel does not count as texture.
         let mut spot = chequered(9, 9, |_| 0);
         spot.pixels[(5, 5)] = [65_280; 4];
-        assert_eq!(one(Plane::filled(9, 9, 2.0), &spot), Some(Class::Other));
-        spot.masked[(5, 5)] = true;
-        assert_eq!(one(Plane::filled(9, 9, 2.0), &spot), Some(Class::Plain));
+        let mut masked = spot.clone();
+        masked.masked[(5, 5)] = true;
+        for (truth, image, class) in [
+            // A span of 4 px is no edge; the central difference is 2.
+            (half(4.0), &image, Class::Slanted),
+            (half(f32::from_bits(4.0_f32.to_bits() + 2)), &image, Class::Edge),
+            // A match exactly at 0 or width - 1 is inside.
+            (flat(4.0), &image, Class::Other),
+            (flat(-4.0), &image, Class::Other),
+            (flat(-4.001), &image, Class::Border),
+            // Along y as along x; 0.1875 is less than 0.2, 0.25 is not.
+            (ramp(0.1875), &image, Class::Other),
+            (ramp(0.25), &image, Class::Slanted),
+            // With an unknown neighbour the slope is unknown.
+            (broken, &image, Class::Other),
+            // 24 of 49 pixels at c: the deviation is c sqrt(24 x 25) / 49, which is 4 at c = 8.0017.
+            (flat(2.0), &chequered(9, 9, |_| 8), Class::Plain),
+            (flat(2.0), &chequered(9, 9, |_| 9), Class::Other),
+            // A masked pixel does not count as texture.
+            (flat(2.0), &spot, Class::Other),
+            (flat(2.0), &masked, Class::Plain),
+        ] {
+            let found = ground(&truth, None).classes(image).unwrap();
+            assert_eq!(found[(4, 4)], Some(class), "{:?}", truth.data());
+        }
     }
 
     #[test]
@@ -360,45 +343,48 @@ mod tests {
         let values = Plane::from_fn(9, 5, |x, y| 10 * y + x);
         let sums = windows(&values, 0, |a, b| a + b);
         for (x, y) in [(0, 0), (4, 2), (8, 4), (7, 0)] {
-            let mut expected = 0;
-            for j in 0..5_usize {
-                for i in 0..9_usize {
-                    expected += if i.abs_diff(x) <= 3 && j.abs_diff(y) <= 3 { values[(i, j)] } else { 0 };
-                }
-            }
-            assert_eq!(sums[(x, y)], expected, "{x}, {y}");
+            let near =
+                values.data().iter().filter(|v| (*v % 10).abs_diff(x) <= 3 && (*v / 10).abs_diff(y) <= 3);
+            assert_eq!(sums[(x, y)], near.sum::<usize>(), "{x}, {y}");
         }
     }
 
     /// Eight pixels of 2: the first two border, the next two occluded, the others plain; one is unknown.
     fn case() -> (Plane<f32>, Plane<u8>, Image) {
-        let mut truth = Plane::filled(8, 1, 2.0);
-        truth[(7, 0)] = INF;
-        let mask = Plane::new(8, 1, vec![128, 128, 128, 0, 255, 255, 255, 255]);
-        (truth, mask, chequered(8, 1, |_| 0))
+        let truth = row(&[2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, INF]);
+        (truth, row(&[128, 128, 128, 0, 255, 255, 255, 255]), chequered(8, 1, |_| 0))
+    }
+
+    /// The errors of a map of this case.
+    fn found() -> Breakdown {
+        let (truth, mask, image) = case();
+        let estimate = row(&[5.0, 2.0, 6.0, INF, 2.0, 3.0, 4.0, 9.0]);
+        ground(&truth, Some(&mask)).breakdown(&estimate, &image).unwrap()
     }
 
     #[test]
     fn a_case_computed_by_hand() {
-        let (truth, mask, image) = case();
-        let estimate = Plane::new(8, 1, vec![5.0, 2.0, 6.0, INF, 2.0, 3.0, 4.0, 9.0]);
-        let found = breakdown(&estimate, &truth, Some(&mask), &image).unwrap();
+        let found = found();
         let [border, occluded, edge, plain, slanted, other] = found.parts;
-        close(Some(border.share), 200.0 / 7.0);
-        close(border.bad, 50.0);
-        close(border.avg, 1.5);
-        close(Some(border.points), 100.0 / 7.0);
-        close(border.of_bad, 100.0 / 3.0);
-        close(border.of_squares, 900.0 / 30.0);
-        close(occluded.bad, 100.0);
-        close(occluded.avg, 4.0);
-        close(occluded.of_bad, 200.0 / 3.0);
-        close(occluded.of_squares, 1600.0 / 30.0);
-        close(Some(plain.share), 300.0 / 7.0);
-        // An error at the threshold is not above it.
-        close(plain.bad, 0.0);
-        close(plain.avg, 1.0);
-        close(plain.of_squares, 500.0 / 30.0);
+        for (got, expected) in [
+            (Some(border.share), 200.0 / 7.0),
+            (border.bad, 50.0),
+            (border.avg, 1.5),
+            (Some(border.points), 100.0 / 7.0),
+            (border.of_bad, 100.0 / 3.0),
+            (border.of_squares, 900.0 / 30.0),
+            (occluded.bad, 100.0),
+            (occluded.avg, 4.0),
+            (occluded.of_bad, 200.0 / 3.0),
+            (occluded.of_squares, 1600.0 / 30.0),
+            (Some(plain.share), 300.0 / 7.0),
+            // An error at the threshold is not above it.
+            (plain.bad, 0.0),
+            (plain.avg, 1.0),
+            (plain.of_squares, 500.0 / 30.0),
+        ] {
+            close(got, expected);
+        }
         for part in [edge, slanted, other] {
             let nothing = (part.share, part.points, part.of_bad, part.of_squares);
             assert_eq!(nothing, (0.0, 0.0, Some(0.0), Some(0.0)));
@@ -411,18 +397,16 @@ mod tests {
 
     #[test]
     fn means_add_up_and_say_nothing_of_what_a_pair_lacks() {
-        let (truth, mask, image) = case();
-        let estimate = Plane::new(8, 1, vec![5.0, 2.0, 6.0, INF, 2.0, 3.0, 4.0, 9.0]);
-        let one = breakdown(&estimate, &truth, Some(&mask), &image).unwrap();
-        let perfect = breakdown(&truth, &truth, None, &image).unwrap();
-        assert_eq!(perfect.parts.map(|p| p.of_bad), [None; 6]);
-        assert_eq!(perfect.parts.map(|p| p.of_squares), [None; 6]);
+        let (truth, _, image) = case();
+        let one = found();
+        let perfect = ground(&truth, None).breakdown(&truth, &image).unwrap();
+        assert_eq!(perfect.parts.map(|p| (p.of_bad, p.of_squares)), [(None, None); 6]);
         let mean = Breakdown::mean(&[&one, &perfect]).unwrap();
-        close(Some(mean.parts.iter().map(|p| p.share).sum()), 100.0);
-        close(Some(mean.parts.iter().map(|p| p.points).sum()), 150.0 / 7.0);
+        close(mean.parts.iter().map(|p| p.share).sum::<f64>(), 100.0);
+        close(mean.parts.iter().map(|p| p.points).sum::<f64>(), 150.0 / 7.0);
         let [border, occluded, ..] = mean.parts;
         close(border.bad, 25.0);
-        close(Some(occluded.share), 100.0 / 7.0);
+        close(occluded.share, 100.0 / 7.0);
         assert_eq!((occluded.bad, occluded.avg, border.of_bad, border.of_squares), (None, None, None, None));
         assert_eq!(Breakdown::mean(&[&one]).unwrap(), one);
         assert_eq!(Breakdown::mean(&[]), None);
@@ -431,14 +415,12 @@ mod tests {
     #[test]
     fn sizes_must_agree_and_something_be_known() {
         let (truth, mask, image) = case();
-        let small = Plane::filled(7, 1, 2.0);
-        let error = breakdown(&small, &truth, Some(&mask), &image).unwrap_err().to_string();
+        let masked = ground(&truth, Some(&mask));
+        let error = masked.breakdown(&Plane::filled(7, 1, 2.0), &image).unwrap_err().to_string();
         assert!(error.contains("disparity map is 7 x 1"), "{error}");
-        let error = breakdown(&truth, &truth, None, &chequered(8, 2, |_| 0)).unwrap_err().to_string();
+        let error = masked.breakdown(&truth, &chequered(8, 2, |_| 0)).unwrap_err().to_string();
         assert!(error.contains("reference image is 8 x 2"), "{error}");
-        let error = classes(&truth, Some(&Plane::filled(7, 1, 255)), &image).unwrap_err().to_string();
-        assert!(error.contains("mask is 7 x 1"), "{error}");
-        let unknown = Plane::filled(8, 1, INF);
-        assert!(matches!(breakdown(&truth, &unknown, None, &image), Err(Error::Mismatch(_))));
+        let unknown = ground(&Plane::filled(8, 1, INF), None);
+        assert!(matches!(unknown.breakdown(&truth, &image), Err(Error::Mismatch(_))));
     }
 }

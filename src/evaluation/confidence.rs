@@ -6,7 +6,8 @@
 
 use serde::Serialize;
 
-use super::metrics::{average, is_bad, nothing_known, same_size};
+use super::dataset::{GroundTruth, same_size};
+use super::metrics::{average, is_bad, nothing_known};
 use crate::error::Result;
 use crate::image::Plane;
 
@@ -55,35 +56,37 @@ struct Group {
     bad: u64,
 }
 
-/// Compares `confidence` (0 ..= 255, larger is more confident) with the errors of `estimate` (not finite =
-/// invalid) where `truth` is known (finite).
-///
-/// # Errors
-/// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ or no truth is known.
-pub fn sparsify(estimate: &Plane<f32>, truth: &Plane<f32>, confidence: &Plane<u8>) -> Result<Sparsification> {
-    same_size("disparity map", estimate.size(), truth.size())?;
-    same_size("confidence map", confidence.size(), truth.size())?;
-    let mut groups = [Group::default(); 256];
-    for ((&d, &t), &c) in estimate.data().iter().zip(truth.data()).zip(confidence.data()) {
-        if t.is_finite() {
-            let group = &mut groups[usize::from(255 - c)];
-            group.pixels += 1;
-            group.bad += u64::from(is_bad(d, t));
+impl GroundTruth {
+    /// How well `confidence` (0 ..= 255, larger is more confident) tells the bad pixels of `estimate` (not finite = invalid)
+    /// from the good ones, where the truth is known.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ or no truth is known.
+    pub fn sparsify(&self, estimate: &Plane<f32>, confidence: &Plane<u8>) -> Result<Sparsification> {
+        let truth = &self.truth;
+        same_size("disparity map", estimate.size(), truth.size())?;
+        same_size("confidence map", confidence.size(), truth.size())?;
+        let (mut groups, mut all) = ([Group::default(); 256], Group::default());
+        for ((&d, &t), &c) in estimate.data().iter().zip(truth.data()).zip(confidence.data()) {
+            if t.is_finite() {
+                for group in [&mut groups[usize::from(255 - c)], &mut all] {
+                    group.pixels += 1;
+                    group.bad += u64::from(is_bad(d, t));
+                }
+            }
         }
+        let Group { pixels, bad } = all;
+        if pixels == 0 {
+            return Err(nothing_known());
+        }
+        let best = [Group { pixels: pixels - bad, bad: 0 }, Group { pixels: bad, bad }];
+        Ok(Sparsification {
+            auc: area(&groups),
+            optimal: area(&best),
+            random: 100.0 * bad as f64 / pixels as f64,
+            curve: std::array::from_fn(|i| share(&groups, pixels as f64 * (i + 1) as f64 / POINTS as f64)),
+        })
     }
-    let all = groups
-        .iter()
-        .fold(Group::default(), |a, b| Group { pixels: a.pixels + b.pixels, bad: a.bad + b.bad });
-    if all.pixels == 0 {
-        return Err(nothing_known());
-    }
-    let best = [Group { pixels: all.pixels - all.bad, bad: 0 }, Group { pixels: all.bad, bad: all.bad }];
-    Ok(Sparsification {
-        auc: area(&groups),
-        optimal: area(&best),
-        random: 100.0 * all.bad as f64 / all.pixels as f64,
-        curve: std::array::from_fn(|i| share(&groups, all.pixels as f64 * (i + 1) as f64 / POINTS as f64)),
-    })
 }
 
 /// The mean over all k of the share of bad pixels among the first k, in percent.
@@ -113,21 +116,15 @@ fn share(groups: &[Group], count: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cases::{close, ground, row};
     use super::*;
     use crate::Error;
-
-    fn row<T: Clone>(values: &[T]) -> Plane<T> {
-        Plane::new(values.len(), 1, values.to_vec())
-    }
 
     /// Pixels that are bad or not, with their confidences.
     fn sparsified(bad: &[bool], confidence: &[u8]) -> Sparsification {
         let estimate: Vec<f32> = bad.iter().map(|&b| if b { 9.0 } else { 4.0 }).collect();
-        sparsify(&row(&estimate), &row(&vec![4.0; bad.len()]), &row(confidence)).unwrap()
-    }
-
-    fn close(got: f64, expected: f64) {
-        assert!((got - expected).abs() <= 1e-9, "{got} instead of {expected}");
+        let truth = row(&vec![4.0; bad.len()]);
+        ground(&truth, None).sparsify(&row(&estimate), &row(confidence)).unwrap()
     }
 
     #[test]
@@ -135,7 +132,7 @@ mod tests {
         // By confidence: bad | good, bad | good. Invalid counts as bad; unknown truth does not count.
         let truth = row(&[4.0, 4.0, 4.0, 4.0, f32::INFINITY]);
         let estimate = row(&[6.0, f32::INFINITY, 9.0, 4.0, 4.0]);
-        let found = sparsify(&estimate, &truth, &row(&[7, 200, 7, 0, 255])).unwrap();
+        let found = ground(&truth, None).sparsify(&estimate, &row(&[7, 200, 7, 0, 255])).unwrap();
         close(found.auc, 100.0 * (1.0 + 1.5 / 2.0 + 2.0 / 3.0 + 2.0 / 4.0) / 4.0);
         close(found.optimal, 100.0 * (0.0 + 0.0 + 1.0 / 3.0 + 2.0 / 4.0) / 4.0);
         close(found.random, 50.0);
@@ -224,9 +221,9 @@ mod tests {
     #[test]
     fn sizes_must_agree_and_something_be_known() {
         let truth = row(&[1.0, 2.0]);
-        let error = sparsify(&truth, &truth, &row(&[1])).unwrap_err().to_string();
+        let error = ground(&truth, None).sparsify(&truth, &row(&[1])).unwrap_err().to_string();
         assert!(error.contains("confidence map is 1 x 1"), "{error}");
-        let unknown = row(&[f32::NAN; 2]);
-        assert!(matches!(sparsify(&truth, &unknown, &row(&[1, 2])), Err(Error::Mismatch(_))));
+        let unknown = ground(&row(&[f32::NAN; 2]), None);
+        assert!(matches!(unknown.sparsify(&truth, &row(&[1, 2])), Err(Error::Mismatch(_))));
     }
 }

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::metrics::{VISIBLE, average, percent, same_size};
+use super::dataset::{GroundTruth, same_size};
+use super::metrics::{VISIBLE, average, percent};
 use crate::error::Result;
 use crate::image::Plane;
 use crate::maps::flag;
@@ -31,25 +32,27 @@ impl Detection {
     }
 }
 
-/// Compares the flags of `validity` (bits of [`flag`]) with `mask` (not 255 = one view does not see the
-/// pixel), over the pixels whose `truth` is known (finite).
-///
-/// # Errors
-/// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
-pub fn detect(validity: &Plane<u8>, truth: &Plane<f32>, mask: &Plane<u8>) -> Result<Detection> {
-    same_size("validity map", validity.size(), truth.size())?;
-    same_size("mask", mask.size(), truth.size())?;
-    let (mut flagged, mut unseen, mut both) = (0_u32, 0_u32, 0_u32);
-    for ((&bits, &t), &m) in validity.data().iter().zip(truth.data()).zip(mask.data()) {
-        if t.is_finite() {
-            let (is_flagged, is_unseen) = (bits & FLAGGED != 0, m != VISIBLE);
-            flagged += u32::from(is_flagged);
-            unseen += u32::from(is_unseen);
-            both += u32::from(is_flagged && is_unseen);
+impl GroundTruth {
+    /// How well the flags of `validity` (bits of [`flag`]) detect the pixels that one view does not see, over the pixels whose
+    /// truth is known; `None` without a mask.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`](crate::Error::Mismatch) when the sizes differ.
+    pub fn detect(&self, validity: &Plane<u8>) -> Result<Option<Detection>> {
+        let Some(mask) = &self.mask else { return Ok(None) };
+        same_size("validity map", validity.size(), self.truth.size())?;
+        let (mut flagged, mut unseen, mut both) = (0_u32, 0_u32, 0_u32);
+        for ((&bits, &t), &m) in validity.data().iter().zip(self.truth.data()).zip(mask.data()) {
+            if t.is_finite() {
+                let (is_flagged, is_unseen) = (bits & FLAGGED != 0, m != VISIBLE);
+                flagged += u32::from(is_flagged);
+                unseen += u32::from(is_unseen);
+                both += u32::from(is_flagged && is_unseen);
+            }
         }
+        let share = |whole: u32| percent(f64::from(both), f64::from(whole));
+        Ok(Some(Detection { precision: share(flagged), recall: share(unseen) }))
     }
-    let share = |whole: u32| percent(f64::from(both), f64::from(whole));
-    Ok(Detection { precision: share(flagged), recall: share(unseen) })
 }
 
 #[cfg(test)]
@@ -74,18 +77,19 @@ mod tests {
         truth[(7, 0)] = f32::INFINITY;
         let mask = Plane::new(10, 1, vec![128, 0, 255, 128, 255, 255, 128, 128, 255, 128]);
         // Flagged: 0, 1, 2, 8, 9. Not seen by one view: 0, 1, 3, 6, 9.
-        let found = detect(&Plane::new(10, 1, flags.to_vec()), &truth, &mask).unwrap();
-        assert_eq!(found, Detection { precision: Some(60.0), recall: Some(60.0) });
-
-        let nothing = Plane::filled(10, 1, 0);
-        let found = detect(&nothing, &truth, &mask).unwrap();
-        assert_eq!(found, Detection { precision: None, recall: Some(0.0) });
-        let found =
-            detect(&Plane::filled(10, 1, flag::OCCLUDED), &truth, &Plane::filled(10, 1, 255)).unwrap();
-        assert_eq!(found, Detection { precision: Some(0.0), recall: None });
-
-        let error = detect(&Plane::filled(7, 1, 0), &truth, &mask).unwrap_err().to_string();
-        assert!(error.contains("validity map is 7 x 1"), "{error}");
+        let (flags, nothing) = (Plane::new(10, 1, flags.to_vec()), Plane::filled(10, 1, 0));
+        let (hidden, seen) = (Plane::filled(10, 1, flag::OCCLUDED), Plane::filled(10, 1, 255));
+        for (flags, mask, precision, recall) in [
+            (&flags, &mask, Some(60.0), Some(60.0)),
+            (&nothing, &mask, None, Some(0.0)),
+            (&hidden, &seen, Some(0.0), None),
+        ] {
+            let ground = GroundTruth::new(truth.clone(), Some(mask.clone())).unwrap();
+            assert_eq!(ground.detect(flags).unwrap(), Some(Detection { precision, recall }));
+            let error = ground.detect(&Plane::filled(7, 1, 0)).unwrap_err().to_string();
+            assert!(error.contains("validity map is 7 x 1"), "{error}");
+        }
+        assert_eq!(GroundTruth::new(truth, None).unwrap().detect(&flags).unwrap(), None);
     }
 
     #[test]

@@ -4,8 +4,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use crate::error::{Error, Result};
-use crate::text;
-use crate::text::quoted;
+use crate::text::{self, quoted};
 
 /// A calibration file is a dozen lines; no more than this is read.
 const MAX_BYTES: u64 = 1 << 20;
@@ -123,40 +122,46 @@ impl Calibration {
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut calibration = Self::default();
         for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-            let at = |key: &str, reason: String| format!("line {}: {key}: {reason}", i + 1);
-            let Some((key, value)) = line.split_once('=') else {
-                let word = line.split([' ', '\t', ':']).find(|w| !w.is_empty()).unwrap_or_default();
-                if KEYS.contains(&word) {
-                    return Err(at(word, "expected key=value".into()));
+            let (key, value) = match line.split_once('=') {
+                Some((key, value)) => (key.trim(), Ok(value.trim())),
+                None => {
+                    let word = line.split([' ', '\t', ':']).find(|word| !word.is_empty());
+                    (word.unwrap_or_default(), Err("expected key=value"))
                 }
-                continue;
             };
-            let (key, value) = (key.trim(), value.trim());
-            let put = match key {
-                "ndisp" => count(value).map(|v| calibration.ndisp = Some(v)),
-                "width" => count(value).map(|v| calibration.width = Some(v)),
-                "height" => count(value).map(|v| calibration.height = Some(v)),
-                "doffs" => number(value).map(|v| calibration.doffs = Some(v)),
-                "baseline" => number(value).map(|v| calibration.baseline = Some(v)),
-                "vmin" => number(value).map(|v| calibration.vmin = Some(v)),
-                "vmax" => number(value).map(|v| calibration.vmax = Some(v)),
-                "cam0" => camera(value).map(|v| calibration.camera = Some(v)),
-                "cam1" => camera(value).map(|_| ()),
-                "unit" => {
-                    let unit = value
-                        .parse()
-                        .map_err(|expected| format!("expected {expected}, found {}", quoted(value)));
-                    unit.map(|unit| calibration.unit = unit)
+            let mut put = || {
+                match key {
+                    "ndisp" => calibration.ndisp = Some(count(value?)?),
+                    "width" => calibration.width = Some(count(value?)?),
+                    "height" => calibration.height = Some(count(value?)?),
+                    "doffs" => calibration.doffs = Some(number(value?)?),
+                    "baseline" => calibration.baseline = Some(number(value?)?),
+                    "vmin" => calibration.vmin = Some(number(value?)?),
+                    "vmax" => calibration.vmax = Some(number(value?)?),
+                    "cam0" => calibration.camera = Some(camera(value?)?),
+                    "cam1" => _ = camera(value?)?,
+                    "unit" => {
+                        // Middlebury's files have no such key, but may have such a word.
+                        let Ok(value) = value else { return Ok(()) };
+                        let wrong = |expected| format!("expected {expected}, found {}", quoted(value));
+                        calibration.unit = value.parse().map_err(wrong)?;
+                    }
+                    _ => {}
                 }
-                _ => Ok(()),
+                Ok::<(), String>(())
             };
-            put.map_err(|reason| at(key, reason))?;
+            put().map_err(|reason| format!("line {}: {key}: {reason}", i + 1))?;
         }
         Ok(calibration)
     }
-}
 
-const KEYS: [&str; 9] = ["ndisp", "width", "height", "doffs", "baseline", "vmin", "vmax", "cam0", "cam1"];
+    /// The cameras of the rectified pair and their baseline, where it says them all.
+    pub(crate) fn cameras(&self) -> Option<([Camera; 2], f64)> {
+        let (left, doffs, baseline) = (self.camera?, self.doffs?, self.baseline?);
+        let [cx, cy] = left.principal_point;
+        Some(([left, Camera { principal_point: [cx + doffs, cy], ..left }], baseline))
+    }
+}
 
 /// A finite number.
 fn number(text: &str) -> std::result::Result<f64, String> {

@@ -5,13 +5,13 @@ use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use image::{ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, max_bytes_of, unsupported};
-use super::raster::{Raster, Samples};
+use super::raster::{Raster, Sample, Samples};
 use super::{jpeg, pfm, tiff};
-use crate::error::{Error, ReadError, Result};
-use crate::memory::Claim;
+use crate::error::{ReadError, Result};
+use crate::memory::{self, Claim};
 use crate::text::one_line;
 
 /// As [`MAX_PIXELS_PER_BYTE`], for uncompressed files, whose smallest pixel is one bit.
@@ -56,10 +56,6 @@ fn unknown(bytes: &[u8]) -> String {
         }
         Ok(other) => format!("is a {} file; {REMEDY}", other.extensions_str()[0]),
     }
-}
-
-pub(super) fn decode_file(path: &Path, max_pixels: u64, no_data: Option<f64>) -> Result<Raster<'static>> {
-    decode(&load(path, max_pixels)?, max_pixels, no_data).map_err(|cause| Error::read(path, cause))
 }
 
 /// Decodes a whole file; the error is one line. Memory for pixels is allocated only once the header is known
@@ -155,25 +151,22 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
     // The decoder holds rows and their filtered copies besides its pixels.
     let _claim = Claim::new(2 * decoder.total_bytes())?;
-    let image = DynamicImage::from_decoder(decoder).map_err(coded_reason)?;
-    let (channels, samples) = match image {
-        DynamicImage::ImageLuma8(i) => (1, Samples::Byte(i.into_raw().into())),
-        DynamicImage::ImageLumaA8(i) => (2, Samples::Byte(i.into_raw().into())),
-        DynamicImage::ImageRgb8(i) => (3, Samples::Byte(i.into_raw().into())),
-        DynamicImage::ImageRgba8(i) => (4, Samples::Byte(i.into_raw().into())),
-        DynamicImage::ImageLuma16(i) => (1, Samples::Word(i.into_raw().into())),
-        DynamicImage::ImageLumaA16(i) => (2, Samples::Word(i.into_raw().into())),
-        DynamicImage::ImageRgb16(i) => (3, Samples::Word(i.into_raw().into())),
-        DynamicImage::ImageRgba16(i) => (4, Samples::Word(i.into_raw().into())),
-        DynamicImage::ImageRgb32F(i) => (3, Samples::Float(i.into_raw().into())),
-        DynamicImage::ImageRgba32F(i) => (4, Samples::Float(i.into_raw().into())),
-        other => {
-            return Err(
-                format!("pixels of the kind {:?} are not read; convert it to PNG", other.color()).into()
-            );
-        }
+    let (colour, size) = (decoder.color_type(), (width as usize, height as usize));
+    let channels = usize::from(colour.channel_count());
+    let samples = match usize::from(colour.bytes_per_pixel()) / channels {
+        1 => filled::<u8>(decoder)?,
+        2 => filled::<u16>(decoder)?,
+        _ => filled::<f32>(decoder)?,
     };
-    Ok(Raster::of((width as usize, height as usize), channels, samples))
+    Ok(Raster::of(size, channels, samples))
+}
+
+/// All samples, which have this type.
+fn filled<S: Sample + bytemuck::Pod>(decoder: impl ImageDecoder) -> Result<Samples<'static>, ReadError> {
+    let bytes = usize::try_from(decoder.total_bytes()).unwrap_or(usize::MAX);
+    let mut samples = memory::filled(bytes / size_of::<S>(), S::zeroed())?;
+    decoder.read_image(bytemuck::cast_slice_mut(&mut samples)).map_err(coded_reason)?;
+    Ok(S::samples(samples.into()))
 }
 
 /// (width, height) that a PNG file claims, from the header that must come first.

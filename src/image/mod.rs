@@ -150,7 +150,7 @@ impl<T> Plane<T> {
 
     /// Row `y`, mutable.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
-        &mut self.data[y * self.width..(y + 1) * self.width]
+        self.rows_mut(y..y + 1)
     }
 
     /// A plane of the same size with `f` applied to each value.
@@ -173,22 +173,15 @@ impl<T: Clone> Plane<T> {
     /// The plane with top and bottom exchanged.
     #[must_use]
     pub fn flipped(&self) -> Self {
-        let mut data = Vec::with_capacity(self.data.len());
-        for row in self.data.chunks(self.width.max(1)).rev() {
-            data.extend_from_slice(row);
-        }
-        Self { width: self.width, height: self.height, data }
+        let rows: Vec<&[T]> = self.data.chunks(self.width.max(1)).rev().collect();
+        Self { width: self.width, height: self.height, data: rows.concat() }
     }
 
     /// The values in `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
-        let (width, height) = part.size();
-        let mut data = Vec::with_capacity(width * height);
-        for y in part.y.clone() {
-            data.extend_from_slice(&self.row(y)[part.x.clone()]);
-        }
-        Self { width, height, data }
+        let rows: Vec<&[T]> = part.y.clone().map(|y| &self.row(y)[part.x.clone()]).collect();
+        Self { width: part.x.len(), height: part.y.len(), data: rows.concat() }
     }
 
     /// A plane that holds `value` everywhere.
@@ -385,7 +378,7 @@ impl Pair {
         let double = |ends: &Range<usize>| 2 * ends.start..2 * ends.end;
         let larger = Rect { x: double(&part.x), y: double(&part.y) };
         let full = self.full.as_ref().map(|full| Box::new(full.crop(&larger)));
-        Self { full, ..Self::without_georeference(self.left.crop(part), self.right.crop(part)) }
+        Self { full, ..self.map(|view| view.crop(part)) }
     }
 
     /// (width, height) of both views.

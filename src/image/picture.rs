@@ -1,58 +1,93 @@
-//! Writing the images that the matcher sees.
+//! What PNG files show.
 
 use std::path::Path;
 
-use image::ExtendedColorType;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 
-use super::Image;
-use super::write::{check_png_path, png, save};
-use crate::error::Result;
+use super::{Image, Plane};
+use crate::error::{Error, Result};
 
-/// Writes an image as PNG, so that reading it gives the same pixels: grey where all colours are, with 8 bits where all levels
-/// have them, else with 16; with alpha where a pixel is masked.
-///
-/// # Errors
-/// [`Error::Write`](crate::Error::Write) when the extension is not `.png` or the file cannot be written.
-pub fn write(path: &Path, image: &Image) -> Result<()> {
-    check_png_path(path)?;
-    save(path, &encode(path, image)?)
+/// What a PNG file shows: 8-bit or 16-bit grey levels, such as depths in millimetres, 8-bit colours (red, green, blue), or an
+/// image that the matcher sees.
+pub trait Picture {
+    /// The bytes of the file, which errors call `path`.
+    ///
+    /// # Errors
+    /// [`Error::Write`] when PNG cannot hold a picture of this size.
+    fn png(&self, path: &Path) -> Result<Vec<u8>>;
 }
 
-/// The bytes of the file that [`write()`] would write to `path`.
-///
-/// # Errors
-/// [`Error::Write`](crate::Error::Write) when PNG cannot hold an image of this size.
-pub fn encode(path: &Path, image: &Image) -> Result<Vec<u8>> {
-    let pixels = image.pixels.data();
-    let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
-    let is_bytes = pixels.iter().all(|pixel| pixel[..3].iter().all(|v| v % 256 == 0));
-    let has_alpha = image.masked.data().contains(&true);
-    let mut samples: Vec<u16> = Vec::with_capacity(pixels.len() * 4);
-    for (pixel, masked) in pixels.iter().zip(image.masked.data()) {
-        samples.extend(&pixel[..if is_grey { 1 } else { 3 }]);
-        samples.extend(has_alpha.then_some(if *masked { 0 } else { u16::MAX }));
-    }
-    let kind = match (is_grey, has_alpha, is_bytes) {
-        (true, false, true) => ExtendedColorType::L8,
-        (true, true, true) => ExtendedColorType::La8,
-        (false, false, true) => ExtendedColorType::Rgb8,
-        (false, true, true) => ExtendedColorType::Rgba8,
-        (true, false, false) => ExtendedColorType::L16,
-        (true, true, false) => ExtendedColorType::La16,
-        (false, false, false) => ExtendedColorType::Rgb16,
-        (false, true, false) => ExtendedColorType::Rgba16,
+macro_rules! planes {
+    ($($pixel:ty: $kind:ident),*) => {
+        $(impl Picture for Plane<$pixel> {
+            fn png(&self, path: &Path) -> Result<Vec<u8>> {
+                png(path, bytemuck::cast_slice(self.data()), self.size(), ExtendedColorType::$kind)
+            }
+        })*
     };
-    if is_bytes {
-        let bytes: Vec<u8> = samples.iter().map(|v| (v >> 8) as u8).collect();
-        png(path, &bytes, image.pixels.size(), kind)
-    } else {
-        png(path, bytemuck::cast_slice(&samples), image.pixels.size(), kind)
+}
+
+planes!(u8: L8, u16: L16, [u8; 3]: Rgb8);
+
+/// Reading the file gives the same pixels: it is grey where all colours are, with 8 bits where all levels have them, else with
+/// 16; with alpha where a pixel is masked.
+impl Picture for Image {
+    fn png(&self, path: &Path) -> Result<Vec<u8>> {
+        let pixels = self.pixels.data();
+        let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
+        let is_bytes = self.holds_bytes();
+        let has_alpha = self.masked.data().contains(&true);
+        let mut samples: Vec<u16> = Vec::with_capacity(pixels.len() * 4);
+        for (pixel, masked) in pixels.iter().zip(self.masked.data()) {
+            samples.extend(&pixel[..if is_grey { 1 } else { 3 }]);
+            samples.extend(has_alpha.then_some(if *masked { 0 } else { u16::MAX }));
+        }
+        let kind = match (is_grey, has_alpha, is_bytes) {
+            (true, false, true) => ExtendedColorType::L8,
+            (true, true, true) => ExtendedColorType::La8,
+            (false, false, true) => ExtendedColorType::Rgb8,
+            (false, true, true) => ExtendedColorType::Rgba8,
+            (true, false, false) => ExtendedColorType::L16,
+            (true, true, false) => ExtendedColorType::La16,
+            (false, false, false) => ExtendedColorType::Rgb16,
+            (false, true, false) => ExtendedColorType::Rgba16,
+        };
+        if is_bytes {
+            let bytes: Vec<u8> = samples.iter().map(|v| (v >> 8) as u8).collect();
+            png(path, &bytes, self.pixels.size(), kind)
+        } else {
+            png(path, bytemuck::cast_slice(&samples), self.pixels.size(), kind)
+        }
+    }
+}
+
+/// A PNG file; 16-bit samples are in the byte order of the machine.
+pub(super) fn png(
+    path: &Path,
+    samples: &[u8],
+    size: (usize, usize),
+    kind: ExtendedColorType,
+) -> Result<Vec<u8>> {
+    let (w, h) = png_or_tiff_size(path, size)?;
+    let mut bytes = Vec::new();
+    let written = PngEncoder::new(&mut bytes).write_image(samples, w, h, kind);
+    written.map_err(|e| Error::write(path, e.to_string()))?;
+    Ok(bytes)
+}
+
+pub(super) fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
+    match (u32::try_from(size.0), u32::try_from(size.1)) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
+        _ => {
+            Err(Error::write(path, format!("the format holds no picture of {} x {} pixels", size.0, size.1)))
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Pair, Plane, grey};
+    use super::super::{Pair, grey, write};
     use super::*;
 
     #[test]
@@ -78,12 +113,9 @@ mod tests {
             if masked {
                 (image.pixels[(3, 2)], image.masked[(3, 2)]) = ([0; 4], true);
             }
-            write(&path, &image).unwrap();
+            write::picture(&path, &image).unwrap();
             let again = Pair::open(&path, &path).unwrap();
             assert_eq!(*again.left(), image, "{colours} {masked} {step}");
         }
-        assert!(
-            write(&folder.path().join("a.jpg"), &Image::from_rgb8(&Plane::filled(1, 1, [0; 3]))).is_err()
-        );
     }
 }

@@ -1,6 +1,7 @@
 //! Images as they are stored, and their conversion to the levels that the matcher sees.
 
 use std::borrow::Cow;
+use std::fmt::Display;
 
 use super::georeference::Georeference;
 use super::{Image, Pair, Pixel, Plane, Rect, grey};
@@ -149,25 +150,27 @@ impl<'a> Raster<'a> {
     }
 
     pub(super) fn marked(self, value: f64) -> Result<Self, MemoryError> {
-        let no_data = Some(holding(&self.samples, self.channels, self.colours(), value)?);
-        Ok(Self { no_data, ..self })
+        let ignored = holding(&self.samples, self.channels, self.colours(), value)?;
+        Ok(self.ignoring(ignored))
+    }
+
+    /// Masks the pixels where `ignored`, as large as the image, is `true`, beside those that are masked already.
+    fn ignoring(mut self, mut ignored: Vec<bool>) -> Self {
+        add(&mut ignored, self.no_data.as_deref());
+        self.no_data = Some(ignored);
+        self
     }
 
     /// Masks the pixels where `ignored` is `true`.
     ///
     /// # Errors
     /// [`Error::Mismatch`] when the sizes differ.
-    pub fn masked_by(mut self, ignored: Plane<bool>) -> Result<Self> {
+    pub fn masked_by(self, ignored: Plane<bool>) -> Result<Self> {
         if ignored.size() != self.size() {
             let ((w, h), (width, height)) = (ignored.size(), self.size());
             return Err(Error::Mismatch(format!("the mask is {w} x {h} and its image {width} x {height}")));
         }
-        let mut ignored = ignored.into_data();
-        for (ignored, no_data) in ignored.iter_mut().zip(self.no_data.iter().flatten()) {
-            *ignored |= no_data;
-        }
-        self.no_data = Some(ignored);
-        Ok(self)
+        Ok(self.ignoring(ignored.into_data()))
     }
 
     /// (width, height) in pixels.
@@ -220,9 +223,7 @@ impl<'a> Raster<'a> {
             });
             Plane::new(self.width, self.height, masked.collect())
         });
-        for (masked, no_data) in plane.data_mut().iter_mut().zip(self.no_data.iter().flatten()) {
-            *masked |= no_data;
-        }
+        add(plane.data_mut(), self.no_data.as_deref());
         plane
     }
 
@@ -237,6 +238,11 @@ impl<'a> Raster<'a> {
         let pixels = values.chunks_exact(self.channels).zip(masked.data()).filter(|(_, masked)| !**masked);
         pixels.flat_map(move |(pixel, _)| &pixel[..colours])
     }
+}
+
+/// Masks what another mask of the same size does, where there is one.
+fn add(masked: &mut [bool], other: Option<&[bool]>) {
+    masked.iter_mut().zip(other.into_iter().flatten()).for_each(|(masked, other)| *masked |= other);
 }
 
 /// Whether the first `colours` of the `n` samples of a pixel are all `value`, rounded to their type. NaN
@@ -264,34 +270,20 @@ pub(in crate::image) fn stretched(v: u8) -> u16 {
 }
 
 impl Pair {
-    /// The pair of two frames in memory, as [`pair`] makes it.
+    /// The pair of two images in memory, with their values scaled alike. [`Reader::pair`] gives the rules.
     ///
     /// # Errors
-    /// Those of [`pair`].
+    /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values; [`Error::Memory`] when the
+    /// system has not enough memory.
+    ///
+    /// [`Reader::pair`]: super::read::Reader::pair
     pub fn of_frames(left: Raster, right: Raster) -> Result<Self> {
-        pair(left, right, None)
+        joined([left, right], ["the left image", "the right one"])
     }
 }
 
-/// The pair of two images, with their values scaled alike; the left one is masked where `ignored` is `true`.
-/// [`Reader::pair`] gives the rules.
-///
-/// # Errors
-/// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values; [`Error::Memory`]
-/// when the system has not enough memory.
-///
-/// [`Reader::pair`]: super::read::Reader::pair
-pub fn pair(left: Raster, right: Raster, ignored: Option<&Plane<bool>>) -> Result<Pair> {
-    let names = ["the left image", "the right one", "the mask"];
-    joined([left, right], names, || Ok(ignored.map(Cow::Borrowed)))
-}
-
-/// As [`pair`], of images that errors call by these names, as they call the mask, which is read once they fit.
-pub(super) fn joined<'a>(
-    [left, right]: [Raster; 2],
-    [of_left, of_right, of_mask]: [&str; 3],
-    mask: impl FnOnce() -> Result<Option<Cow<'a, Plane<bool>>>>,
-) -> Result<Pair> {
+/// As [`Pair::of_frames`], of images that errors call by these names.
+pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Display; 2]) -> Result<Pair> {
     let images = [&left, &right];
     let ((width, height), (w, h)) = (left.size(), right.size());
     if (width, height) != (w, h) {
@@ -301,7 +293,7 @@ pub(super) fn joined<'a>(
     }
     let float = images.map(|image| image.samples.is_float());
     if float[0] != float[1] {
-        let [float, whole] = if float[0] { [of_left, of_right] } else { [of_right, of_left] };
+        let [float, whole] = if float[0] { [&of_left, &of_right] } else { [&of_right, &of_left] };
         return Err(Error::Mismatch(format!(
             "{float} holds float values and {whole} whole ones: give both in one format"
         )));
@@ -309,18 +301,7 @@ pub(super) fn joined<'a>(
     // The pixels and the mask of both views.
     let pixels = width as u64 * height as u64;
     memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
-    let mut masks = images.map(Raster::masked);
-    if let Some(ignored) = mask()? {
-        if ignored.size() != left.size() {
-            let (w, h) = ignored.size();
-            return Err(Error::Mismatch(format!(
-                "{of_mask} is {w} x {h} and {of_left} is {width} x {height}: a mask has the size of the left image"
-            )));
-        }
-        for (masked, ignored) in masks[0].data_mut().iter_mut().zip(ignored.data()) {
-            *masked |= ignored;
-        }
-    }
+    let masks = images.map(Raster::masked);
     let scale = Scale::of(images, &masks);
     let [in_left, in_right] = masks;
     let georeferences = [&left, &right].map(|raster| raster.georeference.clone());

@@ -2,12 +2,11 @@
 //!
 //! The kind of a file is detected from its first bytes, never from its name.
 
-use std::borrow::Cow;
 use std::path::Path;
 
 use image::ImageFormat;
 
-use super::decode::{Kind, decode, decode_file, load};
+use super::decode::{Kind, decode, load};
 use super::raster::{self, Raster, Sample, Samples, of_any};
 use super::{Pair, Plane, grey};
 use crate::error::{Error, ReadError, Result};
@@ -65,9 +64,20 @@ impl Reader {
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
-        let (first, second) =
-            rayon::join(|| self.decode(left, self.no_data), || self.decode(right, self.no_data));
-        self.joined([left, right], [first?, second?], mask)
+        let (first, second) = rayon::join(|| self.raster(left), || self.raster(right));
+        let (mut first, second) = (first?, second?);
+        if let Some(path) = mask {
+            let ignored = self.mask(path)?;
+            let ((w, h), (width, height)) = (ignored.size(), first.size());
+            first = first.masked_by(ignored).map_err(|_| {
+                Error::Mismatch(format!(
+                    "the mask {} is {w} x {h} and {} is {width} x {height}: a mask has the size of the left image",
+                    path.display(),
+                    left.display()
+                ))
+            })?;
+        }
+        raster::joined([first, second], [left, right].map(Path::display))
     }
 
     /// Reads one image, as it is stored: one view, or both beside each other. [`Pair::of_frames`] makes a pair of two.
@@ -75,7 +85,12 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`], as [`Reader::pair`].
     pub fn raster(self, path: &Path) -> Result<Raster<'static>> {
-        self.decode(path, self.no_data)
+        self.with_kind(path).map(|(_, raster)| raster)
+    }
+
+    /// As [`Reader::raster`], of masks and levels, where no value stands for no data.
+    fn whole(self, path: &Path) -> Result<Raster<'static>> {
+        Self { no_data: None, ..self }.raster(path)
     }
 
     /// As [`Reader::pair`], from files that are in memory, each with the name by which errors call it.
@@ -86,21 +101,7 @@ impl Reader {
         let image = |(name, bytes): (&Path, &[u8])| {
             decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))
         };
-        self.joined([left.0, right.0], [image(left)?, image(right)?], None)
-    }
-
-    /// The pair of two images from files with these names.
-    fn joined(
-        self,
-        [left, right]: [&Path; 2],
-        images: [Raster<'static>; 2],
-        mask: Option<&Path>,
-    ) -> Result<Pair> {
-        let name = |path: &Path| path.display().to_string();
-        let of_mask = mask.map_or_else(String::new, |path| format!("the mask {}", name(path)));
-        raster::joined(images, [&name(left), &name(right), &of_mask], || {
-            mask.map(|path| self.mask(path).map(Cow::Owned)).transpose()
-        })
+        raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display))
     }
 
     fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {
@@ -109,16 +110,12 @@ impl Reader {
         Ok((Kind::of(&bytes), raster.map_err(|cause| Error::read(path, cause))?))
     }
 
-    fn decode(self, path: &Path, no_data: Option<f64>) -> Result<Raster<'static>> {
-        decode_file(path, self.max_pixels, no_data)
-    }
-
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).
     ///
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`].
     pub fn mask(self, path: &Path) -> Result<Plane<bool>> {
-        let raster = self.decode(path, None)?;
+        let raster = self.whole(path)?;
         Ok(of_any!(&raster.samples, v => raster.plane(v, |c| c.iter().any(|&v| v.double() != 0.0))))
     }
 
@@ -128,22 +125,19 @@ impl Reader {
     /// # Errors
     /// [`Error::Read`] as [`Reader::pair`], and for float values.
     pub fn grey8(self, path: &Path) -> Result<Plane<u8>> {
-        let raster = self.decode(path, None)?;
-        let level = |c: &[u16]| match c {
-            [r, g, b] => (grey(*r, *g, *b) >> 8) as u8,
-            [v, ..] => (v >> 8) as u8,
-            [] => 0,
-        };
-        match &raster.samples {
-            Samples::Byte(v) => {
-                let wide: Vec<u16> = v.iter().map(|&v| u16::from(v) << 8).collect();
-                Ok(raster.plane(&wide, level))
-            }
-            Samples::Word(v) => Ok(raster.plane(v, level)),
+        let raster = self.whole(path)?;
+        let shift = match &raster.samples {
+            Samples::Byte(_) => 8,
+            Samples::Word(_) => 0,
             Samples::Float(_) | Samples::Double(_) => {
-                Err(Error::read(path, "holds float values; give an 8-bit PNG"))
+                return Err(Error::read(path, "holds float values; give an 8-bit PNG"));
             }
-        }
+        };
+        Ok(of_any!(&raster.samples, v => raster.plane(v, |c| {
+            let level = |i: usize| (c[i].double() as u16) << shift;
+            let level = if c.len() == 3 { grey(level(0), level(1), level(2)) } else { level(0) };
+            (level >> 8) as u8
+        })))
     }
 
     /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM and float TIFF hold disparities
@@ -204,14 +198,6 @@ impl Pair {
     pub fn open(left: impl AsRef<Path>, right: impl AsRef<Path>) -> Result<Self> {
         Reader::default().pair(left.as_ref(), right.as_ref(), None)
     }
-}
-
-/// [`Reader::pair`] with the default settings.
-///
-/// # Errors
-/// Those of [`Reader::pair`].
-pub fn pair(left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
-    Reader::default().pair(left, right, mask)
 }
 
 /// [`Reader::grey8`] with the default settings.

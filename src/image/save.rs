@@ -12,45 +12,35 @@ use crate::error::{Error, Reason, Result};
 /// Largest number of links that are followed.
 const MAX_LINKS: usize = 40;
 
-/// The destination of a file.
-pub(super) enum Target {
-    /// A regular file, existing or not: it is replaced once the new file is complete.
-    File { file: PathBuf, folder: PathBuf },
-    /// Anything else that exists: a device or a pipe must not be replaced by a file.
-    Special,
+/// Where a file at `path` will be once it is complete, replacing what is there, and its folder. `None` for anything else that
+/// exists: a device or a pipe must not be replaced by a file.
+fn destination(path: &Path) -> Result<Option<(PathBuf, PathBuf)>> {
+    let error = |reason: &str| Err(Error::write(path, reason));
+    let file = match fs::metadata(path) {
+        Ok(m) if m.is_dir() => return error("is a folder; give the name of a file"),
+        Ok(m) if !m.is_file() => return Ok(None),
+        Ok(m) if m.permissions().readonly() => {
+            return error("the file there is read-only; remove it first");
+        }
+        _ => followed(path).map_err(|e| Error::write(path, e))?,
+    };
+    if file.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator) {
+        return error("names no file; give the name of one");
+    }
+    let folder = folder_of(&file).to_owned();
+    if !folder.is_dir() {
+        return error(&format!("there is no folder {}; create it first", folder.display()));
+    }
+    Ok(Some((file, folder)))
 }
 
-impl Target {
-    pub(super) fn of(path: &Path) -> Result<Self> {
-        let error = |reason: &str| Err(Error::write(path, reason));
-        let file = match fs::metadata(path) {
-            Ok(m) if m.is_dir() => return error("is a folder; give the name of a file"),
-            Ok(m) if !m.is_file() => return Ok(Self::Special),
-            Ok(m) if m.permissions().readonly() => {
-                return error("the file there is read-only; remove it first");
-            }
-            _ => followed(path).map_err(|e| Error::write(path, e))?,
-        };
-        if file.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator) {
-            return error("names no file; give the name of one");
-        }
-        let folder = match file.parent() {
-            Some(p) if p != Path::new("") => p.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        if !folder.is_dir() {
-            return error(&format!("there is no folder {}; create it first", folder.display()));
-        }
-        Ok(Self::File { file, folder })
-    }
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
+}
 
-    /// Tries to create a file where [`save`] would.
-    pub(super) fn check(&self, path: &Path) -> Result<()> {
-        match self {
-            Self::File { folder, .. } => Temporary::new(path, folder).map(drop),
-            Self::Special => Ok(()),
-        }
-    }
+/// Tries to create a file where [`save`] would.
+pub(super) fn check(path: &Path) -> Result<()> {
+    destination(path)?.map_or(Ok(()), |(_, folder)| Sink::new(path, &folder).map(drop))
 }
 
 /// The target of the chain of links that begins at `path`, or `path` itself.
@@ -66,15 +56,18 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("its links lead in a circle"))
 }
 
-/// An unfinished file, which is deleted when dropped.
-enum Temporary {
-    /// Without a name: it disappears no matter how the program ends.
+/// Where the bytes of a file go until it is complete.
+enum Sink {
+    /// To a device or a pipe, at once.
+    Special(File),
+    /// To a file without a name: it disappears no matter how the program ends.
     #[cfg(target_os = "linux")]
     Unnamed(File),
+    /// To a file that is deleted when dropped.
     Named(NamedTempFile),
 }
 
-impl Temporary {
+impl Sink {
     fn new(path: &Path, folder: &Path) -> Result<Self> {
         #[cfg(target_os = "linux")]
         if let Ok(file) = unnamed(folder) {
@@ -89,6 +82,7 @@ impl Temporary {
     /// The bare file: with its name, errors would mention the temporary name.
     fn file(&mut self) -> &mut File {
         match self {
+            Self::Special(file) => file,
             #[cfg(target_os = "linux")]
             Self::Unnamed(file) => file,
             Self::Named(file) => file.as_file_mut(),
@@ -96,15 +90,18 @@ impl Temporary {
     }
 
     /// Gives it its name, replacing an existing file.
-    fn persist(self, name: &Path) -> io::Result<()> {
+    fn persist(mut self, name: &Path) -> io::Result<()> {
+        if !matches!(self, Self::Special(_)) {
+            // Otherwise a crash of the machine could leave the name without the contents.
+            self.file().sync_all()?;
+        }
         match self {
+            Self::Special(_) => Ok(()),
             #[cfg(target_os = "linux")]
             Self::Unnamed(file) => match link(&file, name) {
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {
                     // Only a named file can replace another.
-                    let folder =
-                        name.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-                    let other = builder().make_in(folder, |other| link(&file, other))?;
+                    let other = builder().make_in(folder_of(name), |other| link(&file, other))?;
                     other.into_temp_path().persist(name).map_err(|e| e.error)
                 }
                 linked => linked,
@@ -155,14 +152,9 @@ fn link(file: &File, name: &Path) -> io::Result<()> {
 /// link is followed.
 pub struct Growing {
     path: PathBuf,
+    /// What it will be called, where links have been followed.
+    name: PathBuf,
     to: Sink,
-}
-
-/// Where the pieces go.
-enum Sink {
-    Special(File),
-    /// Gets its name when it is finished.
-    Whole(Temporary, PathBuf),
 }
 
 impl Growing {
@@ -171,14 +163,13 @@ impl Growing {
     /// # Errors
     /// [`Error::Write`] when it cannot be written.
     pub fn new(path: &Path) -> Result<Self> {
-        let to = match Target::of(path)? {
-            Target::Special => {
-                let file = fs::OpenOptions::new().write(true).open(path);
-                Sink::Special(file.map_err(|e| Error::write(path, e))?)
-            }
-            Target::File { file, folder } => Sink::Whole(Temporary::new(path, &folder)?, file),
+        let (name, to) = if let Some((name, folder)) = destination(path)? {
+            (name, Sink::new(path, &folder)?)
+        } else {
+            let file = fs::OpenOptions::new().write(true).open(path);
+            (path.to_owned(), Sink::Special(file.map_err(|e| Error::write(path, e))?))
         };
-        Ok(Self { path: path.to_owned(), to })
+        Ok(Self { path: path.to_owned(), name, to })
     }
 
     /// Ends the file, and gives it its name.
@@ -186,28 +177,17 @@ impl Growing {
     /// # Errors
     /// [`Error::Write`] when it cannot be written.
     pub fn finish(self) -> Result<()> {
-        let Self { path, to } = self;
-        let Sink::Whole(mut temporary, name) = to else { return Ok(()) };
-        // Otherwise a crash of the machine could leave the name without the contents.
-        let written = temporary.file().sync_all().and_then(|()| temporary.persist(&name));
-        written.map_err(|e| Error::write(&path, e))
-    }
-
-    fn file(&mut self) -> &mut File {
-        match &mut self.to {
-            Sink::Special(file) => file,
-            Sink::Whole(temporary, _) => temporary.file(),
-        }
+        self.to.persist(&self.name).map_err(|e| Error::write(&self.path, e))
     }
 }
 
 impl Write for Growing {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file().write(bytes)
+        self.to.file().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file().flush()
+        self.to.file().flush()
     }
 }
 
@@ -297,19 +277,17 @@ mod tests {
     fn a_file_in_the_making_has_no_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
-        let mut made = Temporary::new(&path, folder.path()).unwrap();
-        made.file().write_all(b"half").unwrap();
-        let Temporary::Unnamed(_) = &made else {
+        let mut made = Growing::new(&path).unwrap();
+        made.write_all(b"half").unwrap();
+        let Sink::Unnamed(_) = made.to else {
             // Some file systems have none; then it has one.
             assert_eq!(count(folder.path()), 1);
             return;
         };
         assert_eq!(count(folder.path()), 0);
-        made.persist(&path).unwrap();
+        made.finish().unwrap();
         // Over one that is there.
-        let mut made = Temporary::new(&path, folder.path()).unwrap();
-        made.file().write_all(b"whole").unwrap();
-        made.persist(&path).unwrap();
+        save(&path, b"whole").unwrap();
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), count(folder.path())), ("whole", 1));
     }
 }

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::ExtendedColorType;
 
 use super::cloud::Cloud;
-use super::save::Target;
+use super::picture::{Picture, png, png_or_tiff_size};
+use super::save::check;
 use super::{Georeference, Plane, pcd, pfm, ply, tiff};
 use crate::error::{Error, Result};
 
@@ -24,7 +24,7 @@ enum Format {
     Tiff,
 }
 
-/// How maps are written. The functions of this module use the default.
+/// How maps are written. [`Plane::save`] uses the default.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Writer {
     /// Where the pixels of a map lie on the ground: those of [`Pair::georeferences`](super::Pair::georeferences). TIFF alone
@@ -82,33 +82,17 @@ impl Writer {
     }
 }
 
-/// [`Writer::disparity`] with the default settings.
-///
-/// # Errors
-/// Those of [`Writer::disparity`].
-pub fn disparity(path: &Path, map: &Plane<f32>) -> Result<()> {
-    Writer::default().disparity(path, map)
-}
-
-/// [`Writer::encode_disparity`] with the default settings.
-///
-/// # Errors
-/// Those of [`Writer::encode_disparity`].
-pub fn encode_disparity(path: &Path, map: &Plane<f32>) -> Result<Vec<u8>> {
-    Writer::default().encode_disparity(path, map)
-}
-
 impl Plane<f32> {
-    /// Writes this disparity map, as [`disparity`] does.
+    /// Writes this disparity map, as [`Writer::disparity`] does with the default settings.
     ///
     /// # Errors
-    /// Those of [`disparity`].
+    /// Those of [`Writer::disparity`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
-        disparity(path.as_ref(), self)
+        Writer::default().disparity(path.as_ref(), self)
     }
 }
 
-/// Checks before any computation that [`disparity`] will be able to write a map with disparities from
+/// Checks before any computation that [`Writer::disparity`] will be able to write a map with disparities from
 /// `min_disparity` to `max_disparity` (pixels, both inclusive) to `path`. An existing file stays untouched.
 ///
 /// # Errors
@@ -122,7 +106,7 @@ pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32)
         );
         return Err(Error::write(path, reason));
     }
-    Target::of(path)?.check(path)
+    check(path)
 }
 
 /// Checks before any computation that [`Writer::depth`] will be able to write a map to `path`.
@@ -132,7 +116,7 @@ pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32)
 /// folder is not writable.
 pub fn check_depth_path(path: &Path) -> Result<()> {
     check_float(path)?;
-    Target::of(path)?.check(path)
+    check(path)
 }
 
 /// Checks before any computation that a PNG picture can be written to `path`.
@@ -141,7 +125,7 @@ pub fn check_depth_path(path: &Path) -> Result<()> {
 /// [`Error::Write`] when the extension is not `.png`, the path is a folder, or its folder is not writable.
 pub fn check_png_path(path: &Path) -> Result<()> {
     png_extension(path)?;
-    Target::of(path)?.check(path)
+    check(path)
 }
 
 /// Checks before any computation that a file can be written to `path`, with any extension.
@@ -149,7 +133,7 @@ pub fn check_png_path(path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Write`] when the path is a folder, or its folder is not writable.
 pub fn check_path(path: &Path) -> Result<()> {
-    Target::of(path)?.check(path)
+    check(path)
 }
 
 /// Writes a cloud of points in the format of the extension: `.ply` as [`ply::encode`] has it, `.pcd` as [`pcd::encode`] has it. An
@@ -161,47 +145,13 @@ pub fn cloud(path: &Path, cloud: &Cloud) -> Result<()> {
     save(path, &cloud_encoder(path)?(cloud))
 }
 
-/// Writes 8-bit grey levels as PNG.
+/// Writes a picture as PNG.
 ///
 /// # Errors
 /// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
-pub fn grey8(path: &Path, plane: &Plane<u8>) -> Result<()> {
+pub fn picture(path: &Path, picture: &impl Picture) -> Result<()> {
     png_extension(path)?;
-    save(path, &encode_grey8(path, plane)?)
-}
-
-/// The bytes of the file that [`grey8`] would write to `path`.
-///
-/// # Errors
-/// [`Error::Write`] when PNG cannot hold a picture of this size.
-pub fn encode_grey8(path: &Path, plane: &Plane<u8>) -> Result<Vec<u8>> {
-    png(path, plane.data(), plane.size(), ExtendedColorType::L8)
-}
-
-/// Writes 16-bit levels, such as depths in millimetres, as PNG.
-///
-/// # Errors
-/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
-pub fn grey16(path: &Path, plane: &Plane<u16>) -> Result<()> {
-    png_extension(path)?;
-    save(path, &png(path, bytemuck::cast_slice(plane.data()), plane.size(), ExtendedColorType::L16)?)
-}
-
-/// Writes 8-bit colours (red, green, blue) as PNG.
-///
-/// # Errors
-/// [`Error::Write`] when the extension is not `.png` or the file cannot be written.
-pub fn rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<()> {
-    png_extension(path)?;
-    save(path, &encode_rgb8(path, plane)?)
-}
-
-/// The bytes of the file that [`rgb8`] would write to `path`.
-///
-/// # Errors
-/// [`Error::Write`] when PNG cannot hold a picture of this size.
-pub fn encode_rgb8(path: &Path, plane: &Plane<[u8; 3]>) -> Result<Vec<u8>> {
-    png(path, plane.data().as_flattened(), plane.size(), ExtendedColorType::Rgb8)
+    save(path, &picture.png(path)?)
 }
 
 fn check_float(path: &Path) -> Result<()> {
@@ -265,29 +215,6 @@ fn png_levels(map: &Plane<f32>) -> std::result::Result<Vec<u16>, String> {
     map.data().iter().map(level).collect()
 }
 
-/// A PNG file; 16-bit samples are in the byte order of the machine.
-pub(super) fn png(
-    path: &Path,
-    samples: &[u8],
-    size: (usize, usize),
-    kind: ExtendedColorType,
-) -> Result<Vec<u8>> {
-    let (w, h) = png_or_tiff_size(path, size)?;
-    let mut bytes = Vec::new();
-    let written = PngEncoder::new(&mut bytes).write_image(samples, w, h, kind);
-    written.map_err(|e| Error::write(path, e.to_string()))?;
-    Ok(bytes)
-}
-
-fn png_or_tiff_size(path: &Path, size: (usize, usize)) -> Result<(u32, u32)> {
-    match (u32::try_from(size.0), u32::try_from(size.1)) {
-        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
-        _ => {
-            Err(Error::write(path, format!("the format holds no picture of {} x {} pixels", size.0, size.1)))
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::read::read_disparity;
@@ -306,12 +233,27 @@ mod tests {
     fn maps_come_back_as_they_went() {
         let folder = tempfile::tempdir().unwrap();
         let map = Plane::new(3, 2, vec![0.5, 255.0, f32::INFINITY, 17.25, 1.0 / 256.0, 3.0]);
-        for name in ["a.pfm", "a.PFM", "a.png", "a.tif", "a.Tiff"] {
+        // What PNG cannot hold.
+        let wild = Plane::new(2, 2, vec![-3.5, 256.0, 1e6, f32::INFINITY]);
+        for (name, map) in [
+            ("a.pfm", &map),
+            ("a.PFM", &map),
+            ("a.png", &map),
+            ("a.tif", &map),
+            ("a.Tiff", &map),
+            ("b.pfm", &wild),
+            ("b.tif", &wild),
+        ] {
             let path = folder.path().join(name);
-            disparity(&path, &map).unwrap();
-            assert_eq!(read_disparity(&path).unwrap(), map, "{name}");
+            map.save(&path).unwrap();
+            assert_eq!(read_disparity(&path).unwrap(), *map, "{name}");
         }
-        assert_eq!(names(folder.path()).len(), 5, "nothing temporary stays");
+        for bad in [-0.01, 255.999, 256.0, 1e30] {
+            let error = Plane::filled(2, 1, bad).save(folder.path().join("b.png")).unwrap_err();
+            let error = error.to_string();
+            assert!([".pfm", ".tif", "b.png"].iter().all(|word| error.contains(word)), "{error}");
+        }
+        assert_eq!(names(folder.path()).len(), 7, "nothing temporary stays");
     }
 
     #[test]
@@ -331,36 +273,18 @@ mod tests {
     }
 
     #[test]
-    fn the_float_formats_hold_what_png_cannot() {
-        let folder = tempfile::tempdir().unwrap();
-        let map = Plane::new(2, 2, vec![-3.5, 256.0, 1e6, f32::INFINITY]);
-        for name in ["a.pfm", "a.tif"] {
-            let path = folder.path().join(name);
-            disparity(&path, &map).unwrap();
-            assert_eq!(read_disparity(&path).unwrap(), map, "{name}");
-        }
-        for bad in [-0.01, 255.999, 256.0, 1e30] {
-            let error =
-                disparity(&folder.path().join("a.png"), &Plane::filled(2, 1, bad)).unwrap_err().to_string();
-            assert!(error.contains(".pfm") && error.contains(".tif") && error.contains("a.png"), "{error}");
-        }
-        assert_eq!(names(folder.path()), ["a.pfm", "a.tif"]);
-    }
-
-    #[test]
     fn invalid_pixels_carry_the_mark_of_each_format() {
         let map = Plane::new(4, 1, vec![f32::INFINITY, f32::NAN, f32::NEG_INFINITY, 1.0]);
         assert_eq!(png_levels(&map).unwrap(), [0, 0, 0, 256]);
+        // No disparity is not invalid.
+        assert_eq!(png_levels(&Plane::new(4, 1, vec![0.0, -0.0, 0.001, 255.99])).unwrap(), [1, 1, 1, 65533]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.pfm");
-        disparity(&path, &map).unwrap();
-        let infinity = f32::INFINITY;
-        assert_eq!(
-            pfm::read(&path).unwrap(),
-            pfm::Pfm::Grey(Plane::new(4, 1, vec![infinity, infinity, infinity, 1.0]))
-        );
+        map.save(&path).unwrap();
+        let expected = Plane::new(4, 1, [[f32::INFINITY; 3].as_slice(), &[1.0]].concat());
+        assert_eq!(pfm::read(&path).unwrap(), pfm::Pfm::Grey(expected));
         let path = folder.path().join("a.tif");
-        disparity(&path, &map).unwrap();
+        map.save(&path).unwrap();
         let bytes = fs::read(&path).unwrap();
         let mut decoder = ::tiff::decoder::Decoder::new(Cursor::new(bytes)).unwrap();
         assert_eq!(decoder.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
@@ -371,23 +295,18 @@ mod tests {
     }
 
     #[test]
-    fn zero_disparity_is_not_invalid_in_png() {
-        assert_eq!(png_levels(&Plane::new(4, 1, vec![0.0, -0.0, 0.001, 255.99])).unwrap(), [1, 1, 1, 65533]);
-    }
-
-    #[test]
     fn pictures_come_back_as_they_went() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        grey8(&path, &Plane::new(2, 1, vec![3, 200])).unwrap();
+        picture(&path, &Plane::new(2, 1, vec![3_u8, 200])).unwrap();
         assert_eq!(
             image::open(&path).unwrap(),
             image::DynamicImage::ImageLuma8(image::GrayImage::from_raw(2, 1, vec![3, 200]).unwrap())
         );
-        rgb8(&path, &Plane::new(1, 1, vec![[1, 2, 3]])).unwrap();
+        picture(&path, &Plane::new(1, 1, vec![[1, 2, 3]])).unwrap();
         assert_eq!(image::open(&path).unwrap().into_rgb8().into_raw(), [1, 2, 3]);
-        assert!(grey8(&path, &Plane::new(0, 0, vec![])).is_err());
-        assert!(grey8(&folder.path().join("a.jpg"), &Plane::new(1, 1, vec![0])).is_err());
+        assert!(picture(&path, &Plane::<u8>::new(0, 0, vec![])).is_err());
+        assert!(picture(&folder.path().join("a.jpg"), &Plane::new(1, 1, vec![0_u8])).is_err());
     }
 
     #[test]
@@ -401,6 +320,9 @@ mod tests {
         check_png_path(&at("a.PNG")).unwrap();
         check_path(&at("a.json")).unwrap();
         assert!(names(folder.path()).is_empty(), "the check leaves nothing");
+        fs::write(at("c.pfm"), "precious").unwrap();
+        check("c.pfm", 0, 9).unwrap();
+        assert_eq!(fs::read(at("c.pfm")).unwrap(), b"precious", "the check keeps what is there");
 
         fs::create_dir(at("b.pfm")).unwrap();
         let refused = |result: Result<()>, words: &[&str]| {
@@ -419,17 +341,8 @@ mod tests {
         refused(check_png_path(&at("none/a.png")), &["create it"]);
         refused(check_path(&at("none/a.json")), &["create it"]);
         refused(check_path(&at("b.pfm")), &["b.pfm", "folder"]);
-        refused(disparity(&at("none/a.pfm"), &Plane::filled(1, 1, 0.0)), &["create it"]);
-        refused(disparity(&at("b.pfm"), &Plane::filled(1, 1, 0.0)), &["folder"]);
-    }
-
-    #[test]
-    fn the_check_keeps_the_file_that_is_there() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.pfm");
-        fs::write(&path, "precious").unwrap();
-        check_disparity_path(&path, 0, 9).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"precious");
+        refused(Plane::filled(1, 1, 0.0).save(at("none/a.pfm")), &["create it"]);
+        refused(Plane::filled(1, 1, 0.0).save(at("b.pfm")), &["folder"]);
     }
 
     #[cfg(unix)]
@@ -439,12 +352,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("plain"), "").unwrap();
-        disparity(&at("a.pfm"), &Plane::filled(1, 1, 0.0)).unwrap();
+        Plane::filled(1, 1, 0.0).save(at("a.pfm")).unwrap();
         let mode = |name: &str| fs::metadata(at(name)).unwrap().permissions().mode();
         assert_eq!(mode("a.pfm"), mode("plain"));
 
         std::os::unix::fs::symlink(at("a.pfm"), at("link.pfm")).unwrap();
-        disparity(&at("link.pfm"), &Plane::filled(1, 1, 2.0)).unwrap();
+        Plane::filled(1, 1, 2.0).save(at("link.pfm")).unwrap();
         assert!(fs::symlink_metadata(at("link.pfm")).unwrap().is_symlink());
         assert_eq!(read_disparity(&at("a.pfm")).unwrap(), Plane::filled(1, 1, 2.0));
 
@@ -460,11 +373,11 @@ mod tests {
         let null = Path::new("/dev/null");
         check_disparity_path(null, -9, 999).unwrap();
         check_png_path(null).unwrap();
-        disparity(null, &Plane::filled(1, 1, 0.0)).unwrap();
-        rgb8(null, &Plane::filled(1, 1, [0; 3])).unwrap();
+        Plane::filled(1, 1, 0.0).save(null).unwrap();
+        picture(null, &Plane::filled(1, 1, [0_u8; 3])).unwrap();
         assert!(is_special(null));
         // A disk that is always full.
-        let error = disparity(Path::new("/dev/full"), &Plane::filled(1, 1, 0.0)).unwrap_err();
+        let error = Plane::filled(1, 1, 0.0).save("/dev/full").unwrap_err();
         assert!(matches!(error, Error::Write { .. }), "{error}");
     }
 }

@@ -8,7 +8,7 @@ mod geotiffs;
 mod tiffs;
 
 use files::{Png, exif_orientation, jpeg};
-use mrfgs::image::{Image, read};
+use mrfgs::image::{Image, Pair};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -22,7 +22,7 @@ fn file(bytes: &[u8]) -> (TempDir, PathBuf) {
 
 fn left(bytes: &[u8]) -> Image {
     let (_folder, path) = file(bytes);
-    read::pair(&path, &path, None).unwrap().left().clone()
+    Pair::open(&path, &path).unwrap().left().clone()
 }
 
 /// Red, green and blue of every pixel in 8-bit levels, `None` where it is masked.
@@ -43,7 +43,7 @@ fn greys(bytes: &[u8]) -> Vec<Option<u16>> {
 
 fn refused(bytes: &[u8], words: &[&str]) {
     let (_folder, path) = file(bytes);
-    let text = read::pair(&path, &path, None).unwrap_err().to_string();
+    let text = Pair::open(&path, &path).unwrap_err().to_string();
     assert!(words.iter().all(|word| text.contains(word)) && !text.contains('\n'), "{text}");
 }
 

@@ -228,6 +228,8 @@ fn alpha_as_it_is_and_multiplied_into_the_colours() {
     assert_eq!(with(&[2], &row), [Some([10, 20, 100]), None]);
     assert_eq!(with(&[], &row), [Some([10, 20, 100]), None], "not said, but meant");
     assert_eq!(with(&[0], &row), known([[10, 20, 100], [1, 2, 3]]), "something else");
+    let tags = [(258, Short(&[8, 8])), (277, Short(&[2])), (338, Short(&[2]))];
+    assert_eq!(greys(&grey([2, 1], &tags, &[&[255, 1, 9, 0]])), [Some(255), None]);
     // Grey, in planes.
     let tags = [(258, Short(&[8, 8])), (277, Short(&[2])), (284, Short(&[2])), (338, Short(&[1]))];
     assert_eq!(greys(&grey([2, 1], &tags, &[&[10, 9], &[128, 0]])), [Some(20), None]);

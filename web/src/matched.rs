@@ -5,8 +5,10 @@ use crate::pair::{Cameras, StereoPair, rgba};
 use crate::words::{error, thrown, warning};
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::image::cloud::{Cloud, Point};
+use mrfgs::image::picture::Picture;
 use mrfgs::image::ply;
-use mrfgs::image::{Plane, Rect, write};
+use mrfgs::image::write::Writer;
+use mrfgs::image::{Plane, Rect};
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -105,7 +107,9 @@ impl Matched {
     /// # Errors
     /// Where there is no such map.
     pub fn pfm(&self, map: &str) -> Thrown<Vec<u8>> {
-        write::encode_disparity(Path::new("disparity.pfm"), &self.disparities(map)?).map_err(thrown)
+        Writer::default()
+            .encode_disparity(Path::new("disparity.pfm"), &self.disparities(map)?)
+            .map_err(thrown)
     }
 
     /// The map "disparity", "raw", "confidence" or "validity" as the program writes it to PNG: disparities times 256 in 16 bits.
@@ -115,9 +119,9 @@ impl Matched {
     pub fn png(&self, map: &str) -> Thrown<Vec<u8>> {
         let path = Path::new("disparity.png");
         match map {
-            "confidence" => write::encode_grey8(path, self.matched.confidence()),
-            "validity" => write::encode_grey8(path, self.matched.validity()),
-            _ => write::encode_disparity(path, &self.disparities(map)?),
+            "confidence" => self.matched.confidence().png(path),
+            "validity" => self.matched.validity().png(path),
+            _ => Writer::default().encode_disparity(path, &self.disparities(map)?),
         }
         .map_err(thrown)
     }

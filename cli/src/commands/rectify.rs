@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::calibration;
-use mrfgs::image::{Image, pfm, picture, write};
+use mrfgs::image::{Image, pfm, write};
 use mrfgs::rectification::Rectification;
 
 use crate::args::reading::ReadingArgs;
@@ -93,9 +93,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 fn write_all(folder: &Path, by: &Rectification, images: [&Image; 2], maps: bool) -> mrfgs::Result<()> {
     let at = |name: &str| folder.join(name);
     for (i, image) in images.into_iter().enumerate() {
-        picture::write(&at(&format!("im{i}.png")), image)?;
-        let mask = image.masked.map(|&masked| if masked { 255 } else { 0 });
-        write::grey8(&at(&format!("mask{i}.png")), &mask)?;
+        write::picture(&at(&format!("im{i}.png")), image)?;
+        let mask = image.masked.map(|&masked| if masked { 255_u8 } else { 0 });
+        write::picture(&at(&format!("mask{i}.png")), &mask)?;
     }
     if maps {
         for (i, map) in by.maps()?.iter().enumerate() {

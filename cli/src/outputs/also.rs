@@ -248,7 +248,7 @@ impl AlsoArgs {
                 let Some(map) = map(maps) else { return Ok(None) };
                 outcome.writer(view).disparity(path, &sign.map(map))?;
             }
-            Kind::Bytes(map) => write::grey8(path, map(maps))?,
+            Kind::Bytes(map) => write::picture(path, map(maps))?,
             Kind::Depth => {
                 let Some(rig) = rig else { return Ok(None) };
                 let depths = rig.depths(&maps.final_map());
@@ -263,7 +263,7 @@ impl AlsoArgs {
                 let Some(depths) = rig.and_then(|rig| rig.millimetres(&maps.final_map())) else {
                     return Ok(None);
                 };
-                write::grey16(path, &depths)?;
+                write::picture(path, &depths)?;
             }
             Kind::Points(frame, format) => {
                 let rig = match frame {
@@ -276,7 +276,7 @@ impl AlsoArgs {
                 let count = cloud.points.len();
                 return Ok(Some(format!("{count} point{}", plural(count))));
             }
-            Kind::Picture { beside } => write::rgb8(path, &self.picture(beside, outcome))?,
+            Kind::Picture { beside } => write::picture(path, &self.picture(beside, outcome))?,
         }
         Ok(None)
     }

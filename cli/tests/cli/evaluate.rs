@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use image::{GrayImage, Luma};
-use mrfgs::evaluation::confidence::sparsify;
-use mrfgs::image::{Plane, read, write};
+use mrfgs::evaluation::GroundTruth;
+use mrfgs::image::{Plane, read};
 use mrfgs::options::Method;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -144,7 +144,7 @@ fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
         let images: Vec<_> = images.split(' ').collect();
         let args = ["match", images[0], images[1], "map.pfm", "--also", "raw", "--max-disparity", &max];
         assert_eq!(run(folder.path(), &args).code, Some(0));
-        write::disparity(&at("truth.pfm"), &pixels).unwrap();
+        pixels.save(at("truth.pfm")).unwrap();
 
         for (map, file) in [("final", "map.pfm"), ("raw", "map.raw.pfm")] {
             let by_pfm = ["map", file, "--truth", "truth.pfm", "--json", "-"];
@@ -177,7 +177,7 @@ fn scales_and_incomplete_folders_are_refused() {
         refused(folder.path(), &["old", "--truth-scale", scale], 2, &["--truth-scale", "0.1 to 255"]);
     }
     copy("slanted", &at("new"));
-    write::disparity(&at("map.pfm"), &Plane::filled(240, 180, 1.0)).unwrap();
+    Plane::filled(240, 180, 1.0).save(at("map.pfm")).unwrap();
     let word = ["--truth-scale", "leave it out"];
     refused(folder.path(), &["new", "--truth-scale", "3"], 2, &word);
     let args = ["map", "map.pfm", "--truth", "map.pfm", "--truth-scale", "3"];
@@ -251,7 +251,8 @@ fn a_breakdown_adds_up() {
     assert_eq!(run(folder.path(), &args).code, Some(0));
     let truth = read::read_disparity(&at("Teddy/disp0GT.pfm")).unwrap();
     let (map, grey) = (read::read_disparity(&at("map.pfm")).unwrap(), |file: &str| read::grey8(&at(file)));
-    let expected = sparsify(&map, &truth, &grey("map.confidence.png").unwrap()).unwrap();
+    let ground = GroundTruth::new(truth.clone(), None).unwrap();
+    let expected = ground.sparsify(&map, &grey("map.confidence.png").unwrap()).unwrap();
     // JSON is read to the last bit but one.
     let near = |value: &Value, expected: f64| {
         let value = value.as_f64().unwrap();

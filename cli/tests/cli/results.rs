@@ -8,7 +8,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use mrfgs::image::{Plane, read, write};
+use mrfgs::image::{Plane, read};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -40,7 +40,7 @@ fn workshop() -> TempDir {
     let truth = read::read_disparity(&scene("thin").join("disp0GT.pfm")).unwrap();
     let part =
         Plane::from_fn(width as usize, height as usize, |i, j| truth[(i + x as usize, j + y as usize)]);
-    write::disparity(&at("Teddy/disp0GT.pfm"), &part).unwrap();
+    part.save(at("Teddy/disp0GT.pfm")).unwrap();
     fs::write(at("Teddy/calib.txt"), "ndisp=32\n").unwrap();
     folder
 }

@@ -2,14 +2,22 @@ use std::fs;
 use std::io::Cursor;
 use std::path::PathBuf;
 
-use image::{GrayAlphaImage, GrayImage, ImageBuffer, Luma, LumaA, Rgb, RgbImage, Rgba, RgbaImage};
+use image::{GrayImage, ImageBuffer, Luma, LumaA, Pixel, PixelWithColorType, Rgb, RgbImage, Rgba};
 use tempfile::TempDir;
 use tiff::encoder::{TiffEncoder, colortype};
-use tiff::tags::{ExtraSamples, Tag};
 
 use super::*;
 use crate::image::raster::{Raster, stretched};
 use crate::image::{Image, pfm};
+
+/// The pair of an image with itself.
+fn twice(path: &Path) -> Pair {
+    Pair::open(path, path).unwrap()
+}
+
+fn pair(left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
+    Reader::default().pair(left, right, mask)
+}
 
 fn decode(bytes: &[u8]) -> std::result::Result<Raster<'static>, String> {
     super::decode(bytes, MAX_PIXELS, None).map_err(|cause| cause.to_string())
@@ -36,14 +44,21 @@ impl Folder {
         self.at(name)
     }
 
-    fn grey8(&self, name: &str, values: [u8; N]) -> PathBuf {
-        GrayImage::from_raw(W, H, values.to_vec()).unwrap().save(self.at(name)).unwrap();
+    /// An image of `W` x `H` pixels.
+    fn image<P: Pixel + PixelWithColorType>(&self, name: &str, values: &[P::Subpixel]) -> PathBuf
+    where
+        [P::Subpixel]: image::EncodableLayout,
+    {
+        ImageBuffer::<P, _>::from_raw(W, H, values.to_vec()).unwrap().save(self.at(name)).unwrap();
         self.at(name)
     }
 
+    fn grey8(&self, name: &str, values: [u8; N]) -> PathBuf {
+        self.image::<Luma<u8>>(name, &values)
+    }
+
     fn grey16(&self, name: &str, values: [u16; N]) -> PathBuf {
-        ImageBuffer::<Luma<u16>, _>::from_raw(W, H, values.to_vec()).unwrap().save(self.at(name)).unwrap();
-        self.at(name)
+        self.image::<Luma<u16>>(name, &values)
     }
 
     fn tiff<C: colortype::ColorType>(&self, name: &str, values: &[C::Inner]) -> PathBuf
@@ -91,8 +106,7 @@ fn colour_agrees_with_the_crates_grey() {
     let f = Folder::new();
     let rgb = Plane::from_fn(W as usize, H as usize, |x, y| [x as u8 * 60, y as u8 * 90, 255 - x as u8]);
     for name in ["a.png", "a.ppm", "a.tif"] {
-        RgbImage::from_raw(W, H, rgb.data().as_flattened().to_vec()).unwrap().save(f.at(name)).unwrap();
-        let pair = pair(&f.at(name), &f.at(name), None).unwrap();
+        let pair = twice(&f.image::<Rgb<u8>>(name, rgb.data().as_flattened()));
         assert_eq!(*pair.left(), Image::from_rgb8(&rgb), "{name}");
         assert_eq!(pair.left(), pair.right());
     }
@@ -105,17 +119,15 @@ fn an_8_bit_pair_times_257_is_the_same_pair() {
     for values in [RAMP, RAMP.map(|v| v / 9)] {
         let byte = f.grey8("byte.png", values);
         let word = f.grey16("word.png", values.map(stretched));
-        let expected = pair(&byte, &byte, None).unwrap();
-        assert_eq!(pair(&word, &word, None).unwrap(), expected);
-        assert_eq!(pair(&byte, &word, None).unwrap(), expected);
-        assert_eq!(pair(&word, &byte, None).unwrap(), expected);
+        for (left, right) in [(&word, &word), (&byte, &word), (&word, &byte)] {
+            assert_eq!(pair(left, right, None).unwrap(), twice(&byte));
+        }
     }
     // Negative control: 256 is no stretching, and one more is a different picture.
     let byte = f.grey8("byte.png", RAMP);
     let mut values = RAMP.map(stretched);
     values[4] += 1;
-    let word = f.grey16("word.png", values);
-    assert_ne!(pair(&word, &word, None).unwrap(), pair(&byte, &byte, None).unwrap());
+    assert_ne!(twice(&f.grey16("word.png", values)), twice(&byte));
 }
 
 #[test]
@@ -125,8 +137,7 @@ fn words_use_the_whole_range() {
     for (max, free) in [(65535, 0), (40000, 0), (32767, 1), (2047, 5), (1024, 5), (1023, 6), (200, 8), (3, 8)]
     {
         let path = f.grey16("a.png", values(max));
-        let same = pair(&path, &path, None).unwrap();
-        assert_eq!(greys(same.left()), values(max).map(|v| v << free), "{max}");
+        assert_eq!(greys(twice(&path).left()), values(max).map(|v| v << free), "{max}");
         // The brighter of the two decides for both.
         let dim = f.grey16("b.tif", values(max / 5));
         for pair in [pair(&dim, &path, None).unwrap(), pair(&path, &dim, None).unwrap()] {
@@ -184,22 +195,20 @@ fn transparent_pixels_are_masked() {
     let la: Vec<u8> = (0..N).flat_map(|i| [RAMP[i], alpha(i)]).collect();
     let rgba: Vec<u8> = (0..N).flat_map(|i| [RAMP[i], RAMP[i], RAMP[i], alpha(i)]).collect();
     let wide = |v: &[u8]| v.iter().map(|&v| stretched(v)).collect::<Vec<u16>>();
-    GrayAlphaImage::from_raw(W, H, la.clone()).unwrap().save(f.at("la8.png")).unwrap();
-    RgbaImage::from_raw(W, H, rgba.clone()).unwrap().save(f.at("rgba8.png")).unwrap();
-    RgbaImage::from_raw(W, H, rgba.clone()).unwrap().save(f.at("rgba8.tif")).unwrap();
-    ImageBuffer::<LumaA<u16>, _>::from_raw(W, H, wide(&la)).unwrap().save(f.at("la16.png")).unwrap();
-    ImageBuffer::<Rgba<u16>, _>::from_raw(W, H, wide(&rgba)).unwrap().save(f.at("rgba16.tif")).unwrap();
     let floats: Vec<f32> = rgba.iter().map(|&v| v as f32).collect();
-    f.tiff::<colortype::RGBA32Float>("rgba32.tif", &floats);
-
-    let plain = f.grey8("plain.png", RAMP);
-    let expected =
-        pair(&plain, &plain, Some(&f.grey8("mask.png", std::array::from_fn(|i| u8::from(i == 3)))));
-    let expected = expected.unwrap();
-    for name in ["la8.png", "rgba8.png", "rgba8.tif", "la16.png", "rgba16.tif", "rgba32.tif"] {
-        let pair = pair(&f.at(name), &f.at(name), None).unwrap();
-        assert_eq!(masked(pair.left()), [3], "{name}");
-        assert_eq!(pair.left(), expected.left(), "{name}");
+    let (plain, mask) = (f.grey8("plain.png", RAMP), std::array::from_fn(|i| u8::from(i == 3)));
+    let expected = pair(&plain, &plain, Some(&f.grey8("mask.png", mask))).unwrap();
+    for path in [
+        f.image::<LumaA<u8>>("la8.png", &la),
+        f.image::<Rgba<u8>>("rgba8.png", &rgba),
+        f.image::<Rgba<u8>>("rgba8.tif", &rgba),
+        f.image::<LumaA<u16>>("la16.png", &wide(&la)),
+        f.image::<Rgba<u16>>("rgba16.tif", &wide(&rgba)),
+        f.tiff::<colortype::RGBA32Float>("rgba32.tif", &floats),
+    ] {
+        let pair = twice(&path);
+        assert_eq!(masked(pair.left()), [3], "{}", path.display());
+        assert_eq!(pair.left(), expected.left(), "{}", path.display());
     }
 }
 
@@ -208,26 +217,26 @@ fn the_colours_of_a_mask_count_and_its_alpha_does_not() {
     let f = Folder::new();
     let mut rgba = [0, 0, 0, 255].repeat(N);
     rgba[5 * 4 + 2] = 1;
-    RgbaImage::from_raw(W, H, rgba).unwrap().save(f.at("m.png")).unwrap();
-    let plane = Reader::default().mask(&f.at("m.png")).unwrap();
-    assert_eq!((0..N).filter(|&i| plane.data()[i]).collect::<Vec<_>>(), [5]);
-    let path = f.tiff::<colortype::Gray32Float>(
-        "m.tif",
-        &[0.0, -0.0, f32::NAN, 1e-9, 0., 0., 0., 0., 0., 0., 0., 0.],
-    );
-    let plane = Reader::default().mask(&path).unwrap();
-    assert_eq!((0..N).filter(|&i| plane.data()[i]).collect::<Vec<_>>(), [2, 3]);
+    let floats = [0.0, -0.0, f32::NAN, 1e-9, 0., 0., 0., 0., 0., 0., 0., 0.];
+    for (path, expected) in [
+        (f.image::<Rgba<u8>>("m.png", &rgba), &[5][..]),
+        (f.tiff::<colortype::Gray32Float>("m.tif", &floats), &[2, 3]),
+    ] {
+        let plane = Reader::default().mask(&path).unwrap();
+        assert_eq!((0..N).filter(|&i| plane.data()[i]).collect::<Vec<_>>(), expected);
+    }
 }
 
 #[test]
 fn levels_are_the_upper_eight_bits() {
     let f = Folder::new();
-    assert_eq!(grey8(&f.grey8("a.png", RAMP)).unwrap().data(), RAMP);
-    let words = f.grey16("b.png", RAMP.map(|v| u16::from(v) * 257));
-    assert_eq!(grey8(&words).unwrap().data(), RAMP);
-    let colours = RAMP.iter().flat_map(|&v| [v; 3]).collect();
-    RgbImage::from_raw(W, H, colours).unwrap().save(f.at("c.png")).unwrap();
-    assert_eq!(grey8(&f.at("c.png")).unwrap().data(), RAMP);
+    for path in [
+        f.grey8("a.png", RAMP),
+        f.grey16("b.png", RAMP.map(|v| u16::from(v) * 257)),
+        f.image::<Rgb<u8>>("c.png", RAMP.map(|v| [v; 3]).as_flattened()),
+    ] {
+        assert_eq!(grey8(&path).unwrap().data(), RAMP);
+    }
     refused(grey8(&f.tiff::<colortype::Gray32Float>("d.tif", &[0.0; N])), &["d.tif", "float"]);
 }
 
@@ -249,15 +258,14 @@ fn floats_are_spread_jointly() {
         "d.tif",
         &[-1.7e308, 1.7e308, 0.0, f64::NAN, 0., 0., 0., 0., 0., 0., 0., 0.],
     );
-    assert_eq!(greys(pair(&wide, &wide, None).unwrap().left())[..4], [0, 65280, 32640, 0]);
+    assert_eq!(greys(twice(&wide).left())[..4], [0, 65280, 32640, 0]);
 }
 
 #[test]
 fn constant_and_wholly_masked_floats_are_black() {
     let f = Folder::new();
     for value in [7.5, 0.0, f32::NAN, f32::MAX] {
-        let path = f.tiff::<colortype::Gray32Float>("a.tif", &[value; N]);
-        let pair = pair(&path, &path, None).unwrap();
+        let pair = twice(&f.tiff::<colortype::Gray32Float>("a.tif", &[value; N]));
         assert_eq!(greys(pair.left()), [0; N], "{value}");
         assert_eq!(masked(pair.left()).len(), if value.is_nan() { N } else { 0 });
     }
@@ -271,46 +279,10 @@ fn float_colours_and_signed_words() {
     let float = f.tiff::<colortype::RGB32Float>("f.tif", &rgb.iter().map(|&v| v as f32).collect::<Vec<_>>());
     let pair = pair(&double, &float, None).unwrap();
     assert_eq!(pair.left(), pair.right());
-    assert_eq!(pair.left().pixels[(0, 0)][0], 0);
-    assert_eq!(pair.left().pixels[(3, 2)][2], 65280);
+    assert_eq!((pair.left().pixels[(0, 0)][0], pair.left().pixels[(3, 2)][2]), (0, 65280));
     let signed: Vec<i16> = (0..N as i16).map(|i| i * 100 - 500).collect();
-    let signed = f.tiff::<colortype::GrayI16>("s.tif", &signed);
-    let pair = self::pair(&signed, &signed, None).unwrap();
-    assert_eq!((greys(pair.left())[0], greys(pair.left())[N - 1]), (0, 65280));
-}
-
-#[test]
-fn tiff_with_grey_and_alpha_and_in_planes() {
-    let f = Folder::new();
-    let mut bytes = Cursor::new(Vec::new());
-    let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
-    let mut image = encoder.new_image::<colortype::Gray8>(W, H).unwrap();
-    image.extra_samples(&[ExtraSamples::UnassociatedAlpha]).unwrap();
-    let la: Vec<u8> = (0..N).flat_map(|i| [RAMP[i], u8::from(i != 6)]).collect();
-    image.write_data(&la).unwrap();
-    let path = f.bytes("la.tif", bytes.get_ref());
-    let pair = pair(&path, &path, None).unwrap();
-    assert_eq!(masked(pair.left()), [6]);
-    assert_eq!(greys(pair.left())[11], 255 << 8);
-
-    let planes: Vec<u8> = [RAMP, [7; N], RAMP.map(|v| 255 - v)].concat();
-    let mut bytes = Cursor::new(Vec::new());
-    let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
-    let mut directory = encoder.image_directory().unwrap();
-    let offset = directory.write_data(planes.as_slice()).unwrap() as u32;
-    let n = N as u32;
-    directory.write_tag(Tag::ImageWidth, W).unwrap();
-    directory.write_tag(Tag::ImageLength, H).unwrap();
-    directory.write_tag(Tag::BitsPerSample, [8_u16; 3].as_slice()).unwrap();
-    directory.write_tag(Tag::PhotometricInterpretation, 2_u16).unwrap();
-    directory.write_tag(Tag::SamplesPerPixel, 3_u16).unwrap();
-    directory.write_tag(Tag::PlanarConfiguration, 2_u16).unwrap();
-    directory.write_tag(Tag::StripOffsets, [offset, offset + n, offset + 2 * n].as_slice()).unwrap();
-    directory.write_tag(Tag::StripByteCounts, [n; 3].as_slice()).unwrap();
-    directory.finish().unwrap();
-    let path = f.bytes("planes.tif", bytes.get_ref());
-    let pair = self::pair(&path, &path, None).unwrap();
-    assert_eq!(pair.left().pixels[(1, 2)][..3], [200 << 8, 7 << 8, 55 << 8]);
+    let signed = greys(twice(&f.tiff::<colortype::GrayI16>("s.tif", &signed)).left());
+    assert_eq!((signed[0], signed[N - 1]), (0, 65280));
 }
 
 #[test]
@@ -321,9 +293,9 @@ fn the_content_decides_and_not_the_name() {
     fs::copy(&expected, f.at("a")).unwrap();
     let text: Vec<String> = RAMP.iter().map(u8::to_string).collect();
     let pgm = f.bytes("a.tif", format!("P2\n# by hand\n4 3\n255\n{}\n", text.join(" ")).as_bytes());
-    let expected = pair(&expected, &expected, None).unwrap();
+    let expected = twice(&expected);
     assert_eq!(pair(&f.at("a.jpg"), &f.at("a"), None).unwrap(), expected);
-    assert_eq!(pair(&pgm, &pgm, None).unwrap(), expected);
+    assert_eq!(twice(&pgm), expected);
 }
 
 #[test]
@@ -332,7 +304,7 @@ fn jpeg_is_read_and_its_end_is_missed() {
     let image = RgbImage::from_fn(64, 48, |x, y| Rgb([x as u8 * 4, y as u8 * 5, 128]));
     let path = f.at("a.jpg");
     image.save(&path).unwrap();
-    assert_eq!(pair(&path, &path, None).unwrap().size(), (64, 48));
+    assert_eq!(twice(&path).size(), (64, 48));
     let whole = fs::read(&path).unwrap();
     for cut in [1, 2, 50, whole.len() / 2, whole.len() - 4] {
         let path = f.bytes("cut.jpg", &whole[..whole.len() - cut]);
@@ -364,18 +336,20 @@ fn files_that_are_no_images_are_refused() {
     };
     bad(&f.at("missing.png"), &["missing.png", "no such file"]);
     bad(f.0.path(), &["folder"]);
-    bad(&f.bytes("empty.png", b""), &["empty.png", "is empty"]);
-    bad(&f.bytes("text.png", b"What is this?\nNo image.\n"), &["text.png", "PNG, JPEG, PNM, TIFF or PFM"]);
-    bad(&f.bytes("a.png", b"GIF89a....................."), &["gif", "PNG, JPEG, PNM, TIFF or PFM"]);
-    bad(&f.bytes("huge.pgm", b"P5\n4000000000 4000000000\n255\n"), &["huge.pgm", "at most"]);
-    bad(&f.bytes("none.pgm", b"P5\n0 5\n255\n"), &["none.pgm"]);
-    bad(&f.bytes("lie.pgm", b"P5\n16384 16384\n255\n"), &["lie.pgm", "get the file again"]);
-    bad(
-        &f.bytes("large.pgm", b"P5\n16385 16384\n255\n"),
-        &["large.pgm", "16385 x 16384", "at most 268435456"],
-    );
-    bad(&f.bytes("short.pgm", b"P5\n30 30\n255\n1234"), &["short.pgm"]);
-    bad(&f.bytes("huge.pfm", b"Pf\n2000000000 2000000000\n-1\n"), &["huge.pfm", "at most"]);
+    for (name, bytes, word) in [
+        ("empty.png", &b""[..], "is empty"),
+        ("text.png", b"What is this?\nNo image.\n", "PNG, JPEG, PNM, TIFF or PFM"),
+        ("a.png", b"GIF89a.....................", "a gif file; give PNG, JPEG, PNM, TIFF or PFM"),
+        ("huge.pgm", b"P5\n4000000000 4000000000\n255\n", "at most"),
+        ("none.pgm", b"P5\n0 5\n255\n", ""),
+        ("lie.pgm", b"P5\n16384 16384\n255\n", "get the file again"),
+        ("large.pgm", b"P5\n16385 16384\n255\n", "16385 x 16384"),
+        ("large.pgm", b"P5\n16385 16384\n255\n", "at most 268435456"),
+        ("short.pgm", b"P5\n30 30\n255\n1234", ""),
+        ("huge.pfm", b"Pf\n2000000000 2000000000\n-1\n", "at most"),
+    ] {
+        bad(&f.bytes(name, bytes), &[name, word]);
+    }
     #[cfg(target_os = "linux")]
     bad(Path::new("/dev/zero"), &["not an image"]);
     // A PNG whose header claims too much.
@@ -386,11 +360,6 @@ fn files_that_are_no_images_are_refused() {
 
 /// One small file of each kind.
 fn samples(f: &Folder) -> Vec<Vec<u8>> {
-    f.grey8("a.png", RAMP);
-    f.grey8("a.pgm", RAMP);
-    f.grey8("a.tif", RAMP);
-    f.grey8("a.jpg", RAMP);
-    f.tiff::<colortype::RGB32Float>("b.tif", &[1.5; N * 3]);
     pfm::write(&f.at("a.pfm"), &Plane::filled(4, 3, 2.0)).unwrap();
     let mut bytes = Cursor::new(Vec::new());
     for compression in [tiff::encoder::Compression::Lzw, tiff::encoder::Compression::Packbits] {
@@ -398,11 +367,10 @@ fn samples(f: &Folder) -> Vec<Vec<u8>> {
         let encoder = TiffEncoder::new(&mut bytes).unwrap();
         encoder.with_compression(compression).write_image::<colortype::Gray16>(W, H, &[300; N]).unwrap();
     }
-    let mut files: Vec<_> = ["a.png", "a.pgm", "a.tif", "a.jpg", "b.tif", "a.pfm"]
-        .map(|name| fs::read(f.at(name)).unwrap())
-        .into();
-    files.push(bytes.into_inner());
-    files
+    let greys = ["a.png", "a.pgm", "a.tif", "a.jpg"].map(|name| f.grey8(name, RAMP));
+    let colours = f.tiff::<colortype::RGB32Float>("b.tif", &[1.5; N * 3]);
+    let files = greys.into_iter().chain([colours, f.at("a.pfm"), f.bytes("c.tif", bytes.get_ref())]);
+    files.map(|path| fs::read(path).unwrap()).collect()
 }
 
 #[test]
@@ -412,12 +380,7 @@ fn every_truncation_is_an_error() {
         // The trailer of a PNG file says nothing about its pixels.
         let end = if whole.starts_with(b"\x89PNG") { whole.len() - 12 } else { whole.len() };
         for length in 0..end {
-            assert!(
-                decode(&whole[..length]).is_err(),
-                "{length} of {} bytes: {:?}",
-                whole.len(),
-                &whole[..4]
-            );
+            assert!(decode(&whole[..length]).is_err(), "{length} bytes of {:?}", &whole[..4]);
         }
     }
 }
@@ -440,8 +403,7 @@ fn damaged_files_never_panic_and_never_lie_about_their_size() {
             }
             match decode(&bytes) {
                 Ok(raster) => {
-                    let n = raster.width * raster.height * raster.channels;
-                    assert_eq!(raster.samples.len(), n);
+                    assert_eq!(raster.samples.len(), raster.width * raster.height * raster.channels);
                 }
                 Err(reason) => assert!(!reason.contains('\n')),
             }
@@ -452,12 +414,14 @@ fn damaged_files_never_panic_and_never_lie_about_their_size() {
 #[test]
 fn disparities_are_refused_where_their_scale_is_unknown() {
     let f = Folder::new();
-    refused(read_disparity(&f.grey8("d.png", RAMP)), &["d.png", "8-bit PNG", "16-bit"]);
-    refused(read_disparity(&f.grey16("d.tif", [9; N])), &["d.tif", "float .tif"]);
-    refused(read_disparity(&f.grey8("d.pgm", RAMP)), &["d.pgm", ".pfm"]);
-    let rgb = ImageBuffer::<Rgb<u16>, Vec<u16>>::new(W, H);
-    rgb.save(f.at("flow.png")).unwrap();
-    refused(read_disparity(&f.at("flow.png")), &["flow.png", "more than one channel"]);
+    for (path, words) in [
+        (f.grey8("d.png", RAMP), &["d.png", "8-bit PNG", "16-bit"][..]),
+        (f.grey16("d.tif", [9; N]), &["d.tif", "float .tif"]),
+        (f.grey8("d.pgm", RAMP), &["d.pgm", ".pfm"]),
+        (f.image::<Rgb<u16>>("flow.png", &[0; 3 * N]), &["flow.png", "more than one channel"]),
+    ] {
+        refused(read_disparity(&path), words);
+    }
     let word = f.grey16("k.png", [0, 1, 256, 65535, 0, 0, 0, 0, 0, 0, 0, 128]);
     let map = read_disparity(&word).unwrap();
     let i = f32::INFINITY;
@@ -473,15 +437,11 @@ fn disparities_are_refused_where_their_scale_is_unknown() {
 fn levels_become_disparities_by_their_scale() {
     let f = Folder::new();
     let i = f32::INFINITY;
-    let map = Reader::default()
-        .scaled_disparity(&f.grey8("d.png", [0, 1, 3, 255, 0, 0, 0, 0, 0, 0, 0, 6]), 3.0)
-        .unwrap();
+    let scaled = |path: &Path| Reader::default().scaled_disparity(path, 3.0);
+    let map = scaled(&f.grey8("d.png", [0, 1, 3, 255, 0, 0, 0, 0, 0, 0, 0, 6])).unwrap();
     assert_eq!(map.data(), [i, 1.0 / 3.0, 1.0, 85.0, i, i, i, i, i, i, i, 2.0]);
-    for path in [f.grey16("k.png", [9; N]), f.grey8("d.pgm", RAMP), f.at("none.png")] {
-        assert!(Reader::default().scaled_disparity(&path, 3.0).is_err(), "{}", path.display());
+    for path in [f.grey8("d.pgm", RAMP), f.at("none.png")] {
+        assert!(scaled(&path).is_err(), "{}", path.display());
     }
-    refused(
-        Reader::default().scaled_disparity(&f.grey16("k.png", [9; N]), 4.0),
-        &["k.png", "8-bit PNG", "needs a scale"],
-    );
+    refused(scaled(&f.grey16("k.png", [9; N])), &["k.png", "8-bit PNG", "needs a scale"]);
 }

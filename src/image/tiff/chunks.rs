@@ -10,10 +10,10 @@ use std::io::Cursor;
 
 use tiff::decoder::{Decoder, Limits};
 use tiff::encoder::TiffEncoder;
-use tiff::tags::Tag;
+use tiff::tags::{ByteOrder, Tag};
 use tiff::{TiffError, TiffResult};
 
-use super::directory::Order;
+use super::directory;
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 use crate::memory;
@@ -31,7 +31,7 @@ pub(super) struct Packing<'a> {
     pub(super) reversed: bool,
     /// Tables shared by all strips or tiles.
     pub(super) jpeg_tables: Option<&'a [u8]>,
-    pub(super) order: Order,
+    pub(super) order: ByteOrder,
     pub(super) bits: u32,
     /// Samples of a pixel in a row: one where each channel has its own plane.
     pub(super) samples: usize,
@@ -124,8 +124,8 @@ impl Packing<'_> {
     fn undo_predictor(&self, row: &mut [u8]) {
         let size = self.bits as usize / 8;
         let store = |to: &mut [u8], value: u64| match self.order {
-            Order::Little => to.copy_from_slice(&value.to_le_bytes()[..size]),
-            Order::Big => to.copy_from_slice(&value.to_be_bytes()[8 - size..]),
+            ByteOrder::LittleEndian => to.copy_from_slice(&value.to_le_bytes()[..size]),
+            ByteOrder::BigEndian => to.copy_from_slice(&value.to_be_bytes()[8 - size..]),
         };
         let floats = self.predictor == 3;
         // Differences are between samples or, for floats, between their bytes in planes, the highest byte
@@ -138,7 +138,7 @@ impl Packing<'_> {
             }
         } else {
             for i in (distance..row.len()).step_by(step) {
-                let number = |row: &[u8], at: usize| self.order.number(&row[at..at + step]);
+                let number = |row: &[u8], at: usize| directory::number(self.order, &row[at..at + step]);
                 let sum = number(row, i).wrapping_add(number(row, i - distance));
                 store(&mut row[i..i + step], sum);
             }
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     /// The packing of a row of four samples of 16 bits or more.
-    fn packing(bits: u32, samples: usize, predictor: u64, order: Order) -> Packing<'static> {
+    fn packing(bits: u32, samples: usize, predictor: u64, order: ByteOrder) -> Packing<'static> {
         let (width, row_bytes) = (4, 4 * samples * bits as usize / 8);
         Packing {
             compression: UNCOMPRESSED,
@@ -198,8 +198,8 @@ mod tests {
         // 1, 300, 65535, 4 and their differences, modulo 2^16.
         let (values, differences) = ([1_u16, 300, 65_535, 4], [1_u16, 299, 65_235, 5]);
         for (order, bytes) in [
-            (Order::Little, u16::to_le_bytes as fn(u16) -> [u8; 2]),
-            (Order::Big, u16::to_be_bytes as fn(u16) -> [u8; 2]),
+            (ByteOrder::LittleEndian, u16::to_le_bytes as fn(u16) -> [u8; 2]),
+            (ByteOrder::BigEndian, u16::to_be_bytes as fn(u16) -> [u8; 2]),
         ] {
             let stored = differences.map(bytes).concat();
             let rows = packing(16, 1, 2, order).rows(&stored, 1).unwrap();
@@ -217,7 +217,7 @@ mod tests {
         for i in (1..stored.len()).rev() {
             stored[i] = stored[i].wrapping_sub(planes[i - 1]);
         }
-        let rows = packing(32, 1, 3, Order::Little).rows(&stored, 1).unwrap();
+        let rows = packing(32, 1, 3, ByteOrder::LittleEndian).rows(&stored, 1).unwrap();
         assert_eq!(*rows, values.map(f32::to_le_bytes).concat());
     }
 

@@ -2,34 +2,13 @@
 
 use std::collections::HashSet;
 
-use tiff::tags::Tag;
+use tiff::tags::{ByteOrder, Tag};
 
 use crate::error::ReadError;
 use crate::image::file::{damaged, unsupported};
 
 /// Largest number of directories that are read: a file with more is endless.
 const MAX_DIRECTORIES: usize = 1 << 12;
-
-/// How numbers are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
-    Little,
-    Big,
-}
-
-impl Order {
-    /// That of the machine.
-    pub(super) const NATIVE: Self = if cfg!(target_endian = "big") { Self::Big } else { Self::Little };
-
-    /// The number in `bytes`, which are at most eight.
-    pub(super) fn number(self, bytes: &[u8]) -> u64 {
-        let append = |n: u64, byte: &u8| n << 8 | u64::from(*byte);
-        match self {
-            Self::Little => bytes.iter().rev().fold(0, append),
-            Self::Big => bytes.iter().fold(0, append),
-        }
-    }
-}
 
 /// A tag, and the position of its values.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +23,7 @@ struct Entry {
 /// The tags of one image in a file.
 pub(super) struct Directory<'a> {
     file: &'a [u8],
-    pub(super) order: Order,
+    pub(super) order: ByteOrder,
     entries: Vec<Entry>,
     /// Position of the next directory; 0 after the last.
     next: u64,
@@ -57,11 +36,11 @@ impl<'a> Directory<'a> {
     /// A description of the damage, in one line.
     pub(super) fn of(file: &'a [u8]) -> Result<Self, ReadError> {
         let (order, big) = match file {
-            [b'I', b'I', kind, 0, ..] => (Order::Little, *kind == 43),
-            [b'M', b'M', 0, kind, ..] => (Order::Big, *kind == 43),
+            [b'I', b'I', kind, 0, ..] => (ByteOrder::LittleEndian, *kind == 43),
+            [b'M', b'M', 0, kind, ..] => (ByteOrder::BigEndian, *kind == 43),
             _ => return Err(damaged("the TIFF file does not begin like one")),
         };
-        let mut place = number(file, order, if big { 8 } else { 4 }, if big { 8 } else { 4 })
+        let mut place = number_at(file, order, if big { 8 } else { 4 }, if big { 8 } else { 4 })
             .ok_or_else(|| damaged("the TIFF file ends before its directory"))?;
         let first = Self::read(file, order, big, place)?;
         if first.is_image()? {
@@ -84,11 +63,11 @@ impl<'a> Directory<'a> {
         Ok(first)
     }
 
-    fn read(file: &'a [u8], order: Order, big: bool, place: u64) -> Result<Self, ReadError> {
+    fn read(file: &'a [u8], order: ByteOrder, big: bool, place: u64) -> Result<Self, ReadError> {
         // Sizes of the number of entries, of an entry, and of counts and positions.
         let (head, size, wide) = if big { (8, 20, 8) } else { (2, 12, 4) };
         let ends = || damaged("the TIFF file ends within its directory");
-        let count = number(file, order, place, head as usize).ok_or_else(ends)?;
+        let count = number_at(file, order, place, head as usize).ok_or_else(ends)?;
         if count > (file.len() / size) as u64 {
             return Err(damaged(format!("the TIFF directory claims {count} tags in {} bytes", file.len())));
         }
@@ -96,15 +75,15 @@ impl<'a> Directory<'a> {
         for i in 0..count {
             let at = place + head + i * size as u64;
             let field =
-                |offset: u64, length: usize| number(file, order, at + offset, length).ok_or_else(ends);
+                |offset: u64, length: usize| number_at(file, order, at + offset, length).ok_or_else(ends);
             let (tag, kind, count) = (field(0, 2)? as u16, field(2, 2)? as u16, field(4, wide)?);
             let inline = at + 4 + wide as u64;
             let fits =
                 (size_of_kind(kind) as u64).checked_mul(count).is_some_and(|bytes| bytes <= wide as u64);
-            let place = if fits { inline } else { number(file, order, inline, wide).ok_or_else(ends)? };
+            let place = if fits { inline } else { number_at(file, order, inline, wide).ok_or_else(ends)? };
             entries.push(Entry { tag, kind, count, place });
         }
-        let next = number(file, order, place + head + count * size as u64, wide).ok_or_else(ends)?;
+        let next = number_at(file, order, place + head + count * size as u64, wide).ok_or_else(ends)?;
         Ok(Self { file, order, entries, next })
     }
 
@@ -155,7 +134,7 @@ impl<'a> Directory<'a> {
         if !matches!(kind, 1 | 3 | 4 | 13 | 16 | 18) {
             return Err(damaged(format!("the TIFF tag {} holds no whole numbers", tag.to_u16())));
         }
-        Ok(Some(values.chunks_exact(size_of_kind(kind)).map(|value| self.order.number(value)).collect()))
+        Ok(Some(values.chunks_exact(size_of_kind(kind)).map(|value| number(self.order, value)).collect()))
     }
 
     /// The first value of a tag, or `default`.
@@ -178,10 +157,10 @@ impl<'a> Directory<'a> {
     pub(super) fn reals(&self, tag: Tag) -> Result<Option<Vec<f64>>, ReadError> {
         let Some((kind, values)) = self.values(tag)? else { return Ok(None) };
         let real = |value: &[u8]| match kind {
-            5 => self.order.number(&value[..4]) as f64 / self.order.number(&value[4..]) as f64,
-            11 => f64::from(f32::from_bits(self.order.number(value) as u32)),
-            12 => f64::from_bits(self.order.number(value)),
-            _ => self.order.number(value) as f64,
+            5 => number(self.order, &value[..4]) as f64 / number(self.order, &value[4..]) as f64,
+            11 => f64::from(f32::from_bits(number(self.order, value) as u32)),
+            12 => f64::from_bits(number(self.order, value)),
+            _ => number(self.order, value) as f64,
         };
         Ok(Some(values.chunks_exact(size_of_kind(kind)).map(real).collect()))
     }
@@ -193,14 +172,23 @@ impl<'a> Directory<'a> {
     }
 }
 
+/// The number in `bytes`, which are at most eight.
+pub(super) fn number(order: ByteOrder, bytes: &[u8]) -> u64 {
+    let append = |n: u64, byte: &u8| n << 8 | u64::from(*byte);
+    match order {
+        ByteOrder::LittleEndian => bytes.iter().rev().fold(0, append),
+        ByteOrder::BigEndian => bytes.iter().fold(0, append),
+    }
+}
+
 /// The number of `size` bytes at `place`; `None` beyond the end.
-fn number(file: &[u8], order: Order, place: u64, size: usize) -> Option<u64> {
+fn number_at(file: &[u8], order: ByteOrder, place: u64, size: usize) -> Option<u64> {
     let start = usize::try_from(place).ok()?;
-    Some(order.number(file.get(start..start.checked_add(size)?)?))
+    Some(number(order, file.get(start..start.checked_add(size)?)?))
 }
 
 /// Bytes per value of a field type.
-pub(super) fn size_of_kind(kind: u16) -> usize {
+fn size_of_kind(kind: u16) -> usize {
     match kind {
         3 | 8 => 2,
         4 | 9 | 11 | 13 => 4,

@@ -1,8 +1,8 @@
 //! The georeference of a TIFF file.
 
-use tiff::tags::{Tag, Type};
+use tiff::tags::{ByteOrder, Tag, Type};
 
-use super::directory::{Directory, Order, size_of_kind};
+use super::directory::Directory;
 use crate::image::georeference::{Field, Georeference};
 
 /// The tags of GeoTIFF and their types.
@@ -31,8 +31,6 @@ fn field(directory: &Directory, tag: Tag, kind: Type) -> Option<Field> {
         return None;
     }
     let mut bytes = values.to_vec();
-    if directory.order != Order::NATIVE {
-        bytes.chunks_exact_mut(size_of_kind(stored)).for_each(<[u8]>::reverse);
-    }
+    directory.order.convert(kind, &mut bytes, ByteOrder::native());
     Some(Field { tag, kind, bytes })
 }

@@ -15,11 +15,11 @@ pub(super) use encode::encode;
 use std::borrow::Cow;
 
 use half::f16;
-use tiff::tags::Tag;
+use tiff::tags::{ByteOrder, Tag};
 
 use self::chunks::Packing;
 use self::colours::Colours;
-use self::directory::{Directory, Order};
+use self::directory::Directory;
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
 use super::raster::{Raster, Sample, Samples, holding};
 use crate::error::ReadError;
@@ -228,15 +228,15 @@ impl<'a> Layout<'a> {
     fn samples(&self, file: &[u8], missing: f64) -> Result<Samples<'static>, ReadError> {
         let (order, bits) = (self.packing.order, self.packing.bits);
         let size = bits as usize / 8;
-        let number = |row: &[u8], i: usize| order.number(&row[i * size..(i + 1) * size]);
+        let number = |row: &[u8], i: usize| directory::number(order, &row[i * size..(i + 1) * size]);
         let signed = |row: &[u8], i: usize| (number(row, i) << (64 - bits)) as i64 >> (64 - bits);
         let float = missing as f32;
         match (self.format, bits) {
             (Format::Unsigned, 8) => self.assembled(file, missing as u8, |row, i| row[i]),
             (Format::Unsigned, 16) => {
                 let word = match order {
-                    Order::Little => u16::from_le_bytes,
-                    Order::Big => u16::from_be_bytes,
+                    ByteOrder::LittleEndian => u16::from_le_bytes,
+                    ByteOrder::BigEndian => u16::from_be_bytes,
                 };
                 self.assembled(file, missing as u16, |row, i| word([row[2 * i], row[2 * i + 1]]))
             }

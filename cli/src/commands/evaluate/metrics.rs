@@ -92,14 +92,14 @@ fn number(value: f64, width: usize, decimals: usize) -> String {
 mod tests {
     use super::*;
     use crate::commands::evaluate::findings::Figures;
-    use mrfgs::evaluation::evaluate;
+    use mrfgs::evaluation::GroundTruth;
     use mrfgs::image::Plane;
 
     fn report(offset: f32, masked: bool) -> Report {
         let truth = Plane::filled(4, 2, 8.0);
         let estimate = Plane::from_fn(4, 2, |x, y| if x + y == 0 { f32::INFINITY } else { 8.0 + offset });
         let mask = Plane::from_fn(4, 2, |x, _| if x == 0 { 128 } else { 255 });
-        evaluate(&estimate, &truth, masked.then_some(&mask)).unwrap()
+        GroundTruth::new(truth, masked.then_some(mask)).unwrap().evaluate(&estimate).unwrap()
     }
 
     fn row(pair: &str, offset: f32, masked: bool) -> Figures {

@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use mrfgs::Error;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::evaluation::{Metrics, Report};
+use mrfgs::image::picture::Picture as _;
 use mrfgs::image::{Pair, Plane, write};
 use mrfgs::low_level::front::zones;
 use mrfgs::maps::{Maps, REASONS};
@@ -79,7 +80,7 @@ impl Picture {
         legend: String,
         picture: &Plane<[u8; 3]>,
     ) -> Result<Self> {
-        let png = write::encode_rgb8(Path::new(file), picture)?;
+        let png = picture.png(Path::new(file))?;
         Ok(Self { file, title, alt, legend, size: picture.size(), png })
     }
 }

@@ -112,7 +112,8 @@ impl Submission {
         let dir = folder.path().join(name);
         fs::create_dir(&dir).map_err(|e| Error::write(folder.place().join(name), e))?;
         let time = format!("{:.3}\n", time.as_secs_f64());
-        Ok(write::disparity(&dir.join(format!("disp0{method}{ending}.pfm")), map)
+        Ok(map
+            .save(dir.join(format!("disp0{method}{ending}.pfm")))
             .and_then(|()| write::save(&dir.join(format!("time{method}.txt")), time.as_bytes()))
             .map_err(|e| folder.named(e))?)
     }

@@ -70,7 +70,7 @@ impl Steps {
     /// A map in colours.
     fn map(&self, name: &str, map: &Plane<f32>, min: f32, max: f32) -> Result<()> {
         let picture = colour::preview(map, min, max, ColourMap::default());
-        write::rgb8(&self.path(&format!("{name}.png")), &picture)
+        write::picture(&self.path(&format!("{name}.png")), &picture)
     }
 
     fn prepared(&self, prepared: &Prepared) -> Result<()> {
@@ -89,13 +89,13 @@ impl Steps {
     }
 
     fn corrected(&self, pair: &Pair) -> Result<()> {
-        write::rgb8(&self.path("corrected-left.png"), &pair.left().to_rgb8())?;
-        write::rgb8(&self.path("corrected-right.png"), &pair.right().to_rgb8())
+        write::picture(&self.path("corrected-left.png"), &pair.left().to_rgb8())?;
+        write::picture(&self.path("corrected-right.png"), &pair.right().to_rgb8())
     }
 
     fn zones(&self, pair: &Pair, zones: &Zones, matches: &[Match]) -> Result<()> {
         let (width, height) = pair.size();
-        write::rgb8(&self.path("zones.png"), &zones.map.map(|&zone| colour::zone(zone)))?;
+        write::picture(&self.path("zones.png"), &zones.map.map(|&zone| colour::zone(zone)))?;
         // Both views side by side, a line from each corner to its match.
         let (left, right) = (pair.left().to_rgb8(), pair.right().to_rgb8());
         let mut both = Plane::from_fn(2 * width, height, |x, y| {
@@ -116,7 +116,7 @@ impl Steps {
                 }
             }
         }
-        write::rgb8(&self.path("matches.png"), &both)?;
+        write::picture(&self.path("matches.png"), &both)?;
         write::save(&self.path("matches.csv"), table.as_bytes())
     }
 
