@@ -121,7 +121,7 @@ fn the_pictures_of_the_guide_are_those_of_its_commands() {
     let folder = Folder::new();
     matched(&folder, "mixed", "d.pfm --also preview,points");
     let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
-    super::render_cloud::run(&[at("d.points.ply"), at("cloud.png")]).unwrap();
+    render_cloud::run(&[at("d.points.ply"), at("cloud.png")]).unwrap();
     // The sines of another system may put a point into the next pixel.
     for (made, name, most) in
         [("d.preview.png", "disparity.png", 0), ("cloud.png", "cloud.png", 640 * 480 / 1000)]
