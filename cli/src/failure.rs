@@ -28,6 +28,11 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
+    /// A flag or argument that makes no sense, and why.
+    pub(crate) fn usage(what: impl fmt::Display, reason: impl fmt::Display) -> Self {
+        Self::Usage(format!("{what}: {reason}"))
+    }
+
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Error(Error::Range(RangeError::NotFound)) => ExitCode::FAILURE,
@@ -41,14 +46,6 @@ impl Failure {
             ) => ExitCode::from(2),
             Self::Stopped(_) => ExitCode::from(stop::STOPPED),
             Self::Failed(_) | Self::Error(_) => ExitCode::FAILURE,
-        }
-    }
-
-    /// As [`at`], where it is an error of the library.
-    pub(crate) fn at(self, path: &Path) -> Self {
-        match self {
-            Self::Error(error) => Self::Error(at(error, path)),
-            failure => failure,
         }
     }
 

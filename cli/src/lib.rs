@@ -76,21 +76,6 @@ enum Command {
     Man(man::Args),
 }
 
-impl Command {
-    /// Whether it asks the drivers which devices there are.
-    fn asks_drivers(&self) -> bool {
-        match self {
-            Self::Match(args) => args.execution.device.asks_drivers(),
-            Self::Sequence(args) => args.execution.device.asks_drivers(),
-            Self::Batch(args) => args.execution.device.asks_drivers(),
-            Self::Evaluate(args) => args.asks_drivers(),
-            Self::Inspect(args) => args.execution.device.asks_drivers(),
-            Self::Bench(_) | Self::Devices => true,
-            Self::Rectify(_) | Self::Presets(_) | Self::Completions(_) | Self::Man(_) => false,
-        }
-    }
-}
-
 /// Does what the command line says; the exit status of the program.
 #[must_use]
 pub fn main() -> ExitCode {
@@ -110,15 +95,9 @@ fn run() -> Result<(), Failure> {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(answer) if answer.use_stderr() => return Err(Failure::Usage(one_line(&answer))),
-        Err(answer) if answer.kind() == ErrorKind::DisplayVersion => {
-            process::quiet_loader();
-            return Ok(devices::print_versions()?);
-        }
+        Err(answer) if answer.kind() == ErrorKind::DisplayVersion => return Ok(devices::print_versions()?),
         Err(help) => return Ok(console::printed(help.print())?),
     };
-    if cli.command.asks_drivers() {
-        process::quiet_loader();
-    }
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
         Command::Rectify(args) => rectify::run(&args)?,

@@ -26,53 +26,66 @@ fn bar(length: Option<usize>, template: &str, quiet: bool) -> ProgressBar {
 }
 
 /// How far a match is.
-pub(crate) struct Bar {
-    start: Instant,
-    bar: ProgressBar,
-}
+pub(crate) struct Bar(ProgressBar);
 
 impl Bar {
     pub(crate) fn new(name: Option<&str>, quiet: bool) -> Self {
         let bar = bar(Some(STEPS as usize), "{prefix} [{bar:40}] {percent:>3} % {msg}", quiet);
-        Self { start: Instant::now(), bar: bar.with_prefix(name.unwrap_or("mrfgs").to_owned()) }
+        Self(bar.with_prefix(name.unwrap_or("mrfgs").to_owned()))
     }
 
     /// Shows how far it is, and says whether to go on.
     pub(crate) fn update(&mut self, progress: Progress) -> ControlFlow<()> {
-        if self.start.elapsed() > PATIENCE {
-            self.bar.set_message(match progress.tile {
+        if self.0.elapsed() > PATIENCE {
+            self.0.set_message(match progress.tile {
                 Some((tile, all)) => format!("tile {tile} of {all}: {}", progress.stage),
                 None => progress.stage.into(),
             });
-            self.bar.set_position((progress.done * STEPS as f64) as u64);
+            self.0.set_position((progress.done * STEPS as f64) as u64);
         }
         stop::go_on()
     }
 }
 
-/// The pairs done of all those of a batch.
-pub(crate) struct PairBar {
+/// How many pairs of a batch or frames of a sequence are done.
+pub(crate) struct Counter {
     bar: ProgressBar,
     log: Log,
 }
 
-impl PairBar {
+impl Counter {
     /// For so many pairs, of which some are done.
-    pub(crate) fn new(pairs: usize, done: usize, quiet: bool) -> Self {
+    pub(crate) fn of_pairs(pairs: usize, done: usize, quiet: bool) -> Self {
         let bar = bar(Some(pairs), "mrfgs [{bar:40}] {pos} of {len} {msg}", quiet);
         bar.set_position(done as u64);
         Self { bar, log: Log::new(quiet) }
     }
 
+    /// For `all` frames, where their number is known.
+    pub(crate) fn of_frames(all: Option<usize>, quiet: bool) -> Self {
+        Self { bar: bar(all, "mrfgs {spinner} {msg}", quiet), log: Log::new(quiet) }
+    }
+
     /// Shows the pair at work.
-    pub(crate) fn begin(&mut self, name: &str) {
+    pub(crate) fn begin_pair(&mut self, name: &str) {
         self.bar.set_message(name.to_owned());
         self.log.tell(|| line(&self.bar, name));
     }
 
     /// Counts a pair that is done or has failed.
-    pub(crate) fn end(&mut self) {
+    pub(crate) fn end_pair(&self) {
         self.bar.inc(1);
+    }
+
+    /// Counts a frame that is done.
+    pub(crate) fn end_frame(&mut self) {
+        self.bar.inc(1);
+        let frames = self.bar.position();
+        let rate = frames as f64 / self.bar.elapsed().as_secs_f64();
+        let of = self.bar.length().map(|all| format!(" of {all}")).unwrap_or_default();
+        let line = format!("{frames}{of} frames, {rate:.1} a second");
+        self.bar.set_message(line.clone());
+        self.log.tell(|| line);
     }
 
     /// Lets `say` write to standard error past the bar.
@@ -84,33 +97,6 @@ impl PairBar {
 /// How far a batch is, for a log.
 fn line(bar: &ProgressBar, name: &str) -> String {
     format!("{} of {} pairs, now {name}", bar.position(), bar.length().unwrap_or_default())
-}
-
-/// The frames done of a sequence.
-pub(crate) struct FrameBar {
-    start: Instant,
-    all: Option<usize>,
-    bar: ProgressBar,
-    log: Log,
-}
-
-impl FrameBar {
-    /// For `all` frames, where their number is known.
-    pub(crate) fn new(all: Option<usize>, quiet: bool) -> Self {
-        let bar = bar(None, "mrfgs {spinner} {msg}", quiet);
-        Self { start: Instant::now(), all, bar, log: Log::new(quiet) }
-    }
-
-    /// Counts a frame that is done.
-    pub(crate) fn end(&mut self) {
-        self.bar.inc(1);
-        let frames = self.bar.position();
-        let rate = frames as f64 / self.start.elapsed().as_secs_f64();
-        let of = self.all.map(|all| format!(" of {all}")).unwrap_or_default();
-        let line = format!("{frames}{of} frames, {rate:.1} a second");
-        self.bar.set_message(line.clone());
-        self.log.tell(|| line);
-    }
 }
 
 /// When a log was last told; `None` where nothing is to be.
@@ -149,9 +135,9 @@ mod tests {
         assert!(!log.is_due(start + SILENCE + SILENCE / 2));
         assert!(log.is_due(start + 2 * SILENCE));
         assert!(!Log(None).is_due(start + 2 * SILENCE));
-        let mut pairs = PairBar::new(9, 2, true);
+        let pairs = Counter::of_pairs(9, 2, true);
         assert_eq!(line(&pairs.bar, "b"), "2 of 9 pairs, now b");
-        (0..3).for_each(|_| pairs.end());
+        (0..3).for_each(|_| pairs.end_pair());
         assert_eq!(line(&pairs.bar, "d"), "5 of 9 pairs, now d");
     }
 }

@@ -4,15 +4,9 @@ use std::fmt;
 
 /// A table whose columns are as wide as their widest cell, in groups with a `|` between them.
 pub(crate) struct Table {
-    /// The alignment of each column, by group.
-    groups: Vec<Vec<Align>>,
+    /// The alignment of each column, by group: `l` or `r`.
+    groups: Vec<Vec<char>>,
     lines: Vec<Line>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Align {
-    Left,
-    Right,
 }
 
 enum Line {
@@ -29,11 +23,8 @@ enum Line {
 impl Table {
     /// An empty table. `columns` has an `l` or an `r` for each column, aligned left or right, and a `|` between groups.
     pub(crate) fn new(columns: &str) -> Self {
-        let align = |c| if c == 'l' { Align::Left } else { Align::Right };
-        Self {
-            groups: columns.split('|').map(|group| group.chars().map(align).collect()).collect(),
-            lines: Vec::new(),
-        }
+        let groups = columns.split('|').map(|group| group.chars().collect());
+        Self { groups: groups.collect(), lines: Vec::new() }
     }
 
     /// Adds a row.
@@ -99,8 +90,8 @@ impl fmt::Display for Table {
                     let groups = widths.iter().zip(&self.groups).map(|(widths, aligns)| {
                         let cells = widths.iter().zip(aligns).zip(&mut cells);
                         let padded = cells.map(|((&width, align), cell)| match align {
-                            Align::Left => format!("{cell:width$}"),
-                            Align::Right => format!("{cell:>width$}"),
+                            'l' => format!("{cell:width$}"),
+                            _ => format!("{cell:>width$}"),
                         });
                         padded.collect::<Vec<_>>().join(" ")
                     });

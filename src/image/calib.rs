@@ -122,12 +122,11 @@ impl Calibration {
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut calibration = Self::default();
         for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-            let (key, value) = match line.split_once('=') {
-                Some((key, value)) => (key.trim(), Ok(value.trim())),
-                None => {
-                    let word = line.split([' ', '\t', ':']).find(|word| !word.is_empty());
-                    (word.unwrap_or_default(), Err("expected key=value"))
-                }
+            let (key, value) = if let Some((key, value)) = line.split_once('=') {
+                (key.trim(), Ok(value.trim()))
+            } else {
+                let word = line.split([' ', '\t', ':']).find(|word| !word.is_empty());
+                (word.unwrap_or_default(), Err("expected key=value"))
             };
             let mut put = || {
                 match key {

@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::options::{Method, PRESETS, Preset};
+use mrfgs::options::{MAX_MEMORY, Method, PRESETS, Preset};
 
-use crate::args::sizes::mebibytes;
 use crate::failure::{Failure, Result};
 
 /// The parameters that determine the result.
@@ -31,6 +30,17 @@ fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
+/// A size of memory, in MiB: a whole number of a unit within [`MAX_MEMORY`].
+fn mebibytes(text: &str) -> Result<u32, String> {
+    let units = [("MiB", 0), ("GiB", 10), ("TiB", 20)];
+    let size = units.into_iter().find_map(|(unit, shift)| {
+        let count: u64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
+        u32::try_from(count.checked_mul(1 << shift)?).ok()
+    });
+    let size = size.filter(|size| (1..=MAX_MEMORY).contains(size));
+    size.ok_or_else(|| "give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB".into())
+}
+
 /// The preset that `--method` names, if it names one.
 fn preset(word: &Path) -> Option<&'static Preset> {
     PRESETS.iter().find(|preset| word == Path::new(preset.name))
@@ -50,7 +60,7 @@ impl MethodArgs {
                 if i > 0 {
                     let name = preset.name;
                     let reason = format!("the preset {name} would replace all keys before it; give it first");
-                    return Err(Failure::Usage(format!("{}: {reason}", "--method")));
+                    return Err(Failure::usage("--method", reason));
                 }
                 method = preset.method();
             } else if word.extension().is_some_and(|extension| extension == "toml") || word.exists() {
@@ -62,7 +72,7 @@ impl MethodArgs {
                     word.display(),
                     names.join(", ")
                 );
-                return Err(Failure::Usage(format!("{}: {reason}", "--method")));
+                return Err(Failure::usage("--method", reason));
             }
         }
         method.set_all(self.set.iter().map(|(key, value)| (key.as_str(), value.as_str())))?;

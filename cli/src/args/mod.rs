@@ -1,9 +1,15 @@
 //! Groups of flags that several commands share.
 
-pub(crate) mod execution;
-pub(crate) mod method;
-pub(crate) mod reading;
-pub(crate) mod rectification;
+mod execution;
+mod method;
+mod reading;
+mod rectification;
 pub(crate) mod search;
-pub(crate) mod sign;
-pub(crate) mod sizes;
+mod sign;
+
+pub(crate) use execution::{ExecutionArgs, ThreadArgs};
+pub(crate) use method::MethodArgs;
+pub(crate) use reading::ReadingArgs;
+pub(crate) use rectification::{RectificationArgs, shown};
+pub(crate) use search::{Found, Search, calibrated_range};
+pub(crate) use sign::Sign;

@@ -25,7 +25,7 @@ impl RectificationArgs {
     pub(crate) fn options_if(&self, rectifies: bool) -> Result<Option<Options>> {
         if self.alpha.is_some() && !rectifies {
             let reason = "is of a rectification; add --rectify, or leave --alpha out";
-            return Err(Failure::Usage(format!("{}: {reason}", "--alpha")));
+            return Err(Failure::usage("--alpha", reason));
         }
         Ok(rectifies.then(|| self.options()))
     }

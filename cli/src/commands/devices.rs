@@ -6,10 +6,12 @@ use mrfgs::Result;
 use mrfgs::low_level::backend::gpu;
 
 use crate::console;
+use crate::process::quiet_loader;
 use crate::table::Table;
 use crate::text::bytes;
 
 pub(crate) fn run() -> Result<()> {
+    quiet_loader();
     let devices = gpu::devices();
     let mut out = String::new();
     if !devices.is_empty() {
@@ -44,6 +46,7 @@ const WGPU: &str = "30";
 
 /// What a report of a bug should begin with: the versions of the program, of wgpu and of every driver.
 pub(crate) fn print_versions() -> Result<()> {
+    quiet_loader();
     let mut out = format!("mrfgs {}\nwgpu {WGPU}\n", env!("CARGO_PKG_VERSION"));
     for device in gpu::devices() {
         let driver = if device.driver.is_empty() { "unknown" } else { &device.driver };

@@ -9,7 +9,7 @@ use mrfgs::Error;
 use mrfgs::image::write;
 
 use crate::failure::Result;
-use crate::outputs::files::{self, Written};
+use crate::outputs::{Written, files};
 
 /// Write the man pages: mrfgs.1 and one for each subcommand
 #[derive(clap::Args)]

@@ -6,11 +6,10 @@ use mrfgs::calibration;
 use mrfgs::image::{Image, pfm, write};
 use mrfgs::rectification::Rectification;
 
-use crate::args::reading::ReadingArgs;
-use crate::args::rectification::RectificationArgs;
+use crate::args::{ReadingArgs, RectificationArgs};
 use crate::failure::Result;
-use crate::outputs::staged::StagedFolder;
-use crate::pairs::raw;
+use crate::outputs::StagedFolder;
+use crate::pairs::input;
 use crate::{console, stop};
 
 const EXAMPLES: &str = "\
@@ -70,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let calibration = calibration::read(&args.calib)?;
     let raw = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
     let options = args.rectification.options();
-    let (rectification, pair) = raw::rectify(&calibration, &args.calib, &raw, &options)?;
+    let (rectification, pair) = input::rectify(&calibration, &args.calib, &raw, &options)?;
     drop(raw);
     write_all(&folder.path(), &rectification, [pair.left(), pair.right()], args.maps)
         .map_err(|e| folder.named(e))?;

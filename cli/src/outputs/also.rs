@@ -1,7 +1,9 @@
-//! What `--also` writes beside a disparity map: one table, from which every command follows.
+//! What `--also` writes beside a disparity map: one table, from which every command follows. And the maps of many pairs, each set
+//! named after its pair.
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mrfgs::calibration::matrix::Matrix;
 use mrfgs::colour::{self, ColourMap};
@@ -12,9 +14,10 @@ use mrfgs::image::{Georeference, Image, Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
 
-use crate::args::sign::Sign;
+use crate::args::Sign;
 use crate::failure::{Failure, Result};
-use crate::outputs::cloud::CloudFormat;
+use crate::outputs::cloud;
+use crate::outputs::files::Written;
 use crate::text::plural;
 
 /// An output beside the disparity map.
@@ -41,8 +44,8 @@ enum Kind {
     Depth,
     /// The same in whole millimetres, as 16-bit PNG.
     Millimetres,
-    /// A cloud of points.
-    Points(Frame, CloudFormat),
+    /// A cloud of points, as PLY unless the word has an extension.
+    Points(Frame),
     /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
     Picture { beside: bool },
 }
@@ -87,19 +90,19 @@ static ALL: [Also; 16] = [
         "Points with the colours of LEFT and their confidence: binary .ply (`quality`), x to the right, y down, z forward \
          of the left camera. Invalid, filled and low-confidence pixels are left out. points.pcd writes PCD (`intensity`, \
          for ROS, PCL and Open3D), points.las and points.laz write LAS 1.2 and LAZ (intensity: 257 times the confidence)",
-        Kind::Points(Frame::Matched, CloudFormat::Ply),
+        Kind::Points(Frame::Matched),
     ),
-    row("points.pcd", "", Kind::Points(Frame::Matched, CloudFormat::Pcd)),
-    row("points.las", "", Kind::Points(Frame::Matched, CloudFormat::Las)),
-    row("points.laz", "", Kind::Points(Frame::Matched, CloudFormat::Laz)),
+    row("points.pcd", "", Kind::Points(Frame::Matched)),
+    row("points.las", "", Kind::Points(Frame::Matched)),
+    row("points.laz", "", Kind::Points(Frame::Matched)),
     row(
         "points-original",
         "The same in the frame of the left camera before --rectify: that of the calibration. Also as .pcd, .las and .laz",
-        Kind::Points(Frame::Original, CloudFormat::Ply),
+        Kind::Points(Frame::Original),
     ),
-    row("points-original.pcd", "", Kind::Points(Frame::Original, CloudFormat::Pcd)),
-    row("points-original.las", "", Kind::Points(Frame::Original, CloudFormat::Las)),
-    row("points-original.laz", "", Kind::Points(Frame::Original, CloudFormat::Laz)),
+    row("points-original.pcd", "", Kind::Points(Frame::Original)),
+    row("points-original.las", "", Kind::Points(Frame::Original)),
+    row("points-original.laz", "", Kind::Points(Frame::Original)),
     row(
         "confidence",
         "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
@@ -184,13 +187,13 @@ impl AlsoArgs {
         let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
         if self.colours.is_some() && !self.wanted().any(is_picture) {
             let reason = "are those of a preview; add --also preview, or leave --colours out";
-            return Err(Failure::Usage(format!("{}: {reason}", "--colours")));
+            return Err(Failure::usage("--colours", reason));
         }
-        let is_original = |also: &&Also| matches!(also.kind, Kind::Points(Frame::Original, _));
+        let is_original = |also: &&Also| matches!(also.kind, Kind::Points(Frame::Original));
         if let Some(word) = self.wanted().find(is_original).filter(|_| !rectifies) {
             let reason =
                 "is of images that `mrfgs match` rectifies; add --rectify there, or take --also points";
-            return Err(Failure::Usage(format!("{}: {reason}", word.flag())));
+            return Err(Failure::usage(word.flag(), reason));
         }
         Ok(())
     }
@@ -231,11 +234,10 @@ impl AlsoArgs {
     /// Refuses outputs that no film shows.
     pub(crate) fn check_film(&self) -> Result<()> {
         match self.wanted().find(|also| !matches!(also.kind, Kind::Picture { .. })) {
-            Some(also) => {
-                let reason =
-                    "is a file of each frame, and OUTPUT is a film; give the name of a folder as OUTPUT";
-                Err(Failure::Usage(format!("{}: {reason}", also.flag())))
-            }
+            Some(also) => Err(Failure::usage(
+                also.flag(),
+                "is a file of each frame, and OUTPUT is a film; give the name of a folder as OUTPUT",
+            )),
             None => Ok(()),
         }
     }
@@ -265,14 +267,14 @@ impl AlsoArgs {
                 };
                 write::picture(path, &depths)?;
             }
-            Kind::Points(frame, format) => {
+            Kind::Points(frame) => {
                 let rig = match frame {
                     Frame::Matched => rig,
                     Frame::Original => rig.zip(rectifying).map(|(rig, by)| rig.in_original_frame(&by)),
                 };
                 let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
                 let cloud = rig.cloud(maps, left);
-                format.write(path, &cloud)?;
+                cloud::write(path, &cloud)?;
                 let count = cloud.points.len();
                 return Ok(Some(format!("{count} point{}", plural(count))));
             }
@@ -306,7 +308,7 @@ impl Also {
             Kind::Disparity(..) => &*own,
             Kind::Depth if is_tiff => &*own,
             Kind::Depth => "pfm",
-            Kind::Points(_, format) => format.extension(),
+            Kind::Points(_) => self.word.split_once('.').map_or("ply", |(_, extension)| extension),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => "png",
         };
         output.with_extension(format!("{}.{extension}", self.stem()))
@@ -320,6 +322,67 @@ impl Also {
             Kind::Points(..) => write::check_path(path),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => write::check_png_path(path),
         }
+    }
+}
+
+/// The maps to write of each pair.
+#[derive(clap::Args)]
+pub(crate) struct MapArgs {
+    /// Format of the disparity maps, as the extensions of `mrfgs match`
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    pub(crate) format: Format,
+    #[command(flatten)]
+    pub(crate) also: AlsoArgs,
+}
+
+impl MapArgs {
+    /// The name of the disparity map of a pair.
+    pub(crate) fn map(&self, name: &str) -> String {
+        format!("{name}.{}", self.format.extension())
+    }
+
+    /// The wanted outputs beside it, with their names.
+    pub(crate) fn also(&self, name: &str) -> impl Iterator<Item = (&'static Also, String)> {
+        let map = self.map(name);
+        self.also.wanted().map(move |word| (word, word.beside(Path::new(&map)).display().to_string()))
+    }
+
+    /// Says before any computing whether those of a pair can be written to `folder`, with disparities in `range`.
+    pub(crate) fn check(&self, folder: &Path, name: &str, range: DisparityRange) -> mrfgs::Result<()> {
+        write::check_disparity_path(&folder.join(self.map(name)), range.min, range.max)?;
+        self.also(name).try_for_each(|(word, file)| word.check(&folder.join(file), range))
+    }
+
+    /// Writes those of a pair to `folder`, all or none.
+    pub(crate) fn write(&self, folder: &Path, name: &str, outcome: &Outcome) -> Result<()> {
+        let map = folder.join(self.map(name));
+        let mut written = Written::default();
+        written.note(&map, outcome.writer(View::Left).disparity(&map, &outcome.maps.final_map()))?;
+        for (word, file) in self.also(name) {
+            let path = folder.join(file);
+            written.note(&path, self.also.write(word, &path, outcome))?;
+        }
+        written.keep();
+        Ok(())
+    }
+}
+
+/// The format of disparity maps.
+#[derive(Clone, Copy, Default, ValueEnum)]
+pub(crate) enum Format {
+    /// Float, +infinity for invalid pixels
+    #[default]
+    Pfm,
+    /// Float, NaN for invalid pixels
+    Tif,
+    /// 16 bits, disparity times 256, 0 for invalid pixels
+    Png,
+}
+
+impl Format {
+    /// The extension of their files, which is the word for it.
+    pub(crate) fn extension(self) -> String {
+        self.to_possible_value().map(|word| word.get_name().to_owned()).unwrap_or_default()
     }
 }
 

@@ -9,41 +9,18 @@ use mrfgs::image::cloud::{Cloud, Point};
 use mrfgs::image::write;
 use mrfgs::{Error, Result};
 
-/// The format of a point cloud.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum CloudFormat {
-    Ply,
-    Pcd,
-    Las,
-    Laz,
-}
-
-impl CloudFormat {
-    /// The extension of its files.
-    pub(crate) fn extension(self) -> &'static str {
-        match self {
-            Self::Ply => "ply",
-            Self::Pcd => "pcd",
-            Self::Las => "las",
-            Self::Laz => "laz",
-        }
+/// Writes `cloud` to `path` in the format of the extension, completely or not at all.
+pub(crate) fn write(path: &Path, cloud: &Cloud) -> Result<()> {
+    let compressed = path.extension().is_some_and(|extension| extension == "laz");
+    if !compressed && path.extension().is_none_or(|extension| extension != "las") {
+        return write::cloud(path, cloud);
     }
-
-    /// Writes `cloud` to `path`, completely or not at all.
-    pub(crate) fn write(self, path: &Path, cloud: &Cloud) -> Result<()> {
-        match self {
-            Self::Ply | Self::Pcd => write::cloud(path, cloud),
-            Self::Las | Self::Laz => {
-                // A writer that cannot write so many panics when it is dropped.
-                if u32::try_from(cloud.points.len()).is_err() {
-                    return Err(Error::write(path, "LAS 1.2 holds at most 4294967295 points; write PLY"));
-                }
-                let bytes = encode_las(cloud, self == Self::Laz);
-                let bytes = bytes.map_err(|e| Error::write(path, e.to_string()))?;
-                write::save(path, &bytes)
-            }
-        }
+    // A writer that cannot write so many panics when it is dropped.
+    if u32::try_from(cloud.points.len()).is_err() {
+        return Err(Error::write(path, "LAS 1.2 holds at most 4294967295 points; write PLY"));
     }
+    let bytes = encode_las(cloud, compressed).map_err(|e| Error::write(path, e.to_string()))?;
+    write::save(path, &bytes)
 }
 
 /// LAS 1.2, the oldest version with colours, which readers of all ages take.
@@ -128,7 +105,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.las");
         let points = cloud(&[[0.0, 0.0, f32::INFINITY]]);
-        let error = CloudFormat::Las.write(&path, &Cloud { points, ..Cloud::default() }).unwrap_err();
+        let error = write(&path, &Cloud { points, ..Cloud::default() }).unwrap_err();
         assert!(error.to_string().contains("a.las"), "{error}");
         assert!(!path.exists());
     }

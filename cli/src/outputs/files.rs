@@ -19,7 +19,7 @@ pub(crate) fn distinct(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> R
         let Some(place) = place(path) else { continue };
         if let Some((other, _)) = taken.iter().find(|(_, p)| *p == place) {
             let reason = format!("{} is {other} already; give another name", path.display());
-            return Err(Failure::Usage(format!("{}: {reason}", *name)));
+            return Err(Failure::usage(*name, reason));
         }
         taken.push((name, place));
     }
@@ -35,17 +35,8 @@ fn place(path: &Path) -> Option<PathBuf> {
 }
 
 /// Where a path leads without its last part.
-fn parent(path: &Path) -> &Path {
+pub(crate) fn parent(path: &Path) -> &Path {
     path.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."))
-}
-
-/// Refuses a file or folder in a folder that is replaced as a whole; each comes with the name of its flag.
-pub(crate) fn outside((folder_name, folder): (&str, &Path), (name, path): (&str, &Path)) -> Result<()> {
-    if path == folder || fs::canonicalize(parent(path)).is_ok_and(|parent| parent.starts_with(folder)) {
-        let reason = format!("{} lies in the folder of {folder_name}; give another name", path.display());
-        return Err(Failure::Usage(format!("{name}: {reason}")));
-    }
-    Ok(())
 }
 
 /// The files and folders written so far: gone again when dropped, unless kept.
@@ -84,6 +75,15 @@ pub(crate) fn is_printed(path: &Path) -> bool {
 /// The file that the JSON goes to, unless it is printed.
 pub(crate) fn json_file(json: Option<&Path>) -> Option<&Path> {
     json.filter(|path| !is_printed(path))
+}
+
+/// Finds out before any computing whether the JSON can be written, and refuses it in place of an input.
+pub(crate) fn check_json(json: Option<&Path>, inputs: impl IntoIterator<Item = PathBuf>) -> Result<()> {
+    let Some(path) = json_file(json) else { return Ok(()) };
+    write::check_path(path)?;
+    let inputs: Vec<_> = inputs.into_iter().collect();
+    let inputs: Vec<_> = inputs.iter().map(|path| ("an input", path.as_path())).collect();
+    distinct(&inputs, &[("--json", path)])
 }
 
 /// The text of a JSON file at `path`.

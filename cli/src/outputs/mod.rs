@@ -1,10 +1,16 @@
 //! Outputs: all checked before any computing, and all written or none left behind.
 
 pub(crate) mod also;
-pub(crate) mod claim;
-pub(crate) mod cloud;
+mod claim;
+mod cloud;
 pub(crate) mod files;
-pub(crate) mod film;
-pub(crate) mod maps;
-pub(crate) mod record;
-pub(crate) mod staged;
+mod film;
+mod record;
+mod staged;
+
+pub(crate) use also::{Also, AlsoArgs, Format, MapArgs, Outcome, View};
+pub(crate) use claim::Claim;
+pub(crate) use files::{Written, is_printed};
+pub(crate) use film::Film;
+pub(crate) use record::{Files, MatchRecord, stage_and_level};
+pub(crate) use staged::StagedFolder;

@@ -8,7 +8,7 @@ use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Matched, Timing};
 use serde::Serialize;
 
-use crate::args::sign::Sign;
+use crate::args::Sign;
 use crate::remedy;
 
 /// The inputs of a match and its map, as the user wrote them.

@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mrfgs::error::Reason;
+use mrfgs::image::write;
 use mrfgs::{Error, Result};
 
-use crate::failure;
+use crate::failure::{self, Failure};
 use crate::outputs::claim::{Claim, FOLDERS};
-use crate::outputs::files::folder_place;
+use crate::outputs::files::{folder_place, json_file, parent};
 
 /// A folder in the making, beside the place that it takes once it is whole. If it is dropped before, it is removed with all it
 /// holds; if the program is killed, the next run that makes the folder removes it.
@@ -44,9 +46,26 @@ impl StagedFolder {
     pub(crate) fn new_or_empty(name: &Path) -> Result<Self> {
         let staged = Self::new(name)?;
         match fs::read_dir(&staged.place).map(|mut entries| entries.next().is_none()) {
-            Ok(false) => Err(Error::write(name, "the folder is not empty; name a new one")),
+            Ok(false) => Err(staged.error("the folder is not empty; name a new one")),
             _ => Ok(staged),
         }
+    }
+
+    /// Refuses JSON that cannot be written, or lies in the folder, which is replaced as a whole; `flag` names the folder.
+    pub(crate) fn check_json(&self, flag: &str, json: Option<&Path>) -> Result<(), Failure> {
+        let Some(path) = json_file(json) else { return Ok(()) };
+        write::check_path(path)?;
+        let beside = fs::canonicalize(parent(path));
+        if path == self.place || beside.is_ok_and(|parent| parent.starts_with(&self.place)) {
+            let reason = format!("{} lies in the folder of {flag}; give another name", path.display());
+            return Err(Failure::usage("--json", reason));
+        }
+        Ok(())
+    }
+
+    /// An error of the folder.
+    pub(crate) fn error(&self, reason: impl Into<Reason>) -> Error {
+        Error::write(&self.name, reason)
     }
 
     /// Where it will be.
@@ -71,7 +90,7 @@ impl StagedFolder {
 
     /// Puts it in its place; what was there goes, and comes back when that fails.
     pub(crate) fn publish(self) -> Result<()> {
-        let error = |e: std::io::Error| Error::write(&self.name, e);
+        let error = |e: std::io::Error| self.error(e);
         let old = self.staging.folder().join(FOLDERS[1]);
         let replaces = self.place.exists();
         if replaces {

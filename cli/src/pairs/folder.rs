@@ -7,7 +7,7 @@ use mrfgs::image::{Pair, Plane, calib::Calibration, read::Reader};
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 
-use crate::args::search::calibrated_range;
+use crate::args::calibrated_range;
 
 /// What a folder holds.
 struct Layout {
@@ -136,6 +136,11 @@ pub(crate) fn name(dir: &Path) -> String {
 /// Every file that may be read of `dir`.
 pub(crate) fn inputs(dir: &Path) -> impl Iterator<Item = PathBuf> {
     LAYOUTS.iter().flat_map(|layout| layout.files).chain([CALIBRATION, MASK]).map(|file| dir.join(file))
+}
+
+/// The same of several.
+pub(crate) fn inputs_of(dirs: &[PathBuf]) -> impl Iterator<Item = PathBuf> {
+    dirs.iter().flat_map(|dir| inputs(dir))
 }
 
 /// One folder, read.

@@ -1,24 +1,21 @@
-//! The pair that `mrfgs match` and `mrfgs inspect` take.
+//! A pair with its range and its cameras, as `mrfgs match`, `mrfgs inspect` and `mrfgs sequence` take it.
 
 use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
-use mrfgs::calibration::{self, matrix::Matrix};
+use mrfgs::calibration::{self, cameras::StereoCalibration, matrix::Matrix};
 use mrfgs::check::{self, Warning};
+use mrfgs::depth::Rig;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::DisparityRange;
-use mrfgs::rectification::Options;
+use mrfgs::rectification::{Options, Rectification};
 
-use crate::args::reading::ReadingArgs;
-use crate::args::rectification;
-use crate::args::search::{Found, Search};
-use crate::args::sign::Sign;
+use crate::args::{Found, ReadingArgs, Search, Sign, shown};
 use crate::console;
-use crate::failure::{self, Result};
-use crate::outputs::record::Files;
+use crate::failure::{self, Failure, Result};
+use crate::outputs::{Also, Files};
 use crate::pairs::folder::CALIBRATION;
-use crate::pairs::raw;
 use crate::remedy;
 
 /// The files of a pair, and how they are read.
@@ -50,8 +47,8 @@ pub(crate) struct Input {
     by_matches: bool,
     /// The calibration of the rectified pair.
     calibration: Option<Known>,
-    /// The rotation from the frame of the left camera to the rectified one, where the images were rectified.
-    pub(crate) rectifying: Option<Matrix>,
+    /// What has rectified the pair, where it was not.
+    pub(crate) rectification: Option<Rectification>,
 }
 
 /// A calibration of a rectified pair, and where it comes from.
@@ -71,25 +68,9 @@ impl PairArgs {
     /// Reads the images and what the range takes, and the cameras where `cameras` asks for them. The user counts disparities
     /// by `sign`. With `rectify`, the images are as the cameras took them, and are rectified.
     pub(crate) fn read(&self, sign: Sign, cameras: bool, rectify: Option<&Options>) -> Result<Input> {
-        let mut pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
-        let files = self.calib.clone();
-        let mut rectifying = None;
-        let calibration = if let Some(options) = rectify {
-            let rectification;
-            (rectification, pair) = raw::rectify(&calibration::read(&files)?, &files, &pair, options)?;
-            rectifying = Some(rectification.rotations()[0]);
-            Some(Known { files, calibration: rectification.calibration()? })
-        } else if !files.is_empty() {
-            Some(Known { calibration: of_rectified_images(&files)?, files })
-        } else if self.search.max_disparity.is_some() && !cameras {
-            None
-        } else {
-            let files = vec![self.left.with_file_name(CALIBRATION)];
-            Calibration::beside(&self.left)?.map(|calibration| Known { files, calibration })
-        };
-        let known = calibration.as_ref().map(Known::named);
-        let Found { range, by_matches } = self.search.range(&pair, known, sign)?;
-        Ok(Input { pair, range, by_matches, calibration, rectifying })
+        let pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
+        let beside = Some(&*self.left).filter(|_| cameras || self.search.max_disparity.is_none());
+        Input::new(pair, &self.search, sign, &self.calib, rectify, beside)
     }
 
     /// The paths for a record.
@@ -99,7 +80,7 @@ impl PairArgs {
             left: path(&self.left),
             right: path(&self.right),
             mask: self.mask.as_deref().map(path),
-            calibration: input.calibration.as_ref().map(|known| rectification::shown(&known.files)),
+            calibration: input.calibration.as_ref().map(|known| shown(&known.files)),
             output: output.map(path),
         }
     }
@@ -115,18 +96,59 @@ impl PairArgs {
 }
 
 impl Input {
-    /// The calibration file and what it holds.
-    pub(crate) fn calibration(&self) -> Option<(&Path, &Calibration)> {
-        self.calibration.as_ref().map(Known::named)
+    /// `pair` with what the user says of it: the range to `search`, counted by `sign`, the files `calib`, and with `rectify` that
+    /// it is as the cameras took it. Without files the calibration is that `beside` a left image, where it is given.
+    pub(crate) fn new(
+        mut pair: Pair,
+        search: &Search,
+        sign: Sign,
+        calib: &[PathBuf],
+        rectify: Option<&Options>,
+        beside: Option<&Path>,
+    ) -> Result<Self> {
+        let mut rectification = None;
+        let files = calib.to_vec();
+        let calibration = if let Some(options) = rectify {
+            let by;
+            (by, pair) = self::rectify(&calibration::read(calib)?, calib, &pair, options)?;
+            let calibration = rectification.insert(by).calibration()?;
+            Some(Known { files, calibration })
+        } else if !calib.is_empty() {
+            Some(Known { files, calibration: of_rectified_images(calib)? })
+        } else if let Some(left) = beside {
+            let files = vec![left.with_file_name(CALIBRATION)];
+            Calibration::beside(left)?.map(|calibration| Known { files, calibration })
+        } else {
+            None
+        };
+        let known = calibration.as_ref().map(Known::named);
+        let Found { range, by_matches } = search.range(&pair, known, sign)?;
+        Ok(Self { pair, range, by_matches, calibration, rectification })
     }
 
-    /// Says which range was found, if the user gave none.
-    pub(crate) fn say_range(&self, sign: Sign) {
+    /// The calibration file.
+    pub(crate) fn calibration_file(&self) -> Option<&Path> {
+        self.calibration.as_ref().map(|known| known.named().0)
+    }
+
+    /// The cameras for the output `word`, if there is one; the left image is `left`.
+    pub(crate) fn rig(&self, word: Option<&Also>, left: &Path) -> Result<Option<Rig>> {
+        let known = self.calibration.as_ref().map(Known::named);
+        word.map(|word| rig(word, known, left, self.pair.size(), "give one with --calib")).transpose()
+    }
+
+    /// The rotation from the frame of the left camera to the rectified one, where the pair was rectified.
+    pub(crate) fn rectifying(&self) -> Option<Matrix> {
+        self.rectification.as_ref().map(|by| by.rotations()[0])
+    }
+
+    /// Says which range was found, if the user gave none; `place` is where, if not in the pair.
+    pub(crate) fn say_range(&self, sign: Sign, place: &str) {
         if self.by_matches {
             let DisparityRange { min, max } = sign.range(self.range);
-            let text =
-                format!("disparities {min} to {max}, by sparse matches; set them with --max-disparity");
-            console::say(&text);
+            console::say(&format!(
+                "disparities {min} to {max}, by sparse matches{place}; set them with --max-disparity"
+            ));
         }
     }
 
@@ -138,12 +160,11 @@ impl Input {
 }
 
 /// What the calibration in `files` says of images that are rectified.
-pub(crate) fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
-    let named = |reason: &str| Error::read(rectification::shown(files), reason);
+fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
+    let named = |reason: &str| Error::read(shown(files), reason);
     let known = calibration::read(files)?;
-    let calibration = known
-        .of_rectified_images()
-        .map_err(|e| failure::in_file(e, rectification::shown(files).as_ref(), ""))?;
+    let calibration =
+        known.of_rectified_images().map_err(|e| failure::in_file(e, shown(files).as_ref(), ""))?;
     Ok(calibration.ok_or_else(|| {
         named("is of images that are not rectified; add --rectify, or give the calibration of the rectified pair")
     })?)
@@ -154,4 +175,57 @@ pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
     for warning in warnings {
         console::say(&format!("warning: {}", remedy::warning(&warning, &remedy::FLAGS)));
     }
+}
+
+/// Rectifies `pair` by the `calibration` of `files`. Errors name these.
+pub(crate) fn rectify(
+    calibration: &StereoCalibration,
+    files: &[PathBuf],
+    pair: &Pair,
+    options: &Options,
+) -> Result<(Rectification, Pair)> {
+    let rectification = Rectification::new(calibration, pair.size(), options).map_err(|e| match e {
+        Error::Mismatch(reason) => Error::Mismatch(format!("{}: {reason}", shown(files))),
+        e => failure::in_file(e, shown(files).as_ref(), ""),
+    })?;
+    let pair = rectification.apply(pair)?;
+    Ok((rectification, pair))
+}
+
+/// The cameras that `word` takes, by the `calibration` file of the pair, whose left image is `left` and has `size`.
+///
+/// # Errors
+/// Where there is no such file, or it is of another size or lacks what depth takes; `remedy` says how to give one.
+pub(crate) fn rig(
+    word: &Also,
+    calibration: Option<(&Path, &Calibration)>,
+    left: &Path,
+    (width, height): (usize, usize),
+    remedy: &str,
+) -> Result<Rig> {
+    let Some((path, calibration)) = calibration else {
+        let reason =
+            format!("takes the cameras, and there is no calib.txt beside {}; {remedy}", left.display());
+        return Err(Failure::usage(word.flag(), reason));
+    };
+    let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
+    if size != (width as u32, height as u32) {
+        return Err(Error::Mismatch(format!(
+            "{} is for images of {} x {} and {} is {width} x {height}: depth takes the calibration of this size",
+            path.display(),
+            size.0,
+            size.1,
+            left.display()
+        ))
+        .into());
+    }
+    let rig = Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?;
+    if word.takes_unit() && rig.unit().millimetres().is_none() {
+        let reason = format!(
+            "{} does not say the unit of the baseline; add an entry `unit` to it: mm, cm or m",
+            path.display()
+        );
+        return Err(Failure::usage(word.flag(), reason));
+    }
+    Ok(rig)
 }

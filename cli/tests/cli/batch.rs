@@ -1,15 +1,8 @@
 //! `mrfgs batch`: the maps of single matches, and every pair exactly once, whatever stops a run on its way.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Child;
 use std::time::SystemTime;
 
-use serde_json::Value;
-
-use super::evaluate::copy;
 use super::*;
 
 const SCENES: [&str; 4] = ["slanted", "steep", "thin", "wall"];
@@ -33,12 +26,12 @@ fn pairs(count: usize, (width, height): (u32, u32)) -> Folder {
     folder
 }
 
-fn batch(folder: &Path, args: &[&str]) -> Run {
-    run(folder, &[&["batch"], args, &["--device cpu"]].concat())
+fn batch(folder: &Path, args: &str) -> Run {
+    run(folder, &format!("batch {args} --device cpu"))
 }
 
 fn record(folder: &Path, name: &str) -> Value {
-    serde_json::from_slice(&fs::read(folder.join(format!("{name}.json"))).unwrap()).unwrap()
+    json(folder.join(format!("{name}.json")))
 }
 
 /// The files of a folder with the times of their last change.
@@ -64,7 +57,7 @@ fn maps(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 fn begun(folder: &Path) -> Child {
-    started(folder, &["batch list.csv out --device cpu --threads 1"])
+    started(folder, "batch list.csv out --device cpu --threads 1")
 }
 
 /// Waits until the folder has so many records.
@@ -75,21 +68,20 @@ fn wait_for(folder: &Path, records: usize) {
 #[test]
 fn a_batch_is_its_single_matches() {
     let folder = pairs(3, (96, 64));
-    let told = batch(&folder, &["list.csv", "out", "--also", "confidence,validity,raw"]).succeeded();
+    let told = batch(&folder, "list.csv out --also confidence,validity,raw").succeeded();
     assert_eq!((told.stdout.as_str(), told.stderr.as_str()), ("", "mrfgs: 3 done, 0 skipped, 0 failed\n"));
     let at = |name: &str| fs::read(folder.join(name)).unwrap();
     for i in 0..3 {
         let [left, right] = ["left", "right"].map(|side| format!("images/{i}-{side}.png"));
         let single = |max| {
-            let args = ["match", &left, &right, "a.pfm --max-disparity", max, "--device cpu"];
-            let more = ["--also validity,confidence,raw"];
-            run(&folder, &[args.as_slice(), &more].concat()).succeeded();
+            let line = format!("match {left} {right} a.pfm --max-disparity {max} --device cpu");
+            run(&folder, &format!("{line} --also validity,confidence,raw")).succeeded();
         };
-        single("31");
+        single(31);
         for end in [".pfm", ".raw.pfm", ".confidence.png", ".validity.png"] {
             assert!(at(&format!("a{end}")) == at(&format!("out/pair-{i}{end}")), "{end} of {i}");
         }
-        single("15");
+        single(15);
         assert!(at("a.pfm") != at(&format!("out/pair-{i}.pfm")), "another range is another map");
     }
     let record = record(&folder.join("out"), "pair-1");
@@ -101,9 +93,9 @@ fn a_batch_is_its_single_matches() {
 
     for format in ["png", "tif"] {
         let name = format!("a.{format}");
-        batch(&folder, &["list.csv", format, "--format", format, "--quiet"]).succeeded();
-        let args = ["match images/0-left.png images/0-right.png", &name, "--max-disparity 31"];
-        run(&folder, &[args.as_slice(), &["--device cpu"]].concat()).succeeded();
+        batch(&folder, &format!("list.csv {format} --format {format} --quiet")).succeeded();
+        let pair = "images/0-left.png images/0-right.png";
+        run(&folder, &format!("match {pair} {name} --max-disparity 31 --device cpu")).succeeded();
         assert!(at(&name) == at(&format!("{format}/pair-0.{format}")));
     }
 }
@@ -117,13 +109,12 @@ fn a_batch_writes_depth_and_points() {
     copy("wall", &folder.join("data/wall"));
     let row = "wall,data/wall/im0.png,data/wall/im1.png,31\n";
     fs::write(folder.join("list.csv"), format!("name,left,right,max_disparity\n{row}")).unwrap();
-    let also = ["--also points,depth,preview,side-by-side --colours viridis"];
-    let args = ["match data/wall/im0.png data/wall/im1.png one.tif --device cpu"];
-    run(&folder, &[&args[..], &also].concat()).succeeded();
+    let also = "--also points,depth,preview,side-by-side --colours viridis";
+    let args = "match data/wall/im0.png data/wall/im1.png one.tif --device cpu";
+    run(&folder, &format!("{args} {also}")).succeeded();
     for list in ["list.csv", "data"] {
         let out = format!("out-{}", list.trim_end_matches(".csv"));
-        let args = [&[list, &out, "--format", "tif"], &also[..]].concat();
-        batch(&folder, &args).succeeded();
+        batch(&folder, &format!("{list} {out} --format tif {also}")).succeeded();
         for end in [".tif", ".depth.tif", ".points.ply", ".preview.png", ".side-by-side.png"] {
             assert!(at(&format!("one{end}")) == at(&format!("{out}/wall{end}")), "{end} of {list}");
         }
@@ -131,17 +122,13 @@ fn a_batch_writes_depth_and_points() {
         assert!(inputs.contains("calib.txt"), "a new calibration is another request: {inputs}");
     }
     // Points in another format take the place of the old ones.
-    let las = ["--also points.las"];
-    run(&folder, &[&args[..], &las].concat()).succeeded();
-    batch(&folder, &[&["data", "out-data", "--format", "tif"], &las[..]].concat()).succeeded();
+    run(&folder, &format!("{args} --also points.las")).succeeded();
+    batch(&folder, "data out-data --format tif --also points.las").succeeded();
     assert!(at("one.points.las") == at("out-data/wall.points.las"));
     assert!(!folder.join("out-data/wall.points.ply").exists());
     fs::remove_file(folder.join("data/wall/calib.txt")).unwrap();
-    let told = batch(&folder, &[&["list.csv", "none"], &also[..]].concat());
-    assert!(
-        told.stderr.contains("wall: --also depth: takes the cameras, and there is no calib.txt"),
-        "{told:?}"
-    );
+    let told = batch(&folder, &format!("list.csv none {also}"));
+    told.says("wall: --also depth: takes the cameras, and there is no calib.txt");
     assert_eq!(told.code, Some(1));
 }
 
@@ -149,49 +136,49 @@ fn a_batch_writes_depth_and_points() {
 fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
     let folder = pairs(3, (64, 48));
     let out = folder.join("out");
-    let again = |args: &[&str], said: &str| {
-        let told = batch(&folder, &[&["list.csv", "out"], args].concat()).succeeded();
+    let again = |args: &str, said: &str| {
+        let told = batch(&folder, &format!("list.csv out {args}")).succeeded();
         assert_eq!(told.stderr, format!("mrfgs: {said}\n"));
     };
-    again(&[], "3 done, 0 skipped, 0 failed");
+    again("", "3 done, 0 skipped, 0 failed");
     let before = (listing(&out), times(&out));
-    again(&[], "0 done, 3 skipped, 0 failed");
+    again("", "0 done, 3 skipped, 0 failed");
     assert!((listing(&out), times(&out)) == before, "finished files are not touched");
 
     // Each of these makes another map of what it concerns.
     fs::remove_file(out.join("pair-0.json")).unwrap();
-    again(&[], "1 done, 2 skipped, 0 failed");
+    again("", "1 done, 2 skipped, 0 failed");
     fs::remove_file(out.join("pair-1.pfm")).unwrap();
-    again(&[], "1 done, 2 skipped, 0 failed");
+    again("", "1 done, 2 skipped, 0 failed");
     // A map that is there and not whole, as after a power cut on some file systems.
     let whole = fs::read(out.join("pair-1.pfm")).unwrap();
     for cut in [&[][..], &whole[..whole.len() - 1]] {
         fs::write(out.join("pair-1.pfm"), cut).unwrap();
-        again(&[], "1 done, 2 skipped, 0 failed");
+        again("", "1 done, 2 skipped, 0 failed");
         assert!(fs::read(out.join("pair-1.pfm")).unwrap() == whole);
     }
     fs::copy(folder.join("images/1-left.png"), folder.join("images/2-left.png")).unwrap();
-    again(&[], "1 done, 2 skipped, 0 failed");
+    again("", "1 done, 2 skipped, 0 failed");
     let list = fs::read_to_string(folder.join("list.csv")).unwrap();
     fs::write(folder.join("list.csv"), list.replacen(",31\n", ",30\n", 1)).unwrap();
-    again(&[], "1 done, 2 skipped, 0 failed");
-    again(&["--also validity"], "3 done, 0 skipped, 0 failed");
-    again(&["--set temperature=0.3"], "3 done, 0 skipped, 0 failed");
+    again("", "1 done, 2 skipped, 0 failed");
+    again("--also validity", "3 done, 0 skipped, 0 failed");
+    again("--set temperature=0.3", "3 done, 0 skipped, 0 failed");
     assert!(names(&out, ".validity.png").is_empty(), "maps of an earlier request go with its record");
-    again(&["--set temperature=0.3"], "0 done, 3 skipped, 0 failed");
+    again("--set temperature=0.3", "0 done, 3 skipped, 0 failed");
     // The record of another version.
     let text = fs::read_to_string(out.join("pair-2.json")).unwrap();
     let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(text.contains(&version));
     fs::write(out.join("pair-2.json"), text.replace(&version, "\"version\": \"0.0.1\"")).unwrap();
-    again(&["--set temperature=0.3"], "1 done, 2 skipped, 0 failed");
+    again("--set temperature=0.3", "1 done, 2 skipped, 0 failed");
 }
 
 #[cfg(unix)]
 #[test]
 fn a_killed_batch_resumes() {
     let folder = pairs(20, (120, 90));
-    batch(&folder, &["list.csv", "whole", "--quiet"]).succeeded();
+    batch(&folder, "list.csv whole --quiet").succeeded();
     let whole = maps(&folder.join("whole"));
     assert_eq!(whole.len(), 20);
     let out = folder.join("out");
@@ -213,7 +200,7 @@ fn a_killed_batch_resumes() {
     fs::write(out.join(".pair-19.tmp/pair-19.pfm"), "half").unwrap();
     let (complete, before) = (names(&out, ".json"), times(&out));
     assert!((14..20).contains(&complete.len()), "{complete:?}");
-    let told = batch(&folder, &["list.csv", "out"]).succeeded();
+    let told = batch(&folder, "list.csv out").succeeded();
     let (done, skipped) = (20 - complete.len(), complete.len());
     assert_eq!(told.stderr, format!("mrfgs: {done} done, {skipped} skipped, 0 failed\n"));
     assert!(maps(&out) == whole);
@@ -230,7 +217,7 @@ fn a_killed_batch_resumes() {
 fn runs_at_the_same_time_share_the_pairs() {
     // Long enough that none does it all before the others begin.
     let folder = pairs(30, (160, 120));
-    batch(&folder, &["list.csv", "single"]).succeeded();
+    batch(&folder, "list.csv single").succeeded();
     let whole = maps(&folder.join("single"));
     let out = folder.join("out");
     let runs = [(); 3].map(|()| begun(&folder));
@@ -265,7 +252,7 @@ fn an_interrupted_batch_tidies_up() {
         assert_eq!(said, format!("mrfgs: stopped after {complete} of 12; run it again to resume\n"));
         assert_eq!(listing(&out).len(), 2 * complete, "nothing half written is left");
     }
-    batch(&folder, &["list.csv", "out"]).succeeded();
+    batch(&folder, "list.csv out").succeeded();
     assert_eq!(listing(&out).len(), 24);
 }
 
@@ -276,7 +263,7 @@ fn a_bad_pair_does_not_stop_the_others() {
     let good = fs::read(folder.join("images/1-right.png")).unwrap();
     fs::write(folder.join("images/1-right.png"), "text").unwrap();
     fs::remove_file(folder.join("images/2-left.png")).unwrap();
-    let told = batch(&folder, &["list.csv", "out", "--quiet"]);
+    let told = batch(&folder, "list.csv out --quiet");
     assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""));
     let lines: Vec<_> = told.stderr.lines().collect();
     assert_eq!(lines.len(), 3, "{lines:?}");
@@ -290,28 +277,27 @@ fn a_bad_pair_does_not_stop_the_others() {
     assert!(failed["reason"].as_str().unwrap().contains("images/1-right.png"));
 
     fs::write(folder.join("images/1-right.png"), good).unwrap();
-    let told = batch(&folder, &["list.csv", "out"]);
+    let told = batch(&folder, "list.csv out");
     assert_eq!(told.code, Some(1));
-    assert!(told.stderr.contains("1 done, 2 skipped, 1 failed: pair-2;"), "{told:?}");
+    told.says("1 done, 2 skipped, 1 failed: pair-2;");
     assert_eq!(record(&out, "pair-1")["status"], "done");
     // What no format holds is a fault of the pair too.
     let list = fs::read_to_string(folder.join("list.csv")).unwrap();
     fs::write(folder.join("list.csv"), list.replacen(",31\n", ",300\n", 1)).unwrap();
-    let told = batch(&folder, &["list.csv", "out", "--format", "png"]);
-    assert!(told.stderr.contains("pair-0: cannot write out/pair-0.png: 16-bit PNG"), "{told:?}");
-    assert!(told.stderr.contains("2 done, 0 skipped, 2 failed"), "{told:?}");
+    let told = batch(&folder, "list.csv out --format png");
+    told.says("pair-0: cannot write out/pair-0.png: 16-bit PNG & 2 done, 0 skipped, 2 failed");
     assert_eq!(names(&out, ".pfm"), <[&str; 0]>::default(), "maps of an earlier request go with its record");
 }
 
 #[test]
 fn shards_are_disjoint_and_make_the_whole() {
     let folder = pairs(9, (64, 48));
-    batch(&folder, &["list.csv", "whole"]).succeeded();
+    batch(&folder, "list.csv whole").succeeded();
     let mut found = Vec::new();
     for shard in ["1/3", "2/3", "3/3"] {
         let apart = format!("part-{}", &shard[..1]);
         for out in [&apart, "together"] {
-            batch(&folder, &["list.csv", out, "--shard", shard, "--quiet"]).succeeded();
+            batch(&folder, &format!("list.csv {out} --shard {shard} --quiet")).succeeded();
         }
         found.extend(names(&folder.join(apart), ".json"));
     }
@@ -324,26 +310,28 @@ fn shards_are_disjoint_and_make_the_whole() {
     let more = list.replacen("pair-0,", "new,images/0-left.png,images/0-right.png,31\npair-0,", 1);
     fs::write(folder.join("list.csv"), more).unwrap();
     for shard in ["1/3", "2/3", "3/3"] {
-        batch(&folder, &["list.csv", "together", "--shard", shard, "--quiet"]).succeeded();
-        let told = batch(&folder, &["list.csv", "together", "--shard", shard, "--status"]).succeeded();
+        batch(&folder, &format!("list.csv together --shard {shard} --quiet")).succeeded();
+        let told = batch(&folder, &format!("list.csv together --shard {shard} --status")).succeeded();
         assert!(told.stdout.ends_with(" complete, 0 failed, 0 missing\n"), "{told:?}");
     }
-    let told = batch(&folder, &["list.csv", "together"]).succeeded();
-    assert_eq!(told.stderr, "mrfgs: 0 done, 10 skipped, 0 failed\n");
+    assert_eq!(
+        batch(&folder, "list.csv together").succeeded().stderr,
+        "mrfgs: 0 done, 10 skipped, 0 failed\n"
+    );
 }
 
 #[test]
 fn status_tells_and_runs_nothing() {
     let folder = pairs(4, (64, 48));
     let before = listing(&folder);
-    let status = || batch(&folder, &["list.csv", "out", "--status"]).succeeded().stdout;
+    let status = || batch(&folder, "list.csv out --status").succeeded().stdout;
     let all = |state: &str| ["0", "1", "2", "3"].map(|i| format!("{state:<9} pair-{i}\n")).concat();
     assert_eq!(status(), all("missing") + "0 complete, 0 failed, 4 missing\n");
     assert!(listing(&folder) == before);
     let image = folder.join("images/3-left.png");
     let good = fs::read(&image).unwrap();
     fs::write(&image, "").unwrap();
-    assert_eq!(batch(&folder, &["list.csv", "out"]).code, Some(1));
+    assert_eq!(batch(&folder, "list.csv out").code, Some(1));
     fs::remove_file(folder.join("out/pair-1.json")).unwrap();
     let (told, out) = (status(), folder.join("out"));
     let lines: Vec<_> = told.lines().collect();
@@ -352,9 +340,9 @@ fn status_tells_and_runs_nothing() {
     assert_eq!(lines[4], "2 complete, 1 failed, 1 missing");
     assert!(!out.join("pair-1.json").exists());
     fs::write(&image, good).unwrap();
-    batch(&folder, &["list.csv", "out"]).succeeded();
+    batch(&folder, "list.csv out").succeeded();
     assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
-    let other = batch(&folder, &["list.csv", "out", "--status", "--also", "validity"]).succeeded().stdout;
+    let other = batch(&folder, "list.csv out --status --also validity").succeeded().stdout;
     assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
 }
 
@@ -367,28 +355,24 @@ fn the_folders_in_a_folder_are_pairs() {
     }
     fs::create_dir(folder.join("data/.hidden")).unwrap();
     fs::write(folder.join("data/readme"), "").unwrap();
-    batch(&folder, &["data", "out"]).succeeded();
-    run(&folder, &["match data/wall/im0.png data/wall/im1.png wall.pfm --device cpu"]).succeeded();
+    batch(&folder, "data out").succeeded();
+    run(&folder, "match data/wall/im0.png data/wall/im1.png wall.pfm --device cpu").succeeded();
     assert_eq!(names(&folder.join("out"), ".pfm"), ["slanted", "wall"]);
     assert!(maps(&folder.join("out"))["wall"] == maps(&folder)["wall"]);
     fs::create_dir(folder.join("data/empty")).unwrap();
-    let told = batch(&folder, &["data", "out"]);
-    assert!(told.stderr.contains("0 done, 2 skipped, 1 failed: empty;"), "{told:?}");
-    let told = batch(&folder, &["data", "data/out"]);
-    told.failed(1, &["data/out", "the folder of the pairs", "give another"], "inside");
+    batch(&folder, "data out").says("0 done, 2 skipped, 1 failed: empty;");
+    batch(&folder, "data data/out").failed(1, "data/out & the folder of the pairs & give another");
     fs::remove_dir(folder.join("data/empty")).unwrap();
     // Whatever file systems allow is a name.
     for name in ["two words", "straße №1 (ä) 日本"] {
         copy("wall", &folder.join("data").join(name));
     }
-    let told = batch(&folder, &["data", "out"]).succeeded();
-    assert_eq!(told.stderr, "mrfgs: 2 done, 2 skipped, 0 failed\n");
+    assert_eq!(batch(&folder, "data out").succeeded().stderr, "mrfgs: 2 done, 2 skipped, 0 failed\n");
     let all = maps(&folder.join("out"));
     assert!(all["two words"] == all["wall"] && all["straße №1 (ä) 日本"] == all["wall"]);
-    let told = batch(&folder, &["data", "out"]).succeeded();
-    assert_eq!(told.stderr, "mrfgs: 0 done, 4 skipped, 0 failed\n");
+    assert_eq!(batch(&folder, "data out").succeeded().stderr, "mrfgs: 0 done, 4 skipped, 0 failed\n");
     fs::create_dir(folder.join("data/a:b")).unwrap();
-    batch(&folder, &["data", "new"]).failed(1, &["data/a:b", "rename it"], "name");
+    batch(&folder, "data new").failed(1, "data/a:b & rename it");
     assert!(!folder.join("new").exists());
 }
 
@@ -396,46 +380,44 @@ fn the_folders_in_a_folder_are_pairs() {
 fn a_bad_list_is_refused_before_anything_runs() {
     let folder = pairs(1, (64, 48));
     let long = format!("name,left,right\n{},l,r\n", "n".repeat(201));
-    let lists: &[(&str, &[&str])] = &[
-        ("", &["lists no pair", "CSV"]),
-        ("name,left,right\n\n# nothing\n", &["lists no pair"]),
-        ("a,l,r\n", &["line 1", "`a` is no column", "name, left, right, max_disparity"]),
-        ("name,left,left\n", &["line 1", "two columns left"]),
-        ("name,left,max_disparity\n", &["line 1", "no column right"]),
-        ("name,left,right\na,l,r\n\n# comment\nb,l\n", &["line 5", "2 fields and 3 columns"]),
-        ("name,left,right\na,l,r,31\n", &["line 2", "4 fields and 3 columns"]),
-        ("name,left,right\na,,r\n", &["line 2", "left is missing"]),
-        ("name,left,right\n,l,r\n", &["line 2", "name is missing"]),
-        ("name,left,right\na,l,r\nA,l,r\n", &["line 3", "name A is taken by line 2", "rename"]),
-        ("name,left,right\n../a,l,r\n", &["line 2", "`../a` is no name for files", "rename"]),
-        ("name,left,right\n.a,l,r\n", &["line 2", "`.a` is no name"]),
-        ("name,left,right\n-a,l,r\n", &["line 2", "`-a` is no name"]),
-        ("name,left,right\na\u{1b}b,l,r\n", &["line 2", "is no name"]),
-        ("name,left,right\na.,l,r\n", &["line 2", "`a.` is no name", ". or space last"]),
-        ("name,left,right\nwhat?,l,r\n", &["line 2", "`what?` is no name"]),
-        ("name,left,right\nÄ,l,r\nä,l,r\n", &["line 3", "name ä is taken by line 2"]),
-        ("name,left,right\na.Validity,l,r\n", &["line 2", "ends in .validity", "rename"]),
-        (&long, &["line 2", "at most 200"]),
-        ("name,left,right,max_disparity\na,l,r,many\n", &["line 2", "max_disparity", "whole number"]),
-        ("name,left,right,max_disparity\na,l,r,-3\n", &["line 2", "max_disparity", "below", "min_disparity"]),
-        ("name,left,right,min_disparity\na,l,r,1.5\n", &["line 2", "min_disparity", "whole number"]),
+    let lists = [
+        ("", "lists no pair & CSV"),
+        ("name,left,right\n\n# nothing\n", "lists no pair"),
+        ("a,l,r\n", "line 1 & `a` is no column & name, left, right, max_disparity"),
+        ("name,left,left\n", "line 1 & two columns left"),
+        ("name,left,max_disparity\n", "line 1 & no column right"),
+        ("name,left,right\na,l,r\n\n# comment\nb,l\n", "line 5 & 2 fields and 3 columns"),
+        ("name,left,right\na,l,r,31\n", "line 2 & 4 fields and 3 columns"),
+        ("name,left,right\na,,r\n", "line 2 & left is missing"),
+        ("name,left,right\n,l,r\n", "line 2 & name is missing"),
+        ("name,left,right\na,l,r\nA,l,r\n", "line 3 & name A is taken by line 2 & rename"),
+        ("name,left,right\n../a,l,r\n", "line 2 & `../a` is no name for files & rename"),
+        ("name,left,right\n.a,l,r\n", "line 2 & `.a` is no name"),
+        ("name,left,right\n-a,l,r\n", "line 2 & `-a` is no name"),
+        ("name,left,right\na\u{1b}b,l,r\n", "line 2 & is no name"),
+        ("name,left,right\na.,l,r\n", "line 2 & `a.` is no name & . or space last"),
+        ("name,left,right\nwhat?,l,r\n", "line 2 & `what?` is no name"),
+        ("name,left,right\nÄ,l,r\nä,l,r\n", "line 3 & name ä is taken by line 2"),
+        ("name,left,right\na.Validity,l,r\n", "line 2 & ends in .validity & rename"),
+        (&*long, "line 2 & at most 200"),
+        ("name,left,right,max_disparity\na,l,r,many\n", "line 2 & max_disparity & whole number"),
+        ("name,left,right,max_disparity\na,l,r,-3\n", "line 2 & max_disparity & below & min_disparity"),
+        ("name,left,right,min_disparity\na,l,r,1.5\n", "line 2 & min_disparity & whole number"),
     ];
     for (text, words) in lists {
         fs::write(folder.join("bad.csv"), text).unwrap();
         let before = listing(&folder);
-        for more in [&[][..], &["--status"]] {
-            let told = batch(&folder, &[&["bad.csv", "out"], more].concat());
-            told.failed(1, &[&["bad.csv"], *words].concat(), text);
+        for more in ["", "--status"] {
+            batch(&folder, &format!("bad.csv out {more}")).failed(1, &format!("bad.csv & {words}"));
         }
         assert!(listing(&folder) == before, "{text}");
     }
     fs::write(folder.join("bad.csv"), b"name,left,right\n\xff,l,r\n").unwrap();
-    batch(&folder, &["bad.csv", "out"]).failed(1, &["bad.csv", "UTF-8"], "bytes");
+    batch(&folder, "bad.csv out").failed(1, "bad.csv & UTF-8");
     // Quotes, spaces, columns in another order, a byte order mark, the line ends of another system.
     let good = "\u{feff}mask,right, left ,name\r\n,\"images/0-right.png\",images/0-left.png,a\r\n";
     fs::write(folder.join("good.csv"), good).unwrap();
-    let told = batch(&folder, &["good.csv", "out"]).succeeded();
-    assert_eq!(told.stderr, "mrfgs: 1 done, 0 skipped, 0 failed\n");
+    assert_eq!(batch(&folder, "good.csv out").succeeded().stderr, "mrfgs: 1 done, 0 skipped, 0 failed\n");
 }
 
 #[cfg(target_os = "linux")]
@@ -443,6 +425,5 @@ fn a_bad_list_is_refused_before_anything_runs() {
 fn a_folder_without_permission_ends_a_batch_at_once() {
     let folder = pairs(2, (64, 48));
     let locked = locked(&folder);
-    let locked = locked.to_str().unwrap();
-    batch(&folder, &["list.csv", locked]).failed(1, &[locked, "nothing can be created"], "locked");
+    batch(&folder, &format!("list.csv {locked}")).failed(1, &format!("{locked} & nothing can be created"));
 }

@@ -1,24 +1,15 @@
 //! `mrfgs bench`.
 
-use std::fs;
-
-use serde_json::Value;
-
-use super::{Folder, has_gpu, listing, run, workshop};
+use super::*;
 
 #[test]
 fn a_bench_gives_every_figure_of_both_backends() {
     let folder = workshop();
-    let (backends, which) = if has_gpu() {
-        (&["cpu", "gpu"][..], &["--device cpu --device gpu"][..])
-    } else {
-        (&["cpu"][..], &["--device cpu"][..])
-    };
-    let args = ["bench misfit without-disp0GT.pfm --repeats 2 --json out.json"];
-    let more = ["--threads 2 --set levels=1 --set percentile=92"];
-    let told = run(&folder, &[&args[..], which, &more].concat()).succeeded();
-    let json = fs::read_to_string(folder.join("out.json")).unwrap();
-    let json: Value = serde_json::from_str(&json).unwrap();
+    let backends = if has_gpu() { &["cpu", "gpu"][..] } else { &["cpu"] };
+    let line = "bench misfit without-disp0GT.pfm --repeats 2 --json out.json --threads 2 --set levels=1";
+    let which = backends.join(" --device ");
+    let told = run(&folder, &format!("{line} --set percentile=92 --device {which}")).succeeded();
+    let json = json(folder.join("out.json"));
     assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
     assert_eq!((&json["threads"], &json["repeats"]), (&2.into(), &2.into()));
 
@@ -31,11 +22,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
         assert_eq!((&pair["name"], &pair["method"]), (&name.into(), &preset.into()));
         assert_eq!((&pair["width"], &pair["height"]), (&width.into(), &height.into()), "{what}");
         assert_eq!(pair["labels"], 32, "{what}");
-        assert!(
-            told.stdout.contains(&format!("{what}: {width} x {height} pixels, 32 labels")),
-            "{}",
-            told.stdout
-        );
+        told.prints(&format!("{what}: {width} x {height} pixels, 32 labels"));
         let method = &json["methods"][preset];
         assert_eq!(method["graph"]["levels"], 1, "--set counts for every preset");
         assert_eq!(pair["devices"].as_object().unwrap().len(), backends.len());
@@ -47,7 +34,7 @@ fn a_bench_gives_every_figure_of_both_backends() {
                 assert!(value > 0.0 && value.is_finite(), "{what}, {backend}: {key} is {value}");
                 value
             };
-            assert!(told.stderr.contains(&format!("{what}, {backend}: ")), "{}", told.stderr);
+            told.says(&format!("{what}, {backend}: "));
             assert_eq!(found["ran_on"].as_str().unwrap().starts_with("the CPU path"), backend == "cpu");
             let runs: Vec<f64> =
                 found["runs_ms"].as_array().unwrap().iter().filter_map(Value::as_f64).collect();
@@ -102,8 +89,8 @@ fn a_bench_gives_every_figure_of_both_backends() {
     }
 
     // A single case, printed.
-    let args = ["bench misfit --method fgs --device cpu --repeats 1 --json -"];
-    let pairs = &run(&folder, &args).succeeded().json()["pairs"];
+    let line = "bench misfit --method fgs --device cpu --repeats 1 --json -";
+    let pairs = &run(&folder, line).succeeded().json()["pairs"];
     assert_eq!((pairs.as_array().unwrap().len(), &pairs[0]["method"]), (1, &"fgs".into()));
     assert_eq!(pairs[0]["devices"]["gpu"], Value::Null);
 }
@@ -111,8 +98,8 @@ fn a_bench_gives_every_figure_of_both_backends() {
 #[test]
 fn a_bench_without_folders_makes_up_its_pair() {
     let folder = Folder::new();
-    let told = run(&folder, &["bench --method default --device cpu --repeats 1 --set levels=1"]).succeeded();
-    assert!(told.stdout.contains("small, method default: 450 x 375 pixels, 60 labels"), "{}", told.stdout);
+    let told = run(&folder, "bench --method default --device cpu --repeats 1 --set levels=1").succeeded();
+    told.prints("small, method default: 450 x 375 pixels, 60 labels");
     assert!(listing(&folder).is_empty());
 }
 
@@ -121,8 +108,7 @@ fn a_bench_without_folders_makes_up_its_pair() {
 fn a_bench_that_cannot_be_written_fails() {
     let folder = workshop();
     let before = listing(&folder);
-    let args = ["bench misfit --method default --device cpu --repeats 1"];
-    let told = run(&folder, &[&args[..], &["--json /dev/full"]].concat());
+    let told = run(&folder, "bench misfit --method default --device cpu --repeats 1 --json /dev/full");
     assert_eq!((told.code, told.stdout.as_str()), (Some(1), ""), "{told:?}");
     assert!(told.stderr.lines().last().unwrap().contains("/dev/full"), "{told:?}");
     assert!(listing(&folder) == before);

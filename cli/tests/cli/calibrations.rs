@@ -1,17 +1,11 @@
 //! Calibrations that people have: each format gives the same pair and the same depths, and what is wrong in a file is told in
 //! one line.
 
-use mrfgs::image::{pfm, read};
-
 use super::*;
-
-fn raw(file: &str) -> String {
-    scene_file("raw", file)
-}
 
 /// That of `testdata/raw`, as OpenCV has it in YAML.
 fn opencv() -> String {
-    fs::read_to_string(raw("cameras.yml")).unwrap()
+    fs::read_to_string(scene("raw/cameras.yml")).unwrap()
 }
 
 /// The numbers of an entry of it.
@@ -65,11 +59,13 @@ fn ros(tx: &str) -> String {
     )
 }
 
-fn rectify(folder: &Path, calibrations: &[&str]) -> Run {
-    let (left, right) = (raw("left.png"), raw("right.png"));
-    let mut args = vec!["rectify", &left, &right, "out"];
-    args.extend(calibrations.iter().flat_map(|file| ["--calib", file]));
-    run(folder, &args)
+/// Flags that name these calibrations.
+fn calib(files: &str) -> String {
+    format!(" --calib {}", files.replace(' ', " --calib "))
+}
+
+fn rectify(folder: &Path, calibrations: &str) -> Run {
+    run(folder, &format!("rectify @raw/left.png @raw/right.png out{}", calib(calibrations)))
 }
 
 #[test]
@@ -89,9 +85,8 @@ fn every_format_rectifies_alike() {
         fs::write(folder.join(name), text).unwrap();
     }
     let mut first = None;
-    for files in [&["a.yml"][..], &["b.txt"], &["c"], &["lenses", "pose"], &["renamed"]] {
-        let told = rectify(&folder, files).succeeded();
-        assert!(told.stderr.contains("240 x 180, 98.7 % of the left"), "{told:?}");
+    for files in ["a.yml", "b.txt", "c", "lenses pose", "renamed"] {
+        rectify(&folder, files).succeeded().says("240 x 180, 98.7 % of the left");
         let found: BTreeMap<_, _> = listing(&folder.join("out"));
         assert_eq!(found.len(), 6, "{files:?}");
         assert!(first.get_or_insert_with(|| found.clone()) == &found, "{files:?}");
@@ -102,16 +97,14 @@ fn every_format_rectifies_alike() {
 #[test]
 fn rectified_first_or_on_the_way_gives_the_same_bits() {
     let folder = Folder::new();
-    let (left, right, calib) = (raw("left.png"), raw("right.png"), raw("cameras.yml"));
-    rectify(&folder, &[&calib]).succeeded();
-    let end = ["--max-disparity 40 --device cpu --also validity,depth-mm,points"];
-    let args =
-        [&["match", &left, &right, "a.pfm --rectify --calib", &calib], &end[..], &["--json a.json"]].concat();
-    run(&folder, &args).succeeded();
-    run(&folder, &[&["match out/im0.png out/im1.png b.pfm"], &end[..]].concat()).succeeded();
+    rectify(&folder, "@raw/cameras.yml").succeeded();
+    let end = "--max-disparity 40 --device cpu --also validity,depth-mm,points";
+    let raw = "@raw/left.png @raw/right.png a.pfm --rectify --calib @raw/cameras.yml --json a.json";
     // OpenCV's form of the calibration says the same.
-    let args = ["match out/im0.png out/im1.png c.pfm --calib out/cameras.yml"];
-    run(&folder, &[&args, &end[..]].concat()).succeeded();
+    let rectified = "out/im0.png out/im1.png";
+    for pair in [raw, &format!("{rectified} b.pfm"), &format!("{rectified} c.pfm --calib out/cameras.yml")] {
+        run(&folder, &format!("match {pair} {end}")).succeeded();
+    }
     let read = |name: String| fs::read(folder.join(name)).unwrap();
     for end in ["pfm", "validity.png", "depth-mm.png"] {
         for other in ["b", "c"] {
@@ -119,18 +112,13 @@ fn rectified_first_or_on_the_way_gives_the_same_bits() {
         }
     }
     assert!(read("a.points.ply".into()) == read("c.points.ply".into()), "points in the unit of the file");
-    let record: Value = serde_json::from_slice(&read("a.json".into())).unwrap();
-    assert_eq!(
-        (&record["rectified"], &record["files"]["calibration"]),
-        (&true.into(), &calib.as_str().into())
-    );
+    let record = json(folder.join("a.json"));
+    assert_eq!(record["rectified"], true);
+    assert_eq!(record["files"]["calibration"], scene("raw/cameras.yml").to_str().unwrap());
     // Depths are in metres, and 16-bit ones in millimetres.
     let pixels = image::open(folder.join("a.depth-mm.png")).unwrap().into_luma16();
-    let (least, most) = pixels
-        .pixels()
-        .map(|p| p.0[0])
-        .filter(|mm| *mm > 0)
-        .fold((u16::MAX, 0), |(l, m), mm| (l.min(mm), m.max(mm)));
+    let known = || pixels.pixels().map(|p| p.0[0]).filter(|mm| *mm > 0);
+    let (least, most) = (known().min().unwrap(), known().max().unwrap());
     assert!((1000..2000).contains(&least) && (2500..6000).contains(&most), "{least} to {most}");
 }
 
@@ -148,21 +136,17 @@ fn seen([x, y, z]: [f64; 3], k: &[f64], d: &[f64]) -> [f64; 2] {
 fn points_of_the_original_camera_are_seen_at_their_pixels() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
-    let (left, right, calib) = (raw("left.png"), raw("right.png"), raw("cameras.yml"));
-    run(&folder, &["rectify", &left, &right, "out --calib", &calib, "--maps"]).succeeded();
-    let args = ["match", &left, &right, "a.pfm --rectify --calib", &calib, "--max-disparity 40"];
-    let also = ["--device cpu --quiet --also validity,points,points-original,points-original.pcd"];
-    run(&folder, &[&args[..], &also].concat()).succeeded();
+    let raw = |output: &str| format!("@raw/left.png @raw/right.png {output} --calib @raw/cameras.yml");
+    run(&folder, &format!("rectify {} --maps", raw("out"))).succeeded();
+    let also = "--device cpu --quiet --also validity,points,points-original,points-original.pcd";
+    run(&folder, &format!("match {} --rectify --max-disparity 40 {also}", raw("a.pfm"))).succeeded();
     let says = |name: &str| {
         String::from_utf8_lossy(&fs::read(at(name)).unwrap()).contains("frame of the original left camera")
     };
     assert!(says("a.points-original.ply") && says("a.points-original.pcd") && !says("a.points.ply"));
 
     let validity = read::grey8(&at("a.validity.png")).unwrap();
-    let places = [at("out/map0x.pfm"), at("out/map0y.pfm")].map(|path| {
-        let pfm::Pfm::Grey(map) = pfm::read(&path).unwrap() else { panic!("one channel") };
-        map
-    });
+    let places = [at("out/map0x.pfm"), at("out/map0y.pfm")].map(read_pfm);
     let [k, d] =
         ["K1", "D1"].map(|name| numbers(name).iter().map(|v| v.parse().unwrap()).collect::<Vec<f64>>());
     let misses = |name: &str| -> Vec<f64> {
@@ -195,17 +179,14 @@ fn every_format_gives_the_same_depths() {
     let p = "!!opencv-matrix\n   rows: 3\n   cols: 4\n   dt: d\n   data: [ 215.5, 0., 118.5, ";
     let rest = ", 0., 215.5, 89.5, 0., 0., 0., 1., 0. ]\n";
     write("cv", &format!("%YAML:1.0\n---\nP1: {p}0.{rest}P2: {p}-34.48{rest}unit: m\n"));
-    let left = scene_file("slanted", "im0.png");
-    let right = scene_file("slanted", "im1.png");
-    let depths = |files: &[&str]| {
-        let mut args = vec!["match", &left, &right, "d.pfm --max-disparity 31 --also depth-mm"];
-        args.extend(files.iter().flat_map(|file| ["--calib", file]));
-        run(&folder, &args).succeeded();
+    let depths = |files: &str| {
+        let line = "match @slanted/im0.png @slanted/im1.png d.pfm --max-disparity 31 --also depth-mm";
+        run(&folder, &format!("{line}{}", calib(files))).succeeded();
         fs::read(folder.join("d.depth-mm.png")).unwrap()
     };
-    let first = depths(&["txt"]);
-    for files in [&["left", "right"][..], &["right", "left"], &["cv"]] {
-        assert!(depths(files) == first, "{files:?}");
+    let first = depths("txt");
+    for files in ["left right", "right left", "cv"] {
+        assert!(depths(files) == first, "{files}");
     }
 }
 
@@ -300,9 +281,8 @@ fn what_is_wrong_in_a_calibration_is_told() {
         let what = format!("{kind}: {from} -> {to}");
         assert!(text.contains(from), "{what}");
         fs::write(folder.join("a-file"), text.replacen(from, to, 1)).unwrap();
-        let files: &[&str] = if *kind == "ros" { &["left", "a-file"] } else { &["a-file"] };
-        let told = rectify(&folder, files);
-        told.failed(1, &["a-file", words], &what);
+        let told = rectify(&folder, if *kind == "ros" { "left a-file" } else { "a-file" });
+        told.failed(1, &format!("a-file & {words}"));
         assert_eq!(listing(&folder).len(), 2, "{what}: nothing is left");
     }
 }
@@ -310,68 +290,37 @@ fn what_is_wrong_in_a_calibration_is_told() {
 #[test]
 fn files_that_are_no_calibration_are_told() {
     let folder = Folder::new();
-    let write = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).unwrap();
-    write("empty", b"");
-    write("words", b"some words\n");
-    write("list", b"- 1\n- 2\n");
-    write("lists", "[".repeat(100_000).as_bytes());
-    write("list of lists", format!("{}1{}", "[".repeat(40), "]".repeat(40)).as_bytes());
-    write("groups", format!("<a>{}", "<b>".repeat(20_000)).as_bytes());
-    write("deep", format!("<a>{}{}</a>", "<b>".repeat(2000), "</b>".repeat(2000)).as_bytes());
-    let keys = (0..2000).map(|n| format!("k{n}: 1\n")).collect::<Vec<_>>();
-    write("keys", keys.concat().as_bytes());
-    let elements = (0..2000).map(|n| format!("<k{n}/>")).collect::<Vec<_>>();
-    write("elements", format!("<a>{}</a>", elements.concat()).as_bytes());
-    write("bytes", &[0, 159, 146, 150, 10]);
-    write("large", &vec![b' '; (1 << 20) + 1]);
-    write("half", b"cam0=[100 0 30; 0 100 20; 0 0 1]\n");
-    write("left", ros("0").as_bytes());
-    write("opencv", opencv().as_bytes());
-    let before = listing(&folder);
-    for (files, words) in [
-        (&["none"][..], &["none", "no such file"][..]),
-        (&["empty"], &["empty", "is no YAML with entries"]),
-        (&["words"], &["words", "expected the entries of OpenCV"]),
-        (&["list"], &["list", "expected the entries of OpenCV"]),
-        (&["lists"], &["lists", "is no YAML"]),
-        (&["list of lists"], &["list of lists", "too many levels"]),
-        (&["groups"], &["groups", "is no XML"]),
-        (&["deep"], &["deep", "too many levels"]),
-        (&["keys"], &["keys", "too many entries"]),
-        (&["elements"], &["elements", "too many entries"]),
-        (&["bytes"], &["bytes"]),
-        (&["large"], &["large", "larger than any calibration file"]),
-        (&["half"], &["half", "K1, D1, K2 and D2"]),
-        (&["left"], &["left", "of one camera", "the other one too"]),
-        (&["left", "left"], &["left", "expected focal length times baseline"]),
-        (&["left", "words"], &["words", "does not belong"]),
-        (&["opencv", "opencv", "opencv"], &["opencv", "one too many"]),
-    ] {
-        rectify(&folder, files).failed(1, words, &files.join(" "));
-        assert!(listing(&folder) == before, "{files:?}");
+    let (keys, elements) = ((0..2000).map(|n| format!("k{n}: 1\n")), (0..2000).map(|n| format!("<k{n}/>")));
+    let (deep, lists) = (("<b>".repeat(2000), "</b>".repeat(2000)), ("[".repeat(40), "]".repeat(40)));
+    let wrong = [
+        ("empty", "".into(), "is no YAML with entries"),
+        ("words", "some words\n".into(), "expected the entries of OpenCV"),
+        ("list", "- 1\n- 2\n".into(), "expected the entries of OpenCV"),
+        ("lists", "[".repeat(100_000).into_bytes(), "is no YAML"),
+        ("nested", format!("{}1{}", lists.0, lists.1).into_bytes(), "too many levels"),
+        ("groups", format!("<a>{}", "<b>".repeat(20_000)).into_bytes(), "is no XML"),
+        ("deep", format!("<a>{}{}</a>", deep.0, deep.1).into_bytes(), "too many levels"),
+        ("keys", keys.collect::<String>().into_bytes(), "too many entries"),
+        ("elements", format!("<a>{}</a>", elements.collect::<String>()).into_bytes(), "too many entries"),
+        ("bytes", vec![0, 159, 146, 150, 10], "bytes"),
+        ("large", vec![b' '; (1 << 20) + 1], "larger than any calibration file"),
+        ("half", "cam0=[100 0 30; 0 100 20; 0 0 1]\n".into(), "K1, D1, K2 and D2"),
+        ("left", ros("0").into_bytes(), "of one camera & the other one too"),
+    ];
+    for (name, bytes, _) in &wrong {
+        fs::write(folder.join(name), bytes).unwrap();
     }
-    let (left, right, calib) = (raw("left.png"), raw("right.png"), raw("cameras.yml"));
-    let no_unit = opencv().replace("unit: m\n", "");
-    write("no-unit", no_unit.as_bytes());
+    fs::write(folder.join("opencv"), opencv()).unwrap();
     let before = listing(&folder);
-    let flags = |args: &[&str], code: i32, words: &[&str]| {
-        run(&folder, args).failed(code, words, &args.join(" "));
-        assert!(listing(&folder) == before, "{args:?}");
-    };
-    let m = ["match", &left, &right, "d.pfm"];
-    flags(&[&m[..], &["--rectify"]].concat(), 2, &["--calib"]);
-    flags(&[&m[..], &["--calib", &calib, "--alpha", "1"]].concat(), 2, &["--alpha", "--rectify"]);
-    flags(&[&m[..], &["--rectify --calib", &calib, "--alpha 2"]].concat(), 2, &["--alpha", "from 0 to 1"]);
-    let original = ["--calib", &calib, "--also points-original.las"];
-    let words = ["--also points-original.las", "add --rectify", "take --also points"];
-    flags(&[&m[..], &original].concat(), 2, &words);
-    flags(&["batch list.csv maps --also points-original"], 2, &["--also points-original:", words[2]]);
-    flags(&[&m[..], &["--calib", &calib, "--also depth"]].concat(), 1, &["not rectified", "--rectify"]);
-    flags(
-        &[&m[..], &["--rectify --calib", "no-unit", "--max-disparity 40 --also depth-mm"]].concat(),
-        2,
-        &["--also depth-mm", "no-unit", "mm, cm or m"],
-    );
-    flags(&["rectify", &left, &right, "out"], 2, &["--calib"]);
-    flags(&["rectify", &left, &right, &left, "--calib", &calib], 1, &["is a file"]);
+    let more = [
+        ("none", "none & no such file"),
+        ("left left", "left & expected focal length times baseline"),
+        ("left words", "words & does not belong"),
+        ("opencv opencv opencv", "opencv & one too many"),
+    ];
+    let wrong = wrong.map(|(name, _, words)| (name, format!("{name} & {words}")));
+    for (files, words) in wrong.into_iter().chain(more.map(|(files, words)| (files, words.to_owned()))) {
+        rectify(&folder, files).failed(1, &words);
+        assert!(listing(&folder) == before, "{files}");
+    }
 }

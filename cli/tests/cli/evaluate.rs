@@ -1,28 +1,22 @@
 //! `mrfgs evaluate` and its modes: figures, older layouts, breakdown.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
-
 use image::{GrayImage, Luma};
 use mrfgs::evaluation::GroundTruth;
 use mrfgs::image::{Plane, read};
 use mrfgs::options::Method;
-use serde_json::Value;
-use tempfile::TempDir;
 
-use super::{in_cells, listing, run, scene, scene_file};
+use super::*;
 
-/// Evaluates; the standard output.
-pub(super) fn evaluated(folder: &Path, args: &[&str]) -> String {
-    run(folder, &[&["evaluate"], args].concat()).succeeded().stdout
+/// Evaluates.
+pub(super) fn evaluated(folder: &Path, line: &str) -> Run {
+    run(folder, &format!("evaluate {line}")).succeeded()
 }
 
 /// Evaluates and fails: one line with all these words, and the folder stays as it was.
-pub(super) fn refused(folder: &Path, args: &[&str], code: i32, words: &[&str]) {
+pub(super) fn refused(folder: &Path, line: &str, code: i32, words: &str) {
     let before = listing(folder);
-    run(folder, &[&["evaluate"], args].concat()).failed(code, words, &format!("{args:?}"));
-    assert!(listing(folder) == before, "{args:?}");
+    run(folder, &format!("evaluate {line}")).failed(code, words);
+    assert!(listing(folder) == before, "{line}");
 }
 
 /// Every number of a report, by its place in the JSON.
@@ -42,9 +36,8 @@ fn figures(value: &Value, place: &str, all: &mut BTreeMap<String, f64>) {
 
 #[test]
 fn evaluate_gives_figures_and_the_same_for_a_written_map() {
-    let folder = tempfile::tempdir().unwrap();
-    let dirs = ["slanted", "exposure"].map(|name| scene(name).to_str().unwrap().to_owned());
-    let told = run(folder.path(), &["evaluate", &dirs[0], &dirs[1], "--json", "out.json"]).succeeded();
+    let folder = Folder::new();
+    let told = evaluated(&folder, "@slanted @exposure --json out.json");
     let lines: Vec<&str> = told.stdout.lines().collect();
     assert_eq!(lines.len(), 3 + 4 + 3, "{}", told.stdout);
     for (line, start) in [(3, "slanted  raw   |"), (5, "exposure raw   |"), (8, "mean     raw   |")] {
@@ -52,8 +45,7 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
         assert!(lines[line + 1].starts_with("         final |"), "{}", told.stdout);
     }
 
-    let json: Value =
-        serde_json::from_str(&fs::read_to_string(folder.path().join("out.json")).unwrap()).unwrap();
+    let json = json(folder.join("out.json"));
     assert_eq!(json["method"], serde_json::to_value(Method::default()).unwrap());
     assert!(json["ran_on"].is_string());
     assert_eq!(json["pairs"].as_array().unwrap().len(), 2);
@@ -68,12 +60,10 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
     assert!(all["final/all/avg"] < 1.0 && all["final/all/bad2.0"] < 10.0, "{all:?}");
     assert_eq!((all["final/all/pixels"], all["final/all/density"]), (240.0 * 180.0, 100.0));
 
-    let at = |file: &str| scene_file("slanted", file);
-    let (left, right, truth, mask) = (at("im0.png"), at("im1.png"), at("disp0GT.pfm"), at("mask0nocc.png"));
-    run(folder.path(), &["match", &left, &right, "map.pfm", "--also", "raw", "--quiet"]).succeeded();
+    run(&folder, "match @slanted/im0.png @slanted/im1.png map.pfm --also raw --quiet").succeeded();
     for (map, file) in [("final", "map.pfm"), ("raw", "map.raw.pfm")] {
-        let args = ["evaluate", "map", file, "--truth", &truth, "--mask", &mask, "--json", "-"];
-        let told = run(folder.path(), &args).succeeded();
+        let mask = "--mask @slanted/mask0nocc.png --json -";
+        let told = evaluated(&folder, &format!("map {file} --truth @slanted/disp0GT.pfm {mask}"));
         assert_eq!(told.stderr, "");
         let json = told.json();
         assert!(json["method"].is_null() && json["pairs"][0]["raw"].is_null());
@@ -85,22 +75,12 @@ fn evaluate_gives_figures_and_the_same_for_a_written_map() {
         }
     }
     // Without the mask there is a table all the same.
-    let args = ["evaluate", "map", "map.pfm", "--truth", &truth];
-    let told = run(folder.path(), &args).succeeded();
-    assert!(told.stdout.contains("map  final |"), "{}", told.stdout);
-}
-
-/// Copies a rendered scene, 2014's layout, to a folder of another name.
-pub(super) fn copy(name: &str, to: &Path) {
-    fs::create_dir(to).unwrap();
-    for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt", "mask0nocc.png"] {
-        fs::copy(scene(name).join(file), to.join(file)).unwrap();
-    }
+    evaluated(&folder, "map map.pfm --truth @slanted/disp0GT.pfm").prints("map  final |");
 }
 
 /// The truth of `slanted` as 8 bits hold it, unknown in the top left corner: in levels, and in pixels as they read.
 fn quantised(scale: f32) -> (GrayImage, Plane<f32>) {
-    let truth = read::read_disparity(&scene("slanted").join("disp0GT.pfm")).unwrap();
+    let truth = read::read_disparity(&scene("slanted/disp0GT.pfm")).unwrap();
     let levels = Plane::from_fn(truth.width(), truth.height(), |x, y| {
         if x < 40 && y < 30 { 0 } else { (truth[(x, y)] * scale).round() as u8 }
     });
@@ -110,48 +90,41 @@ fn quantised(scale: f32) -> (GrayImage, Plane<f32>) {
 }
 
 /// A folder with `slanted` in the layouts of 2003 (`old`) and 2005 (`newer`), and its maps by the program.
-fn older_layouts() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+fn older_layouts() -> Folder {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     for (dir, files, scale) in [
         ("old", ["im2.png", "im6.png", "disp2.png"], 4.0),
         ("newer", ["view1.png", "view5.png", "disp1.png"], 3.0),
     ] {
         fs::create_dir(at(dir)).unwrap();
-        fs::copy(scene("slanted").join("im0.png"), at(dir).join(files[0])).unwrap();
-        fs::copy(scene("slanted").join("im1.png"), at(dir).join(files[1])).unwrap();
+        fs::copy(scene("slanted/im0.png"), at(dir).join(files[0])).unwrap();
+        fs::copy(scene("slanted/im1.png"), at(dir).join(files[1])).unwrap();
         quantised(scale).0.save(at(dir).join(files[2])).unwrap();
     }
     folder
 }
 
-pub(super) fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap()
-}
-
 #[test]
 fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
     let folder = older_layouts();
-    let at = |name: &str| folder.path().join(name);
+    let at = |name: &str| folder.join(name);
     let [old, newer] = ["old/im2.png old/im6.png", "newer/view1.png newer/view5.png"];
     for (dir, images, truth, scale) in
         [("old", old, "old/disp2.png", 4.0), ("newer", newer, "newer/disp1.png", 3.0)]
     {
-        let figures = json(&evaluated(folder.path(), &[dir, "--json", "-"]));
+        let figures = evaluated(&folder, &format!("{dir} --json -")).json();
         let pixels = quantised(scale).1;
         let largest = pixels.data().iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, b| a.max(*b));
-        let max = (largest.ceil() as i32).to_string();
-        let images: Vec<_> = images.split(' ').collect();
-        let args = ["match", images[0], images[1], "map.pfm", "--also", "raw", "--max-disparity", &max];
-        assert_eq!(run(folder.path(), &args).code, Some(0));
+        let max = largest.ceil() as i32;
+        run(&folder, &format!("match {images} map.pfm --also raw --max-disparity {max}")).succeeded();
         pixels.save(at("truth.pfm")).unwrap();
 
         for (map, file) in [("final", "map.pfm"), ("raw", "map.raw.pfm")] {
-            let by_pfm = ["map", file, "--truth", "truth.pfm", "--json", "-"];
-            let scale = scale.to_string();
-            let by_png = ["map", file, "--truth", truth, "--truth-scale", &scale, "--json", "-"];
-            let expected = json(&evaluated(folder.path(), &by_pfm));
-            assert_eq!(json(&evaluated(folder.path(), &by_png)), expected);
+            let by_pfm = format!("map {file} --truth truth.pfm --json -");
+            let by_png = format!("map {file} --truth {truth} --truth-scale {scale} --json -");
+            let expected = evaluated(&folder, &by_pfm).json();
+            assert_eq!(evaluated(&folder, &by_png).json(), expected);
             let (found, expected) = (&figures["pairs"][0][map], &expected["pairs"][0]["final"]);
             assert_eq!(found["all"]["pixels"], 240 * 180 - 40 * 30, "what is unknown stays out");
             assert!(found["all"]["avg"].as_f64().unwrap() < 2.0, "{found}");
@@ -161,10 +134,10 @@ fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
     }
 
     // Twice the scale is half the disparity, and calib.txt has the last word on the range.
-    let half = json(&evaluated(folder.path(), &["old", "--truth-scale", "8", "--json", "-"]));
+    let half = evaluated(&folder, "old --truth-scale 8 --json -").json();
     assert!(half["pairs"][0]["final"]["all"]["avg"].as_f64().unwrap() > 3.0);
     fs::write(at("old/calib.txt"), "ndisp=9\n").unwrap();
-    let near = json(&evaluated(folder.path(), &["old", "newer", "--json", "-"]));
+    let near = evaluated(&folder, "old newer --json -").json();
     assert!(near["pairs"][0]["final"]["all"]["avg"].as_f64().unwrap() > 3.0);
     assert!(near["pairs"][1]["final"]["all"]["avg"].as_f64().unwrap() < 2.0);
 }
@@ -172,31 +145,24 @@ fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
 #[test]
 fn scales_and_incomplete_folders_are_refused() {
     let folder = older_layouts();
-    let at = |name: &str| folder.path().join(name);
+    let at = |name: &str| folder.join(name);
     for scale in ["0", "-3", "nan", "inf", "three", "0.01", "256"] {
-        refused(folder.path(), &["old", "--truth-scale", scale], 2, &["--truth-scale", "0.1 to 255"]);
+        refused(&folder, &format!("old --truth-scale {scale}"), 2, "--truth-scale & 0.1 to 255");
     }
     copy("slanted", &at("new"));
     Plane::filled(240, 180, 1.0).save(at("map.pfm")).unwrap();
-    let word = ["--truth-scale", "leave it out"];
-    refused(folder.path(), &["new", "--truth-scale", "3"], 2, &word);
-    let args = ["map", "map.pfm", "--truth", "map.pfm", "--truth-scale", "3"];
-    refused(folder.path(), &args, 1, &["map.pfm", "8-bit PNG", "remove --truth-scale"]);
-    refused(folder.path(), &[&args[..3], &["old/disp2.png"]].concat(), 1, &["disp2.png", "--truth-scale"]);
-    refused(folder.path(), &[&args[..3], &["old/im2.png"], &args[4..]].concat(), 1, &["im2.png", "grey"]);
+    refused(&folder, "new --truth-scale 3", 2, "--truth-scale & leave it out");
+    let line = "map map.pfm --truth map.pfm --truth-scale 3";
+    refused(&folder, line, 1, "map.pfm & 8-bit PNG & remove --truth-scale");
+    refused(&folder, "map map.pfm --truth old/disp2.png", 1, "disp2.png & --truth-scale");
+    refused(&folder, "map map.pfm --truth old/im2.png --truth-scale 3", 1, "im2.png & grey");
 
     fs::remove_file(at("newer/view5.png")).unwrap();
-    refused(
-        folder.path(),
-        &["old", "newer"],
-        1,
-        &["newer/view5.png", "holds view1.png, view5.png, disp1.png"],
-    );
+    refused(&folder, "old newer", 1, "newer/view5.png & holds view1.png, view5.png, disp1.png");
     fs::remove_file(at("old/disp2.png")).unwrap();
-    refused(folder.path(), &["old"], 1, &["old/disp2.png", "holds im2.png, im6.png, disp2.png"]);
+    refused(&folder, "old", 1, "old/disp2.png & holds im2.png, im6.png, disp2.png");
     fs::create_dir(at("bare")).unwrap();
-    let all = ["bare/im0.png", "disp0GT.pfm, calib.txt", "view1.png", "disp2.png"];
-    refused(folder.path(), &["bare"], 1, &all);
+    refused(&folder, "bare", 1, "bare/im0.png & disp0GT.pfm, calib.txt & view1.png & disp2.png");
 }
 
 /// What JSON holds of each entry of an object, added up.
@@ -206,13 +172,13 @@ fn total(of: &Value, field: &str) -> f64 {
 
 #[test]
 fn a_breakdown_adds_up() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     copy("slanted", &at("Teddy"));
     copy("thin", &at("thin"));
     fs::remove_file(at("thin/mask0nocc.png")).unwrap();
-    let text = evaluated(folder.path(), &["Teddy", "thin", "--breakdown", "--json", "out.json"]);
-    let figures = json(&fs::read_to_string(at("out.json")).unwrap());
+    let text = evaluated(&folder, "Teddy thin --breakdown --json out.json").stdout;
+    let figures = json(at("out.json"));
 
     let [teddy, thin] = &figures["pairs"].as_array().unwrap()[..] else { panic!("two pairs") };
     for (name, of) in [("Teddy", teddy), ("thin", thin), ("mean", &figures["mean"])] {
@@ -247,8 +213,7 @@ fn a_breakdown_adds_up() {
     assert!(thin["validity"].is_null() && figures["mean"]["validity"].is_null());
 
     // Of the maps that the program writes.
-    let args = ["match", "Teddy/im0.png", "Teddy/im1.png", "map.pfm", "--also", "confidence,validity"];
-    assert_eq!(run(folder.path(), &args).code, Some(0));
+    run(&folder, "match Teddy/im0.png Teddy/im1.png map.pfm --also confidence,validity").succeeded();
     let truth = read::read_disparity(&at("Teddy/disp0GT.pfm")).unwrap();
     let (map, grey) = (read::read_disparity(&at("map.pfm")).unwrap(), |file: &str| read::grey8(&at(file)));
     let ground = GroundTruth::new(truth.clone(), None).unwrap();
@@ -270,15 +235,13 @@ fn a_breakdown_adds_up() {
     near(&teddy["validity"]["recall"], 100.0 * hits / (hits + missed));
 
     // The figures are there without the flag, the tables are not; a map that others made has neither.
-    let plain = evaluated(folder.path(), &["Teddy", "thin"]);
+    let plain = evaluated(&folder, "Teddy thin").stdout;
     assert!(text.starts_with(&plain) && text.len() > plain.len());
-    let again = json(&evaluated(folder.path(), &["Teddy", "thin", "--json", "-"]));
-    assert_eq!(again["mean"], figures["mean"]);
-    let args = ["map", "map.pfm", "--truth", "Teddy/disp0GT.pfm", "--json", "-"];
-    let others = json(&evaluated(folder.path(), &args));
+    assert_eq!(evaluated(&folder, "Teddy thin --json -").json()["mean"], figures["mean"]);
+    let line = "map map.pfm --truth Teddy/disp0GT.pfm";
+    let others = evaluated(&folder, &format!("{line} --json -")).json();
     for key in ["breakdown", "confidence", "validity"] {
         assert!(others["pairs"][0][key].is_null() && others["mean"][key].is_null());
     }
-    let words = ["--breakdown", "unexpected argument"];
-    refused(folder.path(), &[&args[..4], &["--breakdown"]].concat(), 2, &words);
+    refused(&folder, &format!("{line} --breakdown"), 2, "--breakdown & unexpected argument");
 }

@@ -1,14 +1,14 @@
 //! What goes wrong: one line that says so, and nothing left behind.
 
-use std::fs;
-use std::path::Path;
-
 use super::*;
 
 /// Arguments; exit status; what the message must say: the thing & the remedy.
 type Failure = (&'static str, i32, &'static str);
 
-/// `M` stands for a `match` that would succeed, up to its output, and `I` for such an `inspect`.
+const TOO_MANY: &str = "240 x 180 & at most 43199 & raise --max-pixels";
+
+/// `M` stands for a `match` that would succeed, up to its output, `I` for such an `inspect`, `P` for a `match` to out.pfm up to its
+/// range, and `R` for one of raw images.
 const FAILURES: &[Failure] = &[
     // The command line itself.
     ("", 2, "subcommand & match, rectify, sequence, batch & --help"),
@@ -118,11 +118,7 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --memory 17TiB", 2, "--memory <SIZE> & from 1MiB to 16TiB"),
     ("M out.pfm --memory 99999999999999999999TiB", 2, "--memory <SIZE> & from 1MiB to 16TiB"),
     ("M out.pfm --set memory=0", 2, "--set memory & 0 is outside 1 to 16777216"),
-    (
-        "match left.png right.png out.pfm --max-disparity 900 --memory 1MiB",
-        2,
-        "--memory & 1 MiB & 60 x 40 & at least & smaller",
-    ),
+    ("P --max-disparity 900 --memory 1MiB", 2, "--memory & 1 MiB & 60 x 40 & at least & smaller"),
     // Inspection.
     ("inspect left.png", 2, "<RIGHT> & mrfgs inspect --help"),
     ("I folder/full", 1, "folder/full & not empty"),
@@ -135,20 +131,16 @@ const FAILURES: &[Failure] = &[
     ("match damaged/left.png right.png out.pfm", 1, "calib.txt & line 1 & ndisp"),
     ("match huge/left.png right.png out.pfm", 1, "calib.txt & ndisp=100000 & at most 16384"),
     ("M out.pfm --max-disparity 9", 2, "--max-disparity & multiple times"),
-    ("match left.png right.png out.pfm --max-disparity many", 2, "many & --max-disparity & whole number"),
-    ("match left.png right.png out.pfm --max-disparity 3.5", 2, "3.5 & --max-disparity & whole number"),
-    ("match left.png right.png out.pfm --max-disparity 99999999999", 2, "--max-disparity & 1048576"),
-    ("match left.png right.png out.pfm --max-disparity 2000000", 2, "--max-disparity & 1048576 of 0"),
-    ("match left.png right.png out.pfm --max-disparity 50000", 2, "--max-disparity & narrow the range"),
-    ("match left.png right.png out.pfm --max-disparity -1", 2, "--max-disparity & -1 & --min-disparity"),
+    ("P --max-disparity many", 2, "many & --max-disparity & whole number"),
+    ("P --max-disparity 3.5", 2, "3.5 & --max-disparity & whole number"),
+    ("P --max-disparity 99999999999", 2, "--max-disparity & 1048576"),
+    ("P --max-disparity 2000000", 2, "--max-disparity & 1048576 of 0"),
+    ("P --max-disparity 50000", 2, "--max-disparity & narrow the range"),
+    ("P --max-disparity -1", 2, "--max-disparity & -1 & --min-disparity"),
     ("M out.pfm --min-disparity 10", 2, "--max-disparity & below the minimum disparity 10 & raise it"),
     ("M out.pfm --min-disparity -2000000", 2, "--min-disparity & 1048576 of 0"),
     ("M out.pfm --min-disparity few", 2, "few & --min-disparity & whole number"),
-    (
-        "match left.png right.png out.pfm --min-disparity 60 --max-disparity 70",
-        2,
-        "--max-disparity & 60 to 70 & 60 pixels wide",
-    ),
+    ("P --min-disparity 60 --max-disparity 70", 2, "--max-disparity & 60 to 70 & 60 pixels wide"),
     // The method.
     ("M out.pfm --method best", 2, "--method & `best` & default, accurate, fast & paper, fgs & TOML file"),
     ("M out.pfm --method none/best.toml", 1, "none/best.toml & no such file"),
@@ -170,6 +162,38 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --method key.toml", 1, "key.toml & line 2 & level & mrfgs presets"),
     ("M out.pfm --method value.toml", 1, "value.toml & line 3 & temperature & -1 is outside"),
     ("M out.pfm --method left.png", 1, "left.png & TOML"),
+    // Raw images.
+    ("R --rectify", 2, "--calib"),
+    ("R --calib @raw/cameras.yml --alpha 1", 2, "--alpha & --rectify"),
+    ("R --rectify --calib @raw/cameras.yml --alpha 2", 2, "--alpha & from 0 to 1"),
+    (
+        "R --calib @raw/cameras.yml --also points-original.las",
+        2,
+        "--also points-original.las & add --rectify & take --also points",
+    ),
+    ("batch list.csv maps --also points-original", 2, "--also points-original: & take --also points"),
+    ("R --calib @raw/cameras.yml --also depth", 1, "not rectified & --rectify"),
+    (
+        "R --rectify --calib no-unit.yml --max-disparity 40 --also depth-mm",
+        2,
+        "--also depth-mm & no-unit.yml & mm, cm or m",
+    ),
+    ("rectify @raw/left.png @raw/right.png out", 2, "--calib"),
+    ("rectify @raw/left.png @raw/right.png @raw/left.png --calib @raw/cameras.yml", 1, "is a file"),
+    // Clouds.
+    ("M out.pfm --also points.xyz", 2, "--also & points.xyz & points"),
+    ("M out.pfm --also points.ply.las", 2, "--also & points.ply.las & points"),
+    ("M out.pfm --also depth.las", 2, "--also & depth.las & points"),
+    ("M out.pfm --also points.", 2, "--also & points."),
+    // The number of pixels.
+    ("M out.pfm --max-pixels 2399", 1, "left.png & 60 x 40 & 2399"),
+    ("M out.pfm --max-pixels 0", 2, "--max-pixels & 0 is not in 1.."),
+    ("M out.pfm --max-pixels -1", 2, "--max-pixels & -1"),
+    ("M out.pfm --max-pixels 10M", 2, "--max-pixels & 10M"),
+    ("M out.pfm --max-pixels 1e6", 2, "--max-pixels & 1e6"),
+    ("evaluate @slanted --max-pixels 43199", 1, TOO_MANY),
+    ("evaluate map @slanted/disp0GT.pfm --truth @slanted/disp0GT.pfm --max-pixels 43199", 1, TOO_MANY),
+    ("bench @slanted --repeats 1 --device cpu --max-pixels 43199", 1, TOO_MANY),
     // Where it runs.
     ("M out.pfm --threads 0", 2, "--threads & 1..=1024"),
     ("M out.pfm --threads -1", 2, "-1"),
@@ -270,24 +294,22 @@ fn every_failure_is_one_line_and_leaves_nothing() {
     let before = listing(&folder);
     let mut other = Vec::new();
     for (line, code, words) in FAILURES {
-        let pair = |command| format!("{command} left.png right.png --max-disparity 9 ");
-        let words_of_line = match line.split_once(' ') {
-            Some(("M", rest)) => pair("match") + rest,
-            Some(("I", rest)) => pair("inspect") + rest,
-            _ => (*line).into(),
+        let (first, rest) = line.split_once(' ').unwrap_or((line, ""));
+        let first = match first {
+            "M" => "match left.png right.png --max-disparity 9",
+            "I" => "inspect left.png right.png --max-disparity 9",
+            "P" => "match left.png right.png out.pfm",
+            "R" => "match @raw/left.png @raw/right.png out.pfm",
+            first => first,
         };
-        let args: Vec<&str> = words_of_line.split_whitespace().collect();
-        let told = run(&folder, &args);
+        let told = run(&folder, &format!("{first} {rest}"));
         if told.code != Some(*code) {
             other.push((*line, told));
             continue;
         }
-        told.failed(*code, &[words], line);
-        assert!(
-            !told.stderr.contains("{ ") && !told.stderr.contains("Some("),
-            "Rust's own words: {}",
-            told.stderr
-        );
+        told.failed(*code, words);
+        let said = &told.stderr;
+        assert!(!said.contains("{ ") && !said.contains("Some("), "Rust's own words: {said}");
         assert!(listing(&folder) == before, "{line}: the folder has changed");
     }
     assert!(other.is_empty(), "another exit status: {other:#?}");
@@ -298,11 +320,10 @@ fn every_failure_is_one_line_and_leaves_nothing() {
 fn a_folder_without_permission_is_named() {
     let folder = workshop();
     let locked = locked(&folder);
-    let output = locked.join("out.pfm");
-    let output = output.to_str().unwrap();
-    for outputs in [[output, "a.json"], ["out.pfm", output]] {
-        let args = ["match left.png right.png", outputs[0], "--json", outputs[1], "--max-disparity 9"];
-        run(&folder, &args).failed(1, &[output, "no file can be created"], "locked");
+    let output = &*format!("{locked}/out.pfm");
+    for [map, json] in [[output, "a.json"], ["out.pfm", output]] {
+        let line = format!("match left.png right.png {map} --json {json} --max-disparity 9");
+        run(&folder, &line).failed(1, &format!("{output} & no file can be created"));
         assert!(!folder.join("out.pfm").exists());
     }
 }
@@ -312,23 +333,23 @@ fn a_folder_without_permission_is_named() {
 fn what_was_written_before_a_failure_is_removed() {
     let folder = workshop();
     let before = listing(&folder);
-    let args = ["match left.png right.png out.pfm --calib camera/calib.txt --quiet"];
-    let words = "raw,depth,points,confidence,validity,preview,side-by-side";
-    let args = [&args[..], &["--also", words, "--json out.json"]].concat();
-    let endings =
-        ["raw.pfm", "depth.pfm", "points.ply", "validity.png", "preview.png", "side-by-side.png", "json"];
-    for end in endings {
+    let line = "match left.png right.png out.pfm --calib camera/calib.txt --quiet --json out.json";
+    let also = "--also raw,depth,points,confidence,validity,preview,side-by-side";
+    for end in
+        ["raw.pfm", "depth.pfm", "points.ply", "validity.png", "preview.png", "side-by-side.png", "json"]
+    {
         // The disk that is always full lets itself be opened.
         let name = format!("out.{end}");
         let link = folder.join(&name);
         std::os::unix::fs::symlink("/dev/full", &link).unwrap();
-        run(&folder, &args).failed(1, &[&name, "No space left"], end);
+        run(&folder, &format!("{line} {also}")).failed(1, &format!("{name} & No space left"));
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink(), "{end}");
         fs::remove_file(link).unwrap();
         assert!(listing(&folder) == before, "{end}");
     }
-    let told = run(&folder, &["inspect left.png right.png steps --max-disparity 9 --json /dev/full"]);
-    assert!(told.code == Some(1) && told.stderr.contains("/dev/full: No space left"), "{told:?}");
+    let told = run(&folder, "inspect left.png right.png steps --max-disparity 9 --json /dev/full");
+    assert_eq!(told.code, Some(1), "{told:?}");
+    told.says("/dev/full: No space left");
     assert!(listing(&folder) == before, "inspect");
     assert!(Path::new("/dev/full").exists());
 }
@@ -338,16 +359,13 @@ fn what_was_written_before_a_failure_is_removed() {
 fn without_a_driver_gpu_says_what_to_do() {
     let folder = workshop();
     let before = listing(&folder);
-    let args = ["match left.png right.png out.pfm --max-disparity 9 --device gpu"];
-    let told = run_with(&folder, &args, NO_DRIVER);
-    told.failed(1, &["driver", "install", "--device cpu"], "--device gpu without a driver");
-    let args = ["match left.png right.png out.pfm --max-disparity 9 --device 0"];
-    let told = run_with(&folder, &args, NO_DRIVER);
-    told.failed(1, &["driver", "install", "--device cpu"], "--device 0 without a driver");
-    for devices in [&["--device gpu"][..], &["--device cpu --device gpu"]] {
-        let args = [&["bench misfit --json a.json"], devices].concat();
-        let told = run_with(&folder, &args, NO_DRIVER);
-        told.failed(1, &["driver", "install", "--device cpu"], "bench without a driver");
+    for line in [
+        "match left.png right.png out.pfm --max-disparity 9 --device gpu",
+        "match left.png right.png out.pfm --max-disparity 9 --device 0",
+        "bench misfit --json a.json --device gpu",
+        "bench misfit --json a.json --device cpu --device gpu",
+    ] {
+        run_with(&folder, line, NO_DRIVER).failed(1, "driver & install & --device cpu");
     }
     assert!(listing(&folder) == before);
 }
@@ -357,12 +375,12 @@ fn an_unknown_device_is_named() {
     let folder = workshop();
     let before = listing(&folder);
     for device in ["no-such-device", "999", "tpu"] {
+        let words = format!("--device & {device} & mrfgs devices");
         if has_gpu() {
-            let args = ["bench misfit --device", device, "--json a.json"];
-            run(&folder, &args).failed(2, &["--device", device, "mrfgs devices"], device);
+            run(&folder, &format!("bench misfit --device {device} --json a.json")).failed(2, &words);
         }
-        let args = ["match left.png right.png out.pfm --max-disparity 9 --device", device];
-        run(&folder, &args).failed(2, &["--device", device, "mrfgs devices"], device);
+        let line = "match left.png right.png out.pfm --max-disparity 9";
+        run(&folder, &format!("{line} --device {device}")).failed(2, &words);
     }
     assert!(listing(&folder) == before);
 }

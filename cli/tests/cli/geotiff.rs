@@ -1,21 +1,20 @@
 //! GeoTIFF: every map that is TIFF lies where its view lies.
 
-use std::fs;
 use std::io::Cursor;
-use std::path::Path;
 
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
 use super::files::{Tiff, Values};
-use super::{Folder, run, scene_file};
 use Values::{Double, Long, Short};
+
+use super::*;
 
 const KEYS: [u16; 8] = [1, 1, 0, 1, 3072, 0, 1, 32_631];
 
 /// Writes a view of a scene as GeoTIFF whose first pixel is this far east.
 fn write_view(path: &Path, from: &str, east: f64) {
-    let grey = image::open(scene_file("slanted", from)).unwrap().to_luma8();
+    let grey = image::open(scene("slanted").join(from)).unwrap().to_luma8();
     let tags = [
         (256, Long(&[grey.width()])),
         (257, Long(&[grey.height()])),
@@ -44,25 +43,25 @@ fn maps_lie_where_their_views_lie() {
     let at = |name: &str| folder.join(name);
     write_view(&at("left.tif"), "im0.png", 4e5);
     write_view(&at("right.tif"), "im1.png", 7e5);
-    fs::copy(scene_file("slanted", "calib.txt"), at("calib.txt")).unwrap();
+    fs::copy(scene("slanted/calib.txt"), at("calib.txt")).unwrap();
     fs::write(at("list.csv"), "left,right,name\nleft.tif,right.tif,d\n").unwrap();
-    let more = ["--device cpu --quiet --method fast --also raw,right,depth"];
-    run(&folder, &[&["match left.tif right.tif d.tif"], &more[..]].concat()).succeeded();
-    run(&folder, &[&["batch list.csv maps --format tif"], &more[..]].concat()).succeeded();
+    let more = "--device cpu --quiet --method fast --also raw,right,depth";
+    run(&folder, &format!("match left.tif right.tif d.tif {more}")).succeeded();
+    run(&folder, &format!("batch list.csv maps --format tif {more}")).succeeded();
     for (name, expected) in [("d.tif", 4e5), ("d.raw.tif", 4e5), ("d.right.tif", 7e5), ("d.depth.tif", 4e5)] {
         for path in [at(name), at("maps").join(name)] {
             assert!((east(&path) - expected).abs() < 1e-9, "{}", path.display());
         }
     }
     // As a frame of a sequence.
-    let line = ["sequence lef*.tif righ*.tif frames --format tif --calib calib.txt"];
-    run(&folder, &[&line, &more[..]].concat()).succeeded();
+    run(&folder, &format!("sequence lef*.tif righ*.tif frames --format tif --calib calib.txt {more}"))
+        .succeeded();
     for name in ["tif", "raw.tif", "right.tif", "depth.tif"] {
         let [frame, map] = [at(&format!("frames/left.{name}")), at(&format!("d.{name}"))];
         assert!(fs::read(&frame).unwrap() == fs::read(map).unwrap(), "{}", frame.display());
     }
     // The same in tiles.
-    let tiled = ["match left.tif right.tif tiled.tif --device cpu --method fast --memory 12MiB"];
-    assert!(run(&folder, &tiled).succeeded().stderr.contains(" tiles, "));
+    let tiled = "match left.tif right.tif tiled.tif --device cpu --method fast --memory 12MiB";
+    run(&folder, tiled).succeeded().says(" tiles, ");
     assert!((east(&at("tiled.tif")) - 4e5).abs() < 1e-9);
 }

@@ -25,6 +25,7 @@ mod robust;
 mod sequences;
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
 use std::ops::Deref;
@@ -32,6 +33,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use mrfgs::image::pfm::{self, Pfm};
+use mrfgs::image::{Plane, read};
 use mrfgs::low_level::backend::gpu;
 use mrfgs::maps::REASONS;
 use mrfgs::options::{self, Takes};
@@ -58,76 +61,91 @@ impl Deref for Folder {
 /// What a run of the program leaves.
 #[derive(Debug)]
 struct Run {
+    /// What was run.
+    line: String,
     code: Option<i32>,
     stdout: String,
     stderr: String,
 }
 
-/// Runs the program in `folder`.
-fn run(folder: &Path, args: &[&str]) -> Run {
-    run_with(folder, args, &[])
-}
-
-/// The arguments in `args`, each of which is a path or holds words with spaces between them.
-fn words<'a>(folder: &Path, args: &[&'a str]) -> Vec<&'a str> {
-    let is_path = |args: &str| Path::new(args).is_absolute() || folder.join(args).exists();
-    args.iter().flat_map(|args| if is_path(args) { vec![*args] } else { args.split(' ').collect() }).collect()
+/// The words of a command line; one like `@wall/im0.png` is the path of that file of the scenes.
+fn words(line: &str) -> impl Iterator<Item = OsString> {
+    line.split_whitespace().map(|word| match word.strip_prefix('@') {
+        Some(file) => scene(file).into(),
+        None => word.into(),
+    })
 }
 
 /// The program in `folder`.
-fn program(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Command {
+fn program(folder: &Path, line: &str) -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_mrfgs"));
-    program.current_dir(folder).args(words(folder, args));
+    program.current_dir(folder).args(words(line));
     // As on a machine without a display, where the Vulkan loader would complain on standard error.
-    program.env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE").envs(environment.iter().copied());
+    program.env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE");
     program
 }
 
 /// The program at work in `folder`, with pipes to all its ends.
-fn started(folder: &Path, args: &[&str]) -> Child {
-    let mut program = program(folder, args, &[]);
+fn started(folder: &Path, line: &str) -> Child {
+    let mut program = program(folder, line);
     program.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-fn run_with(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Run {
-    let output = program(folder, args, environment).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+/// Runs the program in `folder`.
+fn run(folder: &Path, line: &str) -> Run {
+    run_with(folder, line, &[])
+}
+
+fn run_with(folder: &Path, line: &str, environment: &[(&str, &str)]) -> Run {
+    Run::of(line, program(folder, line).envs(environment.iter().copied()).output().unwrap())
+}
+
+/// Runs the program after a command of the shell.
+fn shell(folder: &Path, before: &str, line: &str) -> Run {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &format!("{before} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")]);
+    Run::of(line, shell.current_dir(folder).args(words(line)).env_remove("RUST_BACKTRACE").output().unwrap())
 }
 
 impl Run {
+    fn of(line: &str, output: Output) -> Self {
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        let (stdout, stderr) = (text(output.stdout), text(output.stderr));
+        Self { line: line.to_owned(), code: output.status.code(), stdout, stderr }
+    }
+
     fn succeeded(self) -> Self {
         assert_eq!(self.code, Some(0), "{self:?}");
         self
     }
 
     /// Exactly one line on standard error, with all these words, and nothing on standard output.
-    /// ` & ` separates words, too.
-    fn failed(&self, code: i32, words: &[&str], what: &str) {
-        assert_eq!(self.code, Some(code), "{what}: {self:?}");
-        assert_eq!(self.stdout, "", "{what}");
-        assert!(self.stderr.starts_with("mrfgs: ") && self.stderr.ends_with('\n'), "{what}: {self:?}");
-        assert_eq!(self.stderr.lines().count(), 1, "{what}: {}", self.stderr);
-        assert!(!self.stderr.contains("panicked"), "{what}: {}", self.stderr);
-        for word in words.iter().flat_map(|words| words.split(" & ")) {
-            assert!(self.stderr.contains(word), "{what}: no `{word}` in: {}", self.stderr);
+    fn failed(&self, code: i32, words: &str) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert_eq!(self.stdout, "", "{self:?}");
+        assert!(self.stderr.starts_with("mrfgs: ") && self.stderr.ends_with('\n'), "{self:?}");
+        assert_eq!(self.stderr.lines().count(), 1, "{self:?}");
+        assert!(!self.stderr.contains("panicked"), "{self:?}");
+        self.says(words);
+    }
+
+    /// All these words are on standard error; ` & ` is between them.
+    fn says(&self, words: &str) {
+        for word in words.split(" & ") {
+            assert!(self.stderr.contains(word), "{}: no `{word}` in: {}", self.line, self.stderr);
+        }
+    }
+
+    /// The same of standard output.
+    fn prints(&self, words: &str) {
+        for word in words.split(" & ") {
+            assert!(self.stdout.contains(word), "{}: no `{word}` in:\n{}", self.line, self.stdout);
         }
     }
 
     fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap()
     }
-}
-
-/// Runs the program after a command of the shell.
-fn shell(folder: &Path, before: &str, line: &str) -> Output {
-    Command::new("sh")
-        .current_dir(folder)
-        .args(["-c", &format!("{before} && exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_mrfgs")])
-        .args(line.split(' '))
-        .env_remove("RUST_BACKTRACE")
-        .output()
-        .unwrap()
 }
 
 /// Waits until something is so.
@@ -145,15 +163,15 @@ fn send(signal: &str, child: &Child) {
     assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
 }
 
-/// A folder below `folder` that nobody may write to.
+/// A folder, as `folder` has it, that nobody may write to.
 #[cfg(target_os = "linux")]
-fn locked(folder: &Path) -> PathBuf {
+fn locked(folder: &Path) -> &'static str {
     use std::os::unix::fs::PermissionsExt;
     let locked = folder.join("locked");
     fs::create_dir(&locked).unwrap();
     fs::set_permissions(&locked, fs::Permissions::from_mode(0o555)).unwrap();
     // Root may write anywhere but where the kernel says no.
-    if fs::write(locked.join("probe"), "").is_ok() { "/sys".into() } else { locked }
+    if fs::write(locked.join("probe"), "").is_ok() { "/sys" } else { "locked" }
 }
 
 /// Everything in a folder and below it: the content of files, `None` for folders.
@@ -177,19 +195,41 @@ fn in_cells(text: &str) -> String {
     text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ") + "\n").collect()
 }
 
+/// A scene, or a file of one.
 fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)
 }
 
-/// The path of a file of a scene, as an argument.
-fn scene_file(name: &str, file: &str) -> String {
-    scene(name).join(file).to_str().unwrap().to_owned()
+/// Copies a scene to a folder of another name.
+fn copy(name: &str, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt", "mask0nocc.png"] {
+        fs::copy(scene(name).join(file), to.join(file)).unwrap();
+    }
+}
+
+fn json(path: impl AsRef<Path>) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn read_pfm(path: impl AsRef<Path>) -> Plane<f32> {
+    let Pfm::Grey(map) = pfm::read(path.as_ref()).unwrap() else { panic!("one channel") };
+    map
+}
+
+/// Reads a map in TIFF, whose invalid pixels are NaN.
+fn read_tiff(path: impl AsRef<Path>) -> Plane<f32> {
+    let mut decoder = tiff::decoder::Decoder::new(fs::File::open(path).unwrap()).unwrap();
+    let (width, height) = decoder.dimensions().unwrap();
+    let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else { panic!("float") };
+    Plane::new(width as usize, height as usize, values)
 }
 
 /// A folder with a pair of 60 x 40 pixels without calib.txt, and with much that is wrong.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
+    let copied = |from: &str, to: &str| assert!(fs::copy(at(from), at(to)).is_ok());
     for (from, to) in [("im0.png", "left.png"), ("im1.png", "right.png")] {
         let image = image::open(scene("slanted").join(from)).unwrap();
         image.crop_imm(100, 80, 60, 40).save(at(to)).unwrap();
@@ -202,13 +242,12 @@ fn workshop() -> Folder {
     fs::create_dir_all(at("folder/full")).unwrap();
     fs::write(at("folder/full/of"), "something").unwrap();
     image::GrayImage::from_pixel(60, 40, image::Luma([90])).save(at("flat.png")).unwrap();
-    fs::create_dir(at("taken.pfm")).unwrap();
-    // Where outputs beside taken.tif would be.
-    fs::create_dir(at("taken.raw.tif")).unwrap();
-    fs::create_dir(at("taken.validity.png")).unwrap();
-    fs::create_dir(at("taken.png")).unwrap();
+    // The second and the third are where outputs beside taken.tif would be.
+    for name in ["taken.pfm", "taken.raw.tif", "taken.validity.png", "taken.png", "misfit", "broken"] {
+        fs::create_dir(at(name)).unwrap();
+    }
     // Inputs with the name of an output.
-    fs::copy(at("right.png"), at("view.preview.png")).unwrap();
+    copied("right.png", "view.preview.png");
     fs::write(at("syntax.toml"), "levels = 3\nmatching sad\n").unwrap();
     fs::write(at("key.toml"), "# a comment\nlevel = 3\n").unwrap();
     fs::write(at("value.toml"), "levels = 3\n\ntemperature = -1\n").unwrap();
@@ -222,28 +261,25 @@ fn workshop() -> Folder {
         ("camera", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=1\nwidth=60\nheight=40\nndisp=17\n"),
     ] {
         fs::create_dir(at(name)).unwrap();
-        fs::copy(at("left.png"), at(name).join("left.png")).unwrap();
+        copied("left.png", &format!("{name}/left.png"));
         fs::write(at(name).join("calib.txt"), calib).unwrap();
     }
     // Folders to evaluate, each with one thing wrong.
     for file in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"] {
-        let to = at(&format!("without-{file}"));
-        fs::create_dir(&to).unwrap();
-        for other in ["im0.png", "im1.png", "disp0GT.pfm", "calib.txt"].into_iter().filter(|f| *f != file) {
-            fs::copy(scene("slanted").join(other), to.join(other)).unwrap();
+        copy("slanted", &at(&format!("without-{file}")));
+        for other in [file, "mask0nocc.png"] {
+            fs::remove_file(at(&format!("without-{file}")).join(other)).unwrap();
         }
     }
-    fs::create_dir(at("misfit")).unwrap();
-    for (from, to) in [("left.png", "im0.png"), ("right.png", "im1.png")] {
-        fs::copy(at(from), at("misfit").join(to)).unwrap();
-    }
-    for file in ["disp0GT.pfm", "calib.txt"] {
-        fs::copy(scene("slanted").join(file), at("misfit").join(file)).unwrap();
-    }
-    fs::create_dir(at("broken")).unwrap();
-    for (from, to) in [("left.png", "im0.png"), ("text.png", "im1.png"), ("misfit/calib.txt", "calib.txt")] {
-        fs::copy(at(from), at("broken").join(to)).unwrap();
-    }
+    copied("left.png", "misfit/im0.png");
+    copied("right.png", "misfit/im1.png");
+    copied("without-im0.png/disp0GT.pfm", "misfit/disp0GT.pfm");
+    copied("without-im0.png/calib.txt", "misfit/calib.txt");
+    copied("left.png", "broken/im0.png");
+    copied("text.png", "broken/im1.png");
+    copied("misfit/calib.txt", "broken/calib.txt");
+    let cameras = fs::read_to_string(scene("raw/cameras.yml")).unwrap();
+    fs::write(at("no-unit.yml"), cameras.replace("unit: m\n", "")).unwrap();
     // A pair whose map would take the place of its left image.
     fs::write(at("pairs.csv"), "name,left,right\nleft,left.png,right.png\n").unwrap();
     fs::write(at("unknown.pfm"), b"Pf\n1 1\n-1.0\n\0\0\x80\x7f").unwrap();
@@ -303,8 +339,7 @@ const COMMANDS: [&str; 14] = [
 fn help_fits_a_terminal_of_80_columns() {
     let folder = Folder::new();
     for command in COMMANDS {
-        let args: Vec<_> = command.split_whitespace().chain(["--help"]).collect();
-        let help = run_with(&folder, &args, &[("COLUMNS", "80")]).succeeded().stdout;
+        let help = run_with(&folder, &format!("{command} --help"), &[("COLUMNS", "80")]).succeeded().stdout;
         let (_, examples) = help.split_once("Examples:\n").unwrap_or_default();
         for line in help.lines() {
             assert!(line.chars().count() <= 80, "{command}: {line}");
@@ -320,23 +355,17 @@ fn help_fits_a_terminal_of_80_columns() {
 #[test]
 fn devices_say_what_auto_takes() {
     let folder = Folder::new();
-    let told = run(&folder, &["devices"]).succeeded();
-    let last = told.stdout.lines().last().unwrap();
-    assert!(last.contains("`auto` takes "), "{}", told.stdout);
+    let told = run(&folder, "devices").succeeded();
+    assert!(told.stdout.lines().last().unwrap().contains("`auto` takes "), "{told:?}");
 }
 
 #[test]
 fn the_later_word_counts() {
     let folder = Folder::new();
-    fs::write(
-        folder.join("my.toml"),
-        "levels = 3\nschedule.iterations = 2\n[cost]\nmatching = \"ad-census\"\noutside-cost = 1\n",
-    )
-    .unwrap();
-    let dir = scene("wall").to_str().unwrap().to_owned();
-    let args = ["evaluate", &dir, "--json - --set levels=2 --set graph.levels=1"];
-    let told = run(&folder, &[&args[..], &["--method paper --method my.toml"]].concat());
-    let method = &told.succeeded().json()["method"];
+    let keys = "levels = 3\nschedule.iterations = 2\n[cost]\nmatching = \"ad-census\"\noutside-cost = 1\n";
+    fs::write(folder.join("my.toml"), keys).unwrap();
+    let line = "evaluate @wall --json - --set levels=2 --set graph.levels=1 --method paper --method my.toml";
+    let method = &run(&folder, line).succeeded().json()["method"];
     assert_eq!(method["graph"]["levels"], 1, "--set after --method, the last --set last");
     assert_eq!(method["schedule"]["iterations"], 2, "a file after the preset");
     let cost = &method["cost"];
@@ -349,7 +378,7 @@ fn presets_can_be_pasted_into_a_file() {
     let folder = Folder::new();
     for preset in options::PRESETS {
         let name = preset.name;
-        let told = run(&folder, &["presets", name]).succeeded();
+        let told = run(&folder, &format!("presets {name}")).succeeded();
         let path = folder.join("pasted.toml");
         fs::write(&path, &told.stdout).unwrap();
         for other in options::PRESETS {
@@ -358,7 +387,7 @@ fn presets_can_be_pasted_into_a_file() {
             assert_eq!(method, preset.method(), "{name} over {}", other.name);
         }
     }
-    let told = run(&folder, &["presets", "--json", "-"]).succeeded().json();
+    let told = run(&folder, "presets --json -").succeeded().json();
     let listed = told["presets"].as_array().unwrap();
     assert_eq!(listed.len(), options::PRESETS.len());
     for (row, preset) in listed.iter().zip(options::PRESETS) {
@@ -366,8 +395,8 @@ fn presets_can_be_pasted_into_a_file() {
             serde_json::json!({"name": preset.name, "about": preset.about, "method": preset.method()});
         assert_eq!(*row, expected);
     }
-    let listing = run(&folder, &["presets", "--all"]).succeeded().stdout;
-    let short = run(&folder, &["presets"]).succeeded().stdout;
+    let listing = run(&folder, "presets --all").succeeded().stdout;
+    let short = run(&folder, "presets").succeeded().stdout;
     let names =
         |text: &str, key: &options::Key| text.lines().any(|l| l.split(' ').next() == Some(&key.name()));
     for group in options::GROUPS {
@@ -396,30 +425,30 @@ fn presets_can_be_pasted_into_a_file() {
 #[test]
 fn help_teaches() {
     let folder = Folder::new();
-    let help = |args: &[&str]| {
-        let told = run(&folder, args).succeeded();
+    let help = |line: &str| {
+        let told = run(&folder, line).succeeded();
         assert_eq!(told.stderr, "");
         // As it is wrapped depends on the terminal.
         told.stdout.split_whitespace().collect::<Vec<_>>().join(" ")
     };
-    let text = help(&["match --help"]);
+    let text = help("match --help");
     for (bit, name, _) in REASONS {
         assert!(text.contains(&format!("{bit} {name}")) || bit == 0, "{bit} {name}");
     }
     for words in ["Examples:", "[default: 0, or", "ndisp - 1", "in pixels"] {
         assert!(text.contains(words), "{words}");
     }
-    assert!(help(&["--help"]).contains("Exit status: 0"));
-    assert!(help(&["evaluate --help"]).contains("mask0nocc.png"));
-    assert!(help(&["batch --help"]).contains("name,left,right,max_disparity # a comment"));
-    assert!(help(&["presets --help"]).contains("Examples:"));
-    assert!(help(&["bench --help"]).contains("[default: default and paper,"));
+    assert!(help("--help").contains("Exit status: 0"));
+    assert!(help("evaluate --help").contains("mask0nocc.png"));
+    assert!(help("batch --help").contains("name,left,right,max_disparity # a comment"));
+    assert!(help("presets --help").contains("Examples:"));
+    assert!(help("bench --help").contains("[default: default and paper,"));
 }
 
 #[test]
 fn the_version_names_what_a_report_needs() {
     let folder = Folder::new();
-    let told = run(&folder, &["--version"]).succeeded().stdout;
+    let told = run(&folder, "--version").succeeded().stdout;
     let mut lines = told.lines();
     assert_eq!(lines.next(), Some(format!("mrfgs {}", env!("CARGO_PKG_VERSION")).as_str()));
     assert!(lines.next().is_some_and(|line| line.starts_with("wgpu ")), "{told}");
@@ -428,37 +457,30 @@ fn the_version_names_what_a_report_needs() {
     for (line, device) in lines.zip(devices) {
         assert!(line.contains(&device.name) && line.contains(&device.driver), "{line}");
     }
-    assert_eq!(run(&folder, &["-V"]).succeeded().stdout, told);
+    assert_eq!(run(&folder, "-V").succeeded().stdout, told);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_reader_that_leaves_early_is_no_failure() {
-    use std::process::Stdio;
-    let mut child = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .arg("presets")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let folder = Folder::new();
+    let mut child = started(&folder, "presets");
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{output:?}");
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_mrfgs")).arg("presets").stdout(full).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert!(text.contains("standard output") && text.lines().count() == 1, "{text}");
+    let output = program(&folder, "presets").stdout(full).output().unwrap();
+    Run::of("presets", output).failed(1, "standard output");
 }
 
 #[test]
 fn shells_and_readers_get_every_flag() {
     let folder = Folder::new();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
-        let script = run(&folder, &["completions", shell]).succeeded().stdout;
+        let script = run(&folder, &format!("completions {shell}")).succeeded().stdout;
         assert!(script.contains("mrfgs") && script.contains("max-disparity"), "{shell}");
     }
-    run(&folder, &["man pages"]).succeeded();
+    run(&folder, "man pages").succeeded();
     let pages = listing(&folder.join("pages"));
     let names: Vec<_> = pages.keys().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
     for command in COMMANDS {
@@ -473,5 +495,5 @@ fn shells_and_readers_get_every_flag() {
         assert!(page.contains(flag), "no {flag} in:\n{page}");
     }
     // Again, over what is there.
-    run(&folder, &["man pages"]).succeeded();
+    run(&folder, "man pages").succeeded();
 }

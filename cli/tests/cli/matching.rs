@@ -1,9 +1,7 @@
 //! `mrfgs match` and `mrfgs inspect`: what they write and say.
 
-use std::fs;
 use std::io::{BufRead, BufReader, Read};
 
-use mrfgs::image::read;
 use mrfgs::maps::flag;
 
 use super::*;
@@ -12,19 +10,15 @@ use super::*;
 fn match_writes_every_output_in_every_format() {
     let folder = Folder::new();
     let at = |name: &str| folder.join(name);
-    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("slanted", file));
+    let line = "match @slanted/im0.png @slanted/im1.png --mask mask.png";
     let mask = image::GrayImage::from_fn(240, 180, |x, y| image::Luma([u8::from(x > 200 && y < 9) * 9]));
     mask.save(at("mask.png")).unwrap();
 
-    let common = ["--mask mask.png --threads 2 --device cpu"];
-    let first = ["match", &left, &right, "a.pfm --also raw,confidence --also validity,preview"];
-    let first = [&first[..], &common].concat();
-    let told = run(&folder, &first).succeeded();
+    let first = "a.pfm --also raw,confidence --also validity,preview --threads 2 --device cpu";
+    let told = run(&folder, &format!("{line} {first}")).succeeded();
     assert_eq!(told.stdout, "");
     assert_eq!(told.stderr.lines().count(), 1, "{}", told.stderr);
-    for words in ["mrfgs: 240 x 180, 32 labels, ", " s on the CPU path, 2 threads\n"] {
-        assert!(told.stderr.contains(words), "{}", told.stderr);
-    }
+    told.says("mrfgs: 240 x 180, 32 labels,  &  s on the CPU path, 2 threads\n");
 
     let map = read::read_disparity(&at("a.pfm")).unwrap();
     let raw = read::read_disparity(&at("a.raw.pfm")).unwrap();
@@ -54,41 +48,33 @@ fn match_writes_every_output_in_every_format() {
     assert!(map != raw, "post-processing does something");
 
     // The same map in the other formats; the number of threads changes nothing.
-    for (output, raw, step) in [
+    for (output, raw_output, step) in [
         ("b.png", "b.raw.png", 256.0),
         ("c.tiff", "c.raw.tiff", f32::INFINITY),
         ("C.PFM", "C.raw.PFM", f32::INFINITY),
     ] {
-        let args = ["match", &left, &right, output, "--also raw --mask mask.png --threads 1"];
-        let quiet = run(&folder, &[&args[..], &["--quiet --max-disparity 31"]].concat());
-        let quiet = quiet.succeeded();
+        let more = "--also raw --threads 1 --quiet --max-disparity 31";
+        let quiet = run(&folder, &format!("{line} {output} {more}")).succeeded();
         assert_eq!((quiet.stdout, quiet.stderr), (String::new(), String::new()));
-        for (name, expected) in [(output, &map), (raw, &read::read_disparity(&at("a.raw.pfm")).unwrap())] {
+        for (name, expected) in [(output, &map), (raw_output, &raw)] {
             let same = read::read_disparity(&at(name)).unwrap();
             for (a, b) in same.data().iter().zip(expected.data()) {
                 // In 16-bit PNG a disparity of 0 is 1/256.
-                assert!(
-                    a.total_cmp(b).is_eq() || (a * step - 1.0).abs() < 1e-6 && *b == 0.0,
-                    "{name}: {a} and {b}"
-                );
+                let none = (a * step - 1.0).abs() < 1e-6 && *b == 0.0;
+                assert!(a.total_cmp(b).is_eq() || none, "{name}: {a} and {b}");
             }
         }
     }
-    let tiff = fs::read(at("c.tiff")).unwrap();
-    let mut decoder = tiff::decoder::Decoder::new(std::io::Cursor::new(tiff)).unwrap();
-    let tiff::decoder::DecodingResult::F32(values) = decoder.read_image().unwrap() else { panic!("float") };
-    assert!(values[239].is_nan() && values[0].is_finite(), "invalid is NaN in TIFF");
+    let tiff = read_tiff(at("c.tiff"));
+    assert!(tiff[(239, 0)].is_nan() && tiff[(0, 0)].is_finite(), "invalid is NaN in TIFF");
+    // The last row of a PFM file is the top one.
     let pfm = fs::read(at("a.pfm")).unwrap();
-    assert!(
-        pfm.ends_with(&f32::INFINITY.to_le_bytes()),
-        "invalid is +inf in PFM, whose last row is the top one"
-    );
+    assert!(pfm.ends_with(&f32::INFINITY.to_le_bytes()), "invalid is +inf in PFM");
     let png = image::open(at("b.png")).unwrap().into_luma16();
     assert!(png.get_pixel(239, 0).0 == [0] && png.get_pixel(0, 0).0 != [0], "invalid is 0 in PNG");
 
     // Without the fill, what is invalid stays so.
-    let args = ["match", &left, &right, "d.pfm --set fill=row --set fill=none --mask mask.png"];
-    run(&folder, &[&args[..], &["--also validity"]].concat()).succeeded();
+    run(&folder, &format!("{line} d.pfm --set fill=row --set fill=none --also validity")).succeeded();
     let map = read::read_disparity(&at("d.pfm")).unwrap();
     let validity = read::grey8(&at("d.validity.png")).unwrap();
     assert!(map.data().iter().zip(validity.data()).all(|(d, f)| d.is_finite() == (f & flag::INVALID == 0)));
@@ -102,7 +88,7 @@ fn match_writes_every_output_in_every_format() {
 fn ranges_may_be_negative() {
     let folder = workshop();
     // With the views swapped, every disparity has the other sign.
-    run(&folder, &["match right.png left.png out.tif --min-disparity -31 --max-disparity -1"]).succeeded();
+    run(&folder, "match right.png left.png out.tif --min-disparity -31 --max-disparity -1").succeeded();
     let map = read::read_disparity(&folder.join("out.tif")).unwrap();
     assert_eq!(map.size(), (60, 40));
     assert!(map.data().iter().all(|d| (-31.0..=-1.0).contains(d)));
@@ -117,9 +103,8 @@ fn a_range_is_found_where_none_is_given() {
     let truth = read::read_disparity(&folder.join("truth.pfm")).unwrap();
     let finite = || truth.data().iter().copied().filter(|d| d.is_finite());
     let (least, most) = (finite().fold(f32::MAX, f32::min), finite().fold(f32::MIN, f32::max));
-    for extra in [&[][..], &["--max-disparity auto"][..]] {
-        let args = [&["match left.png right.png out.pfm"], extra].concat();
-        let said = run(&folder, &args).succeeded().stderr;
+    for extra in ["", "--max-disparity auto"] {
+        let said = run(&folder, &format!("match left.png right.png out.pfm {extra}")).succeeded().stderr;
         let line = said.lines().find(|l| l.contains("by sparse matches")).expect("said on stderr");
         let numbers: Vec<f32> =
             line.split_whitespace().filter_map(|w| w.trim_end_matches(',').parse().ok()).collect();
@@ -127,21 +112,20 @@ fn a_range_is_found_where_none_is_given() {
         assert!(numbers[1] - numbers[0] < 1.5 * (most - least), "{line} and the truth is {least} to {most}");
     }
     // What the user says counts.
-    let args = ["match left.png right.png out.pfm --max-disparity auto --min-disparity 2"];
-    assert!(run(&folder, &args).succeeded().stderr.contains("disparities 2 to "));
+    let line = "match left.png right.png out.pfm --max-disparity auto --min-disparity 2";
+    run(&folder, line).succeeded().says("disparities 2 to ");
 }
 
 #[test]
 fn a_pair_that_is_not_rectified_is_named() {
     let folder = Folder::new();
-    let args = ["match left.png right.png out.pfm --max-disparity 47"];
     for (shift, warns) in [(0, false), (1, true), (2, true)] {
         for (from, to, top) in [("im0.png", "left.png", 0), ("im1.png", "right.png", shift)] {
             let image = image::open(scene("mixed").join(from)).unwrap();
             image.crop_imm(0, top, 320, 230).save(folder.join(to)).unwrap();
         }
-        let said = run(&folder, &args).succeeded().stderr;
-        assert_eq!(said.contains("not rectified"), warns, "{said}");
+        let told = run(&folder, "match left.png right.png out.pfm --max-disparity 47").succeeded();
+        assert_eq!(told.stderr.contains("not rectified"), warns, "{told:?}");
     }
 }
 
@@ -149,15 +133,16 @@ fn a_pair_that_is_not_rectified_is_named() {
 #[test]
 fn swapped_views_are_told_whatever_the_range() {
     let folder = Folder::new();
-    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
-    let list = format!("name,left,right,max_disparity\nauto,{right},{left},auto\ngiven,{right},{left},47\n");
+    copy("mixed", &folder.join("mixed"));
+    let views = "mixed/im1.png,mixed/im0.png";
+    let list = format!("name,left,right,max_disparity\nauto,{views},auto\ngiven,{views},47\n");
     fs::write(folder.join("list.csv"), list).unwrap();
-    for (range, told) in [(&["auto"][..], true), (&["47"], true), (&["0", "--min-disparity", "-47"], false)] {
-        let args = ["match", &right, &left, "out.pfm --device cpu --max-disparity"];
-        let said = run(&folder, &[&args[..], range].concat()).succeeded().stderr;
-        assert_eq!(said.contains("warning: the views seem to be swapped"), told, "{range:?}: {said}");
+    for (range, warns) in [("auto", true), ("47", true), ("0 --min-disparity -47", false)] {
+        let line = "match mixed/im1.png mixed/im0.png out.pfm --device cpu --max-disparity";
+        let told = run(&folder, &format!("{line} {range}")).succeeded();
+        assert_eq!(told.stderr.contains("warning: the views seem to be swapped"), warns, "{told:?}");
     }
-    run(&folder, &["batch list.csv maps --device cpu"]).succeeded();
+    run(&folder, "batch list.csv maps --device cpu").succeeded();
     for name in ["auto", "given"] {
         let record = fs::read_to_string(folder.join(format!("maps/{name}.json"))).unwrap();
         assert!(record.contains("the views seem to be swapped"), "{name}: {record}");
@@ -175,51 +160,44 @@ fn what_stands_for_no_data_is_ignored() {
         }
         image.save(folder.join(to)).unwrap();
     }
-    let map = |more: &[&str]| {
-        let args = ["match left.png right.png out.tif --max-disparity 47 --device cpu --quiet"];
-        run(&folder, &[&args[..], more].concat()).succeeded();
+    let map = |more: &str| {
+        let line = "match left.png right.png out.tif --max-disparity 47 --device cpu --quiet";
+        run(&folder, &format!("{line} {more}")).succeeded();
         read::read_disparity(&folder.join("out.tif")).unwrap()
     };
-    let border = |map: &mrfgs::image::Plane<f32>| {
-        (0..240).flat_map(|y| (0..9).map(move |x| (x, y))).all(|at| map[at].is_infinite())
-    };
-    let ignored = map(&["--no-data 255"]);
+    let border =
+        |map: &Plane<f32>| (0..240).flat_map(|y| (0..9).map(move |x| (x, y))).all(|at| map[at].is_infinite());
+    let ignored = map("--no-data 255");
     assert!(border(&ignored) && ignored[(20, 20)].is_finite());
-    assert!(!border(&map(&[])) && !border(&map(&["--no-data -1"])));
+    assert!(!border(&map("")) && !border(&map("--no-data -1")));
 }
 
 #[test]
 fn a_range_that_cuts_off_the_scene_is_told() {
     let folder = Folder::new();
-    let [left, right] = ["im0.png", "im1.png"].map(|file| scene_file("mixed", file));
-    let said = |more: &[&str]| {
-        let args = ["match", &left, &right, "out.pfm --device cpu"];
-        run(&folder, &[&args[..], more].concat()).succeeded().stderr
+    let said = |more: &str| {
+        let line = "match @mixed/im0.png @mixed/im1.png out.pfm --device cpu";
+        run(&folder, &format!("{line} {more}")).succeeded().stderr
     };
-    let warning = "warning: ";
-    assert!(!said(&["--max-disparity 47"]).contains(warning));
-    let told = said(&["--max-disparity 25"]);
-    assert!(
-        told.lines().last().unwrap().ends_with("raise --max-disparity") && told.contains(warning),
-        "{told}"
-    );
-    let told = said(&["--max-disparity 47 --min-disparity 19"]);
-    assert!(
-        told.lines().last().unwrap().ends_with("lower --min-disparity") && told.contains(warning),
-        "{told}"
-    );
-    assert_eq!(said(&["--max-disparity 25 --quiet"]), "");
+    assert!(!said("--max-disparity 47").contains("warning: "));
+    for (range, remedy) in [
+        ("--max-disparity 25", "raise --max-disparity\n"),
+        ("--max-disparity 47 --min-disparity 19", "lower --min-disparity\n"),
+    ] {
+        let told = said(range);
+        assert!(told.ends_with(remedy) && told.contains("warning: "), "{told}");
+    }
+    assert_eq!(said("--max-disparity 25 --quiet"), "");
 }
 
 #[test]
 fn inspect_shows_every_step() {
     let folder = workshop();
-    let args = "inspect left.png right.png steps --max-disparity 20 --set levels=3 --set final-iterations=3";
-    let args: Vec<&str> = args.split_whitespace().collect();
+    let line = "inspect left.png right.png steps --max-disparity 20 --set levels=3 --set final-iterations=3";
     for (preset, more) in
         [("default", &[][..]), ("paper", &["corrected-left", "zones", "matches", "label-range-width"][..])]
     {
-        run(&folder, &[&args[..], &["--method", preset]].concat()).succeeded();
+        run(&folder, &format!("{line} --method {preset}")).succeeded();
         let steps = folder.join("steps");
         let size = |name: &str| {
             let picture = image::open(steps.join(format!("{name}.png"))).unwrap();
@@ -245,20 +223,17 @@ fn inspect_shows_every_step() {
 #[cfg(unix)]
 #[test]
 fn what_is_stopped_leaves_nothing_behind() {
-    let (left, right) = (scene_file("mixed", "im0.png"), scene_file("mixed", "im1.png"));
-    let dirs = ["slanted", "mixed"].map(|name| scene(name).to_str().unwrap().to_owned());
     // `inspect` once its folder is begun, `evaluate` once it has told of the first pair.
-    let runs: [(&str, &[&str]); 2] = [
-        ("-INT", &["inspect", &left, &right, "steps", "--json", "told.json"]),
-        ("-TERM", &["evaluate", &dirs[0], &dirs[1], "--report", "report"]),
-    ];
-    for (signal, args) in runs {
+    for (signal, line) in [
+        ("-INT", "inspect @mixed/im0.png @mixed/im1.png steps --json told.json"),
+        ("-TERM", "evaluate @slanted @mixed --report report"),
+    ] {
         let folder = Folder::new();
-        let more = ["--method paper --set tolerance=0 --device cpu --threads 1"];
-        let mut child = started(&folder, &[args, &more].concat());
+        let more = "--method paper --set tolerance=0 --device cpu --threads 1";
+        let mut child = started(&folder, &format!("{line} {more}"));
         let mut told = BufReader::new(child.stderr.take().unwrap());
         let mut said = String::new();
-        if args[0] == "evaluate" {
+        if line.starts_with("evaluate") {
             told.read_line(&mut said).unwrap();
             assert!(said.contains("slanted"), "{said}");
         } else {
@@ -267,10 +242,10 @@ fn what_is_stopped_leaves_nothing_behind() {
         send(signal, &child);
         told.read_to_string(&mut said).unwrap();
         let output = child.wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(130), "{args:?}: {said}");
-        assert_eq!(said.lines().last(), Some("mrfgs: stopped; nothing is left behind"), "{args:?}");
-        assert_eq!(output.stdout, b"", "{args:?}");
-        assert!(listing(&folder).is_empty(), "{args:?}: {:?}", listing(&folder).keys());
+        assert_eq!(output.status.code(), Some(130), "{line}: {said}");
+        assert_eq!(said.lines().last(), Some("mrfgs: stopped; nothing is left behind"), "{line}");
+        assert_eq!(output.stdout, b"", "{line}");
+        assert!(listing(&folder).is_empty(), "{line}: {:?}", listing(&folder).keys());
     }
 }
 
@@ -278,15 +253,12 @@ fn what_is_stopped_leaves_nothing_behind() {
 fn files_in_the_way_are_replaced_and_devices_are_not() {
     let folder = workshop();
     fs::write(folder.join("out.pfm"), "old").unwrap();
-    let mut args = vec!["match left.png right.png out.pfm --max-disparity 15 --quiet"];
     #[cfg(unix)]
-    {
-        args.extend(["--also raw,preview"]);
-        for file in ["out.raw.pfm", "out.preview.png"] {
-            std::os::unix::fs::symlink("/dev/null", folder.join(file)).unwrap();
-        }
+    for file in ["out.raw.pfm", "out.preview.png"] {
+        std::os::unix::fs::symlink("/dev/null", folder.join(file)).unwrap();
     }
-    run(&folder, &args).succeeded();
+    let line = "match left.png right.png out.pfm --max-disparity 15 --quiet --also raw,preview";
+    run(&folder, line).succeeded();
     assert_eq!(read::read_disparity(&folder.join("out.pfm")).unwrap().size(), (60, 40));
     #[cfg(unix)]
     for file in ["out.raw.pfm", "out.preview.png"] {
@@ -298,8 +270,11 @@ fn files_in_the_way_are_replaced_and_devices_are_not() {
 fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     let folder = workshop();
     let before = listing(&folder);
-    let args = ["match left.png right.png out.pfm --max-disparity 20 --dry-run"];
-    let plan = run(&folder, &[&args[..], &["--quiet --also raw"]].concat()).succeeded();
+    let with = |more: &str| {
+        run(&folder, &format!("match left.png right.png out.pfm --max-disparity 20 --dry-run {more}"))
+            .succeeded()
+    };
+    let plan = with("--quiet --also raw");
     assert_eq!(plan.stderr, "");
     for words in [
         "60 x 40 pixels, disparities 0 to 20 (21 labels)",
@@ -313,20 +288,15 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
     ] {
         assert!(in_cells(&plan.stdout).contains(words), "no `{words}` in:\n{}", plan.stdout);
     }
-    let more = run(&folder, &[&args[..], &["--set final-iterations=3"]].concat()).succeeded();
-    assert!(more.stdout.contains("3 iterations of level 0, the others in between"), "{}", more.stdout);
-    let accurate = run(&folder, &[&args[..], &["--method accurate"]].concat()).succeeded();
+    with("--set final-iterations=3").prints("3 iterations of level 0, the others in between");
+    let accurate = with("--method accurate");
     let (own, double) = accurate.stdout.split_once("\nThen at twice the size:\n\n").unwrap();
     assert!(own == plan.stdout && double.starts_with("120 x 80 pixels, disparities 0 to 40 (41 labels)"));
-    let paper = run(&folder, &[&args[..], &["--method paper"]].concat()).succeeded();
-    for words in
-        ["16 bits", "30 iterations of levels 0 to 5", "or fewer, once the map changes by at most 0.1 px"]
-    {
-        assert!(paper.stdout.contains(words), "no `{words}` in:\n{}", paper.stdout);
-    }
+    let paper = "30 iterations of levels 0 to 5 & or fewer, once the map changes by at most 0.1 px";
+    with("--method paper").prints(&format!("16 bits & {paper}"));
     // It finds what a real run would.
-    let args = ["match left.png right.png none/out.pfm --max-disparity 20 --dry-run"];
-    run(&folder, &args).failed(1, &["none", "create it"], "--dry-run");
+    let line = "match left.png right.png none/out.pfm --max-disparity 20 --dry-run";
+    run(&folder, line).failed(1, "none & create it");
     assert!(listing(&folder) == before);
 }
 
@@ -334,36 +304,25 @@ fn a_dry_run_prints_the_plan_and_leaves_nothing() {
 #[test]
 fn little_memory_makes_tiles() {
     let folder = workshop();
-    let (left, right) = (scene_file("thin", "im0.png"), scene_file("thin", "im1.png"));
-    let args = ["match", &left, &right, "out.pfm --device cpu"];
-    let with = |more: &[&str]| run(&folder, &[&args[..], more].concat());
-    let one = with(&["--dry-run"]).succeeded();
+    let pair = "@thin/im0.png @thin/im1.png";
+    let with = |more: &str| run(&folder, &format!("match {pair} out.pfm --device cpu {more}"));
+    let one = with("--dry-run").succeeded();
     assert!(!one.stdout.contains("tiles") && !one.stdout.contains("whole image"), "{one:?}");
-    let tiled = with(&["--dry-run --memory 16MiB"]).succeeded();
-    for words in
-        ["240 x 180 pixels, disparities 0 to 31 (32 labels)", "in 4 tiles of up to", "whole image", "all"]
-    {
-        assert!(tiled.stdout.contains(words), "no `{words}` in:\n{}", tiled.stdout);
-    }
-    let told = with(&[]).succeeded();
-    assert!(told.stderr.contains("32 labels, 16 iterations"), "{told:?}");
-    let told = with(&["--memory 16MiB"]).succeeded();
-    assert!(told.stderr.contains("32 labels, 4 tiles, 16 iterations"), "{told:?}");
+    let words = "240 x 180 pixels, disparities 0 to 31 (32 labels) & in 4 tiles of up to & whole image & all";
+    with("--dry-run --memory 16MiB").succeeded().prints(words);
+    with("").succeeded().says("32 labels, 16 iterations");
+    with("--memory 16MiB").succeeded().says("32 labels, 4 tiles, 16 iterations");
     assert_eq!(read::read_disparity(&folder.join("out.pfm")).unwrap().size(), (240, 180));
-    let inspect = |more: &[&str]| {
-        let args = ["inspect", &left, &right, "--device cpu --memory 16MiB"];
-        run(&folder, &[&args[..], more].concat())
-    };
-    let told = inspect(&[]).succeeded();
-    assert!(told.stderr.contains("32 labels, 4 tiles, 16 iterations"), "{told:?}");
+    let inspect = |more: &str| run(&folder, &format!("inspect {pair} --device cpu --memory 16MiB {more}"));
+    let told = inspect("").succeeded();
+    told.says("32 labels, 4 tiles, 16 iterations");
     for (stage, runs) in [("cost", 4), ("right_view", 4), ("left_right_check", 1), ("plane", 1)] {
         let row = told.stdout.lines().find(|line| line.starts_with(&format!("{stage}  "))).unwrap();
         assert_eq!(row.split_whitespace().rev().nth(3), Some(&*runs.to_string()), "{row}");
     }
     // Steps of one piece are what the folder shows.
     let before = listing(&folder);
-    let refused = inspect(&["steps"]);
-    refused.failed(2, &["DIR", "in one piece", "give --memory"], "the steps of tiles");
+    inspect("steps").failed(2, "DIR & in one piece & give --memory");
     assert!(listing(&folder) == before);
 }
 
@@ -371,8 +330,8 @@ fn little_memory_makes_tiles() {
 fn inspect_names_every_stage() {
     let folder = workshop();
     let before = listing(&folder);
-    let args = ["inspect left.png right.png --max-disparity 9 --device cpu"];
-    let table = run(&folder, &args).succeeded().stdout;
+    let line = "inspect left.png right.png --max-disparity 9 --device cpu";
+    let table = run(&folder, line).succeeded().stdout;
     let row = |name: &str| table.lines().find(|l| l.starts_with(name)).map(str::to_owned);
     for stage in [
         "stage ",
@@ -398,9 +357,8 @@ fn inspect_names_every_stage() {
 #[test]
 fn without_a_driver_auto_takes_the_cpu_path() {
     let folder = workshop();
-    let args = ["match left.png right.png out.pfm --max-disparity 9 --device auto"];
-    let told = run_with(&folder, &args, NO_DRIVER).succeeded();
-    assert!(told.stderr.contains(" on the CPU path, "), "{}", told.stderr);
-    let told = run_with(&folder, &["devices"], NO_DRIVER).succeeded();
+    let line = "match left.png right.png out.pfm --max-disparity 9 --device auto";
+    run_with(&folder, line, NO_DRIVER).succeeded().says(" on the CPU path, ");
+    let told = run_with(&folder, "devices", NO_DRIVER).succeeded();
     assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` takes the CPU path\n");
 }

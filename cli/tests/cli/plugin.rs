@@ -1,16 +1,8 @@
 //! `mrfgs match` as a stereo algorithm of the Ames Stereo Pipeline, called as its `stereo_corr` calls plug-ins.
 
-use std::fs::File;
-use std::path::Path;
-use std::process::Command;
-
-use mrfgs::image::Plane;
-use mrfgs::image::pfm::{self, Pfm};
-use serde_json::Value;
-use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
 
-use super::{Folder, run, scene, scene_file};
+use super::*;
 
 /// Rows and columns at the borders without data.
 const MARGIN: usize = 6;
@@ -49,20 +41,8 @@ fn write_view(path: &Path, view: &image::GrayImage) {
             if inside(x, width) && inside(y, height) { f32::from(tone.0[0]) / 255.0 } else { f32::NAN }
         })
         .collect();
-    let mut encoder = TiffEncoder::new_big(File::create(path).unwrap()).unwrap();
+    let mut encoder = TiffEncoder::new_big(fs::File::create(path).unwrap()).unwrap();
     encoder.write_image::<Gray32Float>(width, height, &pixels).unwrap();
-}
-
-fn read_map(path: &Path) -> Plane<f32> {
-    let mut decoder = Decoder::new(File::open(path).unwrap()).unwrap();
-    let (width, height) = decoder.dimensions().unwrap();
-    let DecodingResult::F32(values) = decoder.read_image().unwrap() else { panic!("float") };
-    Plane::new(width as usize, height as usize, values)
-}
-
-fn read_pfm(path: &Path) -> Plane<f32> {
-    let Pfm::Grey(map) = pfm::read(path).unwrap() else { panic!("one channel") };
-    map
 }
 
 #[test]
@@ -88,8 +68,7 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
     for options in ["--device cpu", "--device cpu --threads 1 --min-disparity -31 --max-disparity 0"] {
         let (success, told) = call(options);
         assert!(success, "{told}");
-        let (found, truth) =
-            (read_map(&folder.join("out.tif")), read_pfm(&scene("slanted").join("disp0GT.pfm")));
+        let (found, truth) = (read_tiff(folder.join("out.tif")), read_pfm(scene("slanted/disp0GT.pfm")));
         assert_eq!(found.size(), truth.size());
         let (width, height) = found.size();
         let (mut errors, mut holes) = (Vec::new(), 0);
@@ -118,19 +97,18 @@ fn the_plugin_takes_and_gives_what_the_pipeline_expects() {
 #[test]
 fn the_sign_turns_map_and_range_around() {
     let folder = Folder::new();
-    let matched = |name: &str, more: &[&str]| {
-        let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
-        let args = [&["match", &left, &right, name, "--set fill=none --device cpu --json -"], more];
-        let told = run(&folder, &args.concat()).succeeded();
-        (read_map(&folder.join(name)), told.json())
+    let line = "match @steep/im0.png @steep/im1.png --set fill=none --device cpu";
+    let matched = |name: &str, more: &str| {
+        let told = run(&folder, &format!("{line} {name} --json - {more}")).succeeded();
+        (read_tiff(folder.join(name)), told.json())
     };
-    let (ours, told) = matched("ours.tif", &["--max-disparity 30 --min-disparity 2"]);
+    let (ours, told) = matched("ours.tif", "--max-disparity 30 --min-disparity 2");
     let range = |told: &Value| ["min", "max"].map(|end| told["range"][end].as_i64().unwrap());
     assert_eq!((told["sign"].as_str(), range(&told)), (Some("left-minus-right"), [2, 30]));
-    let turned = ["--sign", "right-minus-left", "--min-disparity", "-30", "--max-disparity", "-2"];
-    let (theirs, told) = matched("theirs.tif", &[&turned[..], &["--also raw"]].concat());
+    let turned = "--sign right-minus-left --min-disparity -30 --max-disparity -2";
+    let (theirs, told) = matched("theirs.tif", &format!("{turned} --also raw"));
     assert_eq!((told["sign"].as_str(), range(&told)), (Some("right-minus-left"), [-30, -2]));
-    let raw = read_map(&folder.join("theirs.raw.tif"));
+    let raw = read_tiff(folder.join("theirs.raw.tif"));
     let mut invalid = 0;
     for (i, (&d, &turned)) in ours.data().iter().zip(theirs.data()).enumerate() {
         invalid += usize::from(d.is_nan());
@@ -140,24 +118,17 @@ fn the_sign_turns_map_and_range_around() {
     assert!((1..ours.data().len() / 2).contains(&invalid), "{invalid} of {}", ours.data().len());
 
     // Printed, what is invalid is +infinity all the same.
-    let (left, right) = (scene_file("steep", "im0.png"), scene_file("steep", "im1.png"));
-    let printed = Command::new(env!("CARGO_BIN_EXE_mrfgs"))
-        .args(["match", &left, &right, "-", "--set", "fill=none", "--device", "cpu", "--quiet"])
-        .args(turned)
-        .output()
-        .unwrap();
-    std::fs::write(folder.join("printed.pfm"), printed.stdout).unwrap();
+    let printed = program(&folder, &format!("{line} - --quiet {turned}")).output().unwrap();
+    fs::write(folder.join("printed.pfm"), printed.stdout).unwrap();
     let expected = theirs.map(|&d| if d.is_nan() { f32::INFINITY } else { d });
-    assert_eq!(read_pfm(&folder.join("printed.pfm")), expected);
+    assert_eq!(read_pfm(folder.join("printed.pfm")), expected);
 
     // One end alone: the far one is at 0, as it is the other way round.
-    let (_, told) = matched("a.tif", &["--sign right-minus-left --min-disparity -20"]);
+    let (_, told) = matched("a.tif", "--sign right-minus-left --min-disparity -20");
     assert_eq!(range(&told), [-20, 0]);
     // And by a calibration.
-    let (_, told) = matched("b.tif", &["--sign right-minus-left"]);
-    let (_, ours) = matched("c.tif", &[]);
-    assert_eq!(range(&told), {
-        let [min, max] = range(&ours);
-        [-max, -min]
-    });
+    let (_, told) = matched("b.tif", "--sign right-minus-left");
+    let (_, ours) = matched("c.tif", "");
+    let [min, max] = range(&ours);
+    assert_eq!(range(&told), [-max, -min]);
 }

@@ -1,12 +1,10 @@
 //! `mrfgs evaluate --report`.
 
-use std::fs;
-
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
-use super::evaluate::{copy, evaluated, json, refused};
-use super::scene;
+use super::evaluate::{evaluated, refused};
+use super::*;
 
 /// The values of an attribute in a page, in order.
 fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
@@ -16,13 +14,14 @@ fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
 
 #[test]
 fn a_report_is_whole_and_stands_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     copy("slanted", &at("Teddy"));
     // What a name of a folder may hold.
     let odd = if cfg!(windows) { "a & 'b'" } else { "<b>\"a\" & 'b'" };
     copy("mixed", &at(odd));
-    evaluated(folder.path(), &["Teddy", odd, "--report", "out", "--json", "out.json"]);
+    let line = "evaluate Teddy --report out --json out.json";
+    assert!(program(&folder, line).arg(odd).status().unwrap().success());
 
     let page = fs::read_to_string(at("out/index.html")).unwrap();
     assert!(page.starts_with("<!doctype html>\n") && page.ends_with("</html>\n"));
@@ -31,7 +30,7 @@ fn a_report_is_whole_and_stands_alone() {
     assert!(page.contains("<h2>Teddy</h2>") && !page.contains("<b>\"a\""));
     assert!(page.contains("&amp; &#39;b&#39;</h2>"), "{}", &page[..3000]);
     assert!(page.contains("prefers-color-scheme: dark") && page.contains("image-rendering: pixelated"));
-    let figures = json(&fs::read_to_string(at("out.json")).unwrap());
+    let figures = json(at("out.json"));
     for pair in figures["pairs"].as_array().unwrap() {
         let avg = pair["final"]["all"]["avg"].as_f64().unwrap();
         assert!(page.matches(&format!("<td>{avg:.3}</td>")).count() >= 2, "{avg}");
@@ -64,8 +63,7 @@ fn a_report_is_whole_and_stands_alone() {
     assert_eq!(left, image::open(at("Teddy/im0.png")).unwrap().into_rgb8());
 
     // A later report takes its place; a map that others made has fewer pictures.
-    let args = ["map", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
-    evaluated(folder.path(), &args);
+    evaluated(&folder, "map Teddy/disp0GT.pfm --truth Teddy/disp0GT.pfm --report out");
     let mut names: Vec<_> =
         fs::read_dir(at("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
@@ -75,43 +73,41 @@ fn a_report_is_whole_and_stands_alone() {
     assert!((0..180).all(|y| error.get_pixel(100, y).0 == [250; 3]), "no error is white");
 
     // Nothing temporary is left.
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 4);
+    assert_eq!(fs::read_dir(&*folder).unwrap().count(), 4);
 }
 
 #[test]
 fn a_report_that_cannot_be_leaves_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     copy("slanted", &at("Teddy"));
     fs::create_dir(at("misfit")).unwrap();
     fs::create_dir(at("empty")).unwrap();
     for file in ["im0.png", "im1.png", "calib.txt"] {
         fs::copy(scene("slanted").join(file), at("misfit").join(file)).unwrap();
     }
-    fs::copy(scene("mixed").join("disp0GT.pfm"), at("misfit/disp0GT.pfm")).unwrap();
+    fs::copy(scene("mixed/disp0GT.pfm"), at("misfit/disp0GT.pfm")).unwrap();
 
     // The folder itself.
-    refused(folder.path(), &["Teddy", "--report", "Teddy"], 1, &["Teddy", "no part of an earlier report"]);
-    refused(folder.path(), &["Teddy", "--report", "none/out"], 1, &["none/out", "create it first"]);
-    refused(folder.path(), &["Teddy", "--report", "Teddy/im0.png"], 1, &["im0.png", "is a file"]);
-    let args = ["Teddy", "--report", "empty", "--json", "empty/a.json"];
-    refused(folder.path(), &args, 2, &["--json", "empty/a.json", "another name"]);
+    refused(&folder, "Teddy --report Teddy", 1, "Teddy & no part of an earlier report");
+    refused(&folder, "Teddy --report none/out", 1, "none/out & create it first");
+    refused(&folder, "Teddy --report Teddy/im0.png", 1, "im0.png & is a file");
+    refused(&folder, "Teddy --report empty --json empty/a.json", 2, "--json & empty/a.json & another name");
 
     // What fails later: the second pair, or the JSON.
     for out in ["out", "empty"] {
-        refused(folder.path(), &["misfit", "--report", out], 1, &["disp0GT.pfm is 320 x 240"]);
+        refused(&folder, &format!("misfit --report {out}"), 1, "disp0GT.pfm is 320 x 240");
     }
+    let line = "map Teddy/disp0GT.pfm --truth Teddy/disp0GT.pfm";
     if cfg!(target_os = "linux") {
-        let args = ["map", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "out"];
-        refused(folder.path(), &[&args[..], &["--json", "/dev/full"]].concat(), 1, &["/dev/full"]);
+        refused(&folder, &format!("{line} --report out --json /dev/full"), 1, "/dev/full");
     }
 
     // A report with something else in it stays, and so does a page that is none.
-    let args = ["map", "Teddy/disp0GT.pfm", "--truth", "Teddy/disp0GT.pfm", "--report", "empty"];
-    evaluated(folder.path(), &args);
+    evaluated(&folder, &format!("{line} --report empty"));
     fs::write(at("empty/notes.txt"), "precious").unwrap();
-    refused(folder.path(), &args, 1, &["empty", "notes.txt", "new folder"]);
+    refused(&folder, &format!("{line} --report empty"), 1, "empty & notes.txt & new folder");
     fs::create_dir(at("site")).unwrap();
     fs::write(at("site/index.html"), "<!doctype html><title>Home</title>").unwrap();
-    refused(folder.path(), &[&args[..5], &["site"]].concat(), 1, &["site", "index.html"]);
+    refused(&folder, &format!("{line} --report site"), 1, "site & index.html");
 }

@@ -3,17 +3,12 @@
 #![cfg(unix)]
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::os::unix::fs::PermissionsExt;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use mrfgs::image::{Plane, read};
-use serde_json::Value;
-use tempfile::TempDir;
 
 use super::evaluate::evaluated;
-use super::scene;
+use super::*;
 
 const DOCUMENTS: [&str; 3] = ["README.md", "docs/results.md", "docs/paper.md"];
 
@@ -23,9 +18,9 @@ fn root() -> PathBuf {
 
 /// A folder with a copy of the script and of its documents, and a pair called Teddy, a part of a scene to be
 /// quick.
-fn workshop() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
+fn workshop() -> Folder {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
     for inner in ["scripts", "docs", "Teddy"] {
         fs::create_dir(at(inner)).unwrap();
     }
@@ -37,7 +32,7 @@ fn workshop() -> TempDir {
         let view = image::open(scene("thin").join(file)).unwrap();
         view.crop_imm(x, y, width, height).save(at("Teddy").join(file)).unwrap();
     }
-    let truth = read::read_disparity(&scene("thin").join("disp0GT.pfm")).unwrap();
+    let truth = read::read_disparity(&scene("thin/disp0GT.pfm")).unwrap();
     let part =
         Plane::from_fn(width as usize, height as usize, |i, j| truth[(i + x as usize, j + y as usize)]);
     part.save(at("Teddy/disp0GT.pfm")).unwrap();
@@ -46,10 +41,10 @@ fn workshop() -> TempDir {
 }
 
 /// Runs the copy of the script with this program: whether it succeeded, and what it printed, complaints last.
-fn results(folder: &Path, program: &Path, args: &[&str]) -> (bool, String) {
+fn results(folder: &Path, program: &Path, args: &str) -> (bool, String) {
     let ran = Command::new("python3")
         .arg("scripts/results")
-        .args(args)
+        .args(args.split(' '))
         .current_dir(folder)
         .env("MRFGS", program)
         .output()
@@ -59,9 +54,9 @@ fn results(folder: &Path, program: &Path, args: &[&str]) -> (bool, String) {
     (ran.status.success(), if ran.status.success() { out } else { out + &complaint })
 }
 
-fn printed(folder: &Path, args: &[&str]) -> String {
+fn printed(folder: &Path, args: &str) -> String {
     let (succeeded, text) = results(folder, Path::new(env!("CARGO_BIN_EXE_mrfgs")), args);
-    assert!(succeeded, "{args:?}: {text}");
+    assert!(succeeded, "{args}: {text}");
     text
 }
 
@@ -74,16 +69,16 @@ fn row<'a>(table: &'a str, name: &str) -> Vec<&'a str> {
 }
 
 /// What `mrfgs evaluate` says of the pair, with these decimals: of the raw or the final map, by keys.
-fn figures(folder: &Path, flags: &[&str], map: &str, keys: &[(&str, usize)]) -> Vec<String> {
-    let text = evaluated(folder, &[&["Teddy", "--json", "-"], flags].concat());
-    let all = serde_json::from_str::<Value>(&text).unwrap()["mean"][map]["all"].clone();
+fn figures(folder: &Path, flags: &str, map: &str, keys: &[(&str, usize)]) -> Vec<String> {
+    let found = evaluated(folder, &format!("Teddy --json - {flags}")).json();
+    let all = &found["mean"][map]["all"];
     keys.iter().map(|&(key, decimals)| format!("{:.decimals$}", all[key].as_f64().unwrap())).collect()
 }
 
 #[test]
 fn every_table_stands_in_a_document() {
     let folder = workshop();
-    let listed = printed(folder.path(), &["--list"]);
+    let listed = printed(&folder, "--list");
     let listed: BTreeSet<_> = listed.lines().map(|line| line.split(' ').next().unwrap()).collect();
     let texts = DOCUMENTS.map(|file| fs::read_to_string(root().join(file)).unwrap());
     let marked: BTreeSet<_> = texts
@@ -97,21 +92,21 @@ fn every_table_stands_in_a_document() {
 #[test]
 fn rows_are_what_evaluate_says() {
     let folder = workshop();
-    let parts = printed(folder.path(), &["ablations", "Teddy"]);
+    let parts = printed(&folder, "ablations Teddy");
     let keys = [("avg", 3), ("bad0.5", 2), ("bad2.0", 2)];
     let unchanged = row(&parts, "**`default`**");
-    assert_eq!(unchanged[2..5], figures(folder.path(), &[], "final", &keys));
+    assert_eq!(unchanged[2..5], figures(&folder, "", "final", &keys));
     assert_eq!(unchanged[5..], ["+0.0"]);
     let changed = row(&parts, "no sub-pixel");
     assert_eq!(changed[1], "`sub-pixel=false`");
-    assert_eq!(changed[2..5], figures(folder.path(), &["--set", "sub-pixel=false"], "final", &keys));
+    assert_eq!(changed[2..5], figures(&folder, "--set sub-pixel=false", "final", &keys));
     assert_ne!(changed[2..5], unchanged[2..5]);
 
-    let readings = printed(folder.path(), &["readings", "Teddy"]);
-    for (name, flags) in [("**`paper`**", &[][..]), ("all labels", &["--set", "zone-sigmas=0"])] {
-        let flags = [&["--method", "paper"], flags].concat();
+    let readings = printed(&folder, "readings Teddy");
+    for (name, flags) in [("**`paper`**", ""), ("all labels", "--set zone-sigmas=0")] {
+        let flags = format!("--method paper {flags}");
         let keys = [("avg", 2), ("psnr", 2), ("bad2.0", 2)];
-        let expected = ["raw", "final"].map(|map| figures(folder.path(), &flags, map, &keys)).concat();
+        let expected = ["raw", "final"].map(|map| figures(&folder, &flags, map, &keys)).concat();
         assert_eq!(row(&readings, name)[2..], expected, "{name}");
     }
 }
@@ -119,10 +114,10 @@ fn rows_are_what_evaluate_says() {
 #[test]
 fn the_papers_figures_stand_beside_ours() {
     let folder = workshop();
-    let text = printed(folder.path(), &["paper-raw", "paper-gains", "Teddy"]);
+    let text = printed(&folder, "paper-raw paper-gains Teddy");
     let keys = [("avg", 2), ("psnr", 2), ("bad2.0", 2)];
     let [fgs, paper] = ["fgs", "paper"].map(|preset| {
-        let found = figures(folder.path(), &["--method", preset], "raw", &keys);
+        let found = figures(&folder, &format!("--method {preset}"), "raw", &keys);
         found.join(" / ")
     });
     let expected = ["Teddy", "2.60 / 32.02 / 14.17", &fgs, "2.09 / 32.43 / 13.90", &paper];
@@ -133,11 +128,11 @@ fn the_papers_figures_stand_beside_ours() {
 #[test]
 fn a_table_replaces_that_of_its_name_alone() {
     let folder = workshop();
-    let before = DOCUMENTS.map(|file| fs::read_to_string(folder.path().join(file)).unwrap());
-    let text = printed(folder.path(), &["--write", "accuracy", "Teddy"]);
+    let before = DOCUMENTS.map(|file| fs::read_to_string(folder.join(file)).unwrap());
+    let text = printed(&folder, "--write accuracy Teddy");
     let table = text.strip_prefix("accuracy\n\n").unwrap().trim_end();
     for (file, before) in DOCUMENTS.iter().zip(before) {
-        let after = fs::read_to_string(folder.path().join(file)).unwrap();
+        let after = fs::read_to_string(folder.join(file)).unwrap();
         let marks = ("<!-- scripts/results accuracy -->\n\n", "\n\n<!-- end -->");
         let Some((head, rest)) = before.split_once(marks.0) else {
             assert_eq!(after, before, "{file}");
@@ -154,15 +149,15 @@ fn what_makes_no_table_is_refused() {
     let folder = workshop();
     let program = Path::new(env!("CARGO_BIN_EXE_mrfgs"));
     for (args, words) in [
-        (&["accurate", "Teddy"][..], "accurate: neither a table nor a folder"),
-        (&["accuracy"], "give folders with pairs"),
-        (&["accuracy", "docs"], "give folders with pairs"),
+        ("accurate Teddy", "accurate: neither a table nor a folder"),
+        ("accuracy", "give folders with pairs"),
+        ("accuracy docs", "give folders with pairs"),
     ] {
-        let (succeeded, text) = results(folder.path(), program, args);
-        assert!(!succeeded && text.contains(words), "{args:?}: {text}");
+        let (succeeded, text) = results(&folder, program, args);
+        assert!(!succeeded && text.contains(words), "{args}: {text}");
     }
     // A program that does not do what --set says.
-    let deaf = folder.path().join("deaf");
+    let deaf = folder.join("deaf");
     let script = format!(
         "#!/bin/sh\nfor word; do shift; [ \"$word\" = --set ] && skip=1 && continue\n\
          [ \"$skip\" ] && skip= && continue\nset -- \"$@\" \"$word\"; done\nexec {} \"$@\"\n",
@@ -170,9 +165,9 @@ fn what_makes_no_table_is_refused() {
     );
     fs::write(&deaf, script).unwrap();
     fs::set_permissions(&deaf, fs::Permissions::from_mode(0o755)).unwrap();
-    let (succeeded, text) = results(folder.path(), &deaf, &["ablations", "Teddy"]);
+    let (succeeded, text) = results(&folder, &deaf, "ablations Teddy");
     assert!(!succeeded && text.contains("level-rows=false: it is the same method as default"), "{text}");
     // And one that fails.
-    let (succeeded, text) = results(folder.path(), Path::new("false"), &["accuracy", "Teddy"]);
+    let (succeeded, text) = results(&folder, Path::new("false"), "accuracy Teddy");
     assert!(!succeeded && text.contains("false ended with 1"), "{text}");
 }

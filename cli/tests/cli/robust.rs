@@ -1,11 +1,6 @@
 //! What ends a run from outside: too little memory, a full disk, a signal; and what the outputs are then.
 
-use std::fs;
-use std::path::Path;
-use std::process::Stdio;
-use std::time::{Duration, Instant};
-
-use super::{Folder, listing, program, run, scene_file, shell, workshop};
+use super::*;
 
 /// Whatever the limit, a match ends well or says in one line that there is not enough; no allocation aborts.
 #[cfg(target_os = "linux")]
@@ -13,7 +8,7 @@ use super::{Folder, listing, program, run, scene_file, shell, workshop};
 fn no_limit_of_memory_aborts() {
     let folder = Folder::new();
     let large = |name: &str, ending: &str| {
-        let image = image::open(scene_file("mixed", name)).unwrap();
+        let image = image::open(scene("mixed").join(name)).unwrap();
         let image = image.resize_exact(640, 480, image::imageops::FilterType::Triangle);
         image.to_rgb8().save(folder.join(format!("{name}.{ending}"))).unwrap();
     };
@@ -32,17 +27,13 @@ fn no_limit_of_memory_aborts() {
         );
         // The program itself takes some 60 MiB of addresses.
         let enough = (80..1024).step_by(20).find(|limit| {
-            let output = shell(&folder, &format!("ulimit -v {}", limit << 10), &line);
-            let said = String::from_utf8_lossy(&output.stderr);
-            let enough = output.status.success();
+            let told = shell(&folder, &format!("ulimit -v {}", limit << 10), &line);
+            let enough = told.code == Some(0);
             if enough {
-                assert_eq!(said, "", "{limit}");
+                assert_eq!(told.stderr, "", "{limit}");
             } else {
                 refused += 1;
-                assert_eq!(output.status.code(), Some(1), "{ending}, {limit} MiB: {output:?}");
-                let told =
-                    said.starts_with("mrfgs: ") && said.lines().count() == 1 && said.contains("memory");
-                assert!(told, "{ending}, {limit} MiB: {said}");
+                told.failed(1, "memory");
             }
             assert_eq!(folder.join("out.pfm").exists(), enough, "{ending}, {limit} MiB");
             let _ = fs::remove_file(folder.join("out.pfm"));
@@ -72,10 +63,9 @@ fn a_full_disk_is_told_with_the_name_of_the_output() {
         fs::write(folder.join("camera.csv"), "name,left,right\ncamera,camera/left.png,right.png\n").unwrap();
         let quiet = if line.starts_with("inspect") { "" } else { " --quiet" };
         let line = format!("{line} --device cpu{quiet}");
-        let output = shell(&folder, "trap '' XFSZ; ulimit -f 8", &line);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
-        assert!(said.contains(name) && said.lines().count() == 1 && !said.contains(".tmp"), "{line}: {said}");
+        let told = shell(&folder, "trap '' XFSZ; ulimit -f 8", &line);
+        told.failed(1, name);
+        assert!(!told.stderr.contains(".tmp"), "{told:?}");
         fs::remove_file(folder.join("camera.csv")).unwrap();
         let _ = fs::remove_dir(folder.join("out"));
         assert!(listing(&folder) == before, "{line}");
@@ -85,7 +75,7 @@ fn a_full_disk_is_told_with_the_name_of_the_output() {
 /// Starts a match and kills it after a time.
 #[cfg(unix)]
 fn killed(folder: &Path, after: Duration, line: &str) {
-    let mut child = program(folder, &[line], &[]).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = program(folder, line).stderr(Stdio::null()).spawn().unwrap();
     let start = Instant::now();
     while start.elapsed() < after && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(1));
@@ -100,19 +90,18 @@ fn a_killed_match_leaves_nothing_half_written() {
     let folder = workshop();
     let before = listing(&folder);
     let line = "match left.png right.png out.pfm --max-disparity 9 --device cpu --also raw,confidence";
-    run(&folder, &[line]).succeeded();
-    let whole: Vec<_> = ["out.pfm", "out.raw.pfm", "out.confidence.png"]
-        .map(|name| fs::read(folder.join(name)).unwrap())
-        .into();
+    run(&folder, line).succeeded();
+    let outputs = ["out.pfm", "out.raw.pfm", "out.confidence.png"].map(|name| folder.join(name));
+    let whole = outputs.clone().map(|path| fs::read(path).unwrap());
     for ms in [1, 5, 10, 15, 20, 25, 30, 40, 60] {
-        for name in ["out.pfm", "out.raw.pfm", "out.confidence.png"] {
-            let _ = fs::remove_file(folder.join(name));
+        for path in &outputs {
+            let _ = fs::remove_file(path);
         }
         killed(&folder, Duration::from_millis(ms), line);
         let mut after = listing(&folder);
-        for (name, whole) in ["out.pfm", "out.raw.pfm", "out.confidence.png"].into_iter().zip(&whole) {
-            if let Some(found) = after.remove(&folder.join(name)) {
-                assert!(found.as_ref() == Some(whole), "{name} after {ms} ms");
+        for (path, whole) in outputs.iter().zip(&whole) {
+            if let Some(found) = after.remove(path) {
+                assert!(found.as_ref() == Some(whole), "{} after {ms} ms", path.display());
             }
         }
         assert!(after == before, "{ms} ms: {:?}", after.keys());
@@ -130,7 +119,7 @@ fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     fs::create_dir_all(staging.join("new")).unwrap();
     fs::write(staging.join("new/half.png"), "half").unwrap();
     fs::write(staging.join("lock"), "").unwrap();
-    run(&folder, &[line]).succeeded();
+    run(&folder, line).succeeded();
     assert!(!staging.exists() && folder.join("steps/change-per-iteration.csv").exists());
     assert!(!folder.join("steps/half.png").exists());
     // One that runs is left alone.
@@ -138,7 +127,7 @@ fn what_a_killed_match_leaves_of_a_folder_is_gone_with_the_next_run() {
     fs::create_dir(&staging).unwrap();
     let lock = fs::File::create(staging.join("lock")).unwrap();
     lock.lock().unwrap();
-    run(&folder, &[line]).failed(1, &["steps", "another run is writing it"], "locked");
+    run(&folder, line).failed(1, "steps & another run is writing it");
     drop(lock);
     fs::remove_dir_all(&staging).unwrap();
     assert!(listing(&folder) == before);
@@ -158,24 +147,23 @@ fn links_are_followed_everywhere() {
         for (link, to) in [("out.pfm", "below/map.pfm"), ("out.preview.png", "below/picture.png")] {
             let _ = symlink(to, at(link));
         }
-        run(&folder, &[line]).succeeded();
+        run(&folder, line).succeeded();
         assert!(is_link("out.pfm") && is_link("out.preview.png"));
         assert!(fs::read(at("below/map.pfm")).unwrap().starts_with(b"Pf\n"));
         assert!(fs::read(at("below/picture.png")).unwrap().starts_with(b"\x89PNG"));
     }
     // An input is one by whatever name.
     symlink("left.png", at("other.png")).unwrap();
-    let args = ["match left.png right.png other.png --max-disparity 9"];
-    run(&folder, &args).failed(2, &["other.png is LEFT already"], "an input");
+    run(&folder, "match left.png right.png other.png --max-disparity 9")
+        .failed(2, "other.png is LEFT already");
 
     fs::create_dir(at("maps")).unwrap();
     fs::write(at("list.csv"), "name,left,right,max_disparity\na,left.png,right.png,9\n").unwrap();
     for name in ["a.pfm", "a.json"] {
         symlink(Path::new("../below").join(name), at("maps").join(name)).unwrap();
     }
-    let batch = ["batch list.csv maps --device cpu --quiet"];
-    for more in [&[][..], &["--set temperature=0.3"]] {
-        run(&folder, &[&batch[..], more].concat()).succeeded();
+    for more in ["", "--set temperature=0.3"] {
+        run(&folder, &format!("batch list.csv maps --device cpu --quiet {more}")).succeeded();
         assert!(is_link("maps/a.pfm") && is_link("maps/a.json"));
         assert!(fs::read(at("below/a.pfm")).unwrap().starts_with(b"Pf\n"));
         assert!(fs::read_to_string(at("below/a.json")).unwrap().contains("\"done\""));

@@ -1,13 +1,14 @@
 //! `mrfgs sequence`: whatever the frames come in, the maps are those of `match`; and whatever ends a sequence early, what was done
 //! before stays.
 
-use super::*;
 use std::io::Read;
+
+use super::*;
 
 const SIZE: (u32, u32) = (64, 48);
 /// Scenes whose corners are the frames, in this order: the tenth comes after the second.
 const SCENES: [(&str, &str); 3] = [("f1", "slanted"), ("f2", "thin"), ("f10", "repetitive")];
-const RANGE: [&str; 1] = ["--max-disparity 23 --device cpu"];
+const RANGE: &str = "--max-disparity 23 --device cpu";
 
 fn frame(scene_name: &str, view: usize) -> image::RgbImage {
     let image = image::open(scene(scene_name).join(format!("im{view}.png"))).unwrap();
@@ -41,11 +42,10 @@ fn cameras() -> Folder {
 }
 
 /// The maps of `match` for the frames, in order.
-fn wanted(folder: &Path, options: &[&str]) -> Vec<Vec<u8>> {
+fn wanted(folder: &Path) -> Vec<Vec<u8>> {
     let maps = SCENES.map(|(name, _)| {
-        let (left, right) = (format!("left/{name}.png"), format!("right/{name}.ppm"));
-        let line = [&["match", &left, &right, "wanted.pfm --quiet"], &RANGE[..], options].concat();
-        run(folder, &line).succeeded();
+        let pair = format!("left/{name}.png right/{name}.ppm");
+        run(folder, &format!("match {pair} wanted.pfm --quiet {RANGE}")).succeeded();
         fs::read(folder.join("wanted.pfm")).unwrap()
     });
     fs::remove_file(folder.join("wanted.pfm")).unwrap();
@@ -58,8 +58,8 @@ fn maps(folder: &Path, names: [&str; 3]) -> Vec<Vec<u8>> {
 }
 
 /// Runs the program with `bytes` on standard input.
-fn fed(folder: &Path, args: &[&str], bytes: &[u8]) -> Output {
-    let mut child = started(folder, args);
+fn fed(folder: &Path, line: &str, bytes: &[u8]) -> Output {
+    let mut child = started(folder, line);
     // Where it ends early, it does not take them all.
     let _ = child.stdin.take().unwrap().write_all(bytes);
     child.wait_with_output().unwrap()
@@ -85,38 +85,27 @@ const GREY: &str = "YUV4MPEG2 W128 H48 F30000:1001 Ip A1:1 Cmono XYSCSS=400\n";
 #[test]
 fn files_in_any_order_give_the_maps_of_match() {
     let folder = cameras();
-    let at: &Path = &folder;
-    let wanted = wanted(at, &[]);
+    let wanted = wanted(&folder);
     let names = SCENES.map(|(name, _)| name);
-    for (i, (left, right, layout)) in [
-        ("left", Some("right"), None),
-        ("left/*.png", Some("right/f*.ppm"), None),
-        ("beside", None, None),
-        ("above", None, Some("top-bottom")),
-    ]
-    .into_iter()
-    .enumerate()
+    for (i, frames) in
+        ["left right OUT", "left/*.png right/f*.ppm OUT", "beside OUT", "above OUT --layout top-bottom"]
+            .into_iter()
+            .enumerate()
     {
         let output = format!("maps{i}");
-        let mut line = vec!["sequence", left];
-        line.extend(right);
-        line.push(&output);
-        line.extend(layout.iter().flat_map(|layout| ["--layout", layout]));
-        line.extend(RANGE);
-        let said = run(at, &line).succeeded().stderr;
-        assert!(said.contains("3 frames of 64 x 48, 24 labels"), "{said}");
-        assert_eq!(maps(&at.join(&output), names), wanted, "{line:?}");
-        assert_eq!(listing(&at.join(&output)).len(), 3);
+        let line = format!("sequence {} {RANGE}", frames.replace("OUT", &output));
+        run(&folder, &line).succeeded().says("3 frames of 64 x 48, 24 labels");
+        assert_eq!(maps(&folder.join(&output), names), wanted, "{line}");
+        assert_eq!(listing(&folder.join(&output)).len(), 3);
     }
     // Control: views exchanged are another pair.
-    run(at, &[&["sequence right left swapped --quiet"], &RANGE[..]].concat()).succeeded();
-    assert_ne!(maps(&at.join("swapped"), names), wanted);
+    run(&folder, &format!("sequence right left swapped --quiet {RANGE}")).succeeded();
+    assert_ne!(maps(&folder.join("swapped"), names), wanted);
 }
 
 #[test]
 fn streams_give_the_maps_of_their_pixels() {
     let folder = cameras();
-    let at: &Path = &folder;
     let numbers = ["000000", "000001", "000002"];
     // Pixels alone: what the files hold.
     let mut raw = Vec::new();
@@ -125,17 +114,17 @@ fn streams_give_the_maps_of_their_pixels() {
             raw.extend(frame(scene, view).into_raw());
         }
     }
-    let line = ["sequence - raw --raw-frames 64x96,rgb24 --layout top-bottom --quiet"];
-    let output = fed(at, &[&line, &RANGE[..]].concat(), &raw);
+    let line = "sequence - raw --raw-frames 64x96,rgb24 --layout top-bottom --quiet";
+    let output = fed(&folder, &format!("{line} {RANGE}"), &raw);
     assert!(output.status.success(), "{output:?}");
-    assert_eq!(maps(&at.join("raw"), numbers), wanted(at, &[]));
+    assert_eq!(maps(&folder.join("raw"), numbers), wanted(&folder));
     // Luma alone, in a stream, a file, and grey images.
     let grey = grey_stream(GREY);
-    fs::write(at.join("both.y4m"), &grey).unwrap();
-    let output = fed(at, &[&["sequence - piped"], &RANGE[..]].concat(), &grey);
+    fs::write(folder.join("both.y4m"), &grey).unwrap();
+    let output = fed(&folder, &format!("sequence - piped {RANGE}"), &grey);
     assert!(output.status.success(), "{output:?}");
     // A pipe may hand its header on in pieces.
-    let mut child = started(at, &[&["sequence - pieces"], &RANGE[..]].concat());
+    let mut child = started(&folder, &format!("sequence - pieces {RANGE}"));
     let mut stdin = child.stdin.take().unwrap();
     for piece in [&grey[..5], &grey[5..30], &grey[30..]] {
         stdin.write_all(piece).unwrap();
@@ -145,18 +134,18 @@ fn streams_give_the_maps_of_their_pixels() {
     drop(stdin);
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    run(at, &[&["sequence both.y4m filed --quiet"], &RANGE[..]].concat()).succeeded();
+    run(&folder, &format!("sequence both.y4m filed --quiet {RANGE}")).succeeded();
     for (name, scene) in SCENES {
         for (view, path) in [format!("left/{name}.png"), format!("right/{name}.ppm")].iter().enumerate() {
             let green = frame(scene, view).pixels().map(|pixel| pixel[1]).collect();
             let image = image::GrayImage::from_raw(SIZE.0, SIZE.1, green).unwrap();
-            image.save_with_format(at.join(path), image::ImageFormat::Png).unwrap();
+            image.save_with_format(folder.join(path), image::ImageFormat::Png).unwrap();
         }
     }
-    let of_grey = wanted(at, &[]);
-    assert_eq!(maps(&at.join("piped"), numbers), of_grey);
-    assert_eq!(maps(&at.join("pieces"), numbers), of_grey);
-    assert_eq!(maps(&at.join("filed"), numbers), of_grey);
+    let of_grey = wanted(&folder);
+    for output in ["piped", "pieces", "filed"] {
+        assert_eq!(maps(&folder.join(output), numbers), of_grey, "{output}");
+    }
 }
 
 /// The header, and the pictures of a film, as luma.
@@ -174,16 +163,15 @@ fn film(bytes: &[u8], (width, height): (usize, usize)) -> (String, Vec<Vec<u8>>)
 #[test]
 fn films_show_the_previews() {
     let folder = cameras();
-    let at: &Path = &folder;
-    let line = ["sequence left right film.y4m --colours grey"];
-    run(at, &[&line, &RANGE[..]].concat()).succeeded();
-    let files = ["sequence left right maps --colours grey --also preview,side-by-side"];
-    run(at, &[&files, &RANGE[..]].concat()).succeeded();
-    let preview =
-        |name: &str, what: &str| image::open(at.join(format!("maps/{name}.{what}.png"))).unwrap().to_luma8();
+    for output in ["film.y4m", "maps --also preview,side-by-side"] {
+        run(&folder, &format!("sequence left right {output} --colours grey {RANGE}")).succeeded();
+    }
+    let preview = |name: &str, what: &str| {
+        image::open(folder.join(format!("maps/{name}.{what}.png"))).unwrap().to_luma8()
+    };
     let size = preview("f1", "preview").dimensions();
     let (header, pictures) =
-        film(&fs::read(at.join("film.y4m")).unwrap(), (size.0 as usize, size.1 as usize));
+        film(&fs::read(folder.join("film.y4m")).unwrap(), (size.0 as usize, size.1 as usize));
     assert_eq!(header, format!("YUV4MPEG2 W64 H{} F25:1 Ip A1:1 C444 XCOLORRANGE=LIMITED", size.1));
     let off = |picture: &[u8], name: &str| {
         let levels =
@@ -197,7 +185,7 @@ fn films_show_the_previews() {
     assert!(off(&pictures[0], "f10") > 20.0, "control: another frame looks different");
     // To standard output, beside the left image, at the rate of the stream.
     let output =
-        fed(at, &[&["sequence - - --also side-by-side --quiet"], &RANGE[..]].concat(), &grey_stream(GREY));
+        fed(&folder, &format!("sequence - - --also side-by-side --quiet {RANGE}"), &grey_stream(GREY));
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     let wide = preview("f1", "side-by-side").dimensions();
     let (header, pictures) = film(&output.stdout, (wide.0 as usize, wide.1 as usize));
@@ -208,61 +196,51 @@ fn films_show_the_previews() {
 #[test]
 fn raw_frames_are_rectified_once_and_for_all() {
     let folder = Folder::new();
-    let at: &Path = &folder;
     for (camera, file) in [("left", "left.png"), ("right", "right.png")] {
-        fs::create_dir(at.join(camera)).unwrap();
+        fs::create_dir(folder.join(camera)).unwrap();
         for name in ["a.png", "b.png"] {
-            fs::copy(scene_file("raw", file), at.join(camera).join(name)).unwrap();
+            fs::copy(scene("raw").join(file), folder.join(camera).join(name)).unwrap();
         }
     }
-    let calib = scene_file("raw", "cameras.yml");
-    let options = ["--rectify --calib", &calib, "--max-disparity 31 --device cpu --quiet"];
-    let line = ["sequence left right maps --also depth,points"];
-    run(at, &[&line, &options[..]].concat()).succeeded();
-    let line = ["match left/a.png right/a.png a.pfm --also depth,points"];
-    run(at, &[&line, &options[..]].concat()).succeeded();
-    for (of_sequence, of_match) in [
-        ("a.pfm", "a.pfm"),
-        ("b.pfm", "a.pfm"),
-        ("b.depth.pfm", "a.depth.pfm"),
-        ("b.points.ply", "a.points.ply"),
-    ] {
-        assert_eq!(
-            fs::read(at.join("maps").join(of_sequence)).unwrap(),
-            fs::read(at.join(of_match)).unwrap()
-        );
+    for frames in ["sequence left right maps", "match left/a.png right/a.png a.pfm"] {
+        let options = "--rectify --calib @raw/cameras.yml --max-disparity 31 --device cpu --quiet";
+        run(&folder, &format!("{frames} --also depth,points {options}")).succeeded();
+    }
+    let same =
+        |one: &str, other: &str| fs::read(folder.join(one)).unwrap() == fs::read(folder.join(other)).unwrap();
+    assert!(same("maps/a.pfm", "a.pfm"));
+    for end in ["pfm", "depth.pfm", "points.ply"] {
+        assert!(same(&format!("maps/b.{end}"), &format!("a.{end}")), "{end}");
     }
     // Control: unrectified views are another pair.
-    run(at, &["sequence left right others --max-disparity 31 --device cpu --quiet"]).succeeded();
-    assert_ne!(fs::read(at.join("others/a.pfm")).unwrap(), fs::read(at.join("a.pfm")).unwrap());
+    run(&folder, "sequence left right others --max-disparity 31 --device cpu --quiet").succeeded();
+    assert!(!same("others/a.pfm", "a.pfm"));
 }
 
 #[test]
 fn sequences_that_make_no_sense_are_told_in_one_line() {
     let folder = cameras();
-    let at: &Path = &folder;
-    fs::create_dir_all(at.join("none")).unwrap();
-    fs::create_dir_all(at.join("fewer")).unwrap();
-    fs::create_dir_all(at.join("twice")).unwrap();
-    fs::create_dir_all(at.join("odd")).unwrap();
-    fs::copy(at.join("right/f1.ppm"), at.join("fewer/f1.ppm")).unwrap();
-    fs::copy(at.join("left/f1.png"), at.join("twice/f1.png")).unwrap();
-    fs::copy(at.join("right/f1.ppm"), at.join("twice/F1.ppm")).unwrap();
-    image::GrayImage::new(63, 48).save(at.join("odd/a.png")).unwrap();
-    fs::write(at.join("text.y4m"), "a picture is worth a thousand words").unwrap();
-    fs::write(at.join("empty.y4m"), "").unwrap();
-    fs::write(at.join("head.y4m"), GREY).unwrap();
-    for (name, header) in [
-        ("huge.y4m", "YUV4MPEG2 W4294967295 H4294967295 F25:1 C420\n"),
-        ("wide.y4m", "YUV4MPEG2 W99999999999999999999 H4 F25:1 C420\n"),
-        ("none.y4m", "YUV4MPEG2 W0 H4 F25:1 C420\n"),
-        ("size.y4m", "YUV4MPEG2 F25:1 C420\n"),
-        ("kind.y4m", "YUV4MPEG2 W128 H48 F25:1 C411\n"),
-        ("rate.y4m", "YUV4MPEG2 W128 H48 F25 Cmono\n"),
-    ] {
-        fs::write(at.join(name), header.to_owned() + "FRAME\n").unwrap();
+    for name in ["none", "fewer", "twice", "odd"] {
+        fs::create_dir(folder.join(name)).unwrap();
     }
-    let before = listing(at);
+    fs::copy(folder.join("right/f1.ppm"), folder.join("fewer/f1.ppm")).unwrap();
+    fs::copy(folder.join("left/f1.png"), folder.join("twice/f1.png")).unwrap();
+    fs::copy(folder.join("right/f1.ppm"), folder.join("twice/F1.ppm")).unwrap();
+    image::GrayImage::new(63, 48).save(folder.join("odd/a.png")).unwrap();
+    for (name, bytes) in [
+        ("text.y4m", "a picture is worth a thousand words"),
+        ("empty.y4m", ""),
+        ("head.y4m", GREY),
+        ("huge.y4m", "YUV4MPEG2 W4294967295 H4294967295 F25:1 C420\nFRAME\n"),
+        ("wide.y4m", "YUV4MPEG2 W99999999999999999999 H4 F25:1 C420\nFRAME\n"),
+        ("none.y4m", "YUV4MPEG2 W0 H4 F25:1 C420\nFRAME\n"),
+        ("size.y4m", "YUV4MPEG2 F25:1 C420\nFRAME\n"),
+        ("kind.y4m", "YUV4MPEG2 W128 H48 F25:1 C411\nFRAME\n"),
+        ("rate.y4m", "YUV4MPEG2 W128 H48 F25 Cmono\nFRAME\n"),
+    ] {
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+    let before = listing(&folder);
     for (line, code, words) in [
         ("left right maps --max-disparity auto --calib nothing.yml", 1, "nothing.yml"),
         ("nowhere right maps", 1, "nowhere"),
@@ -299,8 +277,8 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("left", 2, "OUTPUT"),
     ] {
         let range = if line.contains("--max-disparity") { "" } else { " --max-disparity 23" };
-        run(at, &[&format!("sequence {line}{range} --device cpu --quiet")]).failed(code, &[words], line);
-        assert_eq!(listing(at), before, "{line}");
+        run(&folder, &format!("sequence {line}{range} --device cpu --quiet")).failed(code, words);
+        assert_eq!(listing(&folder), before, "{line}");
     }
 }
 
@@ -308,33 +286,35 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
 #[test]
 fn what_was_done_before_a_failure_stays() {
     let folder = cameras();
-    let at: &Path = &folder;
-    let wanted = wanted(at, &[]);
+    let wanted = wanted(&folder);
     let whole = grey_stream(GREY);
-    fs::write(at.join("cut.y4m"), &whole[..whole.len() - 1]).unwrap();
-    fs::write(at.join("short.y4m"), &whole[..GREY.len() + 2 * (6 + 128 * 48)]).unwrap();
     let second = GREY.len() + 6 + 128 * 48;
-    fs::write(at.join("torn.y4m"), [&whole[..second], b"FRAMING\n", &whole[second + 6..]].concat()).unwrap();
-    fs::write(at.join("whole.y4m"), &whole).unwrap();
-    fs::write(at.join("cut.raw"), &whole[..5 * 64 * 48 + 7]).unwrap();
-    fs::create_dir(at.join("bad")).unwrap();
-    fs::create_dir(at.join("larger")).unwrap();
-    for (name, _) in SCENES {
-        for folder in ["bad", "larger"] {
-            fs::copy(at.join(format!("right/{name}.ppm")), at.join(format!("{folder}/{name}.ppm"))).unwrap();
+    for (name, bytes) in [
+        ("cut.y4m", &whole[..whole.len() - 1]),
+        ("short.y4m", &whole[..GREY.len() + 2 * (6 + 128 * 48)]),
+        ("torn.y4m", &[&whole[..second], b"FRAMING\n", &whole[second + 6..]].concat()),
+        ("whole.y4m", &whole),
+        ("cut.raw", &whole[..5 * 64 * 48 + 7]),
+    ] {
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+    for other in ["bad", "larger"].map(|name| folder.join(name)) {
+        fs::create_dir(&other).unwrap();
+        for file in SCENES.map(|(name, _)| format!("{name}.ppm")) {
+            fs::copy(folder.join("right").join(&file), other.join(file)).unwrap();
         }
     }
-    fs::write(at.join("bad/f10.ppm"), "P6 64 48 255\nshort").unwrap();
+    fs::write(folder.join("bad/f10.ppm"), "P6 64 48 255\nshort").unwrap();
     let larger = image::imageops::resize(&frame("thin", 1), 80, 48, image::imageops::FilterType::Nearest);
-    larger.save(at.join("larger/f2.ppm")).unwrap();
+    larger.save(folder.join("larger/f2.ppm")).unwrap();
     for (i, (line, done, words)) in [
-        ("cut.y4m OUT", 2, ["cut.y4m", "frame 000002 is cut off"]),
-        ("torn.y4m OUT", 1, ["torn.y4m", "frame 000001 is damaged"]),
-        ("whole.y4m short.y4m OUT", 2, ["short.y4m ends here", "whole.y4m goes on"]),
-        ("short.y4m whole.y4m OUT", 2, ["short.y4m ends here", "whole.y4m goes on"]),
-        ("cut.raw OUT --raw-frames 128x48,gray", 2, ["cut.raw", "frame 000002 is cut off"]),
-        ("left bad OUT", 2, ["f10.ppm", "truncated"]),
-        ("left larger OUT", 1, ["frame f2", "80 x 48"]),
+        ("cut.y4m OUT", 2, "cut.y4m & frame 000002 is cut off"),
+        ("torn.y4m OUT", 1, "torn.y4m & frame 000001 is damaged"),
+        ("whole.y4m short.y4m OUT", 2, "short.y4m ends here & whole.y4m goes on"),
+        ("short.y4m whole.y4m OUT", 2, "short.y4m ends here & whole.y4m goes on"),
+        ("cut.raw OUT --raw-frames 128x48,gray", 2, "cut.raw & frame 000002 is cut off"),
+        ("left bad OUT", 2, "f10.ppm & truncated"),
+        ("left larger OUT", 1, "frame f2 & 80 x 48"),
     ]
     .into_iter()
     .enumerate()
@@ -342,16 +322,13 @@ fn what_was_done_before_a_failure_stays() {
         let (output, film) = (format!("maps{i}"), format!("film{i}.y4m"));
         for output in [&output, &film] {
             let line = line.replace("OUT", output);
-            let args: Vec<_> = ["sequence"].into_iter().chain(line.split(' ')).chain(RANGE).collect();
-            let run = run(at, &[&args[..], &["--quiet"]].concat());
-            run.failed(1, &words[..1], &line);
-            assert!(words.iter().all(|word| run.stderr.contains(word)), "{line}: {}", run.stderr);
+            run(&folder, &format!("sequence {line} {RANGE} --quiet")).failed(1, words);
         }
-        assert_eq!(listing(&at.join(&output)).len(), done, "{line}");
+        assert_eq!(listing(&folder.join(&output)).len(), done, "{line}");
         if line.starts_with("left") {
-            assert_eq!(fs::read(at.join(&output).join("f1.pfm")).unwrap(), wanted[0], "{line}");
+            assert_eq!(fs::read(folder.join(&output).join("f1.pfm")).unwrap(), wanted[0], "{line}");
         }
-        let film = fs::read(at.join(film)).unwrap();
+        let film = fs::read(folder.join(film)).unwrap();
         let frames = film.windows(6).filter(|bytes| bytes == b"FRAME\n").count();
         assert_eq!(frames, done, "{line}");
     }
@@ -361,11 +338,10 @@ fn what_was_done_before_a_failure_stays() {
 #[test]
 fn what_was_done_before_a_signal_stays() {
     let folder = Folder::new();
-    let at: &Path = &folder;
     // Two frames, and a third that never ends.
     let stream = grey_stream(GREY);
     let stopped = |output: &str, signal: &str, ready: &dyn Fn() -> bool| {
-        let mut child = started(at, &[&["sequence -", output], &RANGE[..]].concat());
+        let mut child = started(&folder, &format!("sequence - {output} {RANGE}"));
         let mut stdin = child.stdin.take().unwrap();
         stdin.write_all(&stream[..stream.len() - 100]).unwrap();
         stdin.flush().unwrap();
@@ -376,9 +352,9 @@ fn what_was_done_before_a_signal_stays() {
         (child.wait().unwrap().code(), said)
     };
     let end = "mrfgs: stopped after 2 frames\n";
-    let (code, said) = stopped("maps", "-INT", &|| at.join("maps/000001.pfm").exists());
+    let (code, said) = stopped("maps", "-INT", &|| folder.join("maps/000001.pfm").exists());
     assert!(code == Some(130) && said.ends_with(end), "{code:?}: {said}");
-    assert_eq!(listing(&at.join("maps")).len(), 2);
+    assert_eq!(listing(&folder.join("maps")).len(), 2);
     // A film has no name before its end, so nobody sees how far it is.
     let done = [1, 4, 16].into_iter().any(|seconds| {
         let start = Instant::now();
@@ -387,7 +363,7 @@ fn what_was_done_before_a_signal_stays() {
         code == Some(130) && said.ends_with(end)
     });
     assert!(done, "no film of two frames");
-    let film = fs::read(at.join("film.y4m")).unwrap();
+    let film = fs::read(folder.join("film.y4m")).unwrap();
     assert_eq!(film.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
 }
 
@@ -396,12 +372,10 @@ fn what_was_done_before_a_signal_stays() {
 #[test]
 fn a_player_that_is_closed_ends_it() {
     let folder = cameras();
-    let mut child = started(&folder, &[&["sequence left right - --quiet"], &RANGE[..]].concat());
+    let line = format!("sequence left right - --quiet {RANGE}");
+    let mut child = started(&folder, &line);
     drop(child.stdout.take());
-    let output = child.wait_with_output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{said}");
-    assert!(said.contains("its reader left"), "{said}");
+    Run::of(&line, child.wait_with_output().unwrap()).failed(1, "its reader left");
 }
 
 /// On a GPU frames overlap; the maps are the same.
@@ -411,7 +385,6 @@ fn a_device_gives_the_same_maps() {
         return;
     }
     let folder = cameras();
-    let at: &Path = &folder;
-    run(at, &["sequence left right maps --max-disparity 23 --device gpu --quiet"]).succeeded();
-    assert_eq!(maps(&at.join("maps"), SCENES.map(|(name, _)| name)), wanted(at, &[]));
+    run(&folder, "sequence left right maps --max-disparity 23 --device gpu --quiet").succeeded();
+    assert_eq!(maps(&folder.join("maps"), SCENES.map(|(name, _)| name)), wanted(&folder));
 }

@@ -153,7 +153,7 @@ impl Half<'_> {
     fn between(&self, own: (usize, usize), place: (usize, usize)) -> i32 {
         let (width, height) = self.above_low.size();
         let beside = |own: usize, place: usize, end: usize| {
-            if place % 2 == 0 { own.saturating_sub(1) } else { (own + 1).min(end - 1) }
+            if place.is_multiple_of(2) { own.saturating_sub(1) } else { (own + 1).min(end - 1) }
         };
         let (x, y) = (beside(own.0, place.0, width), beside(own.1, place.1, height));
         let value = |at| self.above_low[if has_disparity(self.validity[at]) { at } else { own }];

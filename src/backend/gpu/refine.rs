@@ -13,7 +13,7 @@ use crate::stage::refine::{COLUMNS, NEAR, NO_CENSUS, REACH};
 shader! {
     "refine"(plan, level) { full_pitch: u32 }
     census: Census { left, right, left_census_out, right_census_out } => kernel(5 * 6);
-    costs: Costs { left_census, right_census, optima, costs_out } => kernel(2 * 3 * 5);
+    costs: Blocks { left_census, right_census, optima, costs_out } => kernel(2 * 3 * 5);
     fit: Fit { optima, costs_in, raw, disparity } => kernel(3 * (2 * COLUMNS + 2) + REACH);
 }
 
@@ -42,7 +42,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
             right_census_out: full.census[1].bind(&rows),
         }
     })?;
-    r.rows(&costs(r.plan, 0), &own, 4 * l.width, |rows| Costs {
+    r.rows(&costs(r.plan, 0), &own, 4 * l.width, |rows| Blocks {
         left_census: full.census[0].bind(&FullBuffers::rows(rows)),
         right_census: full.census[1].bind(&FullBuffers::rows(rows)),
         optima: b.optima.bind(rows),

@@ -10,13 +10,11 @@ use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::Reader;
 use mrfgs::options::DisparityRange;
 
-use crate::args::search::{Found, Search};
-use crate::args::sign::Sign;
+use crate::args::{Found, Search, Sign};
 use crate::failure::Result;
-use crate::outputs::also::Also;
-use crate::outputs::record::Files;
-use crate::pairs::cameras;
+use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
+use crate::pairs::input;
 use crate::pairs::list::{self, Names, Row};
 
 /// Many pairs.
@@ -143,7 +141,7 @@ impl Listed {
             Some(range) => Found { range, by_matches: false },
             None => search.range(&pair, known, Sign::default())?,
         };
-        let rig = |word| cameras::rig(word, known, &at(&left), pair.size(), "put one there");
+        let rig = |word| input::rig(word, known, &at(&left), pair.size(), "put one there");
         let rig = cameras.map(rig).transpose()?;
         let calibration = (known.is_some() || is_folder && path.exists()).then_some(beside);
         let files = Files { left, right, mask, calibration, output: None };
@@ -151,7 +149,7 @@ impl Listed {
     }
 }
 
-fn shown(path: &Path) -> String {
+pub(super) fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 

@@ -16,20 +16,13 @@ use mrfgs::image::{Pair, write};
 use mrfgs::options::Method;
 use mrfgs::{Error, Matched, Matcher};
 
-use crate::args::execution::ExecutionArgs;
-use crate::args::method::MethodArgs;
-use crate::args::reading::ReadingArgs;
-use crate::args::sign::Sign;
+use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, Sign};
 use crate::failure::{self, Failure, Result};
-use crate::outputs::also::{self, Outcome, View};
-use crate::outputs::claim::Claim;
-use crate::outputs::files;
-use crate::outputs::maps::{Format, MapArgs};
-use crate::outputs::record::MatchRecord;
-use crate::progress::PairBar;
+use crate::outputs::{Claim, Format, MapArgs, MatchRecord, Outcome, also, files};
+use crate::progress::Counter;
 use crate::{console, remedy, stop};
 
-use listed::{Input, List, Listed};
+use listed::{Input, List, Listed, shown};
 use request::{Request, State};
 use shard::{Shard, shard};
 
@@ -95,11 +88,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
-}
-
-fn shown(path: &Path) -> String {
-    path.display().to_string()
+    execution: ExecutionArgs,
 }
 
 /// How long to wait for pairs that other runs match.
@@ -114,10 +103,10 @@ struct Batch<'a> {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    let execution = args.execution.execution();
     // A batch takes rectified pairs.
     args.maps.also.check(false)?;
     let method = args.maps.also.made_by(args.method.method()?)?;
-    let execution = args.execution.execution();
     let List { base, mut pairs } = List::read(&args.list)?;
     check_folder(args, &base, &pairs)?;
     if let Some(shard) = args.shard {
@@ -217,13 +206,13 @@ impl Batch<'_> {
             pairs.iter().filter(|listed| self.state(listed) != State::Complete).collect();
         let all = pairs.len();
         let (mut done, mut skipped, mut failed) = (0, all - left.len(), Vec::new());
-        let mut bar = PairBar::new(all, skipped, self.args.quiet);
+        let mut bar = Counter::of_pairs(all, skipped, self.args.quiet);
         let mut told = None;
         // How many pairs in a row other runs had claimed.
         let mut taken = 0;
         while let Some(listed) = left.pop_front() {
             let name = listed.name.as_str();
-            bar.begin(name);
+            bar.begin_pair(name);
             let interrupted = || {
                 let finished = skipped + done + failed.len();
                 Failure::Stopped(format!("stopped after {finished} of {all}; run it again to resume"))
@@ -244,7 +233,7 @@ impl Batch<'_> {
             if self.state(listed) == State::Complete {
                 // Another run has matched it since this one began.
                 skipped += 1;
-                bar.end();
+                bar.end_pair();
                 continue;
             }
             match self.pair(listed, &claim, &mut matcher) {
@@ -263,7 +252,7 @@ impl Batch<'_> {
                 Err(Failure::Stopped(_)) => return Err(interrupted()),
                 Err(failure) => return Err(failure),
             }
-            bar.end();
+            bar.end_pair();
         }
         drop(bar);
         let summary = format!("{done} done, {skipped} skipped, {} failed", failed.len());
@@ -298,13 +287,8 @@ impl Batch<'_> {
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign, left) = (&matched.maps, Sign::default(), pair.as_ref().map(Pair::left));
         let outcome = Outcome { maps, range, sign, left, rig, rectifying: None, georeferences };
-        let staged = |file: &str| claim.folder().join(file);
-        let map = wanted.map(&listed.name);
-        self.named(&map, outcome.writer(View::Left).disparity(&staged(&map), &maps.final_map()))?;
-        for (word, file) in wanted.also(&listed.name) {
-            self.named(&file, wanted.also.write(word, &staged(&file), &outcome))?;
-        }
-        files.output = Some(map);
+        self.named(claim, wanted.write(claim.folder(), &listed.name, &outcome))?;
+        files.output = Some(wanted.map(&listed.name));
         let found = MatchRecord::new(&files, &matched, time, sign);
         let text = request.done(&record, claim.folder(), found, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
@@ -321,11 +305,7 @@ impl Batch<'_> {
         let input = listed.read(&self.base, self.reader, wanted.also.take_cameras())?;
         let (pair, range) = (&input.pair, input.range);
         // The folder is there, so what can be wrong is the range.
-        let map = wanted.map(&listed.name);
-        self.named(&map, write::check_disparity_path(&claim.folder().join(&map), range.min, range.max))?;
-        for (word, file) in wanted.also(&listed.name) {
-            self.named(&file, word.check(&claim.folder().join(&file), range))?;
-        }
+        self.named(claim, wanted.check(claim.folder(), &listed.name, range))?;
         let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
         let start = Instant::now();
         let matched = matcher.job(pair, range).on_progress(|_| stop::go_on()).run()?;
@@ -336,8 +316,14 @@ impl Batch<'_> {
     }
 
     /// The user knows a file by its place in the output folder.
-    fn named<T, E: Into<Failure>>(&self, file: &str, result: Result<T, E>) -> Result<T> {
-        result.map_err(|e| e.into().at(&self.args.folder.join(file)))
+    fn named<E: Into<Failure>>(&self, claim: &Claim, result: Result<(), E>) -> Result<()> {
+        result.map_err(|e| match e.into() {
+            Failure::Error(Error::Write { path, reason }) => {
+                let file = path.strip_prefix(claim.folder()).map(|file| self.args.folder.join(file));
+                Error::write(file.unwrap_or(path), reason).into()
+            }
+            failure => failure,
+        })
     }
 
     /// Puts `outputs` in their place, and then the record. Without a record the pair is not complete, so the old record is removed

@@ -10,10 +10,9 @@ use mrfgs::options::Method;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::args::search::Search;
+use crate::args::Search;
 use crate::failure::{Failure, Result};
-use crate::outputs::files;
-use crate::outputs::record::MatchRecord;
+use crate::outputs::{MatchRecord, files};
 use crate::remedy;
 
 use super::listed::Listed;

@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use mrfgs::Error;
 use mrfgs::error::ExecutionError;
+use mrfgs::options::DeviceChoice;
 
-use crate::args::execution::{Device, ThreadArgs};
-use crate::args::method::MethodArgs;
-use crate::args::reading::ReadingArgs;
+use crate::args::{MethodArgs, ReadingArgs, ThreadArgs};
 use crate::failure::Result;
 
 use super::synthetic::{LARGE, SMALL, Synthetic};
@@ -73,7 +72,7 @@ pub(crate) struct Args {
         default_values = ["cpu", "auto"],
         help_heading = "Where it runs"
     )]
-    pub(super) device: Vec<Device>,
+    pub(super) device: Vec<DeviceChoice>,
     #[command(flatten)]
     pub(super) threads: ThreadArgs,
 }

@@ -16,10 +16,9 @@ use mrfgs::low_level::roofline;
 use mrfgs::options::{DeviceChoice, DisparityRange};
 use mrfgs::{Error, Matched, Matcher, Timing};
 
-use crate::args::execution::Device;
 use crate::console;
 use crate::failure::{Failure, Result};
-use crate::outputs::record::stage_and_level;
+use crate::outputs::stage_and_level;
 use crate::pairs::folder::{self, Folder};
 use crate::process::{peak_memory, processor_time};
 
@@ -33,7 +32,7 @@ pub(super) struct Case<'a> {
     pub(super) dir: Option<&'a Path>,
     /// The preset that is measured, or that the files of `--method` change.
     pub(super) base: &'static str,
-    pub(super) device: &'a Device,
+    pub(super) device: &'a DeviceChoice,
 }
 
 impl Case<'_> {
@@ -46,7 +45,7 @@ impl Case<'_> {
         let said = String::from_utf8_lossy(&run.stderr);
         if !run.status.success() {
             let said = said.trim().trim_start_matches("mrfgs: ");
-            let ended = format!("{} on {}: {}", self.pair_name(), self.device, run.status);
+            let ended = format!("{} on {}: {}", self.pair_name(), word(self.device), run.status);
             return Err(failed(if said.is_empty() { ended } else { said.into() }));
         }
         let findings: Findings =
@@ -65,7 +64,7 @@ impl Case<'_> {
             text.push(value);
             all.push(text);
         };
-        flag("--device=", &self.device.to_string());
+        flag("--device=", &word(self.device));
         flag("--repeats=", &args.repeats.to_string());
         flag("--max-pixels=", &args.reading.max_pixels.to_string());
         if let Some(value) = args.reading.no_data {
@@ -106,7 +105,7 @@ impl Case<'_> {
             let made_up = self.args.made_up();
             (made_up.pair()?, made_up.range()?)
         };
-        let (name, device) = (self.pair_name(), self.device.to_string());
+        let (name, device) = (self.pair_name(), word(self.device).to_owned());
         let method = self.args.method.name().unwrap_or_else(|| self.base.into());
         let what = format!("{name}, method {method}, {device}");
         let figures = match self.figures(&pair, range) {
@@ -127,7 +126,7 @@ impl Case<'_> {
     fn figures(&self, pair: &Pair, range: DisparityRange) -> Result<Figures> {
         let method = self.args.method.on(self.base)?;
         let mut matcher =
-            Matcher::builder().method(method).execution(self.device.execution(&self.args.threads)).build()?;
+            Matcher::builder().method(method).execution(self.args.threads.execution(self.device)).build()?;
         let mut run = |timings: bool| {
             matcher.keep_time(timings);
             matcher.run(pair, range)
@@ -145,8 +144,8 @@ impl Case<'_> {
         let peak_bytes = peak_memory();
         drop(matcher);
         let copy_gb_per_s = giga(match self.device {
-            Device(DeviceChoice::Cpu) => self.args.pool()?.install(Cpu::copy_rate),
-            device => Gpu::new(device.name())?.copy_rate()?,
+            DeviceChoice::Cpu => self.args.pool()?.install(Cpu::copy_rate),
+            device => Gpu::new(name(device))?.copy_rate()?,
         });
         let message_time = |timings: &Vec<Timing>| ms(messages(&plan, timings).map(|(_, t)| t.time).sum());
         let message_ms = median(timed.iter().map(message_time));
@@ -198,6 +197,21 @@ impl Case<'_> {
             runs_ms,
         })
     }
+}
+
+/// A device in the words of --device.
+fn word(device: &DeviceChoice) -> &str {
+    match device {
+        DeviceChoice::Auto => "auto",
+        DeviceChoice::Cpu => "cpu",
+        DeviceChoice::Gpu => "gpu",
+        DeviceChoice::Named(name) => name,
+    }
+}
+
+/// The index or name of a certain device.
+pub(super) fn name(device: &DeviceChoice) -> Option<&str> {
+    matches!(device, DeviceChoice::Named(_)).then(|| word(device))
 }
 
 /// The message stages among `timings`.

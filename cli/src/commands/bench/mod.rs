@@ -5,29 +5,31 @@ mod case;
 mod findings;
 mod synthetic;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use mrfgs::image::write;
 use mrfgs::low_level::backend::gpu::{self, Gpu};
 use mrfgs::options::DeviceChoice;
 
-use crate::args::execution::Device;
 use crate::failure::Result;
 use crate::outputs::files;
 use crate::pairs::folder::{self, Folder};
+use crate::process;
 
 pub(crate) use args::Args;
-use case::Case;
+use case::{Case, name};
 use findings::Findings;
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    check_output(args)?;
+    process::quiet_loader();
+    let inputs = folder::inputs_of(&args.dirs).chain(args.method.files().map(Path::to_owned));
+    files::check_json(args.json.as_deref(), inputs)?;
     // What is missing in the last folder is said before the first is matched.
     args.dirs.iter().try_for_each(|dir| Folder::to_match(dir).map(drop))?;
     let bases: &[&'static str] =
         if args.method.name().is_some() { &["default"] } else { &["default", "paper"] };
-    let name = |base: &str| args.method.name().unwrap_or_else(|| base.into());
-    let methods = bases.iter().map(|base| Ok((name(base), args.method.on(base)?))).collect::<Result<_>>()?;
+    let called = |base: &str| args.method.name().unwrap_or_else(|| base.into());
+    let methods =
+        bases.iter().map(|base| Ok((called(base), args.method.on(base)?))).collect::<Result<_>>()?;
     let devices = devices(args);
     let dirs: Vec<Option<&Path>> = match args.dirs.as_slice() {
         [] => vec![None],
@@ -36,8 +38,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let alone = dirs.len() * bases.len() * devices.len() == 1;
     if !alone {
         // A device that is missing is said before the others are measured.
-        for device in devices.iter().filter(|device| device.0 != DeviceChoice::Cpu) {
-            Gpu::new(device.name())?;
+        for device in devices.iter().filter(|device| **device != DeviceChoice::Cpu) {
+            Gpu::new(name(device))?;
         }
     }
     let mut pairs = Vec::new();
@@ -64,22 +66,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     files::deliver(args.json.as_deref(), &findings, &findings.text(), |_| Ok(()))
 }
 
-/// Finds out before any computing whether the output can be written.
-fn check_output(args: &Args) -> Result<()> {
-    let Some(path) = files::json_file(args.json.as_deref()) else { return Ok(()) };
-    write::check_path(path)?;
-    let inputs: Vec<PathBuf> = args.dirs.iter().flat_map(|dir| folder::inputs(dir)).collect();
-    let inputs = inputs.iter().map(PathBuf::as_path).chain(args.method.files());
-    files::distinct(&inputs.map(|path| ("an input", path)).collect::<Vec<_>>(), &[("--json", path)])
-}
-
 /// The devices to measure, each once.
-fn devices(args: &Args) -> Vec<Device> {
-    let mut devices: Vec<Device> = Vec::new();
+fn devices(args: &Args) -> Vec<DeviceChoice> {
+    let mut devices = Vec::new();
     for device in &args.device {
         let device = match device {
-            Device(DeviceChoice::Auto) if gpu::has_automatic() => Device(DeviceChoice::Gpu),
-            Device(DeviceChoice::Auto) => Device(DeviceChoice::Cpu),
+            DeviceChoice::Auto if gpu::has_automatic() => DeviceChoice::Gpu,
+            DeviceChoice::Auto => DeviceChoice::Cpu,
             device => device.clone(),
         };
         if !devices.contains(&device) {

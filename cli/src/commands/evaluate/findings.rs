@@ -4,31 +4,30 @@ use mrfgs::evaluation::{Breakdown, Detection, Report, Sparsification, mean};
 use mrfgs::options::Method;
 use serde::Serialize;
 
+use crate::table::Table;
+
 /// The figures of all pairs, and what they are of.
 #[derive(Serialize)]
 pub(super) struct Findings {
     pub(super) method: Option<Method>,
     pub(super) ran_on: Option<String>,
-    pub(super) pairs: Vec<Figures>,
-    pub(super) mean: Mean,
+    pub(super) pairs: Vec<Scored>,
+    /// The means over all pairs.
+    pub(super) mean: Figures,
 }
 
 /// The figures of one pair.
 #[derive(Serialize)]
-pub(super) struct Figures {
+pub(super) struct Scored {
     pub(super) name: String,
-    pub(super) raw: Option<Report>,
-    #[serde(rename = "final")]
-    pub(super) finished: Report,
-    pub(super) breakdown: Option<Breakdown>,
-    pub(super) confidence: Option<Sparsification>,
-    pub(super) validity: Option<Detection>,
+    #[serde(flatten)]
+    pub(super) figures: Figures,
     pub(super) seconds: Option<f64>,
 }
 
-/// The means over all pairs.
-#[derive(Serialize)]
-pub(super) struct Mean {
+/// Figures of a pair, or the means over all; a finished map has that of the final map alone.
+#[derive(Default, Serialize)]
+pub(super) struct Figures {
     pub(super) raw: Option<Report>,
     #[serde(rename = "final")]
     pub(super) finished: Option<Report>,
@@ -37,22 +36,40 @@ pub(super) struct Mean {
     pub(super) validity: Option<Detection>,
 }
 
+impl Figures {
+    /// The errors of each map that there is, with its name.
+    pub(super) fn maps(&self) -> impl Iterator<Item = (&'static str, &Report)> {
+        let maps = [("raw", &self.raw), ("final", &self.finished)].into_iter();
+        maps.filter_map(|(map, report)| Some((map, report.as_ref()?)))
+    }
+}
+
 impl Findings {
-    pub(super) fn new(method: Option<Method>, ran_on: Option<String>, pairs: Vec<Figures>) -> Self {
-        let raw = pairs.iter().map(|f| f.raw.as_ref()).collect::<Option<Vec<_>>>().and_then(mean);
-        let finished = mean(pairs.iter().map(|f| &f.finished));
-        let mean = Mean {
-            raw,
-            finished,
+    pub(super) fn new(method: Option<Method>, ran_on: Option<String>, pairs: Vec<Scored>) -> Self {
+        let mean = Figures {
+            raw: over(&pairs, |f| f.raw.as_ref(), |reports| mean(reports.iter().copied())),
+            finished: over(&pairs, |f| f.finished.as_ref(), |reports| mean(reports.iter().copied())),
             breakdown: over(&pairs, |f| f.breakdown.as_ref(), Breakdown::mean),
             confidence: over(&pairs, |f| f.confidence.as_ref(), Sparsification::mean),
             validity: over(&pairs, |f| f.validity.as_ref(), Detection::mean),
         };
         Self { method, ran_on, pairs, mean }
     }
+
+    /// Adds the rows of all pairs to a table, and from two pairs on that of their mean, below a rule each.
+    pub(super) fn add_rows(&self, table: &mut Table, add: impl Fn(&mut Table, &str, &Figures)) {
+        table.rule();
+        for pair in &self.pairs {
+            add(table, &pair.name, &pair.figures);
+        }
+        if self.pairs.len() > 1 {
+            table.rule();
+            add(table, "mean", &self.mean);
+        }
+    }
 }
 
 /// The mean over all pairs; none if one of them lacks the figure.
-fn over<T>(pairs: &[Figures], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) -> Option<T>) -> Option<T> {
-    mean(&pairs.iter().map(of).collect::<Option<Vec<_>>>()?)
+fn over<T>(pairs: &[Scored], of: fn(&Figures) -> Option<&T>, mean: fn(&[&T]) -> Option<T>) -> Option<T> {
+    mean(&pairs.iter().map(|pair| of(&pair.figures)).collect::<Option<Vec<_>>>()?)
 }

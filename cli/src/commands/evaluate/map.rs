@@ -2,15 +2,14 @@
 
 use std::path::PathBuf;
 
-use crate::args::reading::ReadingArgs;
 use crate::failure::Result;
 use crate::outputs::files;
 use crate::pairs::folder;
 
-use super::findings::{Figures, Findings};
+use super::findings::{Figures, Findings, Scored};
 use super::metrics;
 use super::report::{self, ReportArgs};
-use super::scenes::{self, FigureArgs};
+use super::scenes::SceneArgs;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -32,35 +31,23 @@ pub(crate) struct Args {
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    figures: FigureArgs,
-    #[command(flatten)]
-    reading: ReadingArgs,
+    scenes: SceneArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
-    let json = args.figures.json.as_deref();
-    let destination = args.report.destination(json)?;
+    let SceneArgs { json, truth_scale, reading } = &args.scenes;
+    let json = json.as_deref();
+    let begun = args.report.begin(json)?;
     let inputs = [Some(&args.map), Some(&args.truth), args.mask.as_ref()];
-    scenes::check_json(json, &inputs.into_iter().flatten().cloned().collect::<Vec<_>>())?;
-    let reader = args.reading.reader();
+    files::check_json(json, inputs.into_iter().flatten().cloned())?;
+    let reader = reading.reader();
     let estimate = reader.disparity(&args.map)?;
-    let (scale, mask) = (args.figures.truth_scale, args.mask.as_deref());
-    let ground = folder::ground_truth(reader, &args.truth, scale, mask, &args.map, estimate.size())?;
-    let figures = Figures {
-        name: args.map.file_stem().unwrap_or(args.map.as_os_str()).to_string_lossy().into_owned(),
-        raw: None,
-        finished: ground.evaluate(&estimate)?,
-        breakdown: None,
-        confidence: None,
-        validity: None,
-        seconds: None,
-    };
-    let pictures =
-        destination.as_ref().map(|_| report::pictures(&figures.name, ground.truth(), &estimate, None));
+    let (map, mask) = (&args.map, args.mask.as_deref());
+    let ground = folder::ground_truth(reader, &args.truth, *truth_scale, mask, map, estimate.size())?;
+    let name = map.file_stem().unwrap_or(map.as_os_str()).to_string_lossy().into_owned();
+    let pictures = begun.as_ref().map(|_| report::pictures(&name, ground.truth(), &estimate, None));
     let pictures: Vec<_> = pictures.transpose()?.into_iter().collect();
-    let findings = Findings::new(None, None, vec![figures]);
-    files::deliver(json, &findings, &metrics::text(&findings), |_| match destination {
-        Some(destination) => report::write(&destination, &findings, &pictures),
-        None => Ok(()),
-    })
+    let figures = Figures { finished: Some(ground.evaluate(&estimate)?), ..Figures::default() };
+    let findings = Findings::new(None, None, vec![Scored { name, figures, seconds: None }]);
+    report::deliver(json, &findings, &metrics::text(&findings), begun, &pictures)
 }

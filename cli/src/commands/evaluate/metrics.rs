@@ -1,6 +1,6 @@
 //! The table of metrics.
 
-use mrfgs::evaluation::{Metrics, Report};
+use mrfgs::evaluation::Metrics;
 
 use crate::table::Table;
 
@@ -9,22 +9,19 @@ use super::findings::Findings;
 /// Most characters of a pair's name; longer names are cut.
 const NAME: usize = 12;
 
-/// A column: its head, its largest width, its decimals, and its value.
-type Column = (&'static str, usize, usize, fn(&Metrics) -> Option<f64>);
+/// A column: its head, that in a report, its largest width, its decimals, and its value.
+type Column = (&'static str, &'static str, usize, usize, fn(&Metrics) -> Option<f64>);
 
-const COLUMNS: [Column; 8] = [
-    ("avg", 6, 3, |m| m.avg),
-    ("PSNR", 5, 2, |m| m.psnr),
-    ("b0.5%", 5, 2, |m| Some(m.bad[0])),
-    ("b1%", 5, 2, |m| Some(m.bad[1])),
-    ("b2%", 5, 2, |m| Some(m.bad[2])),
-    ("b4%", 5, 2, |m| Some(m.bad[3])),
-    ("RMS", 5, 2, |m| m.rms),
-    ("dens%", 5, 2, |m| Some(m.density)),
+pub(super) const COLUMNS: [Column; 8] = [
+    ("avg", "avg. error", 6, 3, |m| m.avg),
+    ("PSNR", "PSNR", 5, 2, |m| m.psnr),
+    ("b0.5%", "bad 0.5", 5, 2, |m| Some(m.bad[0])),
+    ("b1%", "bad 1", 5, 2, |m| Some(m.bad[1])),
+    ("b2%", "bad 2", 5, 2, |m| Some(m.bad[2])),
+    ("b4%", "bad 4", 5, 2, |m| Some(m.bad[3])),
+    ("RMS", "RMS", 5, 2, |m| m.rms),
+    ("dens%", "density", 5, 2, |m| Some(m.density)),
 ];
-
-/// What the table shows of a pair, or of the mean: its name, and the errors of the raw and the final map.
-type Row<'a> = (&'a str, Option<&'a Report>, Option<&'a Report>);
 
 /// A table of all pairs and, from two pairs on, of their mean: one line for each map, at most 120 characters wide.
 ///
@@ -32,37 +29,19 @@ type Row<'a> = (&'a str, Option<&'a Report>, Option<&'a Report>);
 /// invalid, `dens%` the share of valid ones, both in percent. A dash marks what is missing, and a mean over fewer than all
 /// pairs is not shown.
 pub(super) fn text(findings: &Findings) -> String {
-    let pairs = findings.pairs.iter().map(|p| (p.name.as_str(), p.raw.as_ref(), Some(&p.finished)));
-    let mean = &findings.mean;
-    table(&pairs.collect::<Vec<_>>(), ("mean", mean.raw.as_ref(), mean.finished.as_ref())).to_string()
-}
-
-fn table(pairs: &[Row], mean: Row) -> Table {
     let columns = "r".repeat(COLUMNS.len());
     let mut table = Table::new(&format!("ll|{columns}|{columns}"));
     table.titles(["", "all", "nonocc"]);
     let heads = COLUMNS.iter().chain(&COLUMNS).map(|column| column.0);
     table.row(["pair", "map"].into_iter().chain(heads));
-    table.rule();
-    for pair in pairs {
-        row(&mut table, pair);
-    }
-    if pairs.len() > 1 {
-        table.rule();
-        row(&mut table, &mean);
-    }
-    table
-}
-
-/// Adds a line for each map that there is.
-fn row(table: &mut Table, &(name, raw, finished): &Row) {
-    let maps =
-        [("raw", raw), ("final", finished)].into_iter().filter_map(|(map, report)| Some((map, report?)));
-    for (i, (map, report)) in maps.enumerate() {
-        let name = if i == 0 { cut(name) } else { String::new() };
-        let cells = cells(Some(&report.all)).chain(cells(report.nonocc.as_ref()));
-        table.row([name, map.to_owned()].into_iter().chain(cells));
-    }
+    findings.add_rows(&mut table, |table, name, figures| {
+        for (i, (map, report)) in figures.maps().enumerate() {
+            let name = if i == 0 { cut(name) } else { String::new() };
+            let cells = cells(Some(&report.all)).chain(cells(report.nonocc.as_ref()));
+            table.row([name, map.to_owned()].into_iter().chain(cells));
+        }
+    });
+    table.to_string()
 }
 
 /// `name` in at most [`NAME`] characters, with a mark where it was cut.
@@ -74,7 +53,7 @@ pub(super) fn cut(name: &str) -> String {
 }
 
 fn cells(metrics: Option<&Metrics>) -> impl Iterator<Item = String> {
-    COLUMNS.iter().map(move |&(_, width, decimals, value)| {
+    COLUMNS.iter().map(move |&(_, _, width, decimals, value)| {
         metrics.and_then(value).map_or_else(|| "-".into(), |v| number(v, width, decimals))
     })
 }
@@ -91,8 +70,8 @@ fn number(value: f64, width: usize, decimals: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::evaluate::findings::Figures;
-    use mrfgs::evaluation::GroundTruth;
+    use crate::commands::evaluate::findings::{Figures, Scored};
+    use mrfgs::evaluation::{GroundTruth, Report};
     use mrfgs::image::Plane;
 
     fn report(offset: f32, masked: bool) -> Report {
@@ -102,19 +81,12 @@ mod tests {
         GroundTruth::new(truth, masked.then_some(mask)).unwrap().evaluate(&estimate).unwrap()
     }
 
-    fn row(pair: &str, offset: f32, masked: bool) -> Figures {
-        Figures {
-            name: pair.into(),
-            raw: Some(report(2.0 * offset, masked)),
-            finished: report(offset, masked),
-            breakdown: None,
-            confidence: None,
-            validity: None,
-            seconds: None,
-        }
+    fn row(pair: &str, offset: f32, masked: bool) -> Scored {
+        let (raw, finished) = (Some(report(2.0 * offset, masked)), Some(report(offset, masked)));
+        Scored { name: pair.into(), figures: Figures { raw, finished, ..Figures::default() }, seconds: None }
     }
 
-    fn table<const N: usize>(pairs: [Figures; N]) -> String {
+    fn table<const N: usize>(pairs: [Scored; N]) -> String {
         text(&Findings::new(None, None, pairs.into()))
     }
 
@@ -138,7 +110,8 @@ mean         raw   | 4.000 37.34 100.0 100.0 56.25 56.25 4.00 87.50 | 4.000 37.3
 
     #[test]
     fn what_is_not_there_is_a_dash_or_no_line() {
-        let first = Figures { raw: None, ..row("first", 0.0, false) };
+        let mut first = row("first", 0.0, false);
+        first.figures.raw = None;
         let text = table([first, row("second", 1.0, true)]);
         let lines: Vec<&str> = text.lines().skip(3).collect();
         assert_eq!(lines.len(), 5, "{text}");

@@ -51,18 +51,6 @@ enum Mode {
     Submission(submission::Args),
 }
 
-impl Args {
-    /// Whether it asks the drivers which devices there are.
-    pub(crate) fn asks_drivers(&self) -> bool {
-        let execution = match &self.mode {
-            None => &self.pairs.execution,
-            Some(Mode::Map(_)) => return false,
-            Some(Mode::Submission(args)) => &args.execution,
-        };
-        execution.device.asks_drivers()
-    }
-}
-
 pub(crate) fn run(args: &Args) -> Result<()> {
     match &args.mode {
         None => {
@@ -79,10 +67,7 @@ fn check_modes(args: &pairs::PairsArgs) -> Result<()> {
     let is_mode =
         |dir: &&PathBuf| dir.to_str().is_some_and(<Mode as Subcommand>::has_subcommand) && !dir.is_dir();
     match args.dirs.iter().find(is_mode) {
-        Some(mode) => {
-            let mode = mode.display();
-            Err(Failure::Usage(format!("{mode}: give it right after `evaluate`, before all flags")))
-        }
+        Some(mode) => Err(Failure::usage(mode.display(), "give it right after `evaluate`, before all flags")),
         None => Ok(()),
     }
 }

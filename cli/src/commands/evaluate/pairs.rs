@@ -2,16 +2,11 @@
 
 use std::path::PathBuf;
 
-use mrfgs::Matcher;
-
-use crate::args::execution::ExecutionArgs;
-use crate::args::method::MethodArgs;
 use crate::failure::Result;
-use crate::outputs::files;
 use crate::stop;
 
 use super::report::{self, ReportArgs};
-use super::scenes::{self, SceneArgs};
+use super::scenes::RunArgs;
 use super::{breakdown, metrics};
 
 /// What to match and print.
@@ -44,24 +39,17 @@ pub(super) struct PairsArgs {
     #[command(flatten)]
     report: ReportArgs,
     #[command(flatten)]
-    scenes: SceneArgs,
-
-    #[command(flatten)]
-    method: MethodArgs,
-    #[command(flatten)]
-    pub(super) execution: ExecutionArgs,
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &PairsArgs) -> Result<()> {
+    let execution = args.run.execution();
     stop::listen();
-    let destination = args.report.destination(args.scenes.json())?;
-    args.scenes.check_json(&args.dirs, &args.method)?;
-    let method = args.method.method()?;
-    let folders = args.scenes.folders(&args.dirs)?;
-    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
+    let json = args.run.json();
+    let begun = args.report.begin(json)?;
     let mut pictures = Vec::new();
-    let findings = scenes::match_all(&args.scenes, &folders, &mut matcher, method, |scene, maps, _| {
-        if destination.is_some() {
+    let findings = args.run.match_all(&args.dirs, args.run.method()?, execution, |scene, maps, _| {
+        if begun.is_some() {
             let (truth, estimate) = (scene.ground.truth(), maps.final_map());
             pictures.push(report::pictures(&scene.name, truth, &estimate, Some((&scene.pair, maps)))?);
         }
@@ -71,8 +59,5 @@ pub(super) fn run(args: &PairsArgs) -> Result<()> {
     if args.breakdown {
         text.push_str(&breakdown::text(&findings));
     }
-    files::deliver(args.scenes.json(), &findings, &text, |_| match destination {
-        Some(destination) => report::write(&destination, &findings, &pictures),
-        None => Ok(()),
-    })
+    report::deliver(json, &findings, &text, begun, &pictures)
 }

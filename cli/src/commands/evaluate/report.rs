@@ -1,12 +1,11 @@
 //! The page of pictures and figures that `--report` writes.
 
-use std::fmt::{Display, Write as _};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use mrfgs::Error;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::evaluation::{Metrics, Report};
 use mrfgs::image::picture::Picture as _;
@@ -15,11 +14,11 @@ use mrfgs::low_level::front::zones;
 use mrfgs::maps::{Maps, REASONS};
 
 use crate::failure::Result;
-use crate::outputs::files;
-use crate::outputs::staged::StagedFolder;
+use crate::outputs::{StagedFolder, files};
 use crate::text::figure;
 
 use super::findings::{Figures, Findings};
+use super::metrics::COLUMNS;
 
 /// Errors beyond this, in pixels, take the last colour: one scale for all pairs, or they could not be compared.
 const ERROR_LIMIT: f32 = 4.0;
@@ -47,16 +46,35 @@ pub(super) struct ReportArgs {
 }
 
 impl ReportArgs {
-    /// Finds out before any computing whether the report can be written, and refuses `json` inside its folder.
-    pub(super) fn destination(&self, json: Option<&Path>) -> Result<Option<Destination<'_>>> {
-        let Some(dir) = &self.report else { return Ok(None) };
-        let destination = Destination::check(dir)?;
-        if let Some(path) = files::json_file(json) {
-            write::check_path(path)?;
-            files::outside(("--report", &destination.place), ("--json", path))?;
+    /// Begins the report before any computing: in a new folder, an empty one, or one that holds nothing but an earlier report.
+    /// Refuses `json` inside it.
+    pub(super) fn begin(&self, json: Option<&Path>) -> Result<Option<StagedFolder>> {
+        let staged = self.report.as_deref().map(StagedFolder::new).transpose()?;
+        if let Some(staged) = &staged {
+            refuse_strangers(staged)?;
+            staged.check_json("--report", json)?;
         }
-        Ok(Some(destination))
+        Ok(staged)
     }
+}
+
+/// Refuses a folder with files that no report has written: they would be lost.
+fn refuse_strangers(staged: &StagedFolder) -> mrfgs::Result<()> {
+    if !staged.place().exists() {
+        return Ok(());
+    }
+    let page = fs::read_to_string(staged.place().join(PAGE)).unwrap_or_default();
+    for entry in fs::read_dir(staged.place()).map_err(|e| staged.error(e))? {
+        let name = entry.map_err(|e| staged.error(e))?.file_name();
+        let name = name.to_string_lossy();
+        let ours = name == PAGE || page.contains(&format!("{FILE}\"{name}\""));
+        if !(page.contains(GENERATOR) && ours) {
+            return Err(staged.error(format!(
+                "the folder holds {name}, which is no part of an earlier report; give a new folder or empty it"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// A picture of a pair, as PNG.
@@ -70,19 +88,6 @@ pub(super) struct Picture {
     legend: String,
     size: (usize, usize),
     png: Vec<u8>,
-}
-
-impl Picture {
-    fn new(
-        file: &'static str,
-        title: &'static str,
-        alt: String,
-        legend: String,
-        picture: &Plane<[u8; 3]>,
-    ) -> Result<Self> {
-        let png = picture.png(Path::new(file))?;
-        Ok(Self { file, title, alt, legend, size: picture.size(), png })
-    }
 }
 
 /// The pictures of one pair, in the order of the page; a finished map has nothing `matched`.
@@ -99,59 +104,38 @@ pub(super) fn pictures(
     let scale = format!("{min} to {max} px, near is warm");
 
     let mut all = Vec::new();
+    let mut add = |file, title, alt: &str, legend: String, picture: &Plane<[u8; 3]>| -> Result<()> {
+        let (alt, size) = (format!("{name}: {alt}"), picture.size());
+        all.push(Picture { file, title, alt, legend, size, png: picture.png(Path::new(file))? });
+        Ok(())
+    };
     if let Some((pair, _)) = matched {
-        let left = pair.left().to_rgb8();
-        let alt = format!("{name}: the left view");
-        all.push(Picture::new("left", "Left view", alt, "The reference view.".into(), &left)?);
+        add("left", "Left view", "the left view", "The reference view.".into(), &pair.left().to_rgb8())?;
         let zones = zones::segment(pair.left(), &zones::Options::default());
-        all.push(Picture::new(
-            "zones",
-            "Texture zones",
-            format!("{name}: texture zones of the left view"),
-            format!("{} zones by Gabor filters and K-means, as the preset paper uses them.", zones.count),
-            &zones.map.map(|&zone| colour::zone(zone)),
-        )?);
+        let legend =
+            format!("{} zones by Gabor filters and K-means, as the preset paper uses them.", zones.count);
+        let picture = zones.map.map(|&zone| colour::zone(zone));
+        add("zones", "Texture zones", "texture zones of the left view", legend, &picture)?;
     }
-    all.push(Picture::new(
-        "disparity",
-        "Disparity",
-        format!("{name}: estimated disparity, {scale}"),
-        format!("{scale}; black: none. The same scale as the truth."),
-        &colour::preview(estimate, min, max, ColourMap::default()),
-    )?);
-    all.push(Picture::new(
-        "truth",
-        "Ground truth",
-        format!("{name}: true disparity, {scale}"),
-        format!("{scale}; black: unknown."),
-        &colour::preview(truth, min, max, ColourMap::default()),
-    )?);
-    all.push(Picture::new(
-        "error",
-        "Signed error",
-        format!("{name}: estimate minus truth, blue where too small, red where too large"),
-        format!(
-            "Estimate minus truth, -{ERROR_LIMIT} to {ERROR_LIMIT} px and beyond. Blue: too far, red: too near; grey: \
-             truth unknown, black: no estimate."
-        ),
-        &colour::error(estimate, truth, ERROR_LIMIT),
-    )?);
+    let legend = format!("{scale}; black: none. The same scale as the truth.");
+    let picture = colour::preview(estimate, min, max, ColourMap::default());
+    add("disparity", "Disparity", &format!("estimated disparity, {scale}"), legend, &picture)?;
+    let picture = colour::preview(truth, min, max, ColourMap::default());
+    let legend = format!("{scale}; black: unknown.");
+    add("truth", "Ground truth", &format!("true disparity, {scale}"), legend, &picture)?;
+    let alt = "estimate minus truth, blue where too small, red where too large";
+    let legend = format!(
+        "Estimate minus truth, -{ERROR_LIMIT} to {ERROR_LIMIT} px and beyond. Blue: too far, red: too near; grey: \
+         truth unknown, black: no estimate."
+    );
+    add("error", "Signed error", alt, legend, &colour::error(estimate, truth, ERROR_LIMIT))?;
     if let Some((_, maps)) = matched {
-        all.push(Picture::new(
-            "confidence",
-            "Confidence",
-            format!("{name}: confidence of every pixel, bright is sure"),
-            "0 to 255, bright is sure: how far the runner-up label is behind the best one, in 1/8 nat."
-                .into(),
-            &colour::grey(&maps.confidence),
-        )?);
-        all.push(Picture::new(
-            "validity",
-            "Validity",
-            format!("{name}: why each pixel is what it is"),
-            validity_legend(),
-            &colour::validity(&maps.validity),
-        )?);
+        let alt = "confidence of every pixel, bright is sure";
+        let legend =
+            "0 to 255, bright is sure: how far the runner-up label is behind the best one, in 1/8 nat.";
+        add("confidence", "Confidence", alt, legend.into(), &colour::grey(&maps.confidence))?;
+        let (alt, picture) = ("why each pixel is what it is", colour::validity(&maps.validity));
+        add("validity", "Validity", alt, validity_legend(), &picture)?;
     }
     Ok(all)
 }
@@ -169,62 +153,27 @@ fn validity_legend() -> String {
     out + "Half as bright: no disparity. Otherwise pixels of 1, 2, 4, 64 and 128 are filled (16)."
 }
 
-/// Where a report goes.
-pub(super) struct Destination<'a> {
-    dir: &'a Path,
-    /// Its full path.
-    place: PathBuf,
-}
-
-impl<'a> Destination<'a> {
-    /// Finds out before any computing whether a report can be written to `dir`: a new folder, an empty one, or one that
-    /// holds nothing but an earlier report.
-    fn check(dir: &'a Path) -> Result<Self> {
-        let place = StagedFolder::new(dir)?.place().to_owned();
-        let destination = Self { dir, place };
-        destination.refuse_strangers()?;
-        Ok(destination)
-    }
-
-    /// Refuses a folder with files that no report has written: they would be lost.
-    fn refuse_strangers(&self) -> Result<()> {
-        if !self.place.exists() {
-            return Ok(());
+/// Delivers the findings as JSON or `text`, and where a report is `begun` that: the page, with its pictures in it, and the pictures
+/// as files, all of them or none, in place of an earlier report.
+pub(super) fn deliver(
+    json: Option<&Path>,
+    findings: &Findings,
+    text: &str,
+    begun: Option<StagedFolder>,
+    pictures: &[Vec<Picture>],
+) -> Result<()> {
+    files::deliver(json, findings, text, |_| {
+        let Some(staged) = begun else { return Ok(()) };
+        let save = |name: String, bytes: &[u8]| {
+            write::save(&staged.path().join(name), bytes).map_err(|e| staged.named(e))
+        };
+        for (i, (pair, pictures)) in findings.pairs.iter().zip(pictures).enumerate() {
+            pictures.iter().try_for_each(|p| save(file_name(i, &pair.name, p), &p.png))?;
         }
-        let page = fs::read_to_string(self.place.join(PAGE)).unwrap_or_default();
-        let is_report = page.contains(GENERATOR);
-        for entry in fs::read_dir(&self.place).map_err(|e| Error::write(self.dir, e))? {
-            let name = entry.map_err(|e| Error::write(self.dir, e))?.file_name();
-            let name = name.to_string_lossy();
-            let ours = name == PAGE || page.contains(&format!("{FILE}\"{name}\""));
-            if !(is_report && ours) {
-                let reason = format!(
-                    "the folder holds {name}, which is no part of an earlier report; give a new folder or empty it"
-                );
-                return Err(Error::write(self.dir, reason).into());
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes all files or none, in place of an earlier report.
-    fn publish<'b>(&self, files: impl Iterator<Item = (String, &'b [u8])>) -> Result<()> {
-        let staged = StagedFolder::new(self.dir)?;
-        for (name, bytes) in files {
-            write::save(&staged.path().join(name), bytes).map_err(|e| staged.named(e))?;
-        }
-        self.refuse_strangers()?;
+        save(PAGE.to_owned(), page(findings, pictures).as_bytes())?;
+        refuse_strangers(&staged)?;
         Ok(staged.publish()?)
-    }
-}
-
-/// Writes the report: the page, with its pictures in it, and the pictures as files.
-pub(super) fn write(to: &Destination, findings: &Findings, pictures: &[Vec<Picture>]) -> Result<()> {
-    let page = page(findings, pictures);
-    let files = (0..).zip(findings.pairs.iter().zip(pictures)).flat_map(|(i, (pair, pictures))| {
-        pictures.iter().map(move |p| (file_name(i, &pair.name, p), p.png.as_slice()))
-    });
-    to.publish(files.chain([(PAGE.to_owned(), page.as_bytes())]))
+    })
 }
 
 /// The name of a picture's file: unique, and harmless in a page and on every file system.
@@ -274,42 +223,38 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{GENERATOR}{version}\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Disparity of {}</title>\n\
          <style>{STYLE}</style>\n</head>\n<body>\n<h1>Disparity against ground truth</h1>",
-        Escaped(&names.join(", "))
+        escaped(&names.join(", "))
     );
     let ran_on = findings.ran_on.as_ref().map(|on| format!(" on {on}")).unwrap_or_default();
     let _ = writeln!(
         out,
         "<p>mrfgs {version}{}. Average error and RMS in pixels, PSNR against 255 in dB, the others in percent: bad \
          pixels are wrong by more than 0.5, 1, 2 or 4 px or have no disparity.</p>",
-        Escaped(&ran_on)
+        escaped(&ran_on)
     );
 
     // All pairs, all pixels.
     let mut rows = Vec::new();
     for pair in &findings.pairs {
-        rows.extend(pair.raw.as_ref().map(|raw| ("", &*pair.name, "raw", &raw.all)));
-        rows.push(("", &pair.name, "final", &pair.finished.all));
+        rows.extend(pair.figures.maps().map(|(map, report)| ("", &*pair.name, map, &report.all)));
     }
     if findings.pairs.len() > 1 {
-        let means = [("raw", &findings.mean.raw), ("final", &findings.mean.finished)];
-        let means = means.into_iter().filter_map(|(map, report)| Some((map, report.as_ref()?)));
-        rows.extend(means.map(|(map, report)| ("mean", "mean", map, &report.all)));
+        rows.extend(findings.mean.maps().map(|(map, report)| ("mean", "mean", map, &report.all)));
     }
     table(&mut out, ["pair", "map"], rows.into_iter());
 
     for (i, (pair, pictures)) in findings.pairs.iter().zip(pictures).enumerate() {
-        let _ = writeln!(out, "<section>\n<h2>{}</h2>", Escaped(&pair.name));
+        let _ = writeln!(out, "<section>\n<h2>{}</h2>", escaped(&pair.name));
         if let Some(seconds) = pair.seconds {
             let _ = writeln!(out, "<p>Matched in {seconds:.2} s.</p>");
         }
         let mut rows = Vec::new();
-        for (map, report) in [("raw", pair.raw.as_ref()), ("final", Some(&pair.finished))] {
-            let Some(Report { all, nonocc }) = report else { continue };
+        for (map, Report { all, nonocc }) in pair.figures.maps() {
             rows.push(("", map, "all", all));
             rows.extend(nonocc.as_ref().map(|m| ("", map, "seen in both views", m)));
         }
         table(&mut out, ["map", "pixels"], rows.into_iter());
-        breakdown(&mut out, pair);
+        breakdown(&mut out, &pair.figures);
         out.push_str("<div class=\"pictures\">\n");
         for picture in pictures {
             let (width, height) = picture.size;
@@ -318,7 +263,7 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
                 "<figure><img {FILE}\"{}\" alt=\"{}\" width=\"{width}\" height=\"{height}\" \
                  src=\"data:image/png;base64,{}\"><figcaption><b>{}</b> {}</figcaption></figure>",
                 file_name(i, &pair.name, picture),
-                Escaped(&picture.alt),
+                escaped(&picture.alt),
                 BASE64.encode(&picture.png),
                 picture.title,
                 picture.legend
@@ -327,7 +272,7 @@ fn page(findings: &Findings, pictures: &[Vec<Picture>]) -> String {
         out.push_str("</div>\n</section>\n");
     }
     if let Some(method) = &findings.method {
-        let _ = writeln!(out, "<h2>Method</h2>\n<pre>{}</pre>", Escaped(&method.table()));
+        let _ = writeln!(out, "<h2>Method</h2>\n<pre>{}</pre>", escaped(&method.table().to_string()));
     }
     out.push_str("</body>\n</html>\n");
     out
@@ -344,7 +289,7 @@ fn table<'a>(
         out,
         "<div class=\"wide\"><table>\n<tr><th class=\"text\">{first}</th><th class=\"text\">{second}</th>"
     );
-    for head in ["avg. error", "PSNR", "bad 0.5", "bad 1", "bad 2", "bad 4", "RMS", "density"] {
+    for (_, head, ..) in COLUMNS {
         let _ = write!(out, "<th>{head}</th>");
     }
     out.push_str("</tr>\n");
@@ -352,13 +297,10 @@ fn table<'a>(
         let _ = write!(
             out,
             "<tr class=\"{class}\"><th scope=\"row\">{}</th><td class=\"text\">{second}</td>",
-            Escaped(&first)
+            escaped(first)
         );
-        let [b0, b1, b2, b4] = m.bad.map(Some);
-        for (value, decimals) in
-            [(m.avg, 3), (m.psnr, 2), (b0, 2), (b1, 2), (b2, 2), (b4, 2), (m.rms, 2), (Some(m.density), 2)]
-        {
-            let _ = write!(out, "<td>{}</td>", figure(value, decimals));
+        for (.., decimals, value) in COLUMNS {
+            let _ = write!(out, "<td>{}</td>", figure(value(m), decimals));
         }
         out.push_str("</tr>\n");
     }
@@ -366,8 +308,8 @@ fn table<'a>(
 }
 
 /// Where the errors of a pair's final map are, and how good its confidence and validity are; nothing for a finished map.
-fn breakdown(out: &mut String, pair: &Figures) {
-    if let Some(breakdown) = &pair.breakdown {
+fn breakdown(out: &mut String, figures: &Figures) {
+    if let Some(breakdown) = &figures.breakdown {
         out.push_str(
             "<div class=\"wide\"><table>\n<tr><th class=\"text\">class</th><th>share</th><th>bad 2</th>\
              <th>avg. error</th><th>bad 2 of all</th><th>of bad 2</th><th>of squares</th></tr>\n",
@@ -381,10 +323,10 @@ fn breakdown(out: &mut String, pair: &Figures) {
         }
         out.push_str("</table></div>\n");
     }
-    if let Some(c) = &pair.confidence {
+    if let Some(c) = &figures.confidence {
         let [auc, optimal, random] = [c.auc, c.optimal, c.random].map(|v| figure(Some(v), 2));
         let _ = write!(out, "<p>Confidence: AUC {auc} % (optimal {optimal}, random {random}).");
-        if let Some(v) = &pair.validity {
+        if let Some(v) = &figures.validity {
             let (precision, recall) = (figure(v.precision, 2), figure(v.recall, 2));
             let _ = write!(out, " Flags of unseen pixels: precision {precision} %, recall {recall} %.");
         }
@@ -393,20 +335,7 @@ fn breakdown(out: &mut String, pair: &Figures) {
 }
 
 /// A text with the special characters of HTML escaped, for attributes too.
-struct Escaped<'a, T: Display>(&'a T);
-
-impl<T: Display> Display for Escaped<'_, T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        for c in self.0.to_string().chars() {
-            match c {
-                '&' => f.write_str("&amp;")?,
-                '<' => f.write_str("&lt;")?,
-                '>' => f.write_str("&gt;")?,
-                '"' => f.write_str("&quot;")?,
-                '\'' => f.write_str("&#39;")?,
-                c => f.write_char(c)?,
-            }
-        }
-        Ok(())
-    }
+fn escaped(text: &str) -> String {
+    let escapes = [("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("\"", "&quot;"), ("'", "&#39;")];
+    escapes.into_iter().fold(text.to_owned(), |text, (special, escape)| text.replace(special, escape))
 }

@@ -8,20 +8,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use mrfgs::Error;
 use mrfgs::image::{Plane, write};
 use mrfgs::options::Fill;
-use mrfgs::{Error, Matcher};
 
-use crate::args::execution::ExecutionArgs;
-use crate::args::method::MethodArgs;
 use crate::failure::{Failure, Result};
-use crate::outputs::files;
-use crate::outputs::staged::StagedFolder;
+use crate::outputs::{StagedFolder, files};
 use crate::pairs::folder;
 use crate::stop;
 
 use super::metrics;
-use super::scenes::{self, SceneArgs};
+use super::scenes::RunArgs;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -46,29 +43,20 @@ pub(crate) struct Args {
     #[arg(value_name = "PAIR", required = true)]
     dirs: Vec<PathBuf>,
     #[command(flatten)]
-    scenes: SceneArgs,
-
-    #[command(flatten)]
-    method: MethodArgs,
-    #[command(flatten)]
-    pub(super) execution: ExecutionArgs,
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<()> {
+    let execution = args.run.execution();
     stop::listen();
-    let method = args.method.method()?;
+    let method = args.run.method()?;
     let names = args.dirs.iter().map(|dir| folder::name(dir)).collect::<Vec<_>>();
     let submission = Submission::new(&args.folder, &args.called, &names, method.refinement.fill)?;
-    if let Some(path) = files::json_file(args.scenes.json()) {
-        files::outside(("DIR", submission.folder.place()), ("--json", path))?;
-    }
-    args.scenes.check_json(&args.dirs, &args.method)?;
-    let folders = args.scenes.folders(&args.dirs)?;
-    let mut matcher = Matcher::builder().execution(args.execution.execution()).build()?;
-    let findings = scenes::match_all(&args.scenes, &folders, &mut matcher, method, |scene, maps, time| {
+    submission.folder.check_json("DIR", args.run.json())?;
+    let findings = args.run.match_all(&args.dirs, method, execution, |scene, maps, time| {
         submission.add(&scene.name, &maps.final_map(), time)
     })?;
-    files::deliver(args.scenes.json(), &findings, &metrics::text(&findings), |written| {
+    files::deliver(args.run.json(), &findings, &metrics::text(&findings), |written| {
         let place = submission.folder.place().to_owned();
         written.note(&place, submission.folder.publish())
     })
@@ -85,7 +73,7 @@ struct Submission {
 impl Submission {
     /// Begins the folder `dir`, a new or an empty one, for the pairs called `names`.
     fn new(dir: &Path, method: &OsStr, names: &[String], fill: Fill) -> Result<Self> {
-        let error = |name: &str, reason: String| Err(Failure::Usage(format!("{name}: {reason}")));
+        let error = |name: &str, reason: String| Err(Failure::usage(name, reason));
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let Some(method) = method.to_str().filter(|m| !m.is_empty() && m.chars().all(plain)) else {
             return error(

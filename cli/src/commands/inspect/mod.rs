@@ -6,17 +6,14 @@ use std::path::PathBuf;
 
 use mrfgs::low_level::engine::{Inspection, Inspector};
 use mrfgs::low_level::plan::Plan;
+use mrfgs::options::Execution;
 use mrfgs::{Matched, Matcher};
 
 use std::time::Duration;
 
-use crate::args::execution::ExecutionArgs;
-use crate::args::method::MethodArgs;
-use crate::args::sign::Sign;
+use crate::args::{ExecutionArgs, MethodArgs, Sign};
 use crate::failure::Result;
-use crate::outputs::files;
-use crate::outputs::record::{MatchRecord, stage_and_level};
-use crate::outputs::staged::StagedFolder;
+use crate::outputs::{MatchRecord, StagedFolder, files, stage_and_level};
 use crate::pairs::input::{Input, PairArgs};
 use crate::table::Table;
 use crate::text::bytes;
@@ -55,21 +52,21 @@ pub(crate) struct Args {
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
+    execution: ExecutionArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    let execution = Execution { timings: true, ..args.execution.execution() };
     stop::listen();
     let method = args.method.method()?;
-    let mut execution = args.execution.execution();
-    execution.timings = true;
     let input = args.pair.read(Sign::default(), false, None)?;
-    input.say_range(Sign::default());
-    check_outputs(args, &input)?;
+    input.say_range(Sign::default(), "");
+    let folder = args.folder.as_deref().map(StagedFolder::new_or_empty).transpose()?;
+    check_outputs(args, &input, folder.as_ref())?;
     input.warn();
     let plan = Plan::new(input.pair.size().0, input.pair.size().1, input.range, &method)?;
     let mut matcher = Matcher::builder().execution(execution).build()?;
-    let mut steps = args.folder.as_deref().map(|folder| Steps::new(folder, plan)).transpose()?;
+    let mut steps = folder.map(|folder| Steps::new(folder, plan));
     let mut look = steps.as_mut().map(|steps| |inspection: &mut Inspection| steps.look(inspection));
     let look: Option<Inspector> = match &mut look {
         Some(look) => Some(look),
@@ -87,20 +84,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Finds out before any computing whether the outputs can be written.
-fn check_outputs(args: &Args, input: &Input) -> Result<()> {
-    let steps = args.folder.as_deref().map(StagedFolder::new_or_empty).transpose()?;
-    let json = files::json_file(args.json.as_deref()).map(|path| ("--json", path));
-    if let Some((flag, path)) = json {
-        mrfgs::image::write::check_path(path)?;
-        if let Some(steps) = &steps {
-            files::outside(("DIR", steps.place()), (flag, path))?;
-        }
+fn check_outputs(args: &Args, input: &Input, folder: Option<&StagedFolder>) -> Result<()> {
+    let json = files::json_file(args.json.as_deref());
+    match folder {
+        Some(folder) => folder.check_json("DIR", json)?,
+        None => json.map_or(Ok(()), mrfgs::image::write::check_path)?,
     }
     let mut inputs = args.pair.inputs(input);
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
-    let outputs: Vec<_> =
-        args.folder.as_deref().map(|folder| ("DIR", folder)).into_iter().chain(json).collect();
-    files::distinct(&inputs, &outputs)
+    let folder = args.folder.as_deref().map(|folder| ("DIR", folder));
+    files::distinct(&inputs, &folder.into_iter().chain(json.map(|json| ("--json", json))).collect::<Vec<_>>())
 }
 
 /// The time of every stage; `whole` is that of the match.

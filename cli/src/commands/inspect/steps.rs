@@ -1,7 +1,7 @@
 //! Every step of a match as a picture or a small table.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mrfgs::Result;
 use mrfgs::colour::{self, ColourMap};
@@ -15,7 +15,7 @@ use mrfgs::low_level::graph::LevelGraph;
 use mrfgs::low_level::plan::{Plan, UNITS_PER_NAT};
 use mrfgs::options::Illumination;
 
-use crate::outputs::staged::StagedFolder;
+use crate::outputs::StagedFolder;
 
 /// Quarters of the label range at which cost slices are cut.
 const SLICES: [usize; 3] = [1, 2, 3];
@@ -29,10 +29,8 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// # Errors
-    /// [`Error::Write`] when `target` is there and not an empty folder, or its parent cannot be written to.
-    pub(super) fn new(target: &Path, plan: Plan) -> Result<Self> {
-        Ok(Self { folder: StagedFolder::new_or_empty(target)?, plan, changes: String::new(), last: None })
+    pub(super) fn new(folder: StagedFolder, plan: Plan) -> Self {
+        Self { folder, plan, changes: String::new(), last: None }
     }
 
     /// Writes what a match shows on its way.

@@ -9,15 +9,9 @@ use mrfgs::check;
 use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
 
-use crate::args::execution::ExecutionArgs;
-use crate::args::method::MethodArgs;
-use crate::args::rectification::RectificationArgs;
-use crate::args::sign::Sign;
+use crate::args::{ExecutionArgs, MethodArgs, RectificationArgs, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::also::{Also, AlsoArgs, Outcome, View};
-use crate::outputs::files::{self, Written};
-use crate::outputs::record::MatchRecord;
-use crate::pairs::cameras;
+use crate::outputs::{Also, AlsoArgs, MatchRecord, Outcome, View, Written, files};
 use crate::pairs::input::{self, Input, PairArgs};
 use crate::{console, matching, stop};
 
@@ -83,7 +77,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
+    execution: ExecutionArgs,
 
     #[command(flatten)]
     also: AlsoArgs,
@@ -101,21 +95,18 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    let execution = args.execution.execution();
     stop::listen();
     let method = args.also.made_by(args.method.method()?)?;
-    let execution = args.execution.execution();
     let cameras = args.also.take_cameras();
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
     let input = args.pair.read(args.sign, cameras.is_some(), rectifying.as_ref())?;
     let range = input.range;
     if !args.quiet {
-        input.say_range(args.sign);
+        input.say_range(args.sign, "");
     }
-    let remedy = "give one with --calib";
-    let rig = cameras
-        .map(|word| cameras::rig(word, input.calibration(), &args.pair.left, input.pair.size(), remedy))
-        .transpose()?;
+    let rig = input.rig(cameras, &args.pair.left)?;
     let also = check_outputs(args, &input)?;
     if !args.quiet {
         input.warn();
@@ -134,9 +125,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     // Outputs take memory too.
     drop(matcher);
     let files = args.pair.files(&input, Some(&args.output));
-    let calibration = input.calibration().map(|(file, _)| file.display().to_string());
+    let calibration = input.calibration_file().map(|file| file.display().to_string());
     let georeferences = input.pair.georeferences();
-    let rectifying = input.rectifying;
+    let rectifying = input.rectifying();
     let pair = Some(input.pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
     let outcome =
@@ -156,7 +147,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {
             let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
-            return Err(Failure::Usage(format!("{}: {reason}", word.flag())));
+            return Err(Failure::usage(word.flag(), reason));
         }
         console::check_takes_data()?;
     } else {

@@ -5,24 +5,13 @@ mod writer;
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::calibration;
-use mrfgs::image::Pair;
-use mrfgs::image::calib::Calibration;
-use mrfgs::options::DisparityRange;
-use mrfgs::rectification::{Options, Rectification};
 use mrfgs::{Error, Matcher};
 
-use crate::args::execution::ExecutionArgs;
-use crate::args::method::MethodArgs;
-use crate::args::reading::ReadingArgs;
-use crate::args::rectification::RectificationArgs;
-use crate::args::search::{Found, Search};
-use crate::args::sign::Sign;
+use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Search, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::files::{self, is_printed};
-use crate::outputs::maps::MapArgs;
-use crate::pairs::{cameras, input, raw};
-use crate::sequences::{Frames, Layout, RawFrames, raw_frames};
+use crate::outputs::{MapArgs, files, is_printed};
+use crate::pairs::input::Input;
+use crate::sequences::{Frame, Frames, Layout, RawFrames, raw_frames};
 use crate::{console, stop};
 
 use pipeline::Pipeline;
@@ -91,7 +80,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     method: MethodArgs,
     #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
+    execution: ExecutionArgs,
 }
 
 /// Whether an output is a film.
@@ -100,6 +89,7 @@ fn is_film(output: &Path) -> bool {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    let execution = args.execution.execution();
     let film = is_film(&args.output);
     if film {
         args.maps.also.check_film()?;
@@ -112,39 +102,25 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     check_output(args, &frames)?;
     let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
-    let mut first = frames.next().ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
-    let (by, calibration) = calibrated(args, rectifying.as_ref(), &mut first.pair)?;
-    let known = calibration.as_ref().map(|calibration| (args.calib[0].as_path(), calibration));
-    let range = range(args, &first.pair, known)?;
-    let rig = args.maps.also.take_cameras();
-    let remedy = "give one with --calib";
-    let rig = rig.map(|word| cameras::rig(word, known, &args.left, first.pair.size(), remedy)).transpose()?;
-    let rectifying = by.as_ref().map(|by| by.rotations()[0]);
+    let Frame { name, pair } = frames.next().ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
+    let sign = Sign::default();
+    let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), None)?;
+    if let Some(by) = &mut input.rectification {
+        by.keep_places()?;
+    }
+    if !args.quiet {
+        input.say_range(sign, " in the first frame");
+        input.warn();
+    }
+    let rig = input.rig(args.maps.also.take_cameras(), &args.left)?;
+    let (range, rectifying) = (input.range, input.rectifying());
     let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying };
-    let matcher = Matcher::builder().method(method).execution(args.execution.execution()).build()?;
+    let matcher = Matcher::builder().method(method).execution(execution).build()?;
     // Before this nothing is written, and a first frame may never come: a signal ends the program there and then.
     stop::listen();
     let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
     let pipeline = Pipeline { matcher, range, quiet: args.quiet };
-    pipeline.run(first, frames, by, &mut sink)
-}
-
-/// Rectifies the first pair where that is wanted. Returns what rectifies all others, and the calibration of rectified pairs.
-fn calibrated(
-    args: &Args,
-    rectifying: Option<&Options>,
-    first: &mut Pair,
-) -> Result<(Option<Rectification>, Option<Calibration>)> {
-    let Some(options) = rectifying else {
-        let known = !args.calib.is_empty();
-        let calibration = known.then(|| input::of_rectified_images(&args.calib)).transpose()?;
-        return Ok((None, calibration));
-    };
-    let (mut by, pair) = raw::rectify(&calibration::read(&args.calib)?, &args.calib, first, options)?;
-    by.keep_places()?;
-    *first = pair;
-    let calibration = by.calibration()?;
-    Ok((Some(by), Some(calibration)))
+    pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
 }
 
 /// The frames that the arguments name.
@@ -153,7 +129,7 @@ fn open(args: &Args) -> Result<Frames> {
     if is_printed(left) && right.is_some_and(is_printed) {
         let reason = "standard input holds one stream; give the frames of one camera another way, or both views \
                       in one stream";
-        return Err(Failure::Usage(format!("RIGHT: {reason}")));
+        return Err(Failure::usage("RIGHT", reason));
     }
     Ok(Frames::open(left, right, args.layout, args.raw_frames, args.reading.reader())?)
 }
@@ -175,20 +151,4 @@ fn check_output(args: &Args, frames: &Frames) -> Result<()> {
         Some(_) => Err(Error::write(output, "holds frames that are read; give another folder").into()),
         None => Ok(()),
     }
-}
-
-/// The range to search in all frames, by the first.
-fn range(args: &Args, pair: &Pair, known: Option<(&Path, &Calibration)>) -> Result<DisparityRange> {
-    let Found { range, by_matches } = args.search.range(pair, known, Sign::default())?;
-    if !args.quiet {
-        if by_matches {
-            let DisparityRange { min, max } = range;
-            let text = format!(
-                "disparities {min} to {max}, by sparse matches in the first frame; set them with --max-disparity"
-            );
-            console::say(&text);
-        }
-        input::warn(mrfgs::check::warnings(pair, (!by_matches).then_some(range)));
-    }
-    Ok(range)
 }

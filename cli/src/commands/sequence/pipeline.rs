@@ -10,7 +10,7 @@ use mrfgs::options::DisparityRange;
 use mrfgs::rectification::Rectification;
 
 use crate::failure::{Failure, Result};
-use crate::progress::FrameBar;
+use crate::progress::Counter;
 use crate::sequences::{Frame, Frames};
 use crate::text::plural;
 use crate::{console, remedy, stop};
@@ -46,7 +46,7 @@ impl Pipeline {
     ) -> Result<()> {
         let start = Instant::now();
         let (size, takes_pair) = (first.pair.size(), sink.takes_pair());
-        let mut bar = FrameBar::new(frames.len(), self.quiet);
+        let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         // It may wait for standard input for ever, so nobody waits for it.
         thread::spawn(move || read(frames, by, &sender));
@@ -168,7 +168,7 @@ fn read(frames: Frames, by: Option<Rectification>, to: &SyncSender<Next>) {
 }
 
 /// Writes what comes. Returns how many frames it wrote.
-fn write(found: Receiver<Found>, sink: &mut Sink, bar: &mut FrameBar) -> (usize, Result<()>) {
+fn write(found: Receiver<Found>, sink: &mut Sink, bar: &mut Counter) -> (usize, Result<()>) {
     let mut done = 0;
     let mut ended = Ok(());
     for found in found {
@@ -177,7 +177,7 @@ fn write(found: Receiver<Found>, sink: &mut Sink, bar: &mut FrameBar) -> (usize,
             break;
         }
         done += 1;
-        bar.end();
+        bar.end_frame();
     }
     (done, sink.finish().and(ended))
 }

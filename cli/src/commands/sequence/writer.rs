@@ -10,12 +10,9 @@ use mrfgs::image::{Georeference, Pair, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
-use crate::args::sign::Sign;
+use crate::args::Sign;
 use crate::failure::Result;
-use crate::outputs::also::{Outcome, View};
-use crate::outputs::files::{self, Written, is_printed};
-use crate::outputs::film::Film;
-use crate::outputs::maps::MapArgs;
+use crate::outputs::{Film, MapArgs, Outcome, files, is_printed};
 use crate::sequences::FrameRate;
 
 /// What is written of every frame.
@@ -63,12 +60,7 @@ impl<'a> Writer<'a> {
     /// Where it cannot be made, or a map cannot be stored in its format.
     pub(super) fn begin_folder(self) -> Result<Sink<'a>> {
         let is_new = files::create_folder(self.output).map_err(|e| Error::write(self.output, e))?;
-        let name = "000000";
-        let map = self.output.join(self.wanted.map(name));
-        let checked = write::check_disparity_path(&map, self.range.min, self.range.max).and_then(|()| {
-            let mut also = self.wanted.also(name);
-            also.try_for_each(|(word, file)| word.check(&self.output.join(file), self.range))
-        });
+        let checked = self.wanted.check(self.output, "000000", self.range);
         if checked.is_err() && is_new {
             let _ = fs::remove_dir(self.output);
         }
@@ -92,15 +84,7 @@ impl Sink<'_> {
         if let Some(film) = &mut self.film {
             return Ok(film.add(&wanted.also.film_picture(&outcome))?);
         }
-        let map = output.join(wanted.map(&found.name));
-        let mut written = Written::default();
-        written.note(&map, outcome.writer(View::Left).disparity(&map, &maps.final_map()))?;
-        for (word, file) in wanted.also(&found.name) {
-            let path = output.join(file);
-            written.note(&path, wanted.also.write(word, &path, &outcome))?;
-        }
-        written.keep();
-        Ok(())
+        wanted.write(output, &found.name, &outcome)
     }
 
     /// Ends a film.
