@@ -17,7 +17,7 @@ const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", 
 /// The left view of a rendered scene.
 fn scene(name: &str) -> Image {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata").join(name);
-    let pair = Pair::open(&folder.join("im0.png"), &folder.join("im1.png"));
+    let pair = Pair::open(folder.join("im0.png"), folder.join("im1.png"));
     pair.expect("the scenes are there").left().clone()
 }
 
@@ -349,7 +349,7 @@ fn zones_are_regions_of_clusters() {
 #[test]
 fn the_method_says_what_is_corrected_and_what_a_zone_is() {
     let folder = Path::new("testdata/exposure");
-    let pair = Pair::open(&folder.join("im0.png"), &folder.join("im1.png")).unwrap();
+    let pair = Pair::open(folder.join("im0.png"), folder.join("im1.png")).unwrap();
     let range = DisparityRange::new(0, 31).unwrap();
     let corrected = Pair::new(homomorphic(pair.left()), homomorphic(pair.right())).unwrap();
     let mut seen = Vec::new();

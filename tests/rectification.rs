@@ -154,7 +154,7 @@ fn the_raw_pair_is_what_the_cameras_see() {
     let scene = raw::scene();
     let raw = photographs(&CAMERAS, SIZE, &scene);
     let folder = Path::new("testdata/raw");
-    assert_eq!(Pair::open(&folder.join("left.png"), &folder.join("right.png")).unwrap(), raw);
+    assert_eq!(Pair::open(folder.join("left.png"), folder.join("right.png")).unwrap(), raw);
     let text = std::fs::read_to_string(folder.join("cameras.yml")).unwrap();
     assert_eq!(text, raw::calibration(&CAMERAS, SIZE, raw::baseline(&scene)));
 }
@@ -163,7 +163,7 @@ fn the_raw_pair_is_what_the_cameras_see() {
 #[test]
 fn the_bits_are_the_same_everywhere() {
     let folder = Path::new("testdata/raw");
-    let raw = Pair::open(&folder.join("left.png"), &folder.join("right.png")).unwrap();
+    let raw = Pair::open(folder.join("left.png"), folder.join("right.png")).unwrap();
     let hash = |bytes: &mut dyn Iterator<Item = u8>| {
         bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
