@@ -26,7 +26,7 @@ struct Params {
 @group(0) @binding(10) var<storage, read_write> raw: array<i32>;
 @group(0) @binding(11) var<storage, read_write> disparity: array<i32>;
 
-// Census of the pixels of both views. One invocation a pixel of the full size.
+// Census of the pixels of both views, in 16 bits. One invocation a pixel of the full size.
 @compute @workgroup_size(GROUP)
 fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -47,7 +47,9 @@ fn census(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     for (var dy = -2; dy <= 2; dy++) {
         let row = (u32(clamp(y + dy, 0, last.y)) - top) * params.full_pitch;
         for (var dx = -2; dx <= 2; dx++) {
-            if dx != 0 || dy != 0 {
+            // The eight around it, and those twice as far.
+            let near = max(abs(dx), abs(dy)) == 1;
+            if near || (dx % 2 == 0 && dy % 2 == 0 && (dx != 0 || dy != 0)) {
                 let at = row + u32(clamp(x + dx, 0, last.x));
                 let a = left[at];
                 let b = right[at];

@@ -50,11 +50,9 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
         }
     }
     let level = found.apply(pair);
-    let sigma = if options.denoise {
-        f64::max(noise::smoothing(&level, &matches), compression::smoothing(pair))
-    } else {
-        0.0
-    };
+    // At half the size, blocks of JPEG are no longer there.
+    let blocks = || if pair.full().is_some() { 0.0 } else { compression::smoothing(pair) };
+    let sigma = if options.denoise { f64::max(noise::smoothing(&level, &matches), blocks()) } else { 0.0 };
     if sigma == 0.0 {
         return (level, found);
     }

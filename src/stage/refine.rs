@@ -4,11 +4,11 @@
 //! A pixel q = (x, y) of half the size stands for the block of the full-size pixels (2x + i, 2y + j), i and j 0 or 1. Disparities are
 //! D there, and views are in whole blocks.
 //!
-//! 1. The census of a pixel p of a full-size view: 24 bits, one for each other pixel of the 5 x 5 around it in raster order, the first
-//!    one the highest. A bit is set where the other pixel, which is clamped to the view, is not masked and its grey is below that of
-//!    p. Where p is masked or outside the view, the census is [`NO_CENSUS`], which differs from most in half of the bits.
+//! 1. The census of a pixel p of a full-size view: 16 bits, one for each of [`OTHERS`], the first one the highest. A bit is set where
+//!    the pixel that far from p, which is clamped to the view, is not masked and its grey is below that of p. Where p is masked or
+//!    outside the view, the census is [`NO_CENSUS`], which differs from most in half of the bits.
 //! 2. The cost of D at q: the number of bits in which the census of the left pixels p of the block differs from that of the right
-//!    pixels p - (D, 0), summed over the block: 0 ..= 96.
+//!    pixels p - (D, 0), summed over the block: 0 ..= 64.
 //! 3. With L the label of q, of the disparity low + L (low is the smallest disparity at half the size), over those q' of its
 //!    neighbourhood of 5 columns and 3 rows that are inside and whose own label is at most 1 from L:
 //!
@@ -44,8 +44,27 @@ pub const REACH: usize = 4;
 pub const NEAR: usize = 1;
 /// How many columns away a neighbour may be.
 pub const COLUMNS: usize = 2;
+/// Columns and rows to the pixels that a census compares: the eight around it, and those twice as far.
+pub const OTHERS: [(isize, isize); 16] = [
+    (-2, -2),
+    (0, -2),
+    (2, -2),
+    (-1, -1),
+    (0, -1),
+    (1, -1),
+    (-2, 0),
+    (-1, 0),
+    (1, 0),
+    (2, 0),
+    (-1, 1),
+    (0, 1),
+    (1, 1),
+    (-2, 2),
+    (0, 2),
+    (2, 2),
+];
 /// The census of a pixel that there is not: every second bit.
-pub const NO_CENSUS: u32 = 0x00aa_aaaa;
+pub const NO_CENSUS: u16 = 0xaaaa;
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Label]),

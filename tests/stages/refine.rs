@@ -58,7 +58,9 @@ fn refine() {
             backend.prepare(&plan, Prepared::new(&pair)).unwrap();
             input.write(backend.as_mut());
             let mut same = |stages: &[Stage], expected: &Finest| {
-                stages.iter().for_each(|&stage| backend.run(stage).unwrap());
+                for &stage in stages {
+                    backend.run(stage).unwrap();
+                }
                 if let Err(e) = compare_finest(backend.as_mut(), expected) {
                     panic!("{name}, {size:?}, seed {seed}, {stages:?}: {e}\n{:?}", plan.range);
                 }

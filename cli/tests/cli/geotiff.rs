@@ -61,7 +61,8 @@ fn maps_lie_where_their_views_lie() {
         assert!(fs::read(&frame).unwrap() == fs::read(map).unwrap(), "{}", frame.display());
     }
     // The same in tiles.
-    let tiled = "match left.tif right.tif tiled.tif --device cpu --method fast --memory 12MiB";
+    let tiled =
+        "match left.tif right.tif tiled.tif --device cpu --method fast --set match-size=full --memory 12MiB";
     run(&folder, tiled).succeeded().says(" tiles, ");
     assert!((east(&at("tiled.tif")) - 4e5).abs() < 1e-9);
 }

@@ -2,13 +2,13 @@
 //!
 //! Most pixels are far from every edge, and interpolate. The others look at the 3 x 3 half-size pixels around them.
 
-use crate::image::{Image, Pair, Pixel, Plane};
+use super::units::each_lane;
+use crate::image::{Pair, Pixel, Plane};
 use crate::maps::{FRACTION, Maps, flag, has_disparity};
 use crate::plan::Plan;
 use crate::stage::MapSet;
 use crate::stage::enlarge::{AWAY, NEAR};
 use rayon::prelude::*;
-use std::ops::Range;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let image = pair.full().expect("the pair at full size").left();
@@ -33,13 +33,18 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
         twice(half.validity.row(y), validity, |validity| validity);
         half.interpolate(y, scratch, disparity);
         for x in (0..width).filter(|&x| !scratch.plain[x]) {
-            let around = half.around((x, y));
-            for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                let (column, row) = (2 * x + i, 2 * y + j);
-                let at = 2 * width * j + column;
-                let (value, like) = half.at_edge((x, y), &around, (column, row), image);
-                (disparity[at], validity[at], confidence[at]) =
-                    (low + value, half.validity[like], half.confidence[like]);
+            if let Some(around) = half.around((x, y)) {
+                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let at = 2 * width * j + 2 * x + i;
+                    let colour = image.pixels[(2 * x + i, 2 * y + j)];
+                    let (above_low, like) = around.at_edge((i, j), colour);
+                    disparity[at] = low + above_low;
+                    (validity[at], confidence[at]) = (half.validity[like], half.confidence[like]);
+                }
+            } else {
+                let own = low + half.above_low[(x, y)];
+                let places = [0, 1, 2 * width, 2 * width + 1].map(|at| 2 * x + at);
+                places.into_iter().for_each(|at| disparity[at] = own);
             }
         }
         let masked = &image.masked.data()[4 * width * y..][..4 * width];
@@ -79,10 +84,27 @@ struct Scratch {
 }
 
 impl Half<'_> {
-    /// The 3 x 3 around a pixel that are inside.
-    fn around(&self, (x, y): (usize, usize)) -> [Range<usize>; 2] {
+    /// The 3 x 3 around a pixel; `None` where that has no disparity.
+    fn around(&self, (x, y): (usize, usize)) -> Option<Around> {
+        if !has_disparity(self.validity[(x, y)]) {
+            return None;
+        }
         let (width, height) = self.above_low.size();
-        [(x, width), (y, height)].map(|(at, end)| at.saturating_sub(1)..(at + 2).min(end))
+        let beside = |at: usize, end: usize| [usize::from(at == 0), 2 - usize::from(at + 1 == end)];
+        let beside = [beside(x, width), beside(y, height)];
+        let mut around = Around { own: (x, y), beside, ..Around::default() };
+        for row in y.saturating_sub(1)..(y + 2).min(height) {
+            for column in x.saturating_sub(1)..(x + 2).min(width) {
+                let (at, k) = ((column, row), 3 * (row + 1 - y) + column + 1 - x);
+                if has_disparity(self.validity[at]) {
+                    around.known[k] = true;
+                    around.above_low[k] = self.above_low[at];
+                    let levels = self.colours[at].map(|channel| (channel >> 8) as i16);
+                    around.colours.iter_mut().zip(levels).for_each(|(channel, level)| channel[k] = level);
+                }
+            }
+        }
+        Some(around)
     }
 
     /// Interpolates the two rows of the full size of row `y`, and finds where that is enough.
@@ -96,76 +118,85 @@ impl Half<'_> {
         let above = self.above_low.row(y.saturating_sub(1));
         let (own, below) = (self.above_low.row(y), self.above_low.row((y + 1).min(height - 1)));
         flat_row([above, own, below], low, high, plain);
-        let [_, rows] = self.around((0, y));
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
         let hole = |x: &usize| rows.clone().any(|y| !has_disparity(self.validity[(*x, y)]));
         for x in (0..width).filter(hole) {
-            let [columns, _] = self.around((x, y));
-            plain[columns].fill(false);
+            plain[x.saturating_sub(1)..(x + 2).min(width)].fill(false);
         }
         let (first, second) = out.split_at_mut(2 * width);
         between_row(self.low, (own, above), sums, first);
         between_row(self.low, (own, below), sums, second);
     }
+}
 
-    /// How far the disparity at `place` of the full size, in the block of `own`, is above the smallest, and the pixel of half the size
-    /// that it is most like.
-    fn at_edge(
-        &self,
-        own: (usize, usize),
-        [columns, rows]: &[Range<usize>; 2],
-        place: (usize, usize),
-        image: &Image,
-    ) -> (i32, (usize, usize)) {
-        if !has_disparity(self.validity[own]) {
-            return (self.above_low[own], own);
-        }
-        let colour = image.pixels[place];
-        let mut near = [((0, 0), 0, 0); 9];
-        let mut count = 0;
-        for at in rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y))) {
-            if has_disparity(self.validity[at]) {
-                near[count] = (at, self.above_low[at], unlike(self.colours[at], at, colour, place));
-                count += 1;
-            }
-        }
-        let near = &near[..count];
-        let (least, most) =
-            near.iter().fold((i32::MAX, i32::MIN), |(a, b), one| (a.min(one.1), b.max(one.1)));
-        if most - least <= FRACTION {
-            return (self.between(own, place), own);
-        }
-        let mut best = near[0];
-        for &one in &near[1..] {
-            if one.2 < best.2 {
-                best = one;
-            }
-        }
-        let (mut sum, mut weights) = (0, 0);
-        for &(_, disparity, unlike) in near.iter().filter(|one| (one.1 - best.1).abs() <= FRACTION) {
-            let weight = (NEAR + best.2 - unlike).max(0);
-            sum += weight * (disparity - best.1);
-            weights += weight;
-        }
-        (best.1 + sum / weights, best.0)
+/// Lanes for the 3 x 3 pixels around one, in raster order.
+const LANES: usize = 16;
+
+/// What is known of the 3 x 3 pixels around one of half the size.
+#[derive(Default)]
+struct Around {
+    own: (usize, usize),
+    /// Which columns, from 0 to 2, are to its left and right, clamped to the image, and the same of rows.
+    beside: [[usize; 2]; 2],
+    /// Whether they are inside and have a disparity.
+    known: [bool; LANES],
+    above_low: [i32; LANES],
+    /// Red, green and blue in 8-bit levels.
+    colours: [[i16; LANES]; 3],
+}
+
+/// What distance adds to how unlike each of the 3 x 3 pixels is, for a pixel in this column and row of the block.
+const fn away((i, j): (usize, usize)) -> [i16; LANES] {
+    let mut away = [0; LANES];
+    let mut k = 0;
+    while k < 9 {
+        // In halves of a pixel: 3, 1 and 5, or the other way round.
+        let (x, y) = (4 * (k % 3) as i32 - 3 - 2 * i as i32, 4 * (k / 3) as i32 - 3 - 2 * j as i32);
+        away[k] = (AWAY * (x.abs() + y.abs()) / 2) as i16;
+        k += 1;
     }
+    away
+}
 
-    /// That at `place` between the four nearest pixels, of which that of its block is `own`.
-    fn between(&self, own: (usize, usize), place: (usize, usize)) -> i32 {
-        let (width, height) = self.above_low.size();
-        let beside = |own: usize, place: usize, end: usize| {
-            if place.is_multiple_of(2) { own.saturating_sub(1) } else { (own + 1).min(end - 1) }
-        };
-        let (x, y) = (beside(own.0, place.0, width), beside(own.1, place.1, height));
-        let value = |at| self.above_low[if has_disparity(self.validity[at]) { at } else { own }];
-        (9 * value(own) + 3 * value((x, own.1)) + 3 * value((own.0, y)) + value((x, y)) + 8) >> 4
+const DISTANCES: [[[i16; LANES]; 2]; 2] = [[away((0, 0)), away((0, 1))], [away((1, 0)), away((1, 1))]];
+
+impl Around {
+    /// How far the disparity of a pixel of the full size in the block, of this `colour`, is above the smallest, and the pixel of half
+    /// the size that it is most like.
+    #[inline(always)]
+    fn at_edge(&self, (i, j): (usize, usize), colour: Pixel) -> (i32, (usize, usize)) {
+        let Self { own, beside, known, above_low, colours } = self;
+        let least = each_known(known, above_low, i32::MAX).into_iter().fold(i32::MAX, i32::min);
+        let most = each_known(known, above_low, i32::MIN).into_iter().fold(i32::MIN, i32::max);
+        if most - least <= FRACTION {
+            // Where it has no disparity, a pixel is that of the block.
+            let value = |k: usize| above_low[if known[k] { k } else { 4 }];
+            let (x, y) = (beside[0][i], 3 * beside[1][j]);
+            return ((9 * value(4) + 3 * value(3 + x) + 3 * value(y + 1) + value(y + x) + 8) >> 4, *own);
+        }
+        let [red, green, blue] = [0, 1, 2].map(|c: usize| (colour[c] >> 8) as i16);
+        let unlike: [i16; LANES] = each_lane(|k| {
+            let apart =
+                (colours[0][k] - red).abs() + (colours[1][k] - green).abs() + (colours[2][k] - blue).abs();
+            if known[k] { apart + DISTANCES[i][j][k] } else { i16::MAX }
+        });
+        let smallest = unlike.into_iter().fold(i16::MAX, i16::min);
+        let best = unlike.iter().position(|&one| one == smallest).unwrap_or(4);
+        let apart: [i32; LANES] = each_lane(|k| above_low[k] - above_low[best]);
+        let weights: [i32; LANES] = each_lane(|k| {
+            let weight = (NEAR + i32::from(smallest) - i32::from(unlike[k])).max(0);
+            if apart[k].abs() <= FRACTION { weight } else { 0 }
+        });
+        let sums: [i32; LANES] = each_lane(|k| weights[k] * apart[k]);
+        let value = above_low[best] + sums.into_iter().sum::<i32>() / weights.into_iter().sum::<i32>();
+        (value, (own.0 + best % 3 - 1, own.1 + best / 3 - 1))
     }
 }
 
-/// How unlike a pixel of half the size is to one of the full size.
-fn unlike(half: Pixel, at: (usize, usize), full: Pixel, place: (usize, usize)) -> i32 {
-    let colours: i32 = (0..3).map(|c| (i32::from(half[c] >> 8) - i32::from(full[c] >> 8)).abs()).sum();
-    let halves = |at: usize, place: usize| (4 * at + 1).abs_diff(2 * place) as i32;
-    colours + AWAY * (halves(at.0, place.0) + halves(at.1, place.1)) / 2
+/// The values that are known, and `other` for the others.
+#[inline(always)]
+fn each_known(known: &[bool; LANES], values: &[i32; LANES], other: i32) -> [i32; LANES] {
+    each_lane(|k| if known[k] { values[k] } else { other })
 }
 
 /// Where the disparities of 3 x 3 pixels span at most a pixel of the full size.

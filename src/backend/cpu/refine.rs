@@ -4,12 +4,12 @@
 //! and of one more row on either side, and then the disparities. The costs of a pixel are [`LANES`] bytes, so that neighbours of other
 //! labels find theirs in them, a few bytes further.
 
-use super::units::Units;
+use super::units::{Units, block, each_lane};
 use super::volumes::Volumes;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
 use crate::plan::Plan;
-use crate::stage::refine::{COLUMNS, NEAR, NO_CENSUS, REACH};
+use crate::stage::refine::{COLUMNS, NEAR, NO_CENSUS, OTHERS, REACH};
 use crate::stage::{MapSet, Optimum};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -72,9 +72,9 @@ impl<'a> Views<'a> {
 #[derive(Default)]
 struct Scratch {
     greys: Vec<u16>,
-    left: Vec<u32>,
+    left: Vec<u16>,
     /// From right to left, with margins.
-    right: Vec<u32>,
+    right: Vec<u16>,
     costs: Vec<[u8; LANES]>,
 }
 
@@ -106,7 +106,7 @@ fn census(
     rows: &Range<usize>,
     mirrored: bool,
     greys: &mut Vec<u16>,
-    (out, margin): (&mut [u32], usize),
+    (out, margin): (&mut [u16], usize),
 ) {
     let (width, height) = image.pixels.size();
     // Greys with the ends of rows and columns repeated, and the masked ones at the largest value: below no other.
@@ -115,12 +115,14 @@ fn census(
     for (y, greys) in (rows.start..).zip(greys.chunks_exact_mut(pitch)) {
         let y = y.saturating_sub(RADIUS).min(height - 1);
         let inside = greys[RADIUS..RADIUS + width].iter_mut();
-        let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
-        let grey = |(pixel, &masked): (&[u16; 4], &bool)| if masked { u16::MAX } else { pixel[3] };
+        let pixels = image.pixels.row(y).iter();
         if mirrored {
-            inside.zip(pixels.rev()).for_each(|(out, pixel)| *out = grey(pixel));
+            inside.zip(pixels.rev()).for_each(|(out, pixel)| *out = pixel[3]);
         } else {
-            inside.zip(pixels).for_each(|(out, pixel)| *out = grey(pixel));
+            inside.zip(pixels).for_each(|(out, pixel)| *out = pixel[3]);
+        }
+        for x in masked_columns(image, y, mirrored) {
+            greys[RADIUS + x] = u16::MAX;
         }
         let (first, last) = (greys[RADIUS], greys[RADIUS + width - 1]);
         greys[..RADIUS].fill(first);
@@ -131,13 +133,17 @@ fn census(
         out[margin + width..].fill(NO_CENSUS);
         let out = &mut out[margin..margin + width];
         census_row(&greys[i * pitch..][..(2 * RADIUS + 1) * pitch], pitch, mirrored, out);
-        let masked = image.masked.row(rows.start + i);
-        if masked.contains(&true) {
-            let last = width - 1;
-            let is_masked = |x: usize| masked[if mirrored { last - x } else { x }];
-            (0..width).filter(|&x| is_masked(x)).for_each(|x| out[x] = NO_CENSUS);
+        for x in masked_columns(image, rows.start + i, mirrored) {
+            out[x] = NO_CENSUS;
         }
     }
+}
+
+/// The columns of masked pixels in a row, from the right where it is `mirrored`.
+fn masked_columns(image: &Image, y: usize, mirrored: bool) -> impl Iterator<Item = usize> {
+    let masked = image.masked.row(y).iter().enumerate().filter(|(_, masked)| **masked);
+    let last = image.width() - 1;
+    masked.map(move |(x, _)| if mirrored { last - x } else { x })
 }
 
 #[pulp::with_simd(census_row = pulp::Arch::new())]
@@ -147,18 +153,19 @@ fn census_row_on<'a, S: pulp::Simd>(
     greys: &'a [u16],
     pitch: usize,
     mirrored: bool,
-    out: &'a mut [u32],
+    out: &'a mut [u16],
 ) {
     let width = out.len();
-    let line = |dy: usize, dx: usize| &greys[dy * pitch + dx..][..width];
-    let centre = line(RADIUS, RADIUS);
+    let line = |dx: isize, dy: isize| {
+        let start = (RADIUS as isize + dy) * pitch as isize + RADIUS as isize + dx;
+        &greys[start as usize..][..width]
+    };
+    let centre = line(0, 0);
     out.fill(0);
-    for dy in 0..=2 * RADIUS {
-        for dx in (0..=2 * RADIUS).filter(|&dx| (dx, dy) != (RADIUS, RADIUS)) {
-            let other = line(dy, if mirrored { 2 * RADIUS - dx } else { dx });
-            for ((bits, &other), &centre) in out.iter_mut().zip(other).zip(centre) {
-                *bits = *bits << 1 | u32::from(other < centre);
-            }
+    for (dx, dy) in OTHERS {
+        let other = line(if mirrored { -dx } else { dx }, dy);
+        for ((bits, &other), &centre) in out.iter_mut().zip(other).zip(centre) {
+            *bits = *bits << 1 | u16::from(other < centre);
         }
     }
 }
@@ -168,8 +175,8 @@ fn census_row_on<'a, S: pulp::Simd>(
 #[inline(always)]
 fn cost_row_on<'a, S: pulp::Simd>(
     _: S,
-    left: (&'a [u32], &'a [u32]),
-    right: (&'a [u32], &'a [u32]),
+    left: (&'a [u16], &'a [u16]),
+    right: (&'a [u16], &'a [u16]),
     optima: &'a [Optimum],
     views: &'a Views<'a>,
     out: &'a mut [[u8; LANES]],
@@ -178,20 +185,21 @@ fn cost_row_on<'a, S: pulp::Simd>(
     let rows = [(left.0, right.0), (left.1, right.1)];
     for (x, (optimum, out)) in optima.iter().zip(out).enumerate() {
         let first = 2 * (i32::from(optimum.label) + views.half_min) - BEFORE as i32;
-        let mut sums = [0u32; LANES];
+        // The bits of the lower and of the upper half of each census, a byte each.
+        let mut sums = [0u8; 2 * LANES];
         for (left, right) in rows {
             let most = (right.len() - LANES) as i32;
             for column in [2 * x, 2 * x + 1] {
                 // The right pixel of a disparity D is at `width` - 1 - `column` + D from the right.
                 let place = (views.margin + width - 1 - column) as i32 + first;
-                let there: &[u32; LANES] =
-                    right[place.clamp(0, most) as usize..].first_chunk().expect("a margin");
-                for (sum, there) in sums.iter_mut().zip(there) {
-                    *sum += (left[column] ^ there).count_ones();
-                }
+                let there: &[u16; LANES] = block(right, place.clamp(0, most) as usize);
+                let differing: [u16; LANES] = each_lane(|i| left[column] ^ there[i]);
+                let bytes: [u8; 2 * LANES] = bytemuck::cast(differing);
+                sums = each_lane(|i| sums[i] + bytes[i].count_ones() as u8);
             }
         }
-        *out = sums.map(|sum| sum as u8);
+        let words: [u16; LANES] = bytemuck::cast(sums);
+        *out = each_lane(|i| (words[i] + (words[i] >> 8)) as u8);
     }
 }
 

@@ -22,7 +22,7 @@ const _: () = assert!(REACH == 4 && NEAR == 1);
 
 fn kernel<B: Bindings>(loops: usize) -> Kernel<B> {
     Kernel::new(loops)
-        .with("NO_CENSUS", NO_CENSUS)
+        .with("NO_CENSUS", u32::from(NO_CENSUS))
         .with("REACH", REACH as i32)
         .with("COLUMNS", COLUMNS as i32)
         .with("BEFORE", (REACH + 1 + 2 * NEAR) as i32)

@@ -22,13 +22,16 @@ fn census(image: &Image, x: i64, y: i64) -> Vec<bool> {
     let (width, height) = (image.width() as i64, image.height() as i64);
     let inside = x >= 0 && x < width && y >= 0 && y < height;
     if !inside || image.masked[(x as usize, y as usize)] {
-        return (0..24).map(|i| i % 2 == 0).collect();
+        return (0..16).map(|i| i % 2 == 0).collect();
     }
     let own = image.pixels[(x as usize, y as usize)][3];
     let mut bits = Vec::new();
     for v in y - 2..=y + 2 {
         for u in x - 2..=x + 2 {
-            if (u, v) != (x, y) {
+            let (across, down) = ((u - x).abs(), (v - y).abs());
+            let beside = across.max(down) == 1;
+            let farther = across.max(down) == 2 && across % 2 == 0 && down % 2 == 0;
+            if beside || farther {
                 let at = (u.clamp(0, width - 1) as usize, v.clamp(0, height - 1) as usize);
                 bits.push(!image.masked[at] && image.pixels[at][3] < own);
             }
