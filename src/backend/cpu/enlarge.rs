@@ -44,7 +44,9 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
             } else {
                 let own = low + half.above_low[(x, y)];
                 let places = [0, 1, 2 * width, 2 * width + 1].map(|at| 2 * x + at);
-                places.into_iter().for_each(|at| disparity[at] = own);
+                for at in places {
+                    disparity[at] = own;
+                }
             }
         }
         let masked = &image.masked.data()[4 * width * y..][..4 * width];
