@@ -7,13 +7,18 @@ impl Image {
     /// The image with as many columns and rows as make whole blocks of 2 x 2 pixels: the last ones are there twice where they are
     /// odd.
     fn in_blocks(&self) -> Self {
-        let (width, height) = self.pixels.size();
-        let size = (width.next_multiple_of(2), height.next_multiple_of(2));
-        let place = |x: usize, y: usize| (x.min(width - 1), y.min(height - 1));
-        Self {
-            pixels: Plane::from_fn(size.0, size.1, |x, y| self.pixels[place(x, y)]),
-            masked: Plane::from_fn(size.0, size.1, |x, y| self.masked[place(x, y)]),
+        fn in_blocks<T: Copy>(plane: &Plane<T>) -> Plane<T> {
+            let (width, height) = plane.size();
+            let size = (width.next_multiple_of(2), height.next_multiple_of(2));
+            let mut data = Vec::with_capacity(size.0 * size.1);
+            for y in 0..size.1 {
+                let row = plane.row(y.min(height - 1));
+                data.extend_from_slice(row);
+                data.extend_from_slice(&row[width - (size.0 - width)..]);
+            }
+            Plane::new(size.0, size.1, data)
         }
+        Self { pixels: in_blocks(&self.pixels), masked: in_blocks(&self.masked) }
     }
 
     /// The image, which is in whole blocks, at half its size: a pixel is the mean of the unmasked pixels of its block of 2 x 2,

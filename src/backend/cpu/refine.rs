@@ -19,11 +19,13 @@ const BAND: usize = 16;
 /// Full-size disparities whose costs are held of each pixel, from [`BEFORE`] below twice that of its label on.
 const LANES: usize = 16;
 const BEFORE: usize = REACH + 1 + 2 * NEAR;
+/// How many bytes further than its own a pixel may read: costs of the next one, which count for nothing.
+const FARTHER: usize = 4 * NEAR;
 /// Disparities whose sums are compared, and one more on either side of them.
 const SUMS: usize = 2 * REACH + 3;
 /// Which of them is twice that of the label.
 const OWN: usize = REACH + 1;
-const _: () = assert!(SUMS + 4 * NEAR <= LANES);
+const _: () = assert!(SUMS + FARTHER <= LANES);
 /// How many pixels around it a census sees.
 const RADIUS: usize = 2;
 
@@ -75,7 +77,8 @@ struct Scratch {
     left: Vec<u16>,
     /// From right to left, with margins.
     right: Vec<u16>,
-    costs: Vec<[u8; LANES]>,
+    /// [`LANES`] bytes a pixel, and some more behind the last.
+    costs: Vec<u8>,
 }
 
 impl Scratch {
@@ -88,15 +91,17 @@ impl Scratch {
         census(views.left, &full, false, greys, (left, 0));
         right.resize(full.len() * (width + 2 * margin), 0);
         census(views.right, &full, true, greys, (right, margin));
-        costs.resize(rows.len() * width / 2, [0; LANES]);
+        costs.resize(rows.len() * width / 2 * LANES + FARTHER, 0);
         let blocks = left.chunks_exact(2 * width).zip(right.chunks_exact(2 * (width + 2 * margin)));
-        for ((y, costs), (left, right)) in rows.clone().zip(costs.chunks_exact_mut(width / 2)).zip(blocks) {
+        for ((y, costs), (left, right)) in
+            rows.clone().zip(costs.chunks_exact_mut(width / 2 * LANES)).zip(blocks)
+        {
             cost_row(left.split_at(width), right.split_at(right.len() / 2), optima(y), views, costs);
         }
     }
 
-    fn costs_of(&self, row: usize, width: usize) -> &[[u8; LANES]] {
-        &self.costs[row * width..][..width]
+    fn costs_of(&self, row: usize, width: usize) -> &[u8] {
+        &self.costs[row * width * LANES..][..width * LANES + FARTHER]
     }
 }
 
@@ -179,11 +184,11 @@ fn cost_row_on<'a, S: pulp::Simd>(
     right: (&'a [u16], &'a [u16]),
     optima: &'a [Optimum],
     views: &'a Views<'a>,
-    out: &'a mut [[u8; LANES]],
+    out: &'a mut [u8],
 ) {
     let width = left.0.len();
     let rows = [(left.0, right.0), (left.1, right.1)];
-    for (x, (optimum, out)) in optima.iter().zip(out).enumerate() {
+    for (x, (optimum, out)) in optima.iter().zip(out.as_chunks_mut::<LANES>().0).enumerate() {
         let first = 2 * (i32::from(optimum.label) + views.half_min) - BEFORE as i32;
         // The bits of the lower and of the upper half of each census, a byte each.
         let mut sums = [0u8; 2 * LANES];
@@ -209,7 +214,7 @@ fn cost_row_on<'a, S: pulp::Simd>(
 #[inline(always)]
 fn fit_row_on<'a, S: pulp::Simd>(
     _: S,
-    rows: &'a [(&'a [Optimum], &'a [[u8; LANES]]); 3],
+    rows: &'a [(&'a [Optimum], &'a [u8]); 3],
     inside: Range<usize>,
     half_min: i32,
     out: &'a mut [i32],
@@ -222,13 +227,13 @@ fn fit_row_on<'a, S: pulp::Simd>(
             for column in x.saturating_sub(COLUMNS)..(x + COLUMNS + 1).min(width) {
                 let above = label - i32::from(optima[column].label) + NEAR as i32;
                 if (0..=2 * NEAR as i32).contains(&above) {
-                    let costs = &costs[column][2 * above as usize..][..SUMS];
-                    for (sum, &cost) in sums.iter_mut().zip(costs) {
-                        *sum += u16::from(cost);
-                    }
+                    let costs: &[u8; LANES] = block(costs, LANES * column + 2 * above as usize);
+                    sums = each_lane(|i| sums[i] + u16::from(costs[i]));
                 }
             }
         }
+        // Apart from those above, which stay in registers: what is indexed by a variable lies in memory.
+        let sums: [u16; LANES] = std::hint::black_box(sums);
         let mut best = OWN;
         for k in 1..=REACH {
             for at in [OWN - k, OWN + k] {
