@@ -1,6 +1,6 @@
 //! The maps that a match leaves behind, and what a pixel of them means.
 
-use crate::image::{Plane, Rect};
+use crate::image::Plane;
 
 /// Fixed-point units of disparity in one pixel.
 pub const FRACTION: i32 = 256;
@@ -74,18 +74,14 @@ pub fn has_disparity(validity: u8) -> bool {
 impl Maps {
     /// The part of (width, height) from the top left.
     pub(crate) fn cut_to(self, size: (usize, usize)) -> Self {
-        if self.disparity.size() == size {
-            return self;
-        }
-        let part = Rect::whole(size);
         Self {
-            disparity: self.disparity.crop(&part),
-            raw: self.raw.crop(&part),
-            confidence: self.confidence.crop(&part),
-            validity: self.validity.crop(&part),
+            disparity: self.disparity.cut_to(size),
+            raw: self.raw.cut_to(size),
+            confidence: self.confidence.cut_to(size),
+            validity: self.validity.cut_to(size),
             right: self.right.map(|right| RightMap {
-                disparity: right.disparity.crop(&part),
-                validity: right.validity.crop(&part),
+                disparity: right.disparity.cut_to(size),
+                validity: right.validity.cut_to(size),
             }),
         }
     }

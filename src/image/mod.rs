@@ -184,6 +184,16 @@ impl<T: Clone> Plane<T> {
         Self { width: part.x.len(), height: part.y.len(), data: rows.concat() }
     }
 
+    /// The part of (width, height) from the top left.
+    #[must_use]
+    pub(crate) fn cut_to(mut self, (width, height): (usize, usize)) -> Self {
+        if self.width == width {
+            self.data.truncate(width * height);
+            return Self { height, ..self };
+        }
+        self.crop(&Rect::whole((width, height)))
+    }
+
     /// A plane that holds `value` everywhere.
     #[must_use]
     pub fn filled(width: usize, height: usize, value: T) -> Self {
