@@ -7,10 +7,15 @@ const radio = (name: string) => document.querySelector<HTMLInputElement>(`input[
 
 export class Settings {
     private presets: Preset[] = [];
+    /** Whether somebody has chosen a preset. */
+    private chosen = false;
 
     /** `ranged` is called when the range changes. */
     constructor(ranged: () => void) {
-        by('preset').addEventListener('change', () => this.about());
+        by('preset').addEventListener('change', () => {
+            this.chosen = true;
+            this.about();
+        });
         for (const input of document.querySelectorAll('input[name="range"]')) {
             input.addEventListener('change', () => {
                 by('ends').hidden = this.automatic;
@@ -46,12 +51,16 @@ export class Settings {
         this.about();
     }
 
-    /** Takes the GPU from the choice, and says why. */
+    /** Takes the GPU from the choice, and says why. Unless a preset was chosen, the one for speed is. */
     withoutGpu(reason: string): void {
         const [gpu, cpu] = ['gpu', 'cpu'].map((value) => document.querySelector<HTMLInputElement>(`input[value="${value}"]`));
         if (gpu && cpu) {
             gpu.disabled = true;
             cpu.checked = true;
+        }
+        if (!this.chosen) {
+            by<HTMLSelectElement>('preset').value = 'fast';
+            this.about();
         }
         say('device-note', reason);
     }

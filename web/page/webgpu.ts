@@ -1,6 +1,6 @@
 // What to do where there is no WebGPU.
 
-const SAME = 'The CPU path is used: the same maps, bit for bit.';
+const SAME = 'The CPU path is used: the same maps, bit for bit. It starts with the preset for speed, fast.';
 
 /** Why this browser cannot use the GPU, with the remedy. */
 export function withoutWebGpu(): string {

@@ -89,14 +89,16 @@ describe('without WebGPU', () => {
     after(() => visit.close());
 
     it('the CPU path matches, and the page says why', async () => {
-        await visit.says('#device-note', /WebGPU.*CPU path is used/);
+        await visit.says('#device-note', /WebGPU.*CPU path is used.*preset for speed, fast/);
+        assert.equal(await visit.tab.$eval('#preset', (select) => select.value), 'fast');
         assert.equal(await visit.tab.$eval('input[value=gpu]', (input) => input.disabled), true);
         assert.equal(await visit.tab.$eval('input[value=cpu]', (input) => input.checked), true);
         await visit.pair(scene('slanted'), join(scene('slanted'), 'calib.txt'));
         await visit.match();
         assert.match(await visit.text('#facts'), /CPU path/);
         assert.equal(await visit.tab.$eval('#compare', (button) => button.disabled), true);
-        assert.equal(difference((await visit.save('pfm')).bytes, native(...views('slanted')).pfm), undefined);
+        const expected = native(...views('slanted'), ['--method', 'fast']).pfm;
+        assert.equal(difference((await visit.save('pfm')).bytes, expected), undefined);
     });
 });
 
