@@ -30,7 +30,7 @@ pub const PRESETS: &[Preset] = &[
     Preset { name: "default", about: "few errors in little time: for most pairs", make: Method::default },
     Preset {
         name: "accurate",
-        about: "nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too",
+        about: "nearest to the truth, in 8 times the default's time: matches the pair at twice its size, too",
         make: Method::accurate,
     },
     Preset {
@@ -63,7 +63,7 @@ impl Method {
         })
     }
 
-    /// Nearest to the truth, in 7 times the default's time: matches the pair at twice its size, too.
+    /// Nearest to the truth, in 8 times the default's time: matches the pair at twice its size, too.
     #[must_use]
     pub fn accurate() -> Self {
         let schedule = ScheduleOptions { match_size: MatchSize::Double, ..ScheduleOptions::default() };

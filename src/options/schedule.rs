@@ -22,7 +22,7 @@ words! {
         /// Its own size.
         Full = "full",
         /// Its own size and twice that. Where both maps agree within a pixel, their mean is taken. Where only the larger pair
-        /// measures a pixel, its disparity is taken. A match takes 7 times as long.
+        /// measures a pixel, its disparity is taken. A match takes 8 times as long.
         Double = "double",
     }
 }
