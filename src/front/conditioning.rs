@@ -30,16 +30,18 @@ pub struct Conditioning {
 #[must_use]
 pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> (Pair, Conditioning) {
     let mut found = Conditioning::default();
-    let mut halves = pair.map(Image::downsampled);
-    if options.equal_sharpness {
-        found.smoothing = sharpness::smoothing(pair, &halves);
-        if found != Conditioning::default() {
-            halves = found.apply(pair).map(Image::downsampled);
-        }
-    }
-    let mut matches = Vec::new();
-    if options.level_rows || options.denoise {
-        matches = rows::matches(&halves, range);
+    let halves = pair.map(Image::downsampled);
+    let unlike = || if options.equal_sharpness { sharpness::smoothing(pair, &halves) } else { [0.0; 2] };
+    let needs_matches = options.level_rows || options.denoise;
+    let matches_of = |halves: &Pair| if needs_matches { rows::matches(halves, range) } else { Vec::new() };
+    // At half the size, blocks of JPEG are no longer there.
+    let has_blocks = options.denoise && pair.full().is_none();
+    let blocks = || if has_blocks { compression::smoothing(pair) } else { 0.0 };
+    // Each is too short for many threads, so they run beside each other.
+    let (blocks, (unlike, mut matches)) = rayon::join(blocks, || rayon::join(unlike, || matches_of(&halves)));
+    found.smoothing = unlike;
+    if found != Conditioning::default() {
+        matches = matches_of(&found.apply(pair).map(Image::downsampled));
     }
     if options.level_rows {
         found.offset = rows::offset(&matches);
@@ -50,9 +52,7 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
         }
     }
     let level = found.apply(pair);
-    // At half the size, blocks of JPEG are no longer there.
-    let blocks = || if pair.full().is_some() { 0.0 } else { compression::smoothing(pair) };
-    let sigma = if options.denoise { f64::max(noise::smoothing(&level, &matches), blocks()) } else { 0.0 };
+    let sigma = if options.denoise { f64::max(noise::smoothing(&level, &matches), blocks) } else { 0.0 };
     if sigma == 0.0 {
         return (level, found);
     }

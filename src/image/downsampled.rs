@@ -14,7 +14,7 @@ impl Image {
     pub fn downsampled(&self) -> Self {
         let (width, height) = self.pixels.size();
         let (w, h) = (width.div_ceil(2), height.div_ceil(2));
-        let any_masked = self.masked.data().contains(&true);
+        let any_masked = self.any_masked();
         let masked = if any_masked { self.masked_children() } else { Plane::filled(w, h, false) };
         let mut pixels = vec![[0; 4]; w * h];
         pixels.par_chunks_mut(w).enumerate().for_each_init(Vec::new, |room, (y, row)| {

@@ -27,7 +27,7 @@ impl Image {
         let (w, h) = (self.width() / 2, self.height() / 2);
         let mut pixels = vec![[0; 4]; w * h];
         let mut masked = vec![false; w * h];
-        let any_masked = self.masked.data().contains(&true);
+        let any_masked = self.any_masked();
         let out = pixels.par_chunks_mut(w).zip(masked.par_chunks_mut(w));
         out.enumerate().for_each(|(y, (pixels, masked))| {
             let rows = [2 * y, 2 * y + 1];

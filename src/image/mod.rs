@@ -254,6 +254,13 @@ impl Image {
         self.pixels.map(|&[r, g, b, _]| [r, g, b].map(|v| (v >> 8) as u8))
     }
 
+    /// Whether any pixel is masked.
+    #[must_use]
+    pub(crate) fn any_masked(&self) -> bool {
+        // Without a branch for each pixel, vectors do this.
+        self.masked.data().chunks(1024).any(|some| some.iter().fold(false, |any, masked| any | masked))
+    }
+
     /// Whether all colours are whole 8-bit levels.
     #[must_use]
     pub(crate) fn holds_bytes(&self) -> bool {
@@ -357,8 +364,9 @@ impl Pair {
     }
 
     /// A pair of what `f` makes of each view, of one size.
-    pub(crate) fn map(&self, f: impl Fn(&Image) -> Image) -> Self {
-        Self::without_georeference(f(&self.left), f(&self.right))
+    pub(crate) fn map(&self, f: impl Fn(&Image) -> Image + Sync) -> Self {
+        let (left, right) = rayon::join(|| f(&self.left), || f(&self.right));
+        Self::without_georeference(left, right)
     }
 
     /// The pair at its full size, where this one is [at half of that](Self::halved).

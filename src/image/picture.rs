@@ -37,7 +37,7 @@ impl Picture for Image {
         let pixels = self.pixels.data();
         let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
         let is_bytes = self.holds_bytes();
-        let has_alpha = self.masked.data().contains(&true);
+        let has_alpha = self.any_masked();
         let mut samples: Vec<u16> = Vec::with_capacity(pixels.len() * 4);
         for (pixel, masked) in pixels.iter().zip(self.masked.data()) {
             samples.extend(&pixel[..if is_grey { 1 } else { 3 }]);

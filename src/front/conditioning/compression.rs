@@ -24,7 +24,7 @@ pub(super) fn smoothing(pair: &Pair) -> f64 {
 /// image may be a part of another.
 fn steps(image: &Image) -> f64 {
     let (width, height) = image.pixels.size();
-    let any_masked = image.masked.data().contains(&true);
+    let any_masked = image.any_masked();
     let masked = |y: usize| any_masked.then(|| image.masked.row(y));
     let rows: Vec<[Steps; 2]> = (0..height)
         .into_par_iter()

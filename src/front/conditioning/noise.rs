@@ -4,6 +4,7 @@ use super::rows::MIN_MATCHES;
 use crate::front::matches::Match;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
+use rayon::prelude::*;
 use std::array::from_fn;
 
 /// By how much both views are smoothed (a standard deviation in pixels), where they share less of their finest detail than this
@@ -30,7 +31,7 @@ pub(super) fn smoothing(pair: &Pair, matches: &[Match]) -> f64 {
 
 /// The correlation of the finest detail of all patches together; `None` where there are too few.
 fn shared_detail(pair: &Pair, matches: &[Match]) -> Option<f64> {
-    let patches: Vec<_> = matches.iter().filter_map(|m| details(pair, m)).collect();
+    let patches: Vec<_> = matches.par_iter().filter_map(|m| details(pair, m)).collect();
     if patches.len() < MIN_MATCHES {
         return None;
     }

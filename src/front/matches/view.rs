@@ -32,7 +32,7 @@ impl View {
     pub(super) fn new(image: &Image) -> Self {
         let grey = image.pixels.map(|p| (p[3] >> GREY_SHIFT) as i16);
         let (width, height) = grey.size();
-        let any_masked = image.masked.data().contains(&true);
+        let any_masked = image.any_masked();
         // One allocation each: rows of a large image that are freed one by one may stay with the process.
         let (mut sums, mut norms) = (Plane::filled(width, height, 0), Plane::filled(width, height, 0.0));
         let rows = sums.data_mut().par_chunks_mut(width).zip(norms.data_mut().par_chunks_mut(width));
