@@ -3,7 +3,7 @@
 //! Most pixels are far from every edge, and interpolate. The others look at the 3 x 3 half-size pixels around them.
 
 use super::units::each_lane;
-use crate::image::{Pair, Pixel, Plane};
+use crate::image::{Image, Pair, Pixel, Plane};
 use crate::maps::{FRACTION, Maps, flag, has_disparity};
 use crate::plan::Plan;
 use crate::stage::MapSet;
@@ -17,7 +17,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let above_low = maps.disparity.map(|d| (2 * d).clamp(low, high) - low);
     let MapSet { raw, confidence, validity, full, .. } = maps;
     let half = Half { low, above_low, validity, confidence, colours: &pair.left().pixels };
-    let width = half.above_low.width();
+    let (width, any_masked) = (half.above_low.width(), image.any_masked());
     let Maps { disparity, raw: full_raw, confidence: full_confidence, validity: full_validity, .. } = full;
     // Two rows of the full size for one of half of it.
     let maps =
@@ -32,29 +32,44 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
         twice(half.confidence.row(y), confidence, |confidence| confidence);
         twice(half.validity.row(y), validity, |validity| validity);
         half.interpolate(y, scratch, disparity);
-        for x in (0..width).filter(|&x| !scratch.plain[x]) {
-            if let Some(around) = half.around((x, y)) {
-                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let at = 2 * width * j + 2 * x + i;
-                    let colour = image.pixels[(2 * x + i, 2 * y + j)];
-                    let (above_low, like) = around.at_edge((i, j), colour);
-                    disparity[at] = low + above_low;
-                    (validity[at], confidence[at]) = (half.validity[like], half.confidence[like]);
-                }
-            } else {
-                let own = low + half.above_low[(x, y)];
-                let places = [0, 1, 2 * width, 2 * width + 1].map(|at| 2 * x + at);
-                for at in places {
-                    disparity[at] = own;
-                }
-            }
-        }
-        let masked = &image.masked.data()[4 * width * y..][..4 * width];
+        edges_row(&half, image, y, &scratch.plain, (disparity, validity, confidence));
+        let masked = if any_masked { &image.masked.data()[4 * width * y..][..4 * width] } else { &[] };
         for (at, _) in masked.iter().enumerate().filter(|(_, masked)| **masked) {
             let own = half.above_low[(at % (2 * width) / 2, y)];
             (disparity[at], validity[at], confidence[at]) = (low + own, flag::MASKED, 0);
         }
     });
+}
+
+/// The two rows of the full size of row `y`, where it is not `plain`.
+#[pulp::with_simd(edges_row = pulp::Arch::new())]
+#[inline(always)]
+fn edges_row_on<'a, S: pulp::Simd>(
+    _: S,
+    half: &'a Half<'a>,
+    image: &'a Image,
+    y: usize,
+    plain: &'a [bool],
+    (disparity, validity, confidence): (&'a mut [i32], &'a mut [u8], &'a mut [u8]),
+) {
+    let width = plain.len();
+    for x in (0..width).filter(|&x| !plain[x]) {
+        if let Some(around) = half.around((x, y)) {
+            for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let at = 2 * width * j + 2 * x + i;
+                let colour = image.pixels[(2 * x + i, 2 * y + j)];
+                let (above_low, like) = around.at((i, j), colour);
+                disparity[at] = half.low + above_low;
+                (validity[at], confidence[at]) = (half.validity[like], half.confidence[like]);
+            }
+        } else {
+            let own = half.low + half.above_low[(x, y)];
+            let places = [0, 1, 2 * width, 2 * width + 1].map(|at| 2 * x + at);
+            for at in places {
+                disparity[at] = own;
+            }
+        }
+    }
 }
 
 /// Writes each value of a row to the four pixels of its block.
@@ -87,6 +102,7 @@ struct Scratch {
 
 impl Half<'_> {
     /// The 3 x 3 around a pixel; `None` where that has no disparity.
+    #[inline(always)]
     fn around(&self, (x, y): (usize, usize)) -> Option<Around> {
         if !has_disparity(self.validity[(x, y)]) {
             return None;
@@ -106,6 +122,10 @@ impl Half<'_> {
                 }
             }
         }
+        let Around { known, above_low, .. } = &around;
+        let least = each_known(known, above_low, i32::MAX).into_iter().fold(i32::MAX, i32::min);
+        let most = each_known(known, above_low, i32::MIN).into_iter().fold(i32::MIN, i32::max);
+        around.is_flat = most - least <= FRACTION;
         Some(around)
     }
 
@@ -133,6 +153,9 @@ impl Half<'_> {
 
 /// Lanes for the 3 x 3 pixels around one, in raster order.
 const LANES: usize = 16;
+/// How unlike is what is not known: more than all others, three channels and the distance.
+const UNKNOWN: i16 = 3 * 255 + 8 * AWAY as i16 + 1;
+const _: () = assert!((UNKNOWN as i32 + 1) * LANES as i32 <= i16::MAX as i32);
 
 /// What is known of the 3 x 3 pixels around one of half the size.
 #[derive(Default)]
@@ -143,6 +166,8 @@ struct Around {
     /// Whether they are inside and have a disparity.
     known: [bool; LANES],
     above_low: [i32; LANES],
+    /// Whether these span at most a pixel of the full size.
+    is_flat: bool,
     /// Red, green and blue in 8-bit levels.
     colours: [[i16; LANES]; 3],
 }
@@ -166,11 +191,9 @@ impl Around {
     /// How far the disparity of a pixel of the full size in the block, of this `colour`, is above the smallest, and the pixel of half
     /// the size that it is most like.
     #[inline(always)]
-    fn at_edge(&self, (i, j): (usize, usize), colour: Pixel) -> (i32, (usize, usize)) {
-        let Self { own, beside, known, above_low, colours } = self;
-        let least = each_known(known, above_low, i32::MAX).into_iter().fold(i32::MAX, i32::min);
-        let most = each_known(known, above_low, i32::MIN).into_iter().fold(i32::MIN, i32::max);
-        if most - least <= FRACTION {
+    fn at(&self, (i, j): (usize, usize), colour: Pixel) -> (i32, (usize, usize)) {
+        let Self { own, beside, known, above_low, is_flat, colours } = self;
+        if *is_flat {
             // Where it has no disparity, a pixel is that of the block.
             let value = |k: usize| above_low[if known[k] { k } else { 4 }];
             let (x, y) = (beside[0][i], 3 * beside[1][j]);
@@ -180,10 +203,12 @@ impl Around {
         let unlike: [i16; LANES] = each_lane(|k| {
             let apart =
                 (colours[0][k] - red).abs() + (colours[1][k] - green).abs() + (colours[2][k] - blue).abs();
-            if known[k] { apart + DISTANCES[i][j][k] } else { i16::MAX }
+            if known[k] { apart + DISTANCES[i][j][k] } else { UNKNOWN }
         });
-        let smallest = unlike.into_iter().fold(i16::MAX, i16::min);
-        let best = unlike.iter().position(|&one| one == smallest).unwrap_or(4);
+        // How unlike, and which, in one number.
+        let keys: [i16; LANES] = each_lane(|k| unlike[k] * LANES as i16 + k as i16);
+        let least = keys.into_iter().fold(i16::MAX, i16::min) as usize;
+        let (smallest, best) = ((least / LANES) as i16, least % LANES);
         let apart: [i32; LANES] = each_lane(|k| above_low[k] - above_low[best]);
         let weights: [i32; LANES] = each_lane(|k| {
             let weight = (NEAR + i32::from(smallest) - i32::from(unlike[k])).max(0);

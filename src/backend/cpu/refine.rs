@@ -26,6 +26,28 @@ const SUMS: usize = 2 * REACH + 3;
 /// Which of them is twice that of the label.
 const OWN: usize = REACH + 1;
 const _: () = assert!(SUMS + FARTHER <= LANES);
+/// Bits of the rank of a sum, which breaks ties; the sums of all blocks fit in the others.
+const RANK_BITS: u32 = 4;
+/// Which sum has each rank: that of twice the label, and then those farther away, the smaller disparity first.
+const BY_RANK: [usize; 1 << RANK_BITS] = {
+    let mut sums = [OWN; 1 << RANK_BITS];
+    let mut k = 1;
+    while k <= REACH {
+        (sums[2 * k - 1], sums[2 * k]) = (OWN - k, OWN + k);
+        k += 1;
+    }
+    sums
+};
+/// The rank of each sum; all bits where it is none that is compared.
+const RANKS: [u16; LANES] = {
+    let mut ranks = [u16::MAX; LANES];
+    let mut rank = 0;
+    while rank <= 2 * REACH {
+        ranks[BY_RANK[rank]] = rank as u16;
+        rank += 1;
+    }
+    ranks
+};
 /// How many pixels around it a census sees.
 const RADIUS: usize = 2;
 
@@ -53,8 +75,8 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
 
 /// The views at full size, and what is the same for all rows.
 struct Views<'a> {
-    left: &'a Image,
-    right: &'a Image,
+    left: View<'a>,
+    right: View<'a>,
     half_min: i32,
     /// Columns without a census on either side of a row of the right view.
     margin: usize,
@@ -66,8 +88,16 @@ impl<'a> Views<'a> {
         // No label leads farther than this, and none farther than the view.
         let farthest = 2 * range.min.unsigned_abs().max(range.max.unsigned_abs()) as usize + LANES;
         let margin = farthest.min(full.size().0 + LANES);
-        Self { left: full.left(), right: full.right(), half_min: range.min, margin }
+        let view = |image: &'a Image, mirrored| View { image, mirrored, any_masked: image.any_masked() };
+        Self { left: view(full.left(), false), right: view(full.right(), true), half_min: range.min, margin }
     }
+}
+
+/// A view, from right to left where it is `mirrored`.
+struct View<'a> {
+    image: &'a Image,
+    mirrored: bool,
+    any_masked: bool,
 }
 
 /// What a thread works on.
@@ -85,12 +115,12 @@ impl Scratch {
     /// The costs of these half-size rows.
     fn fill<'a>(&mut self, views: &Views, rows: &Range<usize>, optima: impl Fn(usize) -> &'a [Optimum]) {
         let Self { greys, left, right, costs } = self;
-        let (width, margin) = (views.left.width(), views.margin);
+        let (width, margin) = (views.left.image.width(), views.margin);
         let full = 2 * rows.start..2 * rows.end;
         left.resize(full.len() * width, 0);
-        census(views.left, &full, false, greys, (left, 0));
+        views.left.census(&full, greys, (left, 0));
         right.resize(full.len() * (width + 2 * margin), 0);
-        census(views.right, &full, true, greys, (right, margin));
+        views.right.census(&full, greys, (right, margin));
         costs.resize(rows.len() * width / 2 * LANES + FARTHER, 0);
         let blocks = left.chunks_exact(2 * width).zip(right.chunks_exact(2 * (width + 2 * margin)));
         for ((y, costs), (left, right)) in
@@ -105,50 +135,48 @@ impl Scratch {
     }
 }
 
-/// The census of these rows of a view, from right to left where it is `mirrored`, with so many columns without one on either side.
-fn census(
-    image: &Image,
-    rows: &Range<usize>,
-    mirrored: bool,
-    greys: &mut Vec<u16>,
-    (out, margin): (&mut [u16], usize),
-) {
-    let (width, height) = image.pixels.size();
-    // Greys with the ends of rows and columns repeated, and the masked ones at the largest value: below no other.
-    let pitch = width + 2 * RADIUS;
-    greys.resize((rows.len() + 2 * RADIUS) * pitch, 0);
-    for (y, greys) in (rows.start..).zip(greys.chunks_exact_mut(pitch)) {
-        let y = y.saturating_sub(RADIUS).min(height - 1);
-        let inside = greys[RADIUS..RADIUS + width].iter_mut();
-        let pixels = image.pixels.row(y).iter();
-        if mirrored {
-            inside.zip(pixels.rev()).for_each(|(out, pixel)| *out = pixel[3]);
-        } else {
-            inside.zip(pixels).for_each(|(out, pixel)| *out = pixel[3]);
+impl View<'_> {
+    /// The census of these rows, with so many columns without one on either side.
+    fn census(&self, rows: &Range<usize>, greys: &mut Vec<u16>, (out, margin): (&mut [u16], usize)) {
+        let Self { image, mirrored, .. } = *self;
+        let (width, height) = image.pixels.size();
+        // Greys with the ends of rows and columns repeated, and the masked ones at the largest value: below no other.
+        let pitch = width + 2 * RADIUS;
+        greys.resize((rows.len() + 2 * RADIUS) * pitch, 0);
+        for (y, greys) in (rows.start..).zip(greys.chunks_exact_mut(pitch)) {
+            let y = y.saturating_sub(RADIUS).min(height - 1);
+            let inside = greys[RADIUS..RADIUS + width].iter_mut();
+            let pixels = image.pixels.row(y).iter();
+            if mirrored {
+                inside.zip(pixels.rev()).for_each(|(out, pixel)| *out = pixel[3]);
+            } else {
+                inside.zip(pixels).for_each(|(out, pixel)| *out = pixel[3]);
+            }
+            for x in self.masked_columns(y) {
+                greys[RADIUS + x] = u16::MAX;
+            }
+            let (first, last) = (greys[RADIUS], greys[RADIUS + width - 1]);
+            greys[..RADIUS].fill(first);
+            greys[RADIUS + width..].fill(last);
         }
-        for x in masked_columns(image, y, mirrored) {
-            greys[RADIUS + x] = u16::MAX;
-        }
-        let (first, last) = (greys[RADIUS], greys[RADIUS + width - 1]);
-        greys[..RADIUS].fill(first);
-        greys[RADIUS + width..].fill(last);
-    }
-    for (i, out) in out.chunks_exact_mut(width + 2 * margin).enumerate() {
-        out[..margin].fill(NO_CENSUS);
-        out[margin + width..].fill(NO_CENSUS);
-        let out = &mut out[margin..margin + width];
-        census_row(&greys[i * pitch..][..(2 * RADIUS + 1) * pitch], pitch, mirrored, out);
-        for x in masked_columns(image, rows.start + i, mirrored) {
-            out[x] = NO_CENSUS;
+        for (i, out) in out.chunks_exact_mut(width + 2 * margin).enumerate() {
+            out[..margin].fill(NO_CENSUS);
+            out[margin + width..].fill(NO_CENSUS);
+            let out = &mut out[margin..margin + width];
+            census_row(&greys[i * pitch..][..(2 * RADIUS + 1) * pitch], pitch, mirrored, out);
+            for x in self.masked_columns(rows.start + i) {
+                out[x] = NO_CENSUS;
+            }
         }
     }
-}
 
-/// The columns of masked pixels in a row, from the right where it is `mirrored`.
-fn masked_columns(image: &Image, y: usize, mirrored: bool) -> impl Iterator<Item = usize> {
-    let masked = image.masked.row(y).iter().enumerate().filter(|(_, masked)| **masked);
-    let last = image.width() - 1;
-    masked.map(move |(x, _)| if mirrored { last - x } else { x })
+    /// The columns of masked pixels in a row.
+    fn masked_columns(&self, y: usize) -> impl Iterator<Item = usize> {
+        let Self { image, mirrored, any_masked } = *self;
+        let row = if any_masked { image.masked.row(y) } else { &[] };
+        let masked = row.iter().enumerate().filter(|(_, masked)| **masked);
+        masked.map(move |(x, _)| if mirrored { image.width() - 1 - x } else { x })
+    }
 }
 
 #[pulp::with_simd(census_row = pulp::Arch::new())]
@@ -232,16 +260,12 @@ fn fit_row_on<'a, S: pulp::Simd>(
                 }
             }
         }
+        // Sum and rank in one number.
+        let keys: [u16; LANES] = each_lane(|at| (sums[at] << RANK_BITS) | RANKS[at]);
+        let least = keys.into_iter().fold(u16::MAX, u16::min);
+        let best = BY_RANK[usize::from(least) % BY_RANK.len()];
         // Apart from those above, which stay in registers: what is indexed by a variable lies in memory.
         let sums: [u16; LANES] = std::hint::black_box(sums);
-        let mut best = OWN;
-        for k in 1..=REACH {
-            for at in [OWN - k, OWN + k] {
-                if sums[at] < sums[best] {
-                    best = at;
-                }
-            }
-        }
         let [a, b, c] = [best - 1, best, best + 1].map(|at| i32::from(sums[at]));
         let slope = a.max(c) - b;
         let offset = if slope <= 0 {
