@@ -17,7 +17,7 @@ use std::ops::Range;
 /// Bands per thread, so that one slow thread does not delay all others.
 const BANDS: usize = 4;
 /// Smallest number of rows of a band.
-const LEAST_ROWS: usize = 8 * REACH;
+const LEAST_ROWS: usize = 4 * REACH;
 
 /// A band of rows, with the beliefs that no other band changes.
 struct Band<'a, U> {
@@ -36,7 +36,10 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
     let l = &plan.levels[level];
     let (height, windows) = (l.height, summands.windows);
     let slots = summands.graph.slots();
-    let count = (BANDS * rayon::current_num_threads()).min(height / LEAST_ROWS).max(1);
+    let threads = rayon::current_num_threads();
+    let most = (BANDS * threads).min(height / LEAST_ROWS).max(1);
+    // As many for each thread.
+    let count = if most > threads { most / threads * threads } else { most };
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
     let cells = |rows: Range<usize>| rows.map(|y| windows.length(y)).sum::<usize>();
 
