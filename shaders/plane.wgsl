@@ -1,4 +1,4 @@
-// The value of a plane through the disparities around every pixel, from the weighted median on. One invocation per pixel.
+// The value of a plane through the disparities around every pixel, from about the weighted median on. One invocation per pixel.
 
 #import band weighted_median
 
@@ -19,10 +19,10 @@ fn fit(w: Window, median: i32, plane: Plane, bits: u32) -> Plane {
     var error = 0;
     var errors = vec2<i32>();
     for (var v = w.first.y; v < w.last.y; v += w.step.y) {
-        for (var u = w.first.x; u < w.last.x; u += w.step.x) {
+        for (var u = start(w, v); u < w.last.x; u += w.step.x) {
             let at = (v - w.top) * params.level.pixel_pitch + u;
-            let away = (vec2<i32>(vec2(u, v)) - vec2<i32>(w.middle)) >> step_bits();
-            if ((away.x + away.y / 2) & 1) == 0 && has_disparity(flags[at]) {
+            if has_disparity(flags[at]) {
+                let away = (vec2<i32>(vec2(u, v)) - vec2<i32>(w.middle)) >> step_bits();
                 let e = (disparity[at] - base - dot(plane.slopes, away)) >> bits;
                 let own = i32(weight(w.centre, at, places(vec2(u, v), w.middle)));
                 let m = (own * max(256 - abs(e), 0)) >> 8u;
@@ -56,7 +56,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let id = place(group, lane);
     if id.x < params.level.width && id.y < params.band.rows {
         let w = window(id);
-        var value = median(w);
+        var value = median(w, START_BITS);
         if touched(flags[w.here]) {
             let rough = fit(w, value, Plane(0, vec2(0)), FIRST_BITS);
             let plane = fit(w, value, rough, SECOND_BITS);

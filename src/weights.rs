@@ -51,6 +51,8 @@ pub struct MedianWeights {
     pub radius: usize,
     /// Spacing of the window's places along rows and along columns: 2 to this many pixels.
     pub step_bits: [u32; 2],
+    /// Whether every second place counts alone, as on a checkerboard: those with dx + dy / 2 even, in steps of the window.
+    pub checkered: bool,
     /// By |dy| and by dx from -radius to radius, in steps of the window, \[dy\]\[dx\].
     space: Vec<u8>,
     /// Factor of a 16-bit channel, 1 ..= 256; the upper 16 bits of the product are its guide.
@@ -66,6 +68,12 @@ impl MedianWeights {
         let refinement = &method.refinement;
         let window = refinement.median_window as usize;
         Self::new(window, refinement.median_sigma_space, refinement.median_sigma_range)
+    }
+
+    /// Those of planes, and of the medians that planes start from: every second place.
+    #[must_use]
+    pub fn of_planes(method: &Method) -> Self {
+        Self { checkered: true, ..Self::of(method) }
     }
 
     /// The weights of filled pixels, in a window of 13 x 13 places that are 2 to `step_bits` pixels apart, along rows and along columns:
@@ -93,7 +101,7 @@ impl MedianWeights {
             doublings += 1;
         }
         let scale = (256.0 * slope + 0.5).floor().clamp(1.0, 256.0) as u32;
-        Self { radius, step_bits: [0; 2], space, scale, doublings }
+        Self { radius, step_bits: [0; 2], checkered: false, space, scale, doublings }
     }
 
     /// The weight that distance subtracts, by |dy| and |dx|, as the shader reads it.

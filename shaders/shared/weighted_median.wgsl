@@ -57,7 +57,7 @@ struct Window {
     middle: vec2<u32>,
     here: u32,
     centre: vec3<u32>,
-    // The first place, and the end of all places, which are `step` pixels apart.
+    // The first place, and the end of all places, which are `step` pixels apart. (`start` says where a row begins.)
     first: vec2<u32>,
     last: vec2<u32>,
     step: vec2<u32>,
@@ -75,7 +75,14 @@ fn window(id: vec2<u32>) -> Window {
     let here = (middle.y - top) * params.level.pixel_pitch + middle.x;
     let first = middle - min(reach, (middle >> raster) << raster);
     let last = min(middle + reach + vec2(1u), vec2(params.level.width, params.level.height));
-    return Window(middle, here, guide(here), first, last, vec2(1u) << raster, top);
+    return Window(middle, here, guide(here), first, last, vec2(EVERY, 1u) << raster, top);
+}
+
+// The column of the first place in row `v` of a window: of all places, or of every second one as on a checkerboard.
+fn start(w: Window, v: u32) -> u32 {
+    let away = (vec2<i32>(vec2(w.first.x, v)) - vec2<i32>(w.middle)) >> step_bits();
+    let skipped = u32(away.x + away.y / 2) & (EVERY - 1u);
+    return w.first.x + (skipped << params.column_bits);
 }
 
 // Whether the median changes a pixel with such flags.
@@ -83,18 +90,24 @@ fn touched(flags: u32) -> bool {
     return has_disparity(flags) && (params.all == 1u || (flags & FILLED) != 0u);
 }
 
-// The median in window `w`; where it changes nothing, the disparity as it is.
-fn median(w: Window) -> i32 {
+// The disparity at `at`, in steps of 2 to `bits`, to the nearest.
+fn in_steps(at: u32, bits: u32) -> i32 {
+    return (disparity[at] + i32((1u << bits) >> 1u)) >> bits;
+}
+
+// The median in window `w`, in steps of 2 to `bits`; where it changes nothing, the disparity as it is.
+fn median(w: Window, bits: u32) -> i32 {
     let pitch = params.level.pixel_pitch;
     var low = disparity[w.here];
     if touched(flags[w.here]) {
+        low = in_steps(w.here, bits);
         var high = low;
         var total = 0u;
         for (var v = w.first.y; v < w.last.y; v += w.step.y) {
-            for (var u = w.first.x; u < w.last.x; u += w.step.x) {
+            for (var u = start(w, v); u < w.last.x; u += w.step.x) {
                 let at = (v - w.top) * pitch + u;
                 if has_disparity(flags[at]) {
-                    let value = disparity[at];
+                    let value = in_steps(at, bits);
                     low = min(low, value);
                     high = max(high, value);
                     total += weight(w.centre, at, places(vec2(u, v), w.middle));
@@ -108,9 +121,9 @@ fn median(w: Window) -> i32 {
             var below_first = vec4<u32>();
             var below_second = vec4<u32>();
             for (var v = w.first.y; v < w.last.y; v += w.step.y) {
-                for (var u = w.first.x; u < w.last.x; u += w.step.x) {
+                for (var u = start(w, v); u < w.last.x; u += w.step.x) {
                     let at = (v - w.top) * pitch + u;
-                    let value = disparity[at];
+                    let value = in_steps(at, bits);
                     if has_disparity(flags[at]) && value < low + i32(8u * share) {
                         let own = vec4(weight(w.centre, at, places(vec2(u, v), w.middle)));
                         let offset = vec4(value - low);
@@ -127,6 +140,7 @@ fn median(w: Window) -> i32 {
             low += i32(skipped * share);
             width = share;
         }
+        low <<= bits;
     }
     return low;
 }

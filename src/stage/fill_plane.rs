@@ -8,6 +8,7 @@
 //! - It changes the pixels with [`FILLED`](crate::maps::flag::FILLED), and no others.
 //! - Its places are (x + 2^a i, y + 2^b j) with |i| and |j| at most 6 and j even; the weights and
 //!   the plane count i and j, not pixels.
+//! - A plane looks at all of them.
 //! - The weights are those [`of_filled`](crate::weights::MedianWeights::of_filled) pixels.
 
 use super::{Descriptor, Map, maps};

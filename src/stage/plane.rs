@@ -1,10 +1,18 @@
 //! [`Median`](super::median), and then planes: each pixel that it changes takes the value at its
 //! place of a plane through the disparities around, which keeps slanted surfaces slanted.
 //!
-//! The plane is fitted by two rounds of weighted least squares. With M the median of the pixel, at
-//! (x, y) from the pixel the plane passes at M + c + a x + b y, in 1/256 px; a, b and c start at 0.
-//! It looks at the median's places (x, y) with x + y / 2 even, of weight w and, before the stage,
-//! of disparity D. `>>` rounds down, and / towards 0. \[f\] is the sum of f over the places.
+//! Of the median's places (x, y), away from the pixel, it looks at those with x + y / 2 even: a
+//! checkerboard. They have the weight w and, before the stage, the disparity D. `>>` rounds down,
+//! and / towards 0. \[f\] is the sum of f over the places.
+//!
+//! The plane is fitted by two rounds of weighted least squares. It starts from M, the median
+//! of disparities in steps of 1/8 px ([`PLANE_START_BITS`](crate::plan::planes::PLANE_START_BITS)):
+//!
+//! ```text
+//! M = 32 median((D + 16) >> 5)
+//! ```
+//!
+//! At (x, y) the plane passes at M + c + a x + b y, in 1/256 px; a, b and c start at 0.
 //!
 //! For k = 2 and then k = 0 ([`PLANE_BITS`](crate::plan::planes::PLANE_BITS)):
 //!

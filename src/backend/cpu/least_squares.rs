@@ -1,9 +1,9 @@
 //! Planes through the disparities of windows, by least squares: see [`crate::backend::Stage::Plane`].
 //!
-//! Neighbouring pixels of a row are the lanes of vectors, as in the median, which loads the places. What is summed along a row or a
+//! Neighbouring pixels of a row are the lanes of vectors, as in the median, which loads the values. What is summed along a row or a
 //! column of the window fits in 16 bits.
 
-use super::places::{LANES, Place, Weighed};
+use super::places::{LANES, Values, Weighed};
 use super::units::each_lane;
 use crate::plan::planes::{PLANE_BITS, PLANE_FARTHEST, PLANE_STEEPEST};
 
@@ -24,8 +24,6 @@ pub(super) struct Planes {
     rows: [Line; MOST],
     columns: [Line; MOST],
     sums: Sums,
-    /// The places that count, with their steps from the centre.
-    counted: Vec<(usize, [i16; 2])>,
 }
 
 /// The sums over a row or a column of the windows. All of them fit in 16 bits: m is at most 127 and |g| at most 1016.
@@ -52,30 +50,18 @@ struct Sums {
 }
 
 impl Planes {
-    /// Chooses the places that count, of those that have weight.
-    #[inline(always)]
-    pub(super) fn choose(&mut self, weighed: &[Weighed]) {
-        // Without a branch, which no processor foresees.
-        self.counted.resize(weighed.len(), Default::default());
-        let mut count = 0;
-        for (at, &Weighed { step: step @ [x, y], .. }) in weighed.iter().enumerate() {
-            self.counted[count] = (at, step);
-            count += usize::from((x + (y >> 1)) & 1 == 0);
-        }
-        self.counted.truncate(count);
-    }
-
-    /// How far above the medians the planes through `places` pass, in windows of this radius.
+    /// How far above the medians the planes through these places pass, in windows of this radius.
     #[inline(always)]
     pub(super) fn above_medians(
         &mut self,
         radius: usize,
-        places: &[Place],
+        weighed: &[Weighed],
+        values: &[Values],
         medians: &Lanes<i16>,
     ) -> &Lanes<i32> {
         (self.value, self.slopes) = Default::default();
         for bits in PLANE_BITS {
-            self.sum_lines(radius, places, medians, bits);
+            self.sum_lines(radius, weighed, values, medians, bits);
             self.sum_all(radius);
             self.follow(bits);
         }
@@ -84,20 +70,26 @@ impl Planes {
 
     /// Sums over the rows and columns, where disparities count up to 256 of 2 to `bits` 1/256 px.
     #[inline(always)]
-    fn sum_lines(&mut self, radius: usize, places: &[Place], medians: &Lanes<i16>, bits: u32) {
-        let Self { value, slopes, rows, columns, counted, .. } = self;
+    fn sum_lines(
+        &mut self,
+        radius: usize,
+        weighed: &[Weighed],
+        values: &[Values],
+        medians: &Lanes<i16>,
+        bits: u32,
+    ) {
+        let Self { value: above, slopes, rows, columns, .. } = self;
         let (rows, columns) = (&mut rows[..=2 * radius], &mut columns[..=2 * radius]);
         rows.fill(Line::default());
         columns.fill(Line::default());
-        let base: Lanes<i16> = each_lane(|i| medians[i] + value[i] as i16);
+        let base: Lanes<i16> = each_lane(|i| medians[i] + above[i] as i16);
         let slope_x: Lanes<i16> = each_lane(|i| slopes[0][i] as i16);
         let slope_y: Lanes<i16> = each_lane(|i| slopes[1][i] as i16);
-        for &(at, [x, y]) in &*counted {
-            let Place { values, weights } = &places[at];
+        for (Values(values), &Weighed { step: [x, y], ref weights, .. }) in values.iter().zip(weighed) {
             let plane: Lanes<i16> = each_lane(|i| base[i] + x * slope_x[i] + y * slope_y[i]);
             let e: Lanes<i16> = each_lane(|i| values[i].saturating_sub(plane[i]) >> bits);
             let near: Lanes<u16> = each_lane(|i| 256u16.saturating_sub(e[i].unsigned_abs()));
-            let m: Lanes<i16> = each_lane(|i| ((weights[i] * near[i]) >> 8) as i16);
+            let m: Lanes<i16> = each_lane(|i| ((u16::from(weights[i]) * near[i]) >> 8) as i16);
             let g: Lanes<i16> = each_lane(|i| (m[i] * e[i]) >> 3);
             let row = &mut rows[(y + radius as i16) as usize];
             row.m = each_lane(|i| row.m[i] + m[i]);

@@ -1,16 +1,17 @@
 //! The weighted median of the disparities: see [`crate::backend::Stage::Median`].
 //!
 //! Neighbouring pixels of a row are the lanes of vectors: what a place of the window holds for all of them is adjacent, and no sum
-//! crosses lanes. Each lane bisects an interval of its own, from the smallest to the largest value in its window that has
-//! weight. Every step sums the weights of the values below the middle. This needs no sort.
+//! crosses lanes. Values are searched as bytes, in steps from a base of each lane: every pass over the window sums the weights of
+//! what is below a value, and halves the interval with the median. This needs no sort.
 
 use super::least_squares::Planes;
-use super::places::{LANES, Place, Weighed};
-use super::units::{block, block_mut, each_lane};
+use super::places::{LANES, Values, Weighed};
+use super::units::{block, each_lane};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::{flag, has_disparity};
 use crate::options::Median;
 use crate::plan::Plan;
+use crate::plan::planes::PLANE_START_BITS;
 use crate::stage::MapSet;
 use crate::weights::{MEDIAN_WEIGHT, MedianWeights, WINDOW_ROW_BITS};
 use rayon::prelude::*;
@@ -44,11 +45,11 @@ pub(super) fn smooth(
     let seen = Seen::new(weights, guide, disparity, flags);
     let disparity = disparity.data_mut().par_chunks_mut(width).enumerate();
     disparity.for_each_init(Window::default, |window, (y, row)| {
-        window.open(weights, &seen, y);
         window.limits = limits;
+        window.open(weights, &seen, y);
         window.touched.clear();
-        window.touched.extend(flags.row(y).iter().map(|&f| touched(f)));
-        window.touched.resize(width + LANES, false);
+        window.touched.extend(flags.row(y).iter().map(|&f| mask(touched(f))));
+        window.touched.resize(width + LANES, 0);
         median_row(window, &seen, row);
     });
 }
@@ -58,25 +59,16 @@ pub(super) fn smooth(
 #[inline(always)]
 fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen, row: &'a mut [i32]) {
     let mut x = 0;
-    while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched) {
+    while let Some(skipped) = window.touched[x..].iter().position(|&touched| touched > 0) {
         x += skipped;
-        let touched: [bool; LANES] = *block(&window.touched, x);
+        let touched: [u8; LANES] = *block(&window.touched, x);
         let results = window.results(seen, x, &touched);
-        for ((out, result), _) in row[x..].iter_mut().zip(results).zip(touched).filter(|each| each.1) {
+        for ((out, result), _) in row[x..].iter_mut().zip(results).zip(touched).filter(|each| each.1 > 0) {
             *out = result;
         }
         x += LANES;
     }
 }
-
-/// Number of pixels whose medians are found together, in vectors of 16 bits.
-const HALF: usize = LANES / 2;
-/// A guess of a median is too far from it where it misses by this much: values at the ends of 16 bits may then be near it.
-const FAR: u16 = 1 << 14;
-/// Number of places whose weights are summed before they join the others.
-const GROUP: usize = 4;
-/// Sums of this many weights fit in 16 bits.
-const PART: usize = 512;
 
 /// The input of the windows, with unknown pixels beyond the ends of the rows.
 struct Seen {
@@ -130,6 +122,9 @@ fn seen_row_on<'a, S: pulp::Simd>(
     }
 }
 
+/// Without planes, the median is searched in steps of 2 to so many 1/256 px, and then within one of them.
+const COARSE_BITS: u32 = 8;
+
 /// The windows of [`LANES`] adjacent pixels.
 #[derive(Default)]
 struct Window {
@@ -143,22 +138,18 @@ struct Window {
     /// What the values of planes stay within, where planes follow the median.
     limits: Option<(i32, i32)>,
     planes: Planes,
-    /// Whether each pixel of the row takes its median.
-    touched: Vec<bool>,
+    /// All bits for each pixel of the row that takes its median.
+    touched: Vec<u8>,
     /// The first `count` places have weight.
     weighed: Vec<Weighed>,
-    places: Vec<Place>,
+    values: Vec<Values>,
+    /// The same values in steps.
+    steps: Vec<[i8; LANES]>,
     count: usize,
-}
-
-/// What is known of the medians before the search, for all lanes.
-struct Bounds {
-    /// The smallest and the largest of the guess and the values that have weight.
-    low: [i16; LANES],
-    high: [i16; LANES],
-    /// The weight that the values up to the median have at least: half of all, rounded up. It fits in 16 bits, since windows have at most
-    /// 31 x 31 places.
+    /// Half of the weight of all places, rounded up.
     need: [u16; LANES],
+    /// The steps of the medians.
+    found: [i8; LANES],
 }
 
 impl Window {
@@ -175,42 +166,68 @@ impl Window {
                     column as i16 - weights.radius as i16,
                     ((ny as i32 - y as i32) >> weights.step_bits[1]) as i16,
                 ];
+                if weights.checkered && (steps[0] + (steps[1] >> 1)) & 1 != 0 {
+                    continue;
+                }
                 let near = MEDIAN_WEIGHT.saturating_sub(taken);
                 self.offsets.push((ny * seen.pitch + column * column_step, steps, near));
             }
         }
         self.radius = weights.radius;
         (self.centre, self.doublings) = (y * seen.pitch + seen.margin, weights.doublings);
-        self.weighed.resize(self.offsets.len(), Weighed::default());
-        self.places.resize(self.offsets.len().next_multiple_of(GROUP), Place::default());
+        let most = self.offsets.len().next_multiple_of(2);
+        self.weighed.resize(most, Weighed::default());
+        self.values.resize(most, Values::default());
+        self.steps.resize(most, [0; LANES]);
     }
 
     /// The medians, or what planes make of them, of the pixels from column `x` on, as far as they are `touched`.
     #[inline(always)]
-    fn results(&mut self, seen: &Seen, x: usize, touched: &[bool; LANES]) -> [i32; LANES] {
-        let mut medians: [i32; LANES] = *block(&seen.values, self.centre + x);
+    fn results(&mut self, seen: &Seen, x: usize, touched: &[u8; LANES]) -> [i32; LANES] {
+        // To the nearest step where planes follow, else to the one below.
+        let (bits, half) = if self.limits.is_some() {
+            (PLANE_START_BITS, 1 << (PLANE_START_BITS - 1))
+        } else {
+            (COARSE_BITS, 0)
+        };
+        // Each lane's own value, at first, in whole steps.
+        let own: &[i32; LANES] = block(&seen.values, self.centre + x);
+        let mut base: [i32; LANES] = each_lane(|i| ((own[i] + i32::from(half)) >> bits) << bits);
         self.weigh(seen, x, touched);
-        let mut found = [0i16; LANES];
-        loop {
-            let bounds = self.load(seen, &medians);
-            for first in [0, HALF] {
-                *block_mut(&mut found, first) = self.search(&bounds, first, block(touched, first));
+        let found = loop {
+            self.load(seen, &base);
+            self.find(&[-half; LANES], bits);
+            let found: [i16; LANES] = each_lane(|i| i16::from(self.found[i]) << bits);
+            // Beyond the ends of a byte the search goes on from there.
+            let is_end = |i: usize| touched[i] > 0 && matches!(self.found[i], i8::MIN | i8::MAX);
+            if !(0..LANES).any(is_end) {
+                break found;
             }
-            medians = each_lane(|i| medians[i] + i32::from(found[i]));
-            // A median out of the reach of its guess is searched for again, from there.
-            if found.iter().zip(touched).all(|(found, &touched)| !touched || found.unsigned_abs() < FAR) {
-                break;
-            }
-        }
-        let Some((low, high)) = self.limits else { return medians };
-        self.planes.choose(&self.weighed[..self.count]);
-        let above = self.planes.above_medians(self.radius, &self.places, &found);
-        each_lane(|i| (medians[i] + above[i]).clamp(low, high))
+            base = each_lane(|i| base[i] + i32::from(found[i]));
+        };
+        let Some((low, high)) = self.limits else {
+            let middle: [i16; LANES] = each_lane(|i| found[i] + (1 << (COARSE_BITS - 1)));
+            self.find(&middle, 0);
+            return each_lane(|i| base[i] + i32::from(middle[i]) + i32::from(self.found[i]));
+        };
+        let weighed = &self.weighed[..self.count];
+        let above = self.planes.above_medians(self.radius, weighed, &self.values, &found);
+        each_lane(|i| (base[i] + i32::from(found[i]) + above[i]).clamp(low, high))
+    }
+
+    /// Finds the medians of the values, less `origin`, in steps of 2 to `bits`.
+    #[inline(always)]
+    fn find(&mut self, origin: &[i16; LANES], bits: u32) {
+        let count = self.count;
+        divide(&self.values[..count], origin, bits, &mut self.steps);
+        // Places are summed in pairs.
+        let pairs = count.next_multiple_of(2);
+        search(&self.steps[..pairs], &self.weighed, &self.need, &mut self.found);
     }
 
     /// Finds the places that have weight for any of the pixels `touched`.
     #[inline(always)]
-    fn weigh(&mut self, seen: &Seen, x: usize, touched: &[bool; LANES]) {
+    fn weigh(&mut self, seen: &Seen, x: usize, touched: &[u8; LANES]) {
         let cells = seen.known.len();
         let known = &seen.known[..cells];
         let [red, green, blue] = seen.guides.each_ref().map(|guide| &guide[..cells]);
@@ -218,7 +235,6 @@ impl Window {
         let doublings = self.doublings;
         // The value that takes all of the weight once it is doubled.
         let most = (MEDIAN_WEIGHT + 1) >> doublings;
-        let touched: [u8; LANES] = each_lane(|i| u8::from(touched[i]).wrapping_neg());
         let mut count = 0;
         for &(offset, step, near) in &self.offsets {
             let at = offset + x;
@@ -233,62 +249,70 @@ impl Window {
             count += usize::from(weights != [0; LANES]);
         }
         self.count = count;
+        if let Some(beyond) = self.weighed.get_mut(count) {
+            beyond.weights = [0; LANES];
+        }
     }
 
-    /// Loads the values of all places that have weight, relative to the guesses.
+    /// Loads the values of all places that have weight, relative to `base`, and sums the weights.
     #[inline(always)]
-    fn load(&mut self, seen: &Seen, guess: &[i32; LANES]) -> Bounds {
-        let (mut low, mut high) = ([0i16; LANES], [0i16; LANES]);
-        let mut total = [0u32; LANES];
-        let weighed = &self.weighed[..self.count];
-        for (places, weighed) in self.places.chunks_mut(PART).zip(weighed.chunks(PART)) {
-            let mut part = [0u16; LANES];
-            for (place, Weighed { at, weights, .. }) in places.iter_mut().zip(weighed) {
-                let weights: [u16; LANES] = each_lane(|i| weights[i].into());
-                let values: &[i32; LANES] = block(&seen.values, *at);
-                let values: [i16; LANES] =
-                    each_lane(|i| (values[i] - guess[i]).clamp(i16::MIN.into(), i16::MAX.into()) as i16);
-                let weighted: [i16; LANES] = each_lane(|i| values[i] & mask(weights[i] > 0) as i16);
-                low = each_lane(|i| low[i].min(weighted[i]));
-                high = each_lane(|i| high[i].max(weighted[i]));
-                part = each_lane(|i| part[i] + weights[i]);
-                *place = Place { values, weights };
-            }
-            total = each_lane(|i| total[i] + u32::from(part[i]));
+    fn load(&mut self, seen: &Seen, base: &[i32; LANES]) {
+        let mut total = [0u16; LANES];
+        for (Values(values), Weighed { at, weights, .. }) in
+            self.values.iter_mut().zip(&self.weighed[..self.count])
+        {
+            total = each_lane(|i| total[i].saturating_add(weights[i].into()));
+            let all: &[i32; LANES] = block(&seen.values, *at);
+            *values = each_lane(|i| (all[i] - base[i]).clamp(i16::MIN.into(), i16::MAX.into()) as i16);
         }
-        // Groups are whole.
-        let whole = self.count.next_multiple_of(GROUP);
-        self.places[self.count..whole].fill(Place::default());
-        Bounds { low, high, need: each_lane(|i| total[i].div_ceil(2) as u16) }
+        self.need = each_lane(|i| total[i].div_ceil(2));
     }
+}
 
-    /// The medians of half of the lanes, from lane `first` on: the largest values below which there is less weight than needed.
-    #[inline(always)]
-    fn search(&self, bounds: &Bounds, first: usize, touched: &[bool; HALF]) -> [i16; HALF] {
-        let [low, high]: [&[i16; HALF]; 2] = [block(&bounds.low, first), block(&bounds.high, first)];
-        let need: &[u16; HALF] = block(&bounds.need, first);
-        let spans: [u16; HALF] = each_lane(|i| if touched[i] { high[i].abs_diff(low[i]) } else { 0 });
-        let mut found = *low;
-        let mut steps = u16::BITS - spans.iter().fold(0, |all, span| all | span).leading_zeros();
-        while steps > 0 {
-            steps -= 1;
-            // A step may take all 16 bits; its halves leave room for the sign.
-            let [less, more] = [(1u16 << steps) / 2, (1u16 << steps).div_ceil(2)].map(|part| part as i16);
-            let end: [i16; HALF] = each_lane(|i| found[i].saturating_add(less).saturating_add(more));
-            let mut below = [0u16; HALF];
-            for places in self.places[..self.count.next_multiple_of(GROUP)].as_chunks::<GROUP>().0 {
-                let mut part = [0u16; HALF];
-                for place in places {
-                    let values: &[i16; HALF] = block(&place.values, first);
-                    let weights: &[u16; HALF] = block(&place.weights, first);
-                    part = each_lane(|i| part[i] + (mask(values[i] < end[i]) & weights[i]));
-                }
-                below = each_lane(|i| below[i].saturating_add(part[i]));
-            }
-            found = each_lane(|i| if below[i] < need[i] { end[i] } else { found[i] });
-        }
-        found
+/// Divides `values`, less `origin`, into `steps` of 2 to `bits`. (A function of its own, as is the search: within another, compilers
+/// take vectors apart.)
+#[pulp::with_simd(divide = pulp::Arch::new())]
+#[inline(always)]
+fn divide_on<'a, S: pulp::Simd>(
+    _: S,
+    values: &'a [Values],
+    origin: &'a [i16; LANES],
+    bits: u32,
+    steps: &'a mut [[i8; LANES]],
+) {
+    for (steps, Values(values)) in steps.iter_mut().zip(values) {
+        *steps = each_lane(|i| {
+            (values[i].saturating_sub(origin[i]) >> bits).clamp(i8::MIN.into(), i8::MAX.into()) as i8
+        });
     }
+}
+
+/// The medians of `steps`, whose number is even: the largest values below which there is less weight than they `need`.
+#[pulp::with_simd(search = pulp::Arch::new())]
+#[inline(always)]
+fn search_on<'a, S: pulp::Simd>(
+    _: S,
+    steps: &'a [[i8; LANES]],
+    weighed: &'a [Weighed],
+    need: &'a [u16; LANES],
+    found: &'a mut [i8; LANES],
+) {
+    let mut all = [i8::MIN; LANES];
+    let (steps, weighed) = (steps.as_chunks::<2>().0, weighed.as_chunks::<2>().0);
+    // Twice 64, since 128 is no number of 8 bits with a sign.
+    for step in [64i8, 64, 64, 32, 16, 8, 4, 2, 1] {
+        let end: [i8; LANES] = each_lane(|i| all[i].saturating_add(step));
+        let mut below = [0u16; LANES];
+        for ([a, b], [of_a, of_b]) in steps.iter().zip(weighed) {
+            let a: [u8; LANES] = each_lane(|i| mask(a[i] < end[i]) & of_a.weights[i]);
+            let b: [u8; LANES] = each_lane(|i| mask(b[i] < end[i]) & of_b.weights[i]);
+            let both: [u8; LANES] = each_lane(|i| a[i].wrapping_add(b[i]));
+            // No sum saturates, but of sums that may wrap compilers make vectors of places.
+            below = each_lane(|i| below[i].saturating_add(u16::from(both[i])));
+        }
+        all = each_lane(|i| if below[i] < need[i] { end[i] } else { all[i] });
+    }
+    *found = all;
 }
 
 /// Absolute differences.
@@ -301,6 +325,6 @@ fn apart(guides: &[u8; LANES], centres: &[u8; LANES]) -> [u8; LANES] {
 
 /// All bits of `yes`.
 #[inline(always)]
-fn mask(yes: bool) -> u16 {
-    u16::from(yes).wrapping_neg()
+fn mask(yes: bool) -> u8 {
+    u8::from(yes).wrapping_neg()
 }

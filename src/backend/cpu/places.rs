@@ -12,12 +12,7 @@ pub(super) struct Weighed {
     pub(super) weights: [u8; LANES],
 }
 
-/// What a place of the window holds, for all lanes.
+/// The disparities at a place of the window, for all lanes, relative to a base of each lane.
 #[repr(align(64))]
 #[derive(Clone, Copy, Default)]
-pub(super) struct Place {
-    /// Relative to a guess of each lane.
-    pub(super) values: [i16; LANES],
-    /// 0 without disparity.
-    pub(super) weights: [u16; LANES],
-}
+pub(super) struct Values(pub(super) [i16; LANES]);

@@ -9,7 +9,7 @@ use crate::weights::MedianWeights;
 
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let guide = pair.left();
-    smooth(&MedianWeights::of(&plan.method), touched(plan), Some(limits(plan)), guide, maps);
+    smooth(&MedianWeights::of_planes(&plan.method), touched(plan), Some(limits(plan)), guide, maps);
 }
 
 /// What the values of planes stay within.

@@ -27,20 +27,25 @@ pub(super) fn over_window(shader: Shader, weights: &MedianWeights, more: usize) 
     // One pass, and one for every three bits of what the disparities of a window may span.
     let passes = 1 + 8 + more;
     let window = 2 * weights.radius + 1;
-    Kernel::of(shader, passes * (window + 1) * window + 8 + more)
+    let every = 1 + u32::from(weights.checkered);
+    Kernel::of(shader, passes * (window + 1) * window + 8 + more).with("EVERY", every)
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
-    record_as(r, &main(r.plan, 0))
+    record_as(r, kernel, &MedianWeights::of(&r.plan.method))
 }
 
-/// Records `kernel` on the pixels that the median changes.
-pub(super) fn record_as(r: &mut Recorder, kernel: &Kernel<Main>) -> Result<()> {
+/// Records the `kernel` for a window with `weights` on the pixels that the median changes.
+pub(super) fn record_as(
+    r: &mut Recorder,
+    kernel: fn(&MedianWeights) -> Kernel<Main>,
+    weights: &MedianWeights,
+) -> Result<()> {
     let median = r.plan.method.refinement.median;
     if median == Median::Off {
         return Ok(());
     }
-    smooth(r, kernel, &MedianWeights::of(&r.plan.method), &r.buffers.median_weights, median == Median::All)
+    smooth(r, &kernel(weights), weights, &r.buffers.median_weights, median == Median::All)
 }
 
 /// Records `kernel` with `weights`, whose spatial part `table` holds, on `all` pixels or on the filled ones.

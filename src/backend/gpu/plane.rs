@@ -7,7 +7,7 @@ use super::shader::Shader;
 use super::{Kernel, median};
 use crate::error::Result;
 use crate::plan::Plan;
-use crate::plan::planes::{PLANE_BITS, PLANE_FARTHEST, PLANE_STEEPEST};
+use crate::plan::planes::{PLANE_BITS, PLANE_FARTHEST, PLANE_START_BITS, PLANE_STEEPEST};
 use crate::weights::MedianWeights;
 
 const SHADER: Shader = Shader::new("plane", "main", include_str!("../../../shaders/plane.wgsl"));
@@ -15,6 +15,7 @@ const SHADER: Shader = Shader::new("plane", "main", include_str!("../../../shade
 /// The kernel for a window with `weights`. It binds what the median does.
 pub(super) fn kernel(weights: &MedianWeights) -> Kernel<median::Main> {
     median::over_window(SHADER, weights, PLANE_BITS.len())
+        .with("START_BITS", PLANE_START_BITS)
         .with("FIRST_BITS", PLANE_BITS[0])
         .with("SECOND_BITS", PLANE_BITS[1])
         .with("STEEPEST", PLANE_STEEPEST)
@@ -22,9 +23,9 @@ pub(super) fn kernel(weights: &MedianWeights) -> Kernel<median::Main> {
 }
 
 pub(super) fn kernels(plan: &Plan, _: usize) -> Vec<Kernel> {
-    vec![kernel(&MedianWeights::of(&plan.method)).any()]
+    vec![kernel(&MedianWeights::of_planes(&plan.method)).any()]
 }
 
 pub(super) fn record(r: &mut Recorder) -> Result<()> {
-    median::record_as(r, &kernel(&MedianWeights::of(&r.plan.method)))
+    median::record_as(r, kernel, &MedianWeights::of_planes(&r.plan.method))
 }

@@ -23,7 +23,7 @@ pub fn colour(a: [u16; 4], b: [u16; 4], sigma_range: f64) -> i64 {
 
 /// Weighted median: sort the window, and take the first value at which half of the weight is reached.
 pub fn median(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    smooth(plan, pair, maps, &Window::of(plan), |validity| changes(plan, validity));
+    smooth(plan, pair, maps, &Window::of(plan), 1, |validity| changes(plan, validity));
 }
 
 /// Whether the median changes a pixel.
@@ -48,6 +48,8 @@ fn known(validity: i32) -> bool {
 pub struct Window {
     pub radius: i64,
     pub step: (i64, i64),
+    /// Whether it has only every second place, as on a checkerboard.
+    pub checkered: bool,
     /// In places.
     pub sigma_space: f64,
     pub sigma_range: f64,
@@ -60,6 +62,7 @@ impl Window {
         Self {
             radius: i64::from(refinement.median_window / 2),
             step: (1, 1),
+            checkered: false,
             sigma_space: refinement.median_sigma_space,
             sigma_range: refinement.median_sigma_range,
         }
@@ -83,11 +86,11 @@ pub fn places(
     (x, y): (usize, usize),
 ) -> Vec<Place> {
     let (width, height) = plan.size();
-    let Window { radius, step, sigma_space, sigma_range } = *window;
+    let Window { radius, step, checkered, sigma_space, sigma_range } = *window;
     let guide = &pair.left().pixels;
     let mut places = Vec::new();
     for j in (-radius..=radius).filter(|j| j % 2 == 0) {
-        for i in -radius..=radius {
+        for i in (-radius..=radius).filter(|i| !checkered || (i + j / 2) % 2 == 0) {
             let (nx, ny) = (x as i64 + step.0 * i, y as i64 + step.1 * j);
             if nx < 0 || ny < 0 || nx >= width as i64 || ny >= height as i64 {
                 continue;
@@ -103,8 +106,15 @@ pub fn places(
     places
 }
 
-/// The median of a window.
-pub fn smooth(plan: &Plan, pair: &Pair, maps: &mut Finest, window: &Window, touched: impl Fn(i32) -> bool) {
+/// The median of a window, to the nearest `step`.
+pub fn smooth(
+    plan: &Plan,
+    pair: &Pair,
+    maps: &mut Finest,
+    window: &Window,
+    step: i32,
+    touched: impl Fn(i32) -> bool,
+) {
     let (width, height) = plan.size();
     let before = maps.clone();
     maps.disparity = Plane::from_fn(width, height, |x, y| {
@@ -118,7 +128,7 @@ pub fn smooth(plan: &Plan, pair: &Pair, maps: &mut Finest, window: &Window, touc
         for place in places {
             cumulated += place.weight;
             if cumulated * 2 >= total {
-                return place.disparity;
+                return (place.disparity + step / 2).div_euclid(step) * step;
             }
         }
         unreachable!("the centre has weight")

@@ -10,7 +10,8 @@ fn fits(value: i64) -> i64 {
 
 /// The median, and then the value of a plane through the disparities that it was taken of.
 pub fn plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
-    through(plan, pair, maps, &Window::of(plan), |validity| changes(plan, validity));
+    let window = Window { checkered: true, ..Window::of(plan) };
+    through(plan, pair, maps, &window, |validity| changes(plan, validity));
 }
 
 /// The same for `touched` pixels, in another window.
@@ -22,7 +23,7 @@ pub fn through(
     touched: impl Fn(i32) -> bool + Copy,
 ) {
     let before = maps.clone();
-    smooth(plan, pair, maps, window, touched);
+    smooth(plan, pair, maps, window, 32, touched);
     let medians = &maps.disparity;
     let (low, high) = (i64::from(plan.range.min) * 256, i64::from(plan.range.max) * 256);
     let (width, height) = plan.size();
@@ -36,7 +37,6 @@ pub fn through(
         for k in [2, 0] {
             let weighed: Vec<[i64; 4]> = places
                 .iter()
-                .filter(|place| (place.step.0 + place.step.1 / 2) % 2 == 0)
                 .map(|place| {
                     let (x, y) = place.step;
                     let e = fits(i64::from(place.disparity) - median - (c + a * x + b * y)) >> k;
