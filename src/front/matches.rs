@@ -102,7 +102,7 @@ pub(super) fn search(
     let spacing = spacing.max(SPACING);
     let reach = (pair.size().0 / REACH) as i32;
     let (min, max) = range.map_or((-reach, reach), |r| (r.min, r.max));
-    let (left, right) = (View::new(pair.left()), View::new(pair.right()));
+    let (left, right) = rayon::join(|| View::new(pair.left()), || View::new(pair.right()));
     let matches = corners(&left, zones, spacing)
         .into_par_iter()
         .filter_map(|(x, y)| {
@@ -222,5 +222,5 @@ fn consistent(matches: Vec<Match>, side: usize) -> Vec<Match> {
         });
         agreeing.count() >= AGREEING
     };
-    matches.iter().filter(|m| agrees(m)).copied().collect()
+    matches.par_iter().filter(|m| agrees(m)).copied().collect()
 }
