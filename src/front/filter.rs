@@ -43,7 +43,7 @@ pub(super) fn moved(image: &Image, offset: i32) -> Image {
         let y = y as isize + rows + isize::from(2 * part >= FRACTION);
         usize::try_from(y).ok().filter(|&y| y < image.height())
     };
-    let weights = WEIGHTS[part as usize].map(|weight| weight as i32).to_vec();
+    let weights = WEIGHTS[part as usize].to_vec();
     let pixels = down(&unmasked(&image.pixels, &image.masked), &Taps { first: rows - 1, weights });
     let (width, height) = image.pixels.size();
     let masked = Plane::from_fn(width, height, |x, y| nearest(y).is_none_or(|y| image.masked[(x, y)]));

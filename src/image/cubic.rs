@@ -7,7 +7,7 @@ pub(crate) const BITS: u32 = 14;
 
 /// The weights of the pixels -1, 0, 1 and 2 for every place between 0 and 1: the cubic of Catmull and Rom, exactly, then
 /// rounded.
-pub(crate) const WEIGHTS: [[i64; 4]; STEPS as usize] = {
+pub(crate) const WEIGHTS: [[i32; 4]; STEPS as usize] = {
     let mut all = [[0; 4]; STEPS as usize];
     let mut i = 0;
     while i < STEPS {
@@ -18,7 +18,7 @@ pub(crate) const WEIGHTS: [[i64; 4]; STEPS as usize] = {
         let mut weights = [0; 4];
         let (mut tap, mut sum) = (0, 0);
         while tap < 4 {
-            weights[tap] = (exact[tap] + (1 << 10)) >> 11;
+            weights[tap] = ((exact[tap] + (1 << 10)) >> 11) as i32;
             sum += weights[tap];
             tap += 1;
         }
@@ -37,7 +37,7 @@ mod tests {
     #[test]
     fn weights_add_up_and_mirror() {
         for (i, weights) in WEIGHTS.iter().enumerate() {
-            assert_eq!(weights.iter().sum::<i64>(), 1 << BITS);
+            assert_eq!(weights.iter().sum::<i32>(), 1 << BITS);
             let t = i as f64 / 256.0;
             let exact = [
                 -t * t * t + 2.0 * t * t - t,
@@ -46,7 +46,7 @@ mod tests {
                 t * t * t - t * t,
             ];
             for (weight, exact) in weights.iter().zip(exact) {
-                assert!((*weight as f64 - exact * 8192.0).abs() <= 2.0, "{i}: {weights:?}");
+                assert!((f64::from(*weight) - exact * 8192.0).abs() <= 2.0, "{i}: {weights:?}");
             }
         }
         assert_eq!(WEIGHTS[0], [0, 1 << BITS, 0, 0]);

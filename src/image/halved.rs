@@ -31,27 +31,27 @@ impl Image {
         let out = pixels.par_chunks_mut(w).zip(masked.par_chunks_mut(w));
         out.enumerate().for_each(|(y, (pixels, masked))| {
             let rows = [2 * y, 2 * y + 1];
+            means(rows.map(|y| self.pixels.row(y)), pixels);
             if any_masked {
-                self.means_of_unmasked(rows, pixels, masked);
-            } else {
-                means(rows.map(|y| self.pixels.row(y)), pixels);
+                let [above, below] = rows.map(|y| self.masked.row(y).as_chunks::<2>().0.iter());
+                let blocks = above.zip(below).map(|(above, below)| above[0] | above[1] | below[0] | below[1]);
+                for (x, _) in blocks.enumerate().filter(|(_, any_masked)| *any_masked) {
+                    (pixels[x], masked[x]) = self.mean_of_unmasked(x, y);
+                }
             }
         });
         Self { pixels: Plane::new(w, h, pixels), masked: Plane::new(w, h, masked) }
     }
 
-    fn means_of_unmasked(&self, rows: [usize; 2], out: &mut [Pixel], masked: &mut [bool]) {
-        for (x, (out, masked)) in out.iter_mut().zip(masked).enumerate() {
-            let places = rows.map(|y| [(2 * x, y), (2 * x + 1, y)]);
-            let seen = places.as_flattened().iter().filter(|&&at| !self.masked[at]);
-            let (mut sums, mut count) = ([0; 4], 0);
-            for &at in seen {
-                sums.iter_mut().zip(self.pixels[at]).for_each(|(sum, v)| *sum += u32::from(v));
-                count += 1;
-            }
-            *masked = count == 0;
-            *out = sums.map(|sum| ((2 * sum + count) / (2 * count).max(1)) as u16);
+    /// The mean of the unmasked pixels of a block, and whether there are none.
+    fn mean_of_unmasked(&self, x: usize, y: usize) -> (Pixel, bool) {
+        let places = [0, 1].map(|j| [0, 1].map(|i| (2 * x + i, 2 * y + j)));
+        let (mut sums, mut count) = ([0; 4], 0);
+        for &at in places.as_flattened().iter().filter(|&&at| !self.masked[at]) {
+            sums.iter_mut().zip(self.pixels[at]).for_each(|(sum, v)| *sum += u32::from(v));
+            count += 1;
         }
+        (sums.map(|sum| ((2 * sum + count) / (2 * count).max(1)) as u16), count == 0)
     }
 }
 
@@ -98,10 +98,8 @@ mod tests {
         for (width, height) in [(36, 22), (2, 2), (2, 8), (40, 2)] {
             let image = noise(width, height);
             let quick = image.halved();
-            for y in 0..quick.height() {
-                let (mut row, mut masked) = (vec![[0; 4]; width / 2], vec![false; width / 2]);
-                image.means_of_unmasked([2 * y, 2 * y + 1], &mut row, &mut masked);
-                assert_eq!((&row[..], &masked[..]), (quick.pixels.row(y), quick.masked.row(y)));
+            for (x, y) in (0..height / 2).flat_map(|y| (0..width / 2).map(move |x| (x, y))) {
+                assert_eq!(image.mean_of_unmasked(x, y), (quick.pixels[(x, y)], quick.masked[(x, y)]));
             }
         }
         let mut image = noise(4, 2);

@@ -32,78 +32,123 @@ pub(super) fn resample(
 ) -> Result<Image> {
     let mut pixels: Vec<Pixel> = memory::filled(width * height, [0; 4])?;
     let mut masked = memory::filled(width * height, true)?;
+    let any_masked = image.any_masked();
     let rows = pixels.par_chunks_mut(width).zip(masked.par_chunks_mut(width));
-    rows.enumerate().for_each(|(y, (pixels, masked))| {
-        for x in 0..width {
-            if let Some(value) = sample(image, source(x, y)) {
-                pixels[x] = pixel(value, bytes);
-                masked[x] = false;
-            }
-        }
+    rows.enumerate().for_each_init(Vec::new, |colours, (y, (pixels, masked))| {
+        colours.clear();
+        colours.resize(width, Colour::default());
+        sample_row(image, any_masked, |x| source(x, y), (colours, masked));
+        round_row(colours.as_flattened(), bytes, pixels.as_flattened_mut());
+        grey_row(pixels);
     });
     Ok(Image { pixels: Plane::new(width, height, pixels), masked: Plane::new(width, height, masked) })
 }
 
-fn pixel(value: [i64; 3], bytes: bool) -> Pixel {
-    let [r, g, b] = value.map(|v| {
-        let half = 1 << (2 * BITS - 1);
-        let level = ((v + half) >> (2 * BITS)).clamp(0, i64::from(u16::MAX));
-        if bytes { (((level + 128) >> 8).min(255) << 8) as u16 } else { level as u16 }
-    });
-    [r, g, b, grey(r, g, b)]
+/// The colours of a row, those that there are, and which pixels are masked.
+#[pulp::with_simd(sample_row = pulp::Arch::new())]
+#[inline(always)]
+fn sample_row_on<'a, S: pulp::Simd, F: Fn(usize) -> Place>(
+    _: S,
+    image: &'a Image,
+    any_masked: bool,
+    source: F,
+    (colours, masked): (&'a mut [Colour], &'a mut [bool]),
+) {
+    for (x, (colour, masked)) in colours.iter_mut().zip(masked).enumerate() {
+        if let Some(found) = sample(image, any_masked, source(x)) {
+            (*colour, *masked) = (found, false);
+        }
+    }
 }
 
-/// The colour at `at`, times 2^28.
-fn sample(image: &Image, at: Place) -> Option<[i64; 3]> {
-    let (width, height) = image.pixels.size();
+/// Values from colours. With `bytes`, they are whole 8-bit levels.
+#[pulp::with_simd(round_row = pulp::Arch::new())]
+#[inline(always)]
+fn round_row_on<'a, S: pulp::Simd>(_: S, colours: &'a [f64], bytes: bool, out: &'a mut [u16]) {
+    const ONE: f64 = (1u64 << (2 * BITS)) as f64;
+    // Whole numbers become the lower bits of such a sum.
+    const WHOLE: f64 = (1u64 << 52) as f64;
+    for (out, colour) in out.iter_mut().zip(colours) {
+        let level = ((colour + 0.5 * ONE) * (1.0 / ONE)).floor().max(0.0).min(f64::from(u16::MAX));
+        let level = (level + WHOLE).to_bits() as u32;
+        *out = if bytes { (((level + 128) >> 8).min(255) << 8) as u16 } else { level as u16 };
+    }
+}
+
+/// Sets the grey of each pixel.
+#[pulp::with_simd(grey_row = pulp::Arch::new())]
+#[inline(always)]
+fn grey_row_on<S: pulp::Simd>(_: S, pixels: &mut [Pixel]) {
+    for pixel in pixels {
+        pixel[3] = grey(pixel[0], pixel[1], pixel[2]);
+    }
+}
+
+/// Red, green, blue and something that is not used, times 2^28: whole numbers, which doubles hold up to 2^53.
+type Colour = [f64; 4];
+
+/// The colour at `at`.
+#[inline(always)]
+fn sample(image: &Image, any_masked: bool, at: Place) -> Option<Colour> {
     let [(x, across), (y, down)] = at.map(|steps| {
         let steps = i64::from(steps);
         (steps.div_euclid(STEPS), &WEIGHTS[steps.rem_euclid(STEPS) as usize])
     });
-    if let Some(sum) = sample_inside(image, [x, y], across, down) {
-        return Some(sum);
-    }
-    let mut sum = [0; 3];
+    sample_inside(image, any_masked, [x, y], across, down)
+        .or_else(|| sample_anywhere(image, [x, y], across, down))
+}
+
+/// The colour around the pixel (x, y), by weights along the row and the column.
+fn sample_anywhere(image: &Image, [x, y]: [i64; 2], across: &[i32; 4], down: &[i32; 4]) -> Option<Colour> {
+    let (width, height) = image.pixels.size();
+    let mut sum = Colour::default();
     for (y, down) in (y.saturating_sub(1)..).zip(down).filter(|(_, weight)| **weight != 0) {
         let y = usize::try_from(y).ok().filter(|y| *y < height)?;
         let (pixels, masked) = (image.pixels.row(y), image.masked.row(y));
-        let mut row = [0; 3];
+        let mut row = [0.0; 4];
         for (x, across) in (x.saturating_sub(1)..).zip(across).filter(|(_, weight)| **weight != 0) {
             let x = usize::try_from(x).ok().filter(|x| *x < width && !masked[*x])?;
             for (sum, value) in row.iter_mut().zip(pixels[x]) {
-                *sum += across * i64::from(value);
+                *sum += f64::from(*across) * f64::from(value);
             }
         }
         for (sum, row) in sum.iter_mut().zip(row) {
-            *sum += down * row;
+            *sum += f64::from(*down) * row;
         }
     }
     Some(sum)
 }
 
 /// The same where all sixteen pixels around (x, y) are in the image and none of them is masked: that is nearly everywhere, and quicker.
-fn sample_inside(image: &Image, [x, y]: [i64; 2], across: &[i64; 4], down: &[i64; 4]) -> Option<[i64; 3]> {
+#[inline(always)]
+fn sample_inside(
+    image: &Image,
+    any_masked: bool,
+    [x, y]: [i64; 2],
+    across: &[i32; 4],
+    down: &[i32; 4],
+) -> Option<Colour> {
     let first = |v: i64, of: usize| usize::try_from(v - 1).ok().filter(|first| first + 4 <= of);
     let (width, height) = image.pixels.size();
     let (x, y) = (first(x, width)?, first(y, height)?);
-    let mut sum = [0; 4];
+    let mut sum = Colour::default();
     for (y, down) in (y..).zip(down) {
         let pixels: &[Pixel; 4] = image.pixels.row(y)[x..].first_chunk()?;
-        if image.masked.row(y)[x..x + 4].contains(&true) {
+        if any_masked && image.masked.row(y)[x..x + 4].contains(&true) {
             return None;
         }
         // Weights have 14 bits and sum to less than 1.5: a row fits in 32 bits.
         let mut row = [0; 4];
         for (pixel, across) in pixels.iter().zip(across) {
             for (row, value) in row.iter_mut().zip(pixel) {
-                *row += *across as i32 * i32::from(*value);
+                *row += across * i32::from(*value);
             }
         }
         for (sum, row) in sum.iter_mut().zip(row) {
-            *sum += down * i64::from(row);
+            *sum += f64::from(*down) * f64::from(row);
         }
     }
-    Some([sum[0], sum[1], sum[2]])
+    Some(sum)
 }
 
 #[cfg(test)]
@@ -137,20 +182,21 @@ mod tests {
         for (y, x) in (-300..4800).step_by(61).flat_map(|y| (-300..6500).step_by(53).map(move |x| (y, x))) {
             let [(column, across), (row, down)] = [x, y]
                 .map(|steps: i64| (steps.div_euclid(STEPS), &WEIGHTS[steps.rem_euclid(STEPS) as usize]));
-            let Some(found) = sample_inside(&image, [column, row], across, down) else { continue };
+            let Some(found) = sample_inside(&image, true, [column, row], across, down) else { continue };
             quick += 1;
-            let mut sum = [0; 3];
+            let mut sum = Colour::default();
             for (j, down) in (row - 1..).zip(down) {
                 for (i, across) in (column - 1..).zip(across) {
                     let pixel = image.pixels[(i as usize, j as usize)];
-                    (0..3).for_each(|c| sum[c] += down * across * i64::from(pixel[c]));
+                    let weight = i64::from(*down) * i64::from(*across);
+                    (0..4).for_each(|c| sum[c] += (weight * i64::from(pixel[c])) as f64);
                 }
             }
             assert_eq!(found, sum, "{x}, {y}");
-            assert_eq!(sample(&image, [x as i32, y as i32]), Some(found));
+            assert_eq!(sample(&image, true, [x as i32, y as i32]), Some(found));
         }
         assert!(quick > 3000, "{quick}");
-        assert_eq!(sample_inside(&image, [11, 8], &WEIGHTS[9], &WEIGHTS[9]), None);
+        assert_eq!(sample_inside(&image, true, [11, 8], &WEIGHTS[9], &WEIGHTS[9]), None);
     }
 
     #[test]
@@ -176,10 +222,10 @@ mod tests {
         };
         assert_eq!(masked(0.0), [6]);
         assert_eq!(masked(0.5), [0, 4, 5, 6, 7, 10, 11]);
-        assert_eq!(sample(&image, NOWHERE), None);
+        assert_eq!(sample(&image, true, NOWHERE), None);
         for nowhere in [[f64::NAN, 3.0], [f64::INFINITY, 3.0], [3.0, -1e300], [1e18, 1e18]] {
             // NaN becomes 0, which is in the image; the lens never gives it.
-            let at = sample(&image, place(nowhere));
+            let at = sample(&image, true, place(nowhere));
             assert!(nowhere[0].is_nan() || at.is_none(), "{nowhere:?}");
         }
     }
