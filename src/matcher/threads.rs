@@ -1,6 +1,15 @@
 //! Where a matcher's own work runs: on threads of its own, in a browser on the one that there is.
 
 use crate::error::{ExecutionError, Result};
+#[cfg(not(target_arch = "wasm32"))]
+use crate::{error::Purpose, memory};
+
+/// Bytes of a thread's stack.
+#[cfg(not(target_arch = "wasm32"))]
+const STACK: u64 = 2 << 20;
+/// Bytes that must be left beside the stacks: a thread ends the process where it lacks some at its start.
+#[cfg(not(target_arch = "wasm32"))]
+const LEFT: u64 = 4 << 20;
 
 /// The threads of a matcher.
 pub(super) struct Threads {
@@ -13,15 +22,16 @@ impl Threads {
     /// So many threads, or one for each core.
     ///
     /// # Errors
-    /// [`ExecutionError`] for none at all, and for more than the system has.
-    pub(super) fn new(count: Option<usize>) -> Result<Self, ExecutionError> {
-        let mut pool = rayon::ThreadPoolBuilder::new();
-        if let Some(count) = count {
-            if count == 0 {
-                return Err(ExecutionError::NoThreads);
-            }
-            pool = pool.num_threads(count);
+    /// [`ExecutionError`] for none at all, and for more than the system has; [`MemoryError`](crate::error::MemoryError) where their
+    /// stacks do not fit.
+    pub(super) fn new(count: Option<usize>) -> Result<Self> {
+        if count == Some(0) {
+            return Err(ExecutionError::NoThreads.into());
         }
+        let least = count.map_or(1, |count| count as u64);
+        memory::check(least.saturating_mul(STACK).saturating_add(LEFT), Purpose::Match)?;
+        // 0 stands for as many as there are cores.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).stack_size(STACK as usize);
         let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
         Ok(Self { pool })
     }
@@ -35,9 +45,9 @@ impl Threads {
 
 #[cfg(target_arch = "wasm32")]
 impl Threads {
-    pub(super) fn new(count: Option<usize>) -> Result<Self, ExecutionError> {
+    pub(super) fn new(count: Option<usize>) -> Result<Self> {
         match count {
-            Some(0) => Err(ExecutionError::NoThreads),
+            Some(0) => Err(ExecutionError::NoThreads.into()),
             _ => Ok(Self {}),
         }
     }
