@@ -59,6 +59,6 @@ pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity]),
     writes: |_| maps(&[Map::Disparity]),
     taken: |method| method.refinement.median != Median::Off && method.refinement.plane,
-    pixel: 130.0,
+    pixel: 90.0,
     ..Descriptor::NONE
 };

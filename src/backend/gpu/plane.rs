@@ -1,6 +1,6 @@
 //! Planes through the disparities: see [`Stage::Plane`](crate::backend::Stage::Plane).
 //!
-//! Floor, a pixel: that of the median, and in each of two rounds 1,500 bytes asked for (53 places) and 2,500 operations.
+//! Floor, a pixel: half of that of the median, and in each of two rounds 1,500 bytes asked for (53 places) and 2,500 operations.
 
 use super::commands::Recorder;
 use super::shader::Shader;
