@@ -1,4 +1,4 @@
-// The value of a plane through the disparities around every pixel, from about the weighted median on. One invocation per pixel.
+// The value of a plane through the disparities around every pixel, which starts from the weighted median. One invocation per pixel.
 
 #import band weighted_median
 

@@ -35,8 +35,8 @@ pub fn condition(pair: &Pair, range: DisparityRange, options: &FrontOptions) -> 
     let needs_matches = options.level_rows || options.denoise;
     let matches_of = |halves: &Pair| if needs_matches { rows::matches(halves, range) } else { Vec::new() };
     // At half the size, blocks of JPEG are no longer there.
-    let has_blocks = options.denoise && pair.full().is_none();
-    let blocks = || if has_blocks { compression::smoothing(pair) } else { 0.0 };
+    let looks_for_blocks = options.denoise && pair.full().is_none();
+    let blocks = || if looks_for_blocks { compression::smoothing(pair) } else { 0.0 };
     // Each is too short for many threads, so they run beside each other.
     let (blocks, (unlike, mut matches)) = rayon::join(blocks, || rayon::join(unlike, || matches_of(&halves)));
     found.smoothing = unlike;

@@ -5,8 +5,9 @@
 //! checkerboard. They have the weight w and, before the stage, the disparity D. `>>` rounds down,
 //! and / towards 0. \[f\] is the sum of f over the places.
 //!
-//! The plane is fitted by two rounds of weighted least squares. It starts from M, the median
-//! of disparities in steps of 1/8 px ([`PLANE_START_BITS`](crate::plan::planes::PLANE_START_BITS)):
+//! The plane is fitted by two rounds of weighted least squares. It starts from M, the weighted
+//! median over the same places, in steps of 1/8 px
+//! ([`PLANE_START_BITS`](crate::plan::planes::PLANE_START_BITS)):
 //!
 //! ```text
 //! M = 32 median((D + 16) >> 5)
