@@ -18,6 +18,10 @@ fn available() -> Option<u64> {
     None
 }
 
+/// Addresses that may be gone at the next allocation of a thread: glibc gives a thread a heap of its own, of this size, as soon
+/// as it finds room for it.
+const HEAP: usize = if cfg!(all(target_os = "linux", target_env = "gnu")) { 64 << 20 } else { 0 };
+
 /// Declines to take `bytes` that this machine cannot give, or does not let this process have: the system would end the process
 /// without a word.
 ///
@@ -28,8 +32,8 @@ pub(crate) fn check(bytes: u64, purpose: Purpose) -> Result<(), MemoryError> {
         return Err(MemoryError::Machine { needed: bytes, available: Some(free), purpose });
     }
     // Limits of the process (`ulimit -v`) and of a system that does not overcommit: what is never touched costs nothing.
-    let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
-    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| lacking(bytes as u64, purpose))
+    let with_heap = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_add(HEAP);
+    Vec::<u8>::new().try_reserve_exact(with_heap).map_err(|_| lacking(bytes, purpose))
 }
 
 /// Bytes that have been claimed.

@@ -1,23 +1,25 @@
 //! Being stopped by Ctrl-C or SIGTERM.
 
 use std::ops::ControlFlow;
-use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
 /// The exit status of what was stopped: as shells have it for SIGINT.
 pub(crate) const STOPPED: u8 = 130;
 
-static STOP: AtomicBool = AtomicBool::new(false);
+static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// From now on the first signal makes [`go_on`] break, so that what was begun can be tidied up, and the second ends the program
 /// as it is.
 pub(crate) fn listen() {
-    // Where that fails a signal ends the program at once.
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            process::exit(STOPPED.into());
-        }
-    });
+    for signal in [SIGINT, SIGTERM] {
+        // The order counts: the first signal must find the flag down. Where that fails a signal ends the program at once.
+        let _ = flag::register_conditional_shutdown(signal, STOPPED.into(), Arc::clone(&STOP))
+            .and_then(|_| flag::register(signal, Arc::clone(&STOP)));
+    }
 }
 
 /// What becomes true with the first signal.

@@ -7,9 +7,6 @@ use crate::{error::Purpose, memory};
 /// Bytes of a thread's stack.
 #[cfg(not(target_arch = "wasm32"))]
 const STACK: u64 = 2 << 20;
-/// Bytes that must be left beside the stacks: a thread ends the process where it lacks some at its start.
-#[cfg(not(target_arch = "wasm32"))]
-const LEFT: u64 = 4 << 20;
 
 /// The threads of a matcher.
 pub(super) struct Threads {
@@ -29,10 +26,12 @@ impl Threads {
             return Err(ExecutionError::NoThreads.into());
         }
         let least = count.map_or(1, |count| count as u64);
-        memory::check(least.saturating_mul(STACK).saturating_add(LEFT), Purpose::Match)?;
+        memory::check(least.saturating_mul(STACK), Purpose::Match)?;
         // 0 stands for as many as there are cores.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).stack_size(STACK as usize);
         let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
+        // Threads take memory when they begin, and as late as they like: nobody counts what is left before they have.
+        pool.broadcast(|_| ());
         Ok(Self { pool })
     }
 

@@ -48,6 +48,8 @@ impl ExecutionArgs {
             // changes nothing.
             let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
         }
+        // Threads take memory when they begin, and as late as they like: nobody counts what is left before they have.
+        rayon::broadcast(|_| ());
         self.threads.execution(&self.device)
     }
 }
