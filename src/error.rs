@@ -302,9 +302,14 @@ pub enum ExecutionError {
         /// The devices, each as `index: name`.
         present: Vec<String>,
     },
-    /// The number of threads is 0.
-    #[error("the thread count must be at least 1")]
-    NoThreads,
+    /// Not so many threads as there may be.
+    #[error("{wanted} threads cannot be had; give 1 to {most}")]
+    ThreadCount {
+        /// How many were asked for.
+        wanted: usize,
+        /// The largest number.
+        most: usize,
+    },
     /// The system does not start the threads.
     #[error("the threads cannot be started: {0}")]
     Threads(String),

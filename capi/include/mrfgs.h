@@ -194,7 +194,7 @@ enum mrfgs_status mrfgs_options_load(struct mrfgs_options *options, const char *
 enum mrfgs_status mrfgs_options_device(struct mrfgs_options *options,
                                        const char *name);
 
-// The threads of a match on the CPU; 0 takes one for each core.
+// The threads of a match on the CPU, up to 1024; 0 takes one for each core.
 enum mrfgs_status mrfgs_options_threads(struct mrfgs_options *options, uint32_t threads);
 
 // What was wrong with the last call of this thread that failed; "" where none has. It stays until the next call of this thread that

@@ -119,7 +119,7 @@ pub unsafe extern "C" fn mrfgs_options_device(options: *mut Options, name: *cons
     unsafe { change(options, set) }
 }
 
-/// The threads of a match on the CPU; 0 takes one for each core.
+/// The threads of a match on the CPU, up to 1024; 0 takes one for each core.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_options_threads(options: *mut Options, threads: u32) -> Status {
     let set = |options: &mut Options| {

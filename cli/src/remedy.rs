@@ -94,7 +94,10 @@ mod tests {
             ),
             (RangeError::NotFound.into(), "too few matches ... give --max-disparity"),
             (no_device.into(), "--device ... 0: llvmpipe ... `mrfgs devices`"),
-            (ExecutionError::NoThreads.into(), "--threads ... at least 1"),
+            (
+                ExecutionError::ThreadCount { wanted: 0, most: 9 }.into(),
+                "--threads: 0 threads ... give 1 to 9",
+            ),
             (ExecutionError::Threads("limit".into()).into(), "--threads ... limit"),
             (too_small.into(), "--memory: 1 MiB ... give at least 7MiB"),
             (BudgetError::Steps { needed: 70 }.into(), "DIR: ... show its steps ... --memory 70MiB"),

@@ -1,12 +1,21 @@
 //! Where a matcher's own work runs: on threads of its own, in a browser on the one that there is.
 
 use crate::error::{ExecutionError, Result};
+use crate::options::Execution;
 #[cfg(not(target_arch = "wasm32"))]
 use crate::{error::Purpose, memory};
 
 /// Bytes of a thread's stack.
 #[cfg(not(target_arch = "wasm32"))]
 const STACK: u64 = 2 << 20;
+
+fn check(count: Option<usize>) -> Result<()> {
+    const MOST: usize = Execution::MOST_THREADS;
+    match count.filter(|count| !(1..=MOST).contains(count)) {
+        Some(wanted) => Err(ExecutionError::ThreadCount { wanted, most: MOST }.into()),
+        None => Ok(()),
+    }
+}
 
 /// The threads of a matcher.
 pub(super) struct Threads {
@@ -19,12 +28,10 @@ impl Threads {
     /// So many threads, or one for each core.
     ///
     /// # Errors
-    /// [`ExecutionError`] for none at all, and for more than the system has; [`MemoryError`](crate::error::MemoryError) where their
+    /// [`ExecutionError`] for none at all, for more than [`Execution::MOST_THREADS`], and for more than the system has; [`MemoryError`](crate::error::MemoryError) where their
     /// stacks do not fit.
     pub(super) fn new(count: Option<usize>) -> Result<Self> {
-        if count == Some(0) {
-            return Err(ExecutionError::NoThreads.into());
-        }
+        check(count)?;
         let least = count.map_or(1, |count| count as u64);
         memory::check(least.saturating_mul(STACK), Purpose::Match)?;
         // 0 stands for as many as there are cores.
@@ -45,10 +52,7 @@ impl Threads {
 #[cfg(target_arch = "wasm32")]
 impl Threads {
     pub(super) fn new(count: Option<usize>) -> Result<Self> {
-        match count {
-            Some(0) => Err(ExecutionError::NoThreads.into()),
-            _ => Ok(Self {}),
-        }
+        check(count).map(|()| Self {})
     }
 
     pub(super) async fn run<T>(&self, work: impl AsyncFnOnce() -> T) -> T {

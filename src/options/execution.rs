@@ -8,10 +8,15 @@ use std::str::FromStr;
 pub struct Execution {
     /// What runs the stages.
     pub device: DeviceChoice,
-    /// Threads of the CPU path; `None` takes one for each core.
+    /// Threads of the CPU path, 1 to [`Execution::MOST_THREADS`]; `None` takes one for each core.
     pub threads: Option<usize>,
     /// Whether to measure the time of every stage.
     pub timings: bool,
+}
+
+impl Execution {
+    /// The largest number of threads: more than any match can share, and few enough for every system.
+    pub const MOST_THREADS: usize = 1024;
 }
 
 /// What runs the stages of a match.

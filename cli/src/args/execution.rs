@@ -17,11 +17,13 @@ pub(crate) struct ExecutionArgs {
     threads: ThreadArgs,
 }
 
+const MOST: i64 = Execution::MOST_THREADS as i64;
+
 /// How many threads the CPU path has.
 #[derive(clap::Args)]
 pub(crate) struct ThreadArgs {
     /// Threads of the CPU path, 1 to 1024 [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST))]
     pub(crate) threads: Option<u16>,
 }
 

@@ -328,9 +328,9 @@ impl Also {
 /// The maps to write of each pair.
 #[derive(clap::Args)]
 pub(crate) struct MapArgs {
-    /// Format of the disparity maps, as the extensions of `mrfgs match`
-    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
-    pub(crate) format: Format,
+    /// Format of the disparity maps, as the extensions of `mrfgs match` [default: pfm]
+    #[arg(long, value_enum, value_name = "WHICH")]
+    pub(crate) format: Option<Format>,
     #[command(flatten)]
     pub(crate) also: AlsoArgs,
 }
@@ -338,7 +338,7 @@ pub(crate) struct MapArgs {
 impl MapArgs {
     /// The name of the disparity map of a pair.
     pub(crate) fn map(&self, name: &str) -> String {
-        format!("{name}.{}", self.format.extension())
+        format!("{name}.{}", self.format.unwrap_or_default().extension())
     }
 
     /// The wanted outputs beside it, with their names.

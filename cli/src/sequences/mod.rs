@@ -4,6 +4,7 @@ mod files;
 mod stream;
 
 use std::collections::VecDeque;
+use std::mem;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -12,13 +13,15 @@ use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Rect};
 use mrfgs::{Error, Result};
 
+pub(crate) use files::Pairing;
 use stream::Stream;
 pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
 
 /// How both views lie in one frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Layout {
     /// The left view on the left
+    #[default]
     SideBySide,
     /// The left view on top
     TopBottom,
@@ -109,10 +112,11 @@ impl Frames {
     /// The frames of two sources, or of one with both views in each frame.
     ///
     /// # Errors
-    /// Where there is none, or they are not as many of both; errors of streams.
+    /// Where there is none, or images of two cameras are no pairs; errors of streams.
     pub(crate) fn open(
         left: &Path,
         right: Option<&Path>,
+        pairing: Pairing,
         layout: Layout,
         raw: Option<RawFrames>,
         reader: Reader,
@@ -121,18 +125,12 @@ impl Frames {
             if path == Path::new("-") { "standard input".into() } else { path.display().to_string() }
         };
         let names = [shown(left), shown(right.unwrap_or(left))];
-        let left = Source::open(left, raw, reader)?;
-        let right = right.map(|right| Source::open(right, raw, reader)).transpose()?;
-        if let (Source::Files { left: l, .. }, Some(Source::Files { left: r, .. })) = (&left, &right)
-            && l.len() != r.len()
+        let mut left = Source::open(left, raw, reader)?;
+        let mut right = right.map(|right| Source::open(right, raw, reader)).transpose()?;
+        if let (Source::Files { left: l, .. }, Some(Source::Files { left: r, .. })) = (&mut left, &mut right)
         {
-            return Err(Error::Mismatch(format!(
-                "{} holds {} images and {} {}: give as many of the left as of the right camera",
-                names[0],
-                l.len(),
-                names[1],
-                r.len()
-            )));
+            let pairs = files::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
+            [*l, *r] = pairs.map(Into::into);
         }
         Ok(Self { left, right, layout, count: 0, size: None, names })
     }
@@ -151,6 +149,16 @@ impl Frames {
             Source::Files { .. } => None,
             Source::Stream(stream) => stream.rate(),
         }
+    }
+
+    /// Whether they are images of two cameras.
+    pub(crate) fn are_images_of_two(&self) -> bool {
+        self.right.is_some() && !self.have_stream()
+    }
+
+    /// Whether a stream is among the sources.
+    pub(crate) fn have_stream(&self) -> bool {
+        std::iter::once(&self.left).chain(&self.right).any(|source| matches!(source, Source::Stream(_)))
     }
 
     /// The files that are read, none of which an output may overwrite.

@@ -57,6 +57,8 @@ impl PixelFormat {
 
 /// Most bytes of a header; the decoder takes no more either.
 const MAX_HEADER: u64 = 1024;
+/// How many bytes tell what a stream is that should be pixels alone.
+const START: u64 = 9;
 /// Bytes that a pixel takes at most while its frame is read: three samples of 16 bits, and what becomes of them.
 const BYTES: u64 = 12;
 
@@ -113,6 +115,11 @@ impl Stream {
         };
         if let Some(raw) = raw {
             check_size(raw.size, max_pixels).map_err(error)?;
+            let mut start = Vec::new();
+            let read = bytes.by_ref().take(START).read_to_end(&mut start);
+            read.map_err(|e| Error::read(&name, e))?;
+            check_start(&start).map_err(error)?;
+            bytes = Box::new(io::Cursor::new(start).chain(bytes));
         } else {
             // A pipe may hand it on in pieces.
             let mut header = Vec::new();
@@ -182,6 +189,20 @@ fn check_size((width, height): (usize, usize), max_pixels: u64) -> Result<(), St
     let bytes = pixels.ok_or(many)?.saturating_mul(BYTES);
     let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
     room.map_err(|_| format!("there is not enough memory for frames of {width} x {height} pixels"))
+}
+
+/// Refuses what is no pixels by the first [`START`] bytes.
+fn check_start(start: &[u8]) -> Result<(), String> {
+    if start.starts_with(b"YUV4MPEG2") {
+        return Err("is YUV4MPEG2, which says itself what its frames hold: leave out --raw-frames".into());
+    }
+    // MP4 and QuickTime, Matroska and WebM, AVI, PNG.
+    let is_file = start.get(4..8) == Some(b"ftyp")
+        || [&b"\x1a\x45\xdf\xa3"[..], b"RIFF", b"\x89PNG"].iter().any(|magic| start.starts_with(magic));
+    if is_file {
+        return Err("holds no pixels alone, but a film or an image: let ffmpeg write -f rawvideo".into());
+    }
+    Ok(())
 }
 
 /// Refuses what is no YUV4MPEG2, and frames that are too large.

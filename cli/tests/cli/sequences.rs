@@ -103,6 +103,24 @@ fn files_in_any_order_give_the_maps_of_match() {
     assert_ne!(maps(&folder.join("swapped"), names), wanted);
 }
 
+/// Frames that one camera lacks shift no other.
+#[test]
+fn images_find_their_partners_by_number() {
+    let folder = cameras();
+    let wanted = wanted(&folder);
+    fs::remove_file(folder.join("right/f2.ppm")).unwrap();
+    fs::remove_file(folder.join("left/f1.png")).unwrap();
+    let line = format!("sequence left right maps --quiet {RANGE}");
+    let said = "left/f2.png has no partner of its number in right (nor has one other): leave out";
+    run(&folder, &line).failed(1, said);
+    run(&folder, &format!("{line} --pairing common")).succeeded();
+    assert_eq!(listing(&folder.join("maps")).len(), 1);
+    assert_eq!(fs::read(folder.join("maps/f10.pfm")).unwrap(), wanted[2]);
+    // Control: in order, f2 has another partner.
+    run(&folder, &format!("{line} --pairing order")).succeeded();
+    assert_ne!(fs::read(folder.join("maps/f2.pfm")).unwrap(), wanted[1]);
+}
+
 #[test]
 fn streams_give_the_maps_of_their_pixels() {
     let folder = cameras();
@@ -247,7 +265,8 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("none maps", 1, "none & holds no images"),
         ("left/*.jpg right/* maps", 1, "left/*.jpg & no image"),
         ("left/f%d.png right maps", 1, "left/f%d.png & write *"),
-        ("left fewer maps", 1, "left holds 3 & fewer 1"),
+        ("left fewer maps", 1, "left/f2.png has no partner & fewer (nor has one other)"),
+        ("left fewer maps --pairing order", 1, "left holds 3 & fewer 1"),
         ("twice maps", 1, "f1.png & F1.ppm"),
         ("odd maps", 1, "frame a & 63 x 48 & odd"),
         ("left/f1.png right/f1.ppm maps", 1, "left/f1.png & neither a folder"),
@@ -275,6 +294,13 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("left right maps --alpha 0.5", 2, "--alpha & --rectify"),
         ("left right maps --format png --min-disparity -9", 1, "png"),
         ("left", 2, "OUTPUT"),
+        ("head.y4m maps --raw-frames 64x48,gray", 1, "head.y4m & YUV4MPEG2 & --raw-frames"),
+        ("left/f1.png maps --raw-frames 8x8,gray", 1, "f1.png & rawvideo"),
+        ("left right maps --raw-frames 64x48,gray", 2, "--raw-frames & streams"),
+        ("left right maps --layout top-bottom", 2, "--layout & RIGHT"),
+        ("left right none/film.y4m --format png", 2, "--format & folder"),
+        ("left right film.MP4", 2, "OUTPUT & NAME.y4m & ffmpeg -i - film.MP4"),
+        ("beside maps --pairing common", 2, "--pairing & two cameras"),
     ] {
         let range = if line.contains("--max-disparity") { "" } else { " --max-disparity 23" };
         run(&folder, &format!("sequence {line}{range} --device cpu --quiet")).failed(code, words);
@@ -294,7 +320,7 @@ fn what_was_done_before_a_failure_stays() {
         ("short.y4m", &whole[..GREY.len() + 2 * (6 + 128 * 48)]),
         ("torn.y4m", &[&whole[..second], b"FRAMING\n", &whole[second + 6..]].concat()),
         ("whole.y4m", &whole),
-        ("cut.raw", &whole[..5 * 64 * 48 + 7]),
+        ("cut.raw", &whole[GREY.len()..][..5 * 64 * 48 + 7]),
     ] {
         fs::write(folder.join(name), bytes).unwrap();
     }
@@ -351,6 +377,18 @@ fn what_was_done_before_a_signal_stays() {
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
         (child.wait().unwrap().code(), said)
     };
+    // A producer that has not said a word, or half of one.
+    for (signal, said) in [("-TERM", &b""[..]), ("-INT", b"YUV4"), ("-INT", &stream[..2000])] {
+        let mut child = started(&folder, &format!("sequence - never {RANGE}"));
+        child.stdin.as_mut().unwrap().write_all(said).unwrap();
+        std::thread::sleep(Duration::from_secs(1));
+        send(signal, &child);
+        let mut words = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut words).unwrap();
+        assert_eq!(words, "mrfgs: stopped before the first frame\n");
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert!(!folder.join("never").exists());
+    }
     let end = "mrfgs: stopped after 2 frames\n";
     let (code, said) = stopped("maps", "-INT", &|| folder.join("maps/000001.pfm").exists());
     assert!(code == Some(130) && said.ends_with(end), "{code:?}: {said}");

@@ -11,7 +11,7 @@ use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Sea
 use crate::failure::{Failure, Result};
 use crate::outputs::{MapArgs, files, is_printed};
 use crate::pairs::input::Input;
-use crate::sequences::{Frame, Frames, Layout, RawFrames, raw_frames};
+use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, raw_frames};
 use crate::{console, stop};
 
 use pipeline::Pipeline;
@@ -31,8 +31,9 @@ Examples:
 /// Match the frames of a video, one after the other
 ///
 /// LEFT and RIGHT are each a folder of images, a pattern of their names ('left/*.png'), a stream in YUV4MPEG2 as ffmpeg writes it
-/// (-f yuv4mpegpipe), or - for a stream on standard input. Images come in the order of their numbers. Without RIGHT each frame
-/// holds both views, as --layout says. All frames have one size.
+/// (-f yuv4mpegpipe), or - for a stream on standard input. Images come in the order of their numbers, and those of the two cameras
+/// that have the same number are a pair (--pairing). Without RIGHT each frame holds both views, as --layout says. All frames have
+/// one size.
 ///
 /// OUTPUT is a folder, or a film: NAME.y4m, or - for a film on standard output. A folder gets a map of each frame, named after
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
@@ -52,9 +53,12 @@ pub(crate) struct Args {
     #[arg(required = true)]
     output: PathBuf,
 
-    /// How both views share a frame, if RIGHT is not given
-    #[arg(long, value_enum, value_name = "WHICH", default_value = "side-by-side")]
-    layout: Layout,
+    /// Which images of LEFT and RIGHT are a pair [default: number]
+    #[arg(long, value_enum, value_name = "WHICH")]
+    pairing: Option<Pairing>,
+    /// How both views share a frame, if RIGHT is not given [default: side-by-side]
+    #[arg(long, value_enum, value_name = "WHICH")]
+    layout: Option<Layout>,
     /// Size and format of raw streams (ffmpeg: -f rawvideo), such as 1280x480,gray; formats are gray,
     /// gray16le, rgb24 and bgr24
     #[arg(long, value_name = "SIZE,FORMAT", value_parser = raw_frames)]
@@ -83,6 +87,9 @@ pub(crate) struct Args {
     execution: ExecutionArgs,
 }
 
+/// What films are called that are not written here.
+const OTHER_FILMS: [&str; 10] = ["mp4", "mkv", "avi", "mov", "webm", "m4v", "mpg", "mpeg", "wmv", "gif"];
+
 /// Whether an output is a film.
 fn is_film(output: &Path) -> bool {
     is_printed(output) || output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m"))
@@ -98,11 +105,17 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let method = args.maps.also.made_by(args.method.method()?)?;
     let rectifying = args.rectification.options_if(args.rectify)?;
-    let mut frames = open(args)?;
+    check_flags(args)?;
+    stop::listen();
+    let frames = open(args)?;
     check_output(args, &frames)?;
     let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
-    let Frame { name, pair } = frames.next().ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
+    let (first, frames) = pipeline::patiently(move || {
+        let mut frames = frames;
+        (frames.next(), frames)
+    })?;
+    let Frame { name, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let sign = Sign::default();
     let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), None)?;
     if let Some(by) = &mut input.rectification {
@@ -116,11 +129,30 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let (range, rectifying) = (input.range, input.rectifying());
     let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying };
     let matcher = Matcher::builder().method(method).execution(execution).build()?;
-    // Before this nothing is written, and a first frame may never come: a signal ends the program there and then.
-    stop::listen();
     let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
     let pipeline = Pipeline { matcher, range, quiet: args.quiet };
     pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
+}
+
+/// Refuses what would mean nothing, and the name of a film that is not written.
+fn check_flags(args: &Args) -> Result<()> {
+    if args.layout.is_some() && args.right.is_some() {
+        let reason = "says how both views share a frame, and RIGHT is given; leave out one of them";
+        return Err(Failure::usage("--layout", reason));
+    }
+    if args.maps.format.is_some() && is_film(&args.output) {
+        let reason = "is that of maps in a folder, and OUTPUT is a film; leave it out, or give the name of a folder as OUTPUT";
+        return Err(Failure::usage("--format", reason));
+    }
+    let extension = args.output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    if OTHER_FILMS.contains(&extension.as_str()) && !args.output.is_dir() {
+        let reason = format!(
+            "films are NAME.y4m here; ffmpeg makes a .{extension} of what goes to -: mrfgs sequence ... - | ffmpeg -i - {}",
+            args.output.display()
+        );
+        return Err(Failure::usage("OUTPUT", reason));
+    }
+    Ok(())
 }
 
 /// The frames that the arguments name.
@@ -131,7 +163,24 @@ fn open(args: &Args) -> Result<Frames> {
                       in one stream";
         return Err(Failure::usage("RIGHT", reason));
     }
-    Ok(Frames::open(left, right, args.layout, args.raw_frames, args.reading.reader())?)
+    let (left, right) = (left.to_owned(), right.map(Path::to_owned));
+    let (pairing, layout) = (args.pairing.unwrap_or_default(), args.layout.unwrap_or_default());
+    let (raw, reader) = (args.raw_frames, args.reading.reader());
+    let open = move || Frames::open(&left, right.as_deref(), pairing, layout, raw, reader);
+    let frames = pipeline::patiently(open)??;
+    if args.pairing.is_some() && !frames.are_images_of_two() {
+        return Err(Failure::usage(
+            "--pairing",
+            "is for the images of two cameras, LEFT and RIGHT; leave it out",
+        ));
+    }
+    if args.raw_frames.is_some() && !frames.have_stream() {
+        return Err(Failure::usage(
+            "--raw-frames",
+            "is for streams, and images say what they hold; leave it out",
+        ));
+    }
+    Ok(frames)
 }
 
 /// Refuses an output that is an input, a terminal, or a file where it must be a folder.

@@ -96,7 +96,7 @@ impl Pipeline {
         let mut failure = None;
         let mut next = Some(Ok(first));
         let pairs = std::iter::from_fn(|| {
-            let frame = match next.take().map_or_else(|| received(frames), Some)? {
+            let frame = match next.take().map_or_else(|| received(frames).map(Result::flatten), Some)? {
                 Ok(frame) => frame,
                 Err(error) => {
                     failure = Some(error);
@@ -138,14 +138,30 @@ struct Ran {
     ended: Result<()>,
 }
 
-/// The next frame; `None` after the last one.
-fn received(frames: &Receiver<Next>) -> Option<Next> {
+/// Does `work`, which may wait for standard input for ever.
+///
+/// # Errors
+/// When the user stops it.
+pub(super) fn patiently<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T> {
+    let (sender, receiver) = sync_channel(1);
+    thread::spawn(move || sender.send(work()));
+    match received(&receiver) {
+        Some(done) => done.map_err(|_| Failure::Stopped("stopped before the first frame".into())),
+        None => Err(Failure::Failed("the reader of frames failed".into())),
+    }
+}
+
+/// What comes next; `None` after the last one.
+///
+/// # Errors
+/// When the user stops it.
+fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
     loop {
         if stop::go_on().is_break() {
             return Some(Err(Failure::Stopped(String::new())));
         }
-        match frames.recv_timeout(PATIENCE) {
-            Ok(frame) => return Some(frame),
+        match from.recv_timeout(PATIENCE) {
+            Ok(next) => return Some(Ok(next)),
             Err(RecvTimeoutError::Disconnected) => return None,
             Err(RecvTimeoutError::Timeout) => {}
         }
