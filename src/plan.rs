@@ -289,6 +289,13 @@ impl Plan {
         plan
     }
 
+    /// This plan where the method may take so many MiB.
+    pub(crate) fn granted(&self, memory: u32) -> Self {
+        let mut plan = Self { memory, ..self.clone() };
+        plan.method.tiles.memory = memory;
+        plan
+    }
+
     /// Whether a match by this plan fits the buffers of `other`: the two may differ in [`Plan::core`] only.
     #[must_use]
     pub fn fits(&self, other: &Self) -> bool {

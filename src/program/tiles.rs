@@ -56,7 +56,8 @@ impl Tiles {
     /// pixels in all.
     ///
     /// # Errors
-    /// [`Error::Budget`](crate::Error::Budget) when no tile is small enough.
+    /// [`Error::Budget`](crate::Error::Budget) when no tile is small enough, here or in the match at twice the size that the
+    /// method asks for.
     pub fn new(whole: &Plan) -> Result<Self> {
         Self::with_overlap(whole, OVERLAP)
     }
@@ -66,6 +67,32 @@ impl Tiles {
     /// # Errors
     /// As [`Tiles::new`].
     pub fn with_overlap(whole: &Plan, overlap: usize) -> Result<Self> {
+        Self::at_all_sizes(whole, overlap).map_err(|needed| {
+            let FullSize { size: (width, height), range } = whole.of_pair();
+            let memory = whole.method.tiles.memory;
+            // Where more may be taken, more may be held: what is told must be enough.
+            let mut needed = needed;
+            while let Ok(granted) = needed.try_into()
+                && let Err(more) = Self::at_all_sizes(&whole.granted(granted), overlap)
+            {
+                needed = more.max(needed + 1);
+            }
+            BudgetError::NoTileFits { memory, width, height, labels: range.labels(), needed }.into()
+        })
+    }
+
+    /// The tiles, where those of the match at twice the size fit, too; else how many MiB the smallest ones need.
+    fn at_all_sizes(whole: &Plan, overlap: usize) -> Result<Self, u64> {
+        let tiles = Self::at_one_size(whole, overlap)?;
+        // What else is wrong with that size is told where it is matched.
+        if let Ok(Some(double)) = whole.doubled() {
+            Self::at_one_size(&double, overlap)?;
+        }
+        Ok(tiles)
+    }
+
+    /// The tiles, or how many MiB the smallest ones need.
+    fn at_one_size(whole: &Plan, overlap: usize) -> Result<Self, u64> {
         let (width, height) = whole.size();
         let memory = u64::from(whole.method.tiles.memory) << 20;
         if streamed(whole).bytes() <= memory {
@@ -89,15 +116,7 @@ impl Tiles {
         let Some((_, (width, height))) = candidates.min_by_key(|&(pixels, _)| pixels) else {
             let least =
                 bytes((across.crop(across.most()), down.crop(down.most()))).min(streamed(whole).bytes());
-            let FullSize { size: (width, height), range } = whole.of_pair();
-            return Err(BudgetError::NoTileFits {
-                memory: whole.method.tiles.memory,
-                width,
-                height,
-                labels: range.labels(),
-                needed: least.div_ceil(1 << 20),
-            }
-            .into());
+            return Err(least.div_ceil(1 << 20));
         };
         let rows = down.spans(height);
         let mut tiles = Vec::new();
