@@ -154,7 +154,7 @@ mod tests {
         let caps = [
             ("match", 19),
             ("rectify", 7),
-            ("sequence", 18),
+            ("sequence", 19),
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),

@@ -59,3 +59,18 @@ impl Threads {
         work().await
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+
+    #[test]
+    fn numbers_that_no_machine_has_are_refused() {
+        for wanted in [0, 1025, usize::MAX] {
+            let Err(Error::Execution(error)) = Threads::new(Some(wanted)) else { panic!("{wanted}") };
+            assert_eq!(error, ExecutionError::ThreadCount { wanted, most: 1024 });
+        }
+        assert!(Threads::new(Some(1)).is_ok() && Threads::new(None).is_ok());
+    }
+}

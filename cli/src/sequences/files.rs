@@ -153,7 +153,10 @@ fn numbers(cameras: &[Vec<PathBuf>; 2]) -> Option<[Vec<Numbers>; 2]> {
     if let [Some(left), Some(right)] = &mut differing
         && left.len() == right.len()
     {
-        left.iter_mut().zip(right).for_each(|(l, r)| (*l, *r) = (*l | *r, *l | *r));
+        for (left, right) in left.iter_mut().zip(right) {
+            *left |= *right;
+            *right = *left;
+        }
     }
     for (names, differing) in all.iter_mut().zip(&differing) {
         for numbers in names.iter_mut() {
