@@ -18,7 +18,7 @@ Images as the cameras took them are rectified by a calibration of OpenCV, ROS, K
 >>> rectification.rig.points(matched, left).save("scene.ply")
 
 `Rig` does the same for a pair that is rectified already, `Matcher.match_all` matches pair after pair, and `evaluate` compares a map with
-the truth.
+the truth, which `read_disparity` reads.
 """
 
 from ._mrfgs import (
@@ -35,6 +35,7 @@ from ._mrfgs import (
     match,
     options,
     presets,
+    read_disparity,
 )
 
 __all__ = [
@@ -51,4 +52,5 @@ __all__ = [
     "match",
     "options",
     "presets",
+    "read_disparity",
 ]

@@ -268,6 +268,9 @@ class _Report(TypedDict):
     all: _Errors
     nonocc: _Errors | None
 
+def read_disparity(path: _Path, /) -> npt.NDArray[np.float32]:
+    """Reads a disparity map in pixels from a PFM, a float TIFF or a 16-bit PNG as KITTI has it; +inf where there is none."""
+
 def evaluate(disparity: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> _Report:
     """Compares a disparity map with the truth, as `mrfgs evaluate map` does: errors in pixels and shares in percent, over all pixels
     with known truth and over those of them that both views see."""

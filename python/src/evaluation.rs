@@ -1,11 +1,29 @@
 //! Maps against the truth.
 
+use std::path::PathBuf;
+
 use mrfgs::evaluation::{self, GroundTruth, Metrics};
+use mrfgs::image::read::read_disparity as read;
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::exceptions::exception;
+
+/// Reads a disparity map: one of this or of another matcher, or the truth.
+///
+/// path: a PFM or a TIFF of floats, in pixels; or a PNG of 16 bits as KITTI has it, with disparity times 256 and 0 where there is none.
+///     The scale in the header of a PFM does not count, as in Middlebury's files; cv2.imread multiplies by it.
+///
+/// Returns an array of shape (height, width), float32, in pixels; +inf where there is no disparity. Raises OSError where there is no such
+/// file, and ValueError where it holds no disparities.
+#[pyfunction]
+#[pyo3(signature = (path, /))]
+pub(crate) fn read_disparity(py: Python, path: PathBuf) -> PyResult<Bound<PyArray2<f32>>> {
+    let map = py.detach(|| read(&path)).map_err(exception)?;
+    arrays::map(py, map)
+}
 
 /// Compares a disparity map with the truth, as `mrfgs evaluate map` does.
 ///

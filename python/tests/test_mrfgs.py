@@ -818,6 +818,17 @@ class Evaluation(Folder):
         self.assertEqual(list(found["all"]), list(expected["with.json"]["all"]))
         self.assertEqual(mrfgs.evaluate(map_, truth), expected["without.json"])
         self.assertIsNone(expected["without.json"]["nonocc"])
+        # Files, with whatever scale their header has.
+        expected_truth = np.where(np.isfinite(truth), truth, np.inf)
+        bytes_ = (self.folder / "truth.pfm").read_bytes()
+        for scale in (b"-1", b"-0.003922", b"-256.0"):
+            (self.folder / "scaled.pfm").write_bytes(bytes_.replace(b"\n-1\n", b"\n" + scale + b"\n"))
+            np.testing.assert_array_equal(mrfgs.read_disparity(self.folder / "scaled.pfm"), expected_truth)
+        self.assertEqual(mrfgs.read_disparity(str(self.folder / "map.pfm")).dtype, np.float32)
+        with self.assertRaisesRegex(FileNotFoundError, "nowhere.pfm"):
+            mrfgs.read_disparity("nowhere.pfm")
+        with self.assertRaisesRegex(ValueError, "mask.pgm"):
+            mrfgs.read_disparity(self.folder / "mask.pgm")
         # By the definitions.
         known = np.isfinite(truth)
         error = np.abs(map_[known].astype(np.float64) - truth[known])
