@@ -208,7 +208,9 @@ fn check_start(start: &[u8]) -> Result<(), String> {
 /// Refuses what is no YUV4MPEG2, and frames that are too large.
 fn check_header(line: &[u8], max_pixels: u64) -> Result<(), String> {
     if line.is_empty() {
-        return Err("is empty".into());
+        return Err(
+            "is empty; where ffmpeg should write it, give it -pix_fmt yuv444p, and see what it says".into()
+        );
     }
     if !line.starts_with(b"YUV4MPEG2") {
         return Err("is neither a folder, nor a pattern such as 'left/*.png', nor a stream in YUV4MPEG2 \

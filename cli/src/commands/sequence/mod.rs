@@ -23,7 +23,7 @@ Examples:
   mrfgs sequence 'cam/*_L.png' 'cam/*_R.png' maps --method fast
   # Frames with both views, to a film:
   mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
-  # What ffmpeg -i stereo.mkv -f yuv4mpegpipe - sends, matched and played:
+  # What ffmpeg -pix_fmt yuv444p -f yuv4mpegpipe sends, matched and played:
   mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
   # Raw images and a calibration, to depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
