@@ -16,8 +16,8 @@ use crate::exceptions::exception;
 /// path: a PFM or a TIFF of floats, in pixels; or a PNG of 16 bits as KITTI has it, with disparity times 256 and 0 where there is none.
 ///     The scale in the header of a PFM does not count, as in Middlebury's files; cv2.imread multiplies by it.
 ///
-/// Returns an array of shape (height, width), float32, in pixels; +inf where there is no disparity. Raises OSError where there is no such
-/// file, and ValueError where it holds no disparities.
+/// Returns an array of shape (height, width), float32, in pixels; +inf where there is no disparity. Raises
+/// FileNotFoundError where there is no such file, and ValueError where it holds no disparities.
 #[pyfunction]
 #[pyo3(signature = (path, /))]
 pub(crate) fn read_disparity(py: Python, path: PathBuf) -> PyResult<Bound<PyArray2<f32>>> {

@@ -1,11 +1,15 @@
 //! What Python is told where something goes wrong.
 
+use std::error::Error as _;
 use std::ffi::CString;
+use std::io;
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
+use mrfgs::error::ReadError;
 use pyo3::exceptions::{
-    PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyUserWarning, PyValueError,
+    PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyUserWarning,
+    PyValueError,
 };
 use pyo3::prelude::*;
 
@@ -24,10 +28,19 @@ pub(crate) fn exception(error: Error) -> PyErr {
     match error {
         Error::Memory(_) => PyMemoryError::new_err(text),
         Error::Device(_) => PyRuntimeError::new_err(text),
+        Error::Read { cause: ReadError::Other(reason), .. } if is_missing(reason.source()) => {
+            PyFileNotFoundError::new_err(text)
+        }
         Error::Write { .. } => PyOSError::new_err(text),
         Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         _ => PyValueError::new_err(text),
     }
+}
+
+/// Whether the system says that there is no such file.
+fn is_missing(cause: Option<&(dyn std::error::Error + 'static)>) -> bool {
+    let of_system = cause.and_then(|cause| cause.downcast_ref::<io::Error>());
+    of_system.is_some_and(|error| error.kind() == io::ErrorKind::NotFound)
 }
 
 /// Says what is probably wrong, at the line of Python that called.

@@ -987,7 +987,7 @@ class Sequences(Folder):
             self.refused(error, words, go)
             self.assertEqual(len(found), 1)
         # What the match itself refuses.
-        self.refused(ValueError, "pair 0: max_disparity", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
+        self.refused(ValueError, "pair 0: the views have too few matches", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
         self.refused(ValueError, "pair 0: options[\"memory\"]: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
         # Before any pair is taken.
         taken = iter([(left, right)])
