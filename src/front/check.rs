@@ -225,8 +225,9 @@ pub fn clipped(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
     let (mut all, mut at) = (0, [0; 2]);
     for (disparity, _) in measured {
         all += 1;
-        at[0] += usize::from(*disparity == range.min * FRACTION);
-        at[1] += usize::from(*disparity == range.max * FRACTION);
+        // What was matched at half the size may end a few pixels beyond.
+        at[0] += usize::from(*disparity <= range.min * FRACTION);
+        at[1] += usize::from(*disparity >= range.max * FRACTION);
     }
     let ends = [(range.min, false, at[0]), (range.max, true, at[1])];
     ends.into_iter()
