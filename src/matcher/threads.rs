@@ -9,6 +9,7 @@ use crate::{error::Purpose, memory};
 #[cfg(not(target_arch = "wasm32"))]
 const STACK: u64 = 2 << 20;
 
+/// Refuses numbers of threads that there may not be.
 fn check(count: Option<usize>) -> Result<()> {
     const MOST: usize = Execution::MOST_THREADS;
     match count.filter(|count| !(1..=MOST).contains(count)) {
@@ -28,8 +29,8 @@ impl Threads {
     /// So many threads, or one for each core.
     ///
     /// # Errors
-    /// [`ExecutionError`] for none at all, for more than [`Execution::MOST_THREADS`], and for more than the system has; [`MemoryError`](crate::error::MemoryError) where their
-    /// stacks do not fit.
+    /// [`ExecutionError`] for none at all, for more than [`Execution::MOST_THREADS`], and for more than the system has;
+    /// [`MemoryError`](crate::error::MemoryError) where their stacks do not fit.
     pub(super) fn new(count: Option<usize>) -> Result<Self> {
         check(count)?;
         let least = count.map_or(1, |count| count as u64);
@@ -37,7 +38,7 @@ impl Threads {
         // 0 stands for as many as there are cores.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).stack_size(STACK as usize);
         let pool = pool.build().map_err(|e| ExecutionError::Threads(e.to_string()))?;
-        // Threads take memory when they begin, and as late as they like: nobody counts what is left before they have.
+        // A thread takes memory when it begins. All have begun before anybody counts what is left.
         pool.broadcast(|_| ());
         Ok(Self { pool })
     }

@@ -17,6 +17,7 @@ pub(crate) struct ExecutionArgs {
     threads: ThreadArgs,
 }
 
+/// The largest number of threads.
 const MOST: i64 = Execution::MOST_THREADS as i64;
 
 /// How many threads the CPU path has.
@@ -50,7 +51,7 @@ impl ExecutionArgs {
             // changes nothing.
             let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
         }
-        // Threads take memory when they begin, and as late as they like: nobody counts what is left before they have.
+        // Begun before anybody counts what memory is left, as the threads of a matcher are.
         rayon::broadcast(|_| ());
         self.threads.execution(&self.device)
     }

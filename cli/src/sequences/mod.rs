@@ -1,6 +1,7 @@
 //! Sequences of pairs: numbered images, and streams of frames.
 
 mod files;
+mod pairing;
 mod stream;
 
 use std::collections::VecDeque;
@@ -13,7 +14,7 @@ use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Rect};
 use mrfgs::{Error, Result};
 
-pub(crate) use files::Pairing;
+pub(crate) use pairing::Pairing;
 use stream::Stream;
 pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
 
@@ -129,7 +130,7 @@ impl Frames {
         let mut right = right.map(|right| Source::open(right, raw, reader)).transpose()?;
         if let (Source::Files { left: l, .. }, Some(Source::Files { left: r, .. })) = (&mut left, &mut right)
         {
-            let pairs = files::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
+            let pairs = pairing::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
             [*l, *r] = pairs.map(Into::into);
         }
         Ok(Self { left, right, layout, count: 0, size: None, names })

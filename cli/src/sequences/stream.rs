@@ -57,7 +57,7 @@ impl PixelFormat {
 
 /// Most bytes of a header; the decoder takes no more either.
 const MAX_HEADER: u64 = 1024;
-/// How many bytes tell what a stream is that should be pixels alone.
+/// How many bytes tell whether a stream is something else than pixels alone.
 const START: u64 = 9;
 /// Bytes that a pixel takes at most while its frame is read: three samples of 16 bits, and what becomes of them.
 const BYTES: u64 = 12;
@@ -191,7 +191,7 @@ fn check_size((width, height): (usize, usize), max_pixels: u64) -> Result<(), St
     room.map_err(|_| format!("there is not enough memory for frames of {width} x {height} pixels"))
 }
 
-/// Refuses what is no pixels by the first [`START`] bytes.
+/// Refuses what is not pixels alone, by its first [`START`] bytes.
 fn check_start(start: &[u8]) -> Result<(), String> {
     if start.starts_with(b"YUV4MPEG2") {
         return Err("is YUV4MPEG2, which says itself what its frames hold: leave out --raw-frames".into());
@@ -200,7 +200,7 @@ fn check_start(start: &[u8]) -> Result<(), String> {
     let is_file = start.get(4..8) == Some(b"ftyp")
         || [&b"\x1a\x45\xdf\xa3"[..], b"RIFF", b"\x89PNG"].iter().any(|magic| start.starts_with(magic));
     if is_file {
-        return Err("holds no pixels alone, but a film or an image: let ffmpeg write -f rawvideo".into());
+        return Err("is a film or an image and not pixels alone: let ffmpeg write -f rawvideo".into());
     }
     Ok(())
 }

@@ -107,14 +107,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let rectifying = args.rectification.options_if(args.rectify)?;
     check_flags(args)?;
     stop::listen();
-    let frames = open(args)?;
+    let mut frames = open(args)?;
     check_output(args, &frames)?;
     let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
-    let (first, frames) = pipeline::patiently(move || {
-        let mut frames = frames;
-        (frames.next(), frames)
-    })?;
+    let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
     let Frame { name, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let sign = Sign::default();
     let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), None)?;
