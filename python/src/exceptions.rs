@@ -45,8 +45,13 @@ fn is_missing(cause: Option<&(dyn std::error::Error + 'static)>) -> bool {
 
 /// Says what is probably wrong, at the line of Python that called.
 pub(crate) fn warn(py: Python, warnings: impl IntoIterator<Item = Warning>) -> PyResult<()> {
-    for warning in warnings {
-        let text = CString::new(words::warning(&warning))?;
+    tell(py, warnings.into_iter().map(|warning| words::warning(&warning)))
+}
+
+/// Says these lines as warnings.
+pub(crate) fn tell(py: Python, lines: impl IntoIterator<Item = String>) -> PyResult<()> {
+    for line in lines {
+        let text = CString::new(line)?;
         PyErr::warn(py, &py.get_type::<MatchWarning>(), &text, 1)?;
     }
     Ok(())

@@ -12,7 +12,7 @@ use pyo3::types::PyTuple;
 use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
 use crate::depth::PyRig;
-use crate::exceptions::exception;
+use crate::exceptions::{self, exception};
 
 /// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
 ///
@@ -23,7 +23,8 @@ use crate::exceptions::exception;
 /// zero_disparity: whether both views have the same principal point, so that what is infinitely far has a disparity of 0.
 ///
 /// The views are those of OpenCV's stereoRectify. Where one camera is above the other, both views are turned by a quarter, so that
-/// matches are on the same row. Raises ValueError for a calibration that gives no rectified pair, and for one of another size.
+/// matches are on the same row. Raises ValueError for a calibration that gives no rectified pair, and for one of another size. What is
+/// probably wrong with it is told as a MatchWarning.
 #[pyclass(name = "Rectification", frozen, module = "mrfgs")]
 pub(crate) struct PyRectification {
     by: Rectification,
@@ -72,6 +73,7 @@ impl PyRectification {
         };
         let by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
             .map_err(|error| known.wrong(error))?;
+        exceptions::tell(py, by.doubts().iter().map(|doubt| format!("{}: {doubt}", known.names)))?;
         let calibration = by.calibration().map_err(|error| known.wrong(error))?;
         let rig = Py::new(py, PyRig::of(&calibration, &known)?)?;
         Ok(Self { by, kept: OnceLock::new(), raw_size: size, calibration, rig })

@@ -1,7 +1,7 @@
 //! What a calibration says of a pair of cameras.
 
 use super::lens::Lens;
-use super::matrix::{Matrix, product, rotated, transposed};
+use super::matrix::{Matrix, degrees, degrees_between, product, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 
@@ -49,6 +49,27 @@ impl Views {
     #[must_use]
     pub fn is_vertical(&self) -> bool {
         self.translation[1].abs() > self.translation[0].abs()
+    }
+
+    /// Whether it makes rectified views of cameras that stand like `pose`.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] where the views look past each other, or not at right angles to the baseline.
+    pub(crate) fn check(&self, pose: &Pose) -> Result<()> {
+        // What the digits of a file leave open is far less.
+        const DEGREES: f64 = 0.1;
+        let [left, right] = &self.rotations;
+        let [x, y] = self.translation;
+        let turn = degrees(&product(&product(right, &pose.rotation), &transposed(left)));
+        let slant = degrees_between(rotated(right, pose.translation), [x, y, 0.0]);
+        let (of, by) = if turn > slant { ("R", turn) } else { ("T", slant) };
+        if by <= DEGREES {
+            return Ok(());
+        }
+        Err(Error::Calibration(format!(
+            "has a rectification, R1 and R2, that contradicts {of} by {by:.2} degrees; leave out R1, R2, P1 and P2 to rectify by R \
+             and T, or calibrate again"
+        )))
     }
 
     /// The calibration of the rectified images, of the given size.

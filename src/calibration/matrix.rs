@@ -70,6 +70,17 @@ pub fn rotation_vector(m: &Matrix) -> [f64; 3] {
     scaled(v, libm::atan2(sin, cos) / (2.0 * sin))
 }
 
+/// The angle of a rotation, in degrees.
+pub(crate) fn degrees(m: &Matrix) -> f64 {
+    let v = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]];
+    libm::atan2(length(v), m[0][0] + m[1][1] + m[2][2] - 1.0).to_degrees()
+}
+
+/// The angle between two directions, in degrees.
+pub(crate) fn degrees_between(a: [f64; 3], b: [f64; 3]) -> f64 {
+    libm::atan2(length(cross(a, b)), dot(a, b)).to_degrees()
+}
+
 /// The rotation nearest to `m`, or `None` where `m` is none up to the digits of a file.
 pub(crate) fn nearest_rotation(m: &Matrix) -> Option<Matrix> {
     const DIGITS: f64 = 1e-2;
@@ -107,6 +118,15 @@ mod tests {
         // A quarter turn about z takes x to y.
         let turned = rotated(&rotation([0.0, 0.0, std::f64::consts::FRAC_PI_2]), [1.0, 0.0, 0.0]);
         assert!((turned[1] - 1.0).abs() < 1e-15 && turned[0].abs() < 1e-15, "{turned:?}");
+    }
+
+    #[test]
+    fn angles_are_in_degrees() {
+        for angle in [0.0, 0.001, 90.0, 179.0_f64] {
+            let found = degrees(&rotation(scaled([0.6, 0.0, 0.8], angle.to_radians())));
+            assert!((found - angle).abs() < 1e-9, "{angle}: {found}");
+        }
+        assert!((degrees_between([1.0, 0.0, 0.0], [-2.0, 2.0, 0.0]) - 135.0).abs() < 1e-12);
     }
 
     #[test]

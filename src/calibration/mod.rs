@@ -9,6 +9,7 @@ mod kalibr;
 pub mod lens;
 pub mod matrix;
 mod middlebury;
+mod models;
 mod node;
 mod opencv;
 mod ros;

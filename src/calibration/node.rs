@@ -120,6 +120,16 @@ impl<'a> Entry<'a> {
         Error::read(self.path, format!("{}: expected {expected}, found {found}", self.name))
     }
 
+    /// An error about this entry, for this `reason`.
+    pub(super) fn error(&self, reason: impl std::fmt::Display) -> Error {
+        Error::read(self.path, format!("{}: {reason}", self.name))
+    }
+
+    /// Its name, as the file spells it.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The entries in it.
     pub(super) fn group(&self) -> Result<Entries<'a>> {
         match self.node {

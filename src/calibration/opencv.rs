@@ -3,6 +3,7 @@
 use super::cameras::{Pose, StereoCalibration, Views};
 use super::lens::{Distortion, Lens};
 use super::matrix::{IDENTITY, Matrix, length, rotation};
+use super::models::Model;
 use super::node::{Entries, Entry};
 use crate::error::Result;
 use crate::image::calib::Camera;
@@ -24,6 +25,8 @@ const SIZE: &str = "imagesize size imgsize resolution";
 const WIDTH: &str = "imagewidth width";
 const HEIGHT: &str = "imageheight height";
 const FISHEYE: &str = "fisheye fisheyemodel usefisheye";
+const MODEL: [&str; 2] = ["distortionmodel distortiontype lensmodel", "cameramodel cameratype model"];
+const Q: &str = "q disparitytodepth disptodepth";
 const UNIT: &str = "unit units";
 
 /// Whether these entries are OpenCV's: whether there is any camera.
@@ -50,7 +53,51 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     if has(ROTATION) || has(TRANSLATION) || !stored {
         calibration.pose = Some(pose(entries)?);
     }
+    check_baseline(entries, &calibration)?;
     Ok(calibration)
+}
+
+/// T, P2 and Q each say the distance of the cameras; an error where they differ.
+fn check_baseline(entries: &Entries, calibration: &StereoCalibration) -> Result<()> {
+    // Files round their numbers.
+    const ROUNDING: f64 = 0.01;
+    let mut said: Vec<(Entry, f64)> = Vec::new();
+    let mut put =
+        |names: &str, baseline: f64| said.extend(entries.find(names).map(|entry| (entry, baseline)));
+    if let Some(pose) = &calibration.pose {
+        put(TRANSLATION, length(pose.translation));
+    }
+    if let Some(Views { translation: [x, y], .. }) = calibration.views {
+        put(PROJECTION[1], length([x, y, 0.0]));
+    }
+    if let Some(entry) = entries.find(Q) {
+        let inverse = entry.matrix::<4, 4>()?[3][2].abs();
+        if inverse == 0.0 {
+            return Err(entry.wrong("1 / baseline in its last row, other than 0"));
+        }
+        put(Q, 1.0 / inverse);
+    }
+    let Some(((first, baseline), others)) = said.split_first() else { return Ok(()) };
+    match others.iter().find(|(_, other)| (other / baseline - 1.0).abs() > ROUNDING) {
+        Some((entry, other)) => Err(entry.error(format_args!(
+            "says a baseline of {} and {} one of {}, which differ by a factor of {}; give both in one unit, or leave out the \
+             wrong one",
+            digits(*other),
+            first.name(),
+            digits(*baseline),
+            digits((other / baseline).max(baseline / other))
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// A number with four digits, as a message shows it.
+fn digits(number: f64) -> String {
+    let before = libm::log10(number).floor() as i32;
+    match usize::try_from(3 - before) {
+        Ok(after @ 0..9) => format!("{number:.after$}"),
+        _ => format!("{number:.3e}"),
+    }
 }
 
 fn size(entries: &Entries) -> Result<Option<(usize, usize)>> {
@@ -72,9 +119,26 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
-/// Files of OpenCV do not say so by themselves; see the guide.
+/// Whether the lenses are fisheyes. Files of OpenCV do not say so by themselves; see the guide.
 fn is_fisheye(entries: &Entries) -> Result<bool> {
-    let Some(entry) = entries.find(FISHEYE) else { return Ok(false) };
+    let mut said: Option<(Entry, bool)> = None;
+    let flag = entries.find(FISHEYE).map(|entry| fisheye_flag(&entry).map(|is| (entry, Some(is))));
+    let models = MODEL.iter().filter_map(|names| entries.find(names));
+    let models = models.map(|entry| Model::of(&entry).map(|model| (entry, model.is_fisheye())));
+    for found in flag.into_iter().chain(models) {
+        let (entry, Some(is)) = found? else { continue };
+        match &said {
+            Some((first, other)) if *other != is => {
+                let reason = format_args!("contradicts {}; keep the one that is right", first.name());
+                return Err(entry.error(reason));
+            }
+            _ => said = Some((entry, is)),
+        }
+    }
+    Ok(said.is_some_and(|(_, is)| is))
+}
+
+fn fisheye_flag(entry: &Entry) -> Result<bool> {
     match entry.word()? {
         "1" | "true" => Ok(true),
         "0" | "false" => Ok(false),

@@ -121,6 +121,7 @@ impl Calibration {
     /// skipped. The error names line and key.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut calibration = Self::default();
+        let mut right = None;
         for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
             let (key, value) = if let Some((key, value)) = line.split_once('=') {
                 (key.trim(), Ok(value.trim()))
@@ -138,7 +139,7 @@ impl Calibration {
                     "vmin" => calibration.vmin = Some(number(value?)?),
                     "vmax" => calibration.vmax = Some(number(value?)?),
                     "cam0" => calibration.camera = Some(camera(value?)?),
-                    "cam1" => _ = camera(value?)?,
+                    "cam1" => right = Some((i + 1, camera(value?)?)),
                     "unit" => {
                         // Middlebury's files have no such key, but may have such a word.
                         let Ok(value) = value else { return Ok(()) };
@@ -151,7 +152,40 @@ impl Calibration {
             };
             put().map_err(|reason| format!("line {}: {key}: {reason}", i + 1))?;
         }
+        if let Some((line, right)) = right {
+            calibration.check_right(right).map_err(|reason| format!("line {line}: cam1: {reason}"))?;
+        }
         Ok(calibration)
+    }
+
+    /// The right camera of a rectified pair is the left one, moved by `doffs` along the rows. The error says what contradicts that.
+    fn check_right(&self, right: Camera) -> std::result::Result<(), String> {
+        // Files round their numbers.
+        const ROUNDING: f64 = 0.05;
+        let Some(left) = self.camera else { return Ok(()) };
+        let [f0, f1] = [left, right].map(|camera| camera.focal_length);
+        let [[cx0, cy0], [cx1, cy1]] = [left, right].map(|camera| camera.principal_point);
+        let apart = f0.iter().zip(f1).map(|(a, b)| (b / a - 1.0).abs()).fold(0.0, f64::max);
+        if apart > 1e-4 {
+            return Err(format!(
+                "its focal length contradicts that of cam0 by {:.2} %; a rectified pair has one, so correct it or rectify again",
+                100.0 * apart
+            ));
+        }
+        if (cy1 - cy0).abs() > ROUNDING {
+            return Err(format!(
+                "its row cy={cy1} contradicts cy={cy0} of cam0 by {:.2} px; a rectified pair has one, so correct it or rectify again",
+                (cy1 - cy0).abs()
+            ));
+        }
+        match self.doffs {
+            Some(doffs) if (cx1 - cx0 - doffs).abs() > ROUNDING => Err(format!(
+                "cx1 - cx0 = {:.3} contradicts doffs={doffs} by {:.2} px; correct the one that is wrong",
+                cx1 - cx0,
+                (cx1 - cx0 - doffs).abs()
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// The cameras of the rectified pair and their baseline, where it says them all.
@@ -252,6 +286,18 @@ mod tests {
             ("cam0=[1 9 2; 0 1 2; 0 0 1]", ["line 1", "cam0"]),
             ("cam1=[-1 0 2; 0 1 2; 0 0 1]", ["line 1", "cam1"]),
             ("baseline=1\nunit=feet", ["line 2", "mm, cm, m or unknown"]),
+            (
+                "cam0=[100 0 2; 0 100 2; 0 0 1]\ncam1=[101 0 2; 0 101 2; 0 0 1]",
+                ["line 2: cam1", "contradicts that of cam0 by 1.00 %"],
+            ),
+            (
+                "cam1=[100 0 2; 0 100 3; 0 0 1]\ncam0=[100 0 2; 0 100 2; 0 0 1]",
+                ["line 1: cam1", "cy=3 contradicts cy=2 of cam0 by 1.00 px"],
+            ),
+            (
+                "cam0=[9 0 2; 0 9 2; 0 0 1]\ncam1=[9 0 7.5; 0 9 2; 0 0 1]\ndoffs=-5.5",
+                ["line 2: cam1", "cx1 - cx0 = 5.500 contradicts doffs=-5.5 by 11.00 px"],
+            ),
         ] {
             let reason = Calibration::parse(text).unwrap_err();
             assert!(words.iter().all(|w| reason.contains(w)), "{text:?}: {reason}");

@@ -21,10 +21,12 @@
 //! # }
 //! ```
 
+mod doubts;
 mod options;
 mod sampling;
 mod views;
 
+pub use doubts::Doubt;
 pub use options::Options;
 
 use crate::calibration::cameras::{StereoCalibration, Views};
@@ -46,6 +48,7 @@ pub struct Rectification {
     /// Of the images, and of the rectified ones.
     sizes: [(usize, usize); 2],
     unit: Unit,
+    doubts: Vec<Doubt>,
     /// Where the pixels of both rectified views come from, row by row, where they are [kept](Self::keep_places).
     places: Option<[Vec<Place>; 2]>,
 }
@@ -74,14 +77,27 @@ impl Rectification {
             .lenses
             .ok_or_else(|| error("does not say the lenses, K1, D1, K2 and D2, which rectification takes"))?;
         let views = match (calibration.views, &calibration.pose) {
-            (Some(views), _) if options.alpha.is_none() => views,
+            (Some(views), pose) if options.alpha.is_none() => {
+                pose.as_ref().map_or(Ok(()), |pose| views.check(pose))?;
+                views
+            }
             (_, Some(pose)) => views::choose(&lenses, pose, size, options)?,
             _ => return Err(error("does not say how the cameras stand to each other, R and T")),
         };
         let (views, rectified) = turned(views, size);
         // Says where the right camera is on the left.
         views.calibration(None, calibration.unit)?;
-        Ok(Self { lenses, views, sizes: [size, rectified], unit: calibration.unit, places: None })
+        let doubts = match calibration.size {
+            None => doubts::of_lenses(&lenses, size).into_iter().collect(),
+            Some(_) => Vec::new(),
+        };
+        Ok(Self { lenses, views, sizes: [size, rectified], unit: calibration.unit, doubts, places: None })
+    }
+
+    /// What is probably wrong with the calibration.
+    #[must_use]
+    pub fn doubts(&self) -> &[Doubt] {
+        &self.doubts
     }
 
     /// (width, height) of the rectified images.

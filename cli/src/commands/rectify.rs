@@ -75,6 +75,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         .map_err(|e| folder.named(e))?;
     folder.publish()?;
     if !args.quiet {
+        input::doubt(&rectification, &args.calib);
         let (width, height) = rectification.size();
         let known = |image: &Image| {
             let known = image.masked.data().iter().filter(|masked| !**masked).count();

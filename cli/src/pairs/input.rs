@@ -154,6 +154,9 @@ impl Input {
 
     /// Says what is probably wrong with the pair.
     pub(crate) fn warn(&self) {
+        if let (Some(by), Some(known)) = (&self.rectification, &self.calibration) {
+            doubt(by, &known.files);
+        }
         // A range that was found does not show what the user knows.
         warn(check::warnings(&self.pair, (!self.by_matches).then_some(self.range)));
     }
@@ -174,6 +177,13 @@ fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
 pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
     for warning in warnings {
         console::say(&format!("warning: {}", remedy::warning(&warning, &remedy::FLAGS)));
+    }
+}
+
+/// Says on standard error what is probably wrong with the calibration of `files`.
+pub(crate) fn doubt(by: &Rectification, files: &[PathBuf]) {
+    for doubt in by.doubts() {
+        console::say(&format!("warning: {}: {doubt}", shown(files)));
     }
 }
 

@@ -1,6 +1,8 @@
 //! Calibrations that people have: each format gives the same pair and the same depths, and what is wrong in a file is told in
 //! one line.
 
+use mrfgs::rectification::{Options, Rectification};
+
 use super::*;
 
 /// That of `testdata/raw`, as OpenCV has it in YAML.
@@ -284,6 +286,137 @@ fn what_is_wrong_in_a_calibration_is_told() {
         let told = rectify(&folder, if *kind == "ros" { "left a-file" } else { "a-file" });
         told.failed(1, &format!("a-file & {words}"));
         assert_eq!(listing(&folder).len(), 2, "{what}: nothing is left");
+    }
+}
+
+/// A rectification for `testdata/raw` of its own making, with the lenses and the pose that it is of.
+fn stored() -> String {
+    let by = mrfgs::calibration::of_texts(&[(Path::new("cameras"), opencv())]).unwrap();
+    let by = Rectification::new(&by, (240, 180), &Options::default()).unwrap();
+    let matrix = |name: &str, rows: usize, numbers: &[f64]| {
+        let columns = numbers.len() / rows;
+        format!(
+            "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: {numbers:?}\n"
+        )
+    };
+    let calibration = by.calibration().unwrap();
+    let (camera, baseline) = (calibration.camera.unwrap(), calibration.baseline.unwrap());
+    let ([f, _], [cx, cy]) = (camera.focal_length, camera.principal_point);
+    let mut text = opencv() + "\n";
+    for (i, rotation) in by.rotations().iter().enumerate() {
+        text += &matrix(&format!("R{}", i + 1), 3, rotation.as_flattened());
+        let tx = [0.0, -baseline * f][i];
+        text += &matrix(&format!("P{}", i + 1), 3, &[f, 0.0, cx, tx, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    }
+    let q = [1.0, 0.0, 0.0, -cx, 0.0, 1.0, 0.0, -cy, 0.0, 0.0, 0.0, f, 0.0, 0.0, 1.0 / baseline, 0.0];
+    text + &matrix("Q", 4, &q)
+}
+
+/// What is added to or changed in a calibration, and what must be said then. The change is a text and its replacement; of an
+/// entry that begins with it, `NAME * factor` scales all numbers, and `NAME turned degrees` turns a rotation about the y axis.
+const CONTRADICTIONS: &[(&str, &str, &str)] = &[
+    ("model", "fisheye: 0\ndistortion_model: equidistant", "distortion_model: contradicts fisheye"),
+    ("model", "fisheye: 1\ncamera_model: brown_conrady", "camera_model: contradicts fisheye"),
+    (
+        "model",
+        "distortion_model: plumb_bob\ncamera_model: fisheye",
+        "camera_model: contradicts distortion_model & keep the one that is right",
+    ),
+    ("model", "distortion_model: equidistant", "D1: expected the 4 coefficients of a fisheye & 5 numbers"),
+    ("model", "camera_model: fisheye", "D1: expected the 4 coefficients of a fisheye"),
+    ("model", "camera_model: KANNALA_BRANDT", "D1: expected the 4 coefficients of a fisheye"),
+    ("model", "distortion_model: scaramuzza", "distortion_model: expected a lens model & `scaramuzza`"),
+    ("model", "camera_model: cylinder", "camera_model: expected a lens model & `cylinder`"),
+    ("stored", "T * 1000", "P2: says a baseline of 0.1636 and T one of 163.6 & a factor of 1000 & one unit"),
+    ("stored", "T * 1.05", "P2: says a baseline of 0.1636 and T one of 0.1718 & a factor of 1.050"),
+    ("stored", "T * 0.1", "P2: says a baseline & a factor of 10.00"),
+    ("stored", "Q * 1000", "Q: says a baseline of 0.0001636 and T one of 0.1636 & 1000"),
+    ("stored", "Q * 0.5", "Q: says a baseline of 0.3272 and T one of 0.1636 & a factor of 2.000"),
+    ("stored", "T * -1", "R1 and R2, that contradicts T by 180.00 degrees & leave out R1, R2, P1 and P2"),
+    ("stored", "R turned 0.2", "that contradicts R by 0.20 degrees & leave out R1, R2, P1 and P2"),
+    ("stored", "R turned -3", "that contradicts R by 3.00 degrees"),
+    ("stored", "R1 turned 0.15", "that contradicts R by 0.15 degrees"),
+    ("stored", "R2 turned 1", "degrees & or calibrate again"),
+    (
+        "calib.txt",
+        "cam1=[216 0 118.5; 0 216 89.5; 0 0 1]",
+        "line 5: cam1: its focal length contradicts that of cam0 by 0.23 % & rectify again",
+    ),
+    (
+        "calib.txt",
+        "cam1=[215.5 0 118.5; 0 215.5 91; 0 0 1]",
+        "line 5: cam1: its row cy=91 contradicts cy=89.5 of cam0 by 1.50 px",
+    ),
+    (
+        "calib.txt",
+        "cam1=[215.5 0 120; 0 215.5 89.5; 0 0 1]",
+        "line 5: cam1: cx1 - cx0 = 1.500 contradicts doffs=0 by 1.50 px",
+    ),
+];
+
+/// `text` with the numbers of an entry changed.
+fn with_numbers(text: &str, name: &str, change: impl Fn(&[f64]) -> Vec<f64>) -> String {
+    let entry = text.find(&format!("\n{name}: ")).unwrap();
+    let start = entry + text[entry..].find("data: [").unwrap() + 7;
+    let end = start + text[start..].find(']').unwrap();
+    let numbers: Vec<f64> = text[start..end].split(',').map(|word| word.trim().parse().unwrap()).collect();
+    let changed = format!("{:?}", change(&numbers));
+    [&text[..start], changed.trim_matches(['[', ']']), &text[end..]].concat()
+}
+
+#[test]
+fn calibrations_that_contradict_themselves_are_told() {
+    let folder = Folder::new();
+    for (kind, change, words) in CONTRADICTIONS {
+        let text = match *kind {
+            "model" => format!("{}\n{change}\n", opencv()),
+            "calib.txt" => {
+                let text = "cam0=[215.5 0 118.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\nwidth=240\n";
+                format!("{text}{change}\n")
+            }
+            _ => match change.split(' ').collect::<Vec<_>>()[..] {
+                [name, "*", factor] => {
+                    let factor: f64 = factor.parse().unwrap();
+                    with_numbers(&stored(), name, |numbers| numbers.iter().map(|v| v * factor).collect())
+                }
+                [name, _, degrees] => {
+                    let (sin, cos) = degrees.parse::<f64>().unwrap().to_radians().sin_cos();
+                    with_numbers(&stored(), name, |m| {
+                        let row = |a: f64, b: f64| (0..3).map(move |x| a * m[x] + b * m[6 + x]);
+                        row(cos, sin).chain(m[3..6].iter().copied()).chain(row(-sin, cos)).collect()
+                    })
+                }
+                _ => unreachable!("{change}"),
+            },
+        };
+        fs::write(folder.join("a-file"), text).unwrap();
+        let told = rectify(&folder, "a-file");
+        told.failed(1, &format!("a-file & {words}"));
+        assert_eq!(listing(&folder).len(), 1, "{change}: nothing is left");
+    }
+    // Control: without a change, nothing contradicts.
+    fs::write(folder.join("a-file"), stored()).unwrap();
+    rectify(&folder, "a-file").succeeded().says("240 x 180, 98.7 % of the left");
+}
+
+/// A calibration that does not say the size of its images, and has the optical axis far from the middle of these.
+#[test]
+fn a_calibration_for_another_size_is_told() {
+    let folder = Folder::new();
+    let silent = opencv().replace("imageSize: [ 240, 180 ]", "").replace("121.4,", "150.0,");
+    fs::write(folder.join("a-file"), &silent).unwrap();
+    let told = rectify(&folder, "a-file").succeeded();
+    told.says(
+        "warning: a-file: the principal point of the left camera, (150.0, 87.9), is 13 % of the width from the middle of \
+         images of 240 x 180",
+    );
+    told.says("add imageSize: [240, 180] if this is right");
+    // Where the size is stated, or the axis is in the middle, nothing is said.
+    for text in [silent.replace("unit: m", "imageSize: [ 240, 180 ]"), silent.replace("150.0,", "121.4,")] {
+        fs::remove_dir_all(folder.join("out")).unwrap();
+        fs::write(folder.join("a-file"), text).unwrap();
+        let told = rectify(&folder, "a-file").succeeded();
+        assert!(!told.stderr.contains("warning"), "{}", told.stderr);
     }
 }
 
