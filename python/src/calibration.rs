@@ -15,9 +15,9 @@ use crate::words;
 
 /// What is known of a pair of cameras, read from files.
 ///
-/// files: the path of a file, or those of two that belong together. The content tells the form: OpenCV's YAML or XML (K1, D1, K2,
-///     D2, R, T, or R1, R2, P1, P2 too), ROS's camera_info of both cameras in any order, Kalibr's camera chain (cam0 is the left
-///     camera), or Middlebury's calib.txt.
+/// files: the path of a file, or those of several that belong together. The content tells the form: OpenCV's YAML, XML or JSON (K1,
+///     D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's camera_info of both cameras in any order, Kalibr's camera chain (cam0 is the
+///     left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK or COLMAP, or Middlebury's calib.txt.
 /// unit: the unit of the baseline, "mm", "cm" or "m", where the files do not say it or say it wrong.
 ///
 /// Rectification and Rig take it; they take paths, too. Raises FileNotFoundError for a file that is not there, and ValueError for

@@ -21,6 +21,8 @@ pub struct StereoCalibration {
     pub unit: Unit,
     /// What `calib.txt` says, where it is one.
     pub benchmark: Option<Calibration>,
+    /// The same cameras with images of other sizes.
+    pub others: Vec<StereoCalibration>,
 }
 
 /// How the right camera stands to the left one: a point X in the frame of the left camera is R X + T in that of the right
@@ -42,6 +44,23 @@ pub struct Views {
     pub cameras: [Camera; 2],
     /// Where the left camera is in the frame of the right view: x and y, in the unit of the calibration. One of them is 0.
     pub translation: [f64; 2],
+    /// Width and height of the rectified images, where the calibration says them; else they are those of the images.
+    pub size: Option<(usize, usize)>,
+}
+
+impl Pose {
+    /// The way back.
+    pub(super) fn inverse(&self) -> Self {
+        let rotation = transposed(&self.rotation);
+        Self { rotation, translation: rotated(&rotation, self.translation).map(|v| -v) }
+    }
+
+    /// How the right camera stands to the left one, where both stand like this to a third frame: from that to each of them.
+    pub(super) fn between(left: &Self, right: &Self) -> Self {
+        let rotation = product(&right.rotation, &transposed(&left.rotation));
+        let moved = rotated(&rotation, left.translation);
+        Self { rotation, translation: std::array::from_fn(|i| right.translation[i] - moved[i]) }
+    }
 }
 
 impl Views {
@@ -101,6 +120,11 @@ impl Views {
 }
 
 impl StereoCalibration {
+    /// What it says of images of this size, where it is for several; else itself.
+    pub(crate) fn of_size(&self, size: (usize, usize)) -> &Self {
+        std::iter::once(self).chain(&self.others).find(|one| one.size == Some(size)).unwrap_or(self)
+    }
+
     /// The calibration of images that are rectified already; `None` where it does not say how they were rectified.
     ///
     /// # Errors
@@ -109,7 +133,7 @@ impl StereoCalibration {
         if let Some(benchmark) = &self.benchmark {
             return Ok(Some(benchmark.clone()));
         }
-        self.views.map(|views| views.calibration(self.size, self.unit)).transpose()
+        self.views.map(|views| views.calibration(views.size.or(self.size), self.unit)).transpose()
     }
 
     /// With the pose that the rectification implies, where a file gives that alone.

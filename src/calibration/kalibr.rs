@@ -1,10 +1,11 @@
 //! Kalibr's camera chain: cam0 is the left camera, cam1 the right one.
 
-use super::cameras::{Pose, StereoCalibration};
-use super::lens::{Distortion, Lens};
-use super::matrix::length;
+use super::cameras::StereoCalibration;
+use super::lens::{Distortion, Lens, RadialTangential};
+use super::models::Model;
 use super::node::Entries;
 use super::opencv;
+use super::posed::apart;
 use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 
@@ -25,44 +26,76 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         return Err(Error::read(entries.path(), reason));
     }
     let entry = right.require("tcncnm1", "T_cn_cnm1", "a matrix of 4 x 4 from cam0 to cam1")?;
-    let wrong = || entry.wrong("a rotation and a translation other than 0, and 0 0 0 1 in the last row");
-    let [a, b, c, [0.0, 0.0, 0.0, 1.0]] = entry.matrix::<4, 4>()? else { return Err(wrong()) };
-    let translation = [a[3], b[3], c[3]];
-    if length(translation) == 0.0 {
-        return Err(wrong());
-    }
-    let rotation = entry.rotation(&[a, b, c].map(|row| [row[0], row[1], row[2]]))?;
+    let pose = entry.pose()?;
+    apart(&entry, &pose)?;
     Ok(StereoCalibration {
         lenses: Some(lenses),
-        pose: Some(Pose { rotation, translation }),
+        pose: Some(pose),
         size: Some(sizes[0]),
         unit: Unit::Metre,
         ..StereoCalibration::default()
     })
 }
 
-fn size(camera: &Entries) -> Result<(usize, usize)> {
+/// The size of the images of a camera, as EuRoC has it, too.
+pub(super) fn size(camera: &Entries) -> Result<(usize, usize)> {
     camera.require("resolution", "resolution", "width and height")?.size()
 }
 
-fn lens(camera: &Entries) -> Result<Lens> {
-    const INTRINSICS: &str = "4 numbers: fu, fv, pu, pv, with fu and fv above 0";
-    if let Some(model) = camera.find("cameramodel")
-        && model.word()? != "pinhole"
-    {
-        return Err(model.wrong("pinhole"));
-    }
-    let entry = camera.require("intrinsics", "intrinsics", INTRINSICS)?;
-    let [fu, fv, pu, pv] = entry.numbers(INTRINSICS)?;
-    let expected = "radtan, equidistant or none";
-    let model = camera.require("distortionmodel", "distortion_model", expected)?;
-    let distortion = match model.word()? {
-        word @ ("radtan" | "equidistant") => {
-            let entry = camera.require("distortioncoeffs", "distortion_coeffs", "4 coefficients")?;
-            opencv::distortion(&entry, "4 coefficients", word == "equidistant")?
-        }
-        "none" => Distortion::NONE,
-        _ => return Err(model.wrong(expected)),
+/// The lens of a camera, as EuRoC has it, too.
+pub(super) fn lens(camera: &Entries) -> Result<Lens> {
+    let (model, names) = match camera.find("cameramodel").map(|entry| (Model::of(&entry), entry)) {
+        None => (Model::Pinhole, ""),
+        Some((model, entry)) => match model? {
+            model @ Model::Pinhole => (model, ""),
+            model @ Model::Unified => (model, "xi, "),
+            model @ Model::DoubleSphere => (model, "xi, alpha, "),
+            model @ Model::ExtendedUnified => (model, "alpha, beta, "),
+            _ => return Err(entry.wrong("pinhole, omni, ds or eucm")),
+        },
     };
-    Lens::new([fu, fv], [pu, pv], distortion).map_err(|_| entry.wrong(INTRINSICS))
+    let own = names.matches(',').count();
+    let expected = format!("{} numbers: {names}fu, fv, pu, pv, with fu and fv above 0", own + 4);
+    let entry = camera.require("intrinsics", "intrinsics", &expected)?;
+    let numbers = entry.list(&expected)?;
+    let Some((own, &[fu, fv, pu, pv])) = numbers.split_at_checked(own) else {
+        return Err(entry.wrong(&expected));
+    };
+    let distortion = distortion(camera, model, own)?;
+    Lens::new([fu, fv], [pu, pv], distortion).map_err(|_| entry.wrong(&expected))
+}
+
+/// What a lens of this model does, whose `own` numbers stand before the focal length.
+fn distortion(camera: &Entries, model: Model, own: &[f64]) -> Result<Distortion> {
+    let expected = match model {
+        Model::Pinhole => "radtan, equidistant, fov or none",
+        Model::Unified => "radtan or none, which go with omni",
+        _ => "none, which goes with this camera_model",
+    };
+    let entry = camera.require("distortionmodel", "distortion_model", expected)?;
+    let coefficients =
+        || camera.require("distortioncoeffs distortioncoefficients", "distortion_coeffs", "the coefficients");
+    let radial = || opencv::radial_tangential(&coefficients()?, "4 coefficients");
+    // "none" is a pinhole's.
+    match (model, Model::of(&entry).map_err(|_| entry.wrong(expected))?, own) {
+        (Model::Pinhole, Model::RadialTangential, _) => radial().map(Distortion::RadialTangential),
+        (Model::Pinhole, Model::Equidistant, _) => {
+            opencv::distortion(&coefficients()?, "4 coefficients", true)
+        }
+        (Model::Pinhole, Model::FieldOfView, _) => {
+            let entry = coefficients()?;
+            let [w] = entry.numbers("1 coefficient, the field of view in radians")?;
+            Ok(Distortion::FieldOfView(w))
+        }
+        (Model::Pinhole, Model::Pinhole, _) => Ok(Distortion::NONE),
+        (Model::Unified, Model::RadialTangential, &[xi]) => Ok(Distortion::Unified { xi, then: radial()? }),
+        (Model::Unified, Model::Pinhole, &[xi]) => {
+            Ok(Distortion::Unified { xi, then: RadialTangential::NONE })
+        }
+        (Model::DoubleSphere, Model::Pinhole, &[xi, alpha]) => Ok(Distortion::DoubleSphere { xi, alpha }),
+        (Model::ExtendedUnified, Model::Pinhole, &[alpha, beta]) => {
+            Ok(Distortion::ExtendedUnified { alpha, beta })
+        }
+        _ => Err(entry.wrong(expected)),
+    }
 }

@@ -57,6 +57,17 @@ pub fn rotation(v: [f64; 3]) -> Matrix {
     })
 }
 
+/// The rotation of a quaternion, w first. `None` where its length is not 1, up to the digits of a file.
+pub(crate) fn of_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix> {
+    let square = w * w + x * x + y * y + z * z;
+    let s = 2.0 / square;
+    ((square - 1.0).abs() < 1e-2).then_some([
+        [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+        [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
+        [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)],
+    ])
+}
+
 /// The axis of a rotation by less than half a turn, as long as its angle in radians: the inverse of [`rotation`].
 #[must_use]
 pub fn rotation_vector(m: &Matrix) -> [f64; 3] {
@@ -118,6 +129,14 @@ mod tests {
         // A quarter turn about z takes x to y.
         let turned = rotated(&rotation([0.0, 0.0, std::f64::consts::FRAC_PI_2]), [1.0, 0.0, 0.0]);
         assert!((turned[1] - 1.0).abs() < 1e-15 && turned[0].abs() < 1e-15, "{turned:?}");
+    }
+
+    #[test]
+    fn a_quaternion_is_its_rotation() {
+        let (half, axis) = (0.35_f64, [0.36, -0.48, 0.8]);
+        let q = [half.cos(), half.sin() * axis[0], half.sin() * axis[1], half.sin() * axis[2]];
+        assert!(close(&of_quaternion(q).unwrap(), &rotation(scaled(axis, 0.7))));
+        assert_eq!(of_quaternion([0.0, 0.5, 0.5, 0.5]), None);
     }
 
     #[test]

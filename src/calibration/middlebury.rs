@@ -8,7 +8,7 @@ use super::matrix::IDENTITY;
 use crate::error::Result;
 use crate::image::calib::{Calibration, Camera};
 
-/// Whether a text has lines `key=value`, and none that begin like YAML or XML.
+/// Whether a text has lines `key=value`, and does not begin like YAML, JSON, XML or INI.
 pub(super) fn is(text: &str) -> bool {
     let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|line| !line.trim().is_empty());
     let first = lines.clone().next().unwrap_or_default();
@@ -16,7 +16,7 @@ pub(super) fn is(text: &str) -> bool {
         line.split_once('=')
             .is_some_and(|(key, _)| key.trim().chars().all(|c| c.is_alphanumeric() || c == '_'))
     };
-    !first.starts_with(['<', '%']) && lines.any(entry)
+    !first.starts_with(['<', '%', '{', '[']) && lines.any(entry)
 }
 
 pub(super) fn of_text(path: &Path, text: &str) -> Result<StereoCalibration> {
@@ -31,8 +31,12 @@ pub(super) fn of_text(path: &Path, text: &str) -> Result<StereoCalibration> {
         let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
         calibration.lenses = Some([lens(left)?, lens(right)?]);
         calibration.pose = Some(Pose { rotation: IDENTITY, translation: [-baseline, 0.0, 0.0] });
-        calibration.views =
-            Some(Views { rotations: [IDENTITY; 2], cameras: [left, right], translation: [-baseline, 0.0] });
+        calibration.views = Some(Views {
+            rotations: [IDENTITY; 2],
+            cameras: [left, right],
+            translation: [-baseline, 0.0],
+            size: None,
+        });
     }
     calibration.benchmark = Some(benchmark);
     Ok(calibration)

@@ -12,10 +12,18 @@ pub(super) enum Model {
     RadialTangential,
     /// A fisheye of Kannala and Brandt.
     Equidistant,
+    /// The unified model of Mei and Rives.
+    Unified,
+    /// Double sphere.
+    DoubleSphere,
+    /// The extended unified model.
+    ExtendedUnified,
+    /// By the field of view.
+    FieldOfView,
 }
 
 /// In lower case, without what separates words.
-const NAMES: [(Model, &[&str]); 3] = [
+const NAMES: [(Model, &[&str]); 7] = [
     (Model::Pinhole, &["pinhole", "perspective", "none"]),
     (
         Model::RadialTangential,
@@ -28,6 +36,8 @@ const NAMES: [(Model, &[&str]); 3] = [
             "brown",
             "brownconrady",
             "opencv",
+            "pinholeradtan8",
+            "pinholefull",
         ],
     ),
     (
@@ -44,6 +54,10 @@ const NAMES: [(Model, &[&str]); 3] = [
             "opencvfisheye",
         ],
     ),
+    (Model::Unified, &["omni", "omnidir", "mei", "unified"]),
+    (Model::DoubleSphere, &["ds", "doublesphere"]),
+    (Model::ExtendedUnified, &["eucm", "extendedunified"]),
+    (Model::FieldOfView, &["fov", "atan"]),
 ];
 
 impl Model {
@@ -52,17 +66,16 @@ impl Model {
         let plain = |c: &char| !['_', '-', ' '].contains(c);
         let name: String = entry.word()?.chars().filter(plain).collect::<String>().to_lowercase();
         let known = NAMES.iter().find(|(_, names)| names.contains(&name.as_str()));
-        known
-            .map(|(model, _)| *model)
-            .ok_or_else(|| entry.wrong("a lens model of the guide, such as radtan or equidistant"))
+        let expected = "a lens model of the guide, such as radtan or equidistant";
+        known.map(|(model, _)| *model).ok_or_else(|| entry.wrong(expected))
     }
 
-    /// Whether it is a fisheye, where it says that.
+    /// Whether it is OpenCV's fisheye, where it says that.
     pub(super) fn is_fisheye(self) -> Option<bool> {
         match self {
-            Self::Pinhole => None,
-            Self::RadialTangential => Some(false),
+            Self::Pinhole | Self::Unified => None,
             Self::Equidistant => Some(true),
+            _ => Some(false),
         }
     }
 }

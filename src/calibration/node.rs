@@ -2,7 +2,11 @@
 
 use std::path::Path;
 
-use crate::calibration::matrix::Matrix;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD as STANDARD;
+
+use crate::calibration::cameras::Pose;
+use crate::calibration::matrix::{Matrix, of_quaternion};
 use crate::error::{Error, Result};
 use crate::text::quoted;
 
@@ -39,7 +43,8 @@ impl Node {
                 nodes.iter().map(Self::numbers).collect::<Option<Vec<_>>>().map(|all| all.concat())
             }
             Self::Map(_) => {
-                let data = self.get("data")?.numbers()?;
+                let data = self.get("data")?;
+                let data = data.numbers().or_else(|| data.packed())?;
                 let count = |key: &str| self.get(key).map(Self::numbers);
                 let (rows, columns) = (count("rows"), count("cols"));
                 match (rows, columns) {
@@ -51,6 +56,20 @@ impl Node {
                     _ => None,
                 }
             }
+        }
+    }
+
+    /// The numbers of a matrix that OpenCV has written in base64: 24 bytes that say their type, such as `1d`, then the numbers.
+    fn packed(&self) -> Option<Vec<f64>> {
+        let Self::Scalar(text) = self else { return None };
+        let text: String = text.trim_start_matches("$base64$").split_whitespace().collect();
+        let bytes = STANDARD.decode(text).ok()?;
+        let (head, data) = bytes.split_at_checked(24)?;
+        match std::str::from_utf8(head).ok()?.trim().trim_start_matches(|c: char| c.is_ascii_digit()) {
+            "d" => unpacked(data, f64::from_le_bytes),
+            "f" => unpacked(data, |bytes| f64::from(f32::from_le_bytes(bytes))),
+            "i" => unpacked(data, |bytes| f64::from(i32::from_le_bytes(bytes))),
+            _ => None,
         }
     }
 
@@ -69,7 +88,12 @@ impl Node {
     }
 }
 
-/// The entries of one or two files that belong together.
+fn unpacked<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Option<Vec<f64>> {
+    let numbers = data.chunks(N).map(|bytes| bytes.try_into().ok().map(&number).filter(|v| v.is_finite()));
+    numbers.collect()
+}
+
+/// The entries of one or several files that belong together.
 pub(super) struct Entries<'a> {
     files: Vec<(&'a Path, &'a Node)>,
     /// The name of the group they are in, with a dot: `cam0.`.
@@ -86,6 +110,11 @@ pub(super) struct Entry<'a> {
 impl<'a> Entries<'a> {
     pub(super) fn new(files: Vec<(&'a Path, &'a Node)>) -> Self {
         Self { files, group: String::new() }
+    }
+
+    /// Those of all these files.
+    pub(super) fn together(files: &[Self]) -> Self {
+        Self::new(files.iter().flat_map(|entries| entries.files.iter().copied()).collect())
     }
 
     /// The first entry that has one of `names`: words in lower case, without `_` and `-`.
@@ -106,6 +135,16 @@ impl<'a> Entries<'a> {
         self.find(names).ok_or_else(|| {
             Error::read(self.path(), format!("{}{called} is missing: expected {expected}", self.group))
         })
+    }
+
+    /// The number in the entry that is called so; see [`Entries::require`].
+    pub(super) fn number(&self, names: &str, called: &str) -> Result<f64> {
+        self.require(names, called, "a number")?.number()
+    }
+
+    /// As [`Entries::number`]; 0 where there is none.
+    pub(super) fn number_or_zero(&self, names: &str) -> Result<f64> {
+        self.find(names).map_or(Ok(0.0), |entry| entry.number())
     }
 
     /// The file that errors of all entries together name.
@@ -165,6 +204,32 @@ impl<'a> Entry<'a> {
     pub(super) fn rotation(&self, matrix: &Matrix) -> Result<Matrix> {
         let wrong = || self.wrong("a rotation, whose rows are at right angles and of length 1");
         super::matrix::nearest_rotation(matrix).ok_or_else(wrong)
+    }
+
+    /// A rotation and a translation, as a matrix of 4 x 4.
+    pub(super) fn pose(&self) -> Result<Pose> {
+        let [a, b, c, [0.0, 0.0, 0.0, 1.0]] = self.matrix::<4, 4>()? else {
+            return Err(self.wrong("a rotation and a translation, and 0 0 0 1 in the last row"));
+        };
+        let rotation = self.rotation(&[a, b, c].map(|row| [row[0], row[1], row[2]]))?;
+        Ok(Pose { rotation, translation: [a[3], b[3], c[3]] })
+    }
+
+    /// The rotation of a quaternion, w first.
+    pub(super) fn quaternion(&self, wxyz: [f64; 4]) -> Result<Matrix> {
+        of_quaternion(wxyz).ok_or_else(|| self.wrong("a rotation as a quaternion of length 1"))
+    }
+
+    /// The members of a list.
+    pub(super) fn items(&self) -> Result<Vec<Self>> {
+        let Node::List(nodes) = self.node else { return Err(self.wrong("a list")) };
+        let item = |(i, node)| Self { path: self.path, name: format!("{}[{i}]", self.name), node };
+        Ok(nodes.iter().enumerate().map(item).collect())
+    }
+
+    /// A number.
+    pub(super) fn number(&self) -> Result<f64> {
+        self.numbers("a number").map(|[number]| number)
     }
 
     /// A number of pixels.

@@ -1,7 +1,7 @@
 //! OpenCV's stereo calibrations, in YAML or XML, by the names that its programs and most others give to entries.
 
 use super::cameras::{Pose, StereoCalibration, Views};
-use super::lens::{Distortion, Lens};
+use super::lens::{Distortion, Lens, RadialTangential};
 use super::matrix::{IDENTITY, Matrix, length, rotation};
 use super::models::Model;
 use super::node::{Entries, Entry};
@@ -10,24 +10,31 @@ use crate::image::calib::Camera;
 
 // In lower case and without `_`, as `Entries::find` takes them.
 const CAMERA: [&str; 2] = [
-    "k1 m1 cameramatrix1 cameramatrixleft leftcameramatrix kleft kl leftk mleft",
-    "k2 m2 cameramatrix2 cameramatrixright rightcameramatrix kright kr rightk mright",
+    "k1 m1 cameramatrix1 cameramatrixleft leftcameramatrix kleft kl leftk mleft cameramatrixl ml left.k",
+    "k2 m2 cameramatrix2 cameramatrixright rightcameramatrix kright kr rightk mright cameramatrixr mr right.k",
 ];
 const DISTORTION: [&str; 2] = [
-    "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl",
-    "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr",
+    "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl distcoeffsl distcoeffl distl left.d",
+    "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr distcoeffsr distcoeffr distr right.d",
 ];
 const ROTATION: &str = "r rotation rotationmatrix stereor";
 const TRANSLATION: &str = "t translation translationvector trans stereot";
-const RECTIFICATION: [&str; 2] = ["r1 rectification1 rleft rl", "r2 rectification2 rright rr"];
-const PROJECTION: [&str; 2] = ["p1 projection1 pleft pl", "p2 projection2 pright pr"];
+const RECTIFICATION: [&str; 2] = ["r1 rectification1 rleft rl left.r", "r2 rectification2 rright rr right.r"];
+const PROJECTION: [&str; 2] = ["p1 projection1 pleft pl left.p", "p2 projection2 pright pr right.p"];
 const SIZE: &str = "imagesize size imgsize resolution";
-const WIDTH: &str = "imagewidth width";
-const HEIGHT: &str = "imageheight height";
+const NEW_SIZE: &str = "newimagesize newsize rectifiedsize rectifiedimagesize";
+const WIDTH: &str = "imagewidth width left.width";
+const HEIGHT: &str = "imageheight height left.height";
+const XI: [&str; 2] = ["xi1 xileft xil", "xi2 xiright xir"];
 const FISHEYE: &str = "fisheye fisheyemodel usefisheye";
-const MODEL: [&str; 2] = ["distortionmodel distortiontype lensmodel", "cameramodel cameratype model"];
+const MODEL: [&str; 2] = ["distortionmodel distortiontype lensmodel", "cameramodel"];
 const Q: &str = "q disparitytodepth disptodepth";
 const UNIT: &str = "unit units";
+
+/// Whether there is a lens by its names.
+pub(super) fn has_lens(entries: &Entries) -> bool {
+    CAMERA.iter().any(|names| entries.find(names).is_some())
+}
 
 /// Whether these entries are OpenCV's: whether there is any camera.
 pub(super) fn is(entries: &Entries) -> bool {
@@ -44,7 +51,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     }
     let has = |names: &str| entries.find(names).is_some();
     let stored = PROJECTION.iter().any(|names| has(names));
-    if CAMERA.iter().any(|names| has(names)) || !stored {
+    if has_lens(entries) || !stored {
         calibration.lenses = Some([lens(entries, 0)?, lens(entries, 1)?]);
     }
     if stored {
@@ -115,7 +122,13 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
     let called = ["D1", "D2"][view];
     let expected = "the distortion of the lens, 0 0 0 0 for none";
     let entry = entries.require(DISTORTION[view], called, expected)?;
-    let distortion = distortion(&entry, "the coefficients of the distortion", is_fisheye(entries)?)?;
+    let expected = "the coefficients of the distortion";
+    let fisheye = is_fisheye(entries)?;
+    let distortion = match entries.find(XI[view]) {
+        // Of OpenCV's module omnidir.
+        Some(xi) => Distortion::Unified { xi: xi.number()?, then: radial_tangential(&entry, expected)? },
+        None => distortion(&entry, expected, fisheye)?,
+    };
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
@@ -124,7 +137,16 @@ fn is_fisheye(entries: &Entries) -> Result<bool> {
     let mut said: Option<(Entry, bool)> = None;
     let flag = entries.find(FISHEYE).map(|entry| fisheye_flag(&entry).map(|is| (entry, Some(is))));
     let models = MODEL.iter().filter_map(|names| entries.find(names));
-    let models = models.map(|entry| Model::of(&entry).map(|model| (entry, model.is_fisheye())));
+    let models = models.map(|entry| {
+        let model = Model::of(&entry)?;
+        if matches!(model, Model::DoubleSphere | Model::ExtendedUnified | Model::FieldOfView) {
+            return Err(entry.wrong("a lens model of OpenCV; others are read in the form of Kalibr"));
+        }
+        if model == Model::Unified && entries.find(XI[0]).is_none() {
+            return Err(entry.error("takes xi1 and xi2 beside D1 and D2, which are missing"));
+        }
+        Ok((entry, model.is_fisheye()))
+    });
     for found in flag.into_iter().chain(models) {
         let (entry, Some(is)) = found? else { continue };
         match &said {
@@ -148,12 +170,17 @@ fn fisheye_flag(entry: &Entry) -> Result<bool> {
 
 /// The distortion that the coefficients in `entry` describe.
 pub(super) fn distortion(entry: &Entry, expected: &str, fisheye: bool) -> Result<Distortion> {
-    let coefficients = entry.list(expected)?;
     if fisheye {
-        let four = coefficients.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
+        let four =
+            entry.list(expected)?.try_into().map_err(|_| entry.wrong("the 4 coefficients of a fisheye"))?;
         return Ok(Distortion::Equidistant(four));
     }
-    Distortion::radial_tangential(&coefficients).map_err(|expected| entry.wrong(expected))
+    radial_tangential(entry, expected).map(Distortion::RadialTangential)
+}
+
+/// The polynomials of the coefficients in `entry`.
+pub(super) fn radial_tangential(entry: &Entry, expected: &str) -> Result<RadialTangential> {
+    RadialTangential::new(&entry.list(expected)?).map_err(|expected| entry.wrong(expected))
 }
 
 /// Focal length and principal point of a camera matrix.
@@ -193,21 +220,23 @@ fn views(entries: &Entries) -> Result<Views> {
         projections.push(projection(&entries.require(PROJECTION[view], called, expected)?)?);
     }
     let entry = entries.require(PROJECTION[1], "P2", "")?;
-    rectified(&entry, rotations, [projections[0], projections[1]])
+    let size = entries.find(NEW_SIZE).map(|entry| entry.size()).transpose()?;
+    Ok(Views { size, ..rectified(&entry, rotations, [projections[0], projections[1]])? })
 }
 
-/// A rectified camera, and the fourth column of its matrix.
+/// A rectified camera.
 #[derive(Clone, Copy)]
 pub(super) struct Projection {
     pub(super) camera: Camera,
-    pub(super) column: [f64; 2],
+    /// Where the origin is in its frame, across and down: the fourth column of its matrix by the focal length.
+    pub(super) offset: [f64; 2],
 }
 
 pub(super) fn projection(entry: &Entry) -> Result<Projection> {
     match entry.matrix::<3, 4>()? {
         [[fx, 0.0, cx, tx], [0.0, fy, cy, ty], [0.0, 0.0, 1.0, 0.0]] if fx > 0.0 && fy > 0.0 => {
             let camera = Camera { focal_length: [fx, fy], principal_point: [cx, cy] };
-            Ok(Projection { camera, column: [tx, ty] })
+            Ok(Projection { camera, offset: [tx / fx, ty / fy] })
         }
         _ => Err(entry.wrong("a projection like [f 0 cx tx; 0 f cy ty; 0 0 1 0] with f above 0")),
     }
@@ -221,8 +250,7 @@ pub(super) fn rectified(
 ) -> Result<Views> {
     let [a, b] = [left.camera, right.camera];
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-    let translation: [f64; 2] =
-        std::array::from_fn(|i| (right.column[i] - left.column[i]) / b.focal_length[i]);
+    let translation: [f64; 2] = std::array::from_fn(|i| right.offset[i] - left.offset[i]);
     // The direction in which both views must agree.
     let across = usize::from(translation[0].abs() >= translation[1].abs());
     let agree = (0..2).all(|i| close(a.focal_length[i], b.focal_length[i]))
@@ -233,5 +261,5 @@ pub(super) fn rectified(
     if translation.iter().all(|v| *v == 0.0) {
         return Err(entry.wrong("focal length times baseline in its fourth column"));
     }
-    Ok(Views { rotations, cameras: [a, b], translation })
+    Ok(Views { rotations, cameras: [a, b], translation, size: None })
 }

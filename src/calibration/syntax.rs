@@ -1,7 +1,11 @@
-//! YAML and XML, as calibration programs write them.
+//! YAML, JSON, XML and INI, as calibration programs write them.
+
+use std::fmt;
 
 use roxmltree::{Document, ParsingOptions};
 use saphyr_parser::{Event, Parser};
+
+use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
 use super::node::{MAX_DEPTH, MAX_ENTRIES, Node};
 use crate::text::{one_line, quoted};
@@ -10,6 +14,8 @@ use crate::text::{one_line, quoted};
 pub(super) fn yaml(text: &str) -> Result<Node, String> {
     // OpenCV's own form of the directive, which is no YAML.
     let rest = text.strip_prefix("%YAML:1.0").unwrap_or(text);
+    // OpenCV needs no blank before a list.
+    let rest = &rest.replace(":[", ": [");
     // Groups that are open, each with the key that its next value has.
     let mut open: Vec<(Node, Option<String>)> = Vec::new();
     for event in Parser::new_from_str(rest) {
@@ -55,6 +61,113 @@ pub(super) fn yaml(text: &str) -> Result<Node, String> {
         }
     }
     Err("is no YAML with entries; is it a calibration?".into())
+}
+
+/// A JSON file. The error is one line.
+pub(super) fn json(text: &str) -> Result<Node, String> {
+    let root = serde_json::from_str::<Json>(text);
+    root.map(|Json(node)| node).map_err(|e| format!("is no JSON: {}", one_line(&e.to_string())))
+}
+
+struct Json(Node);
+
+impl<'de> Deserialize<'de> for Json {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(JsonVisitor)
+    }
+}
+
+struct JsonVisitor;
+
+impl<'de> Visitor<'de> for JsonVisitor {
+    type Value = Json;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a value")
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Json, E> {
+        Ok(Json(Node::Scalar(text.into())))
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Json, E> {
+        Ok(Json(Node::Scalar(value.to_string())))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Json, E> {
+        Ok(Json(Node::Scalar(value.to_string())))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Json, E> {
+        Ok(Json(Node::Scalar(value.to_string())))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Json, E> {
+        // As many digits as give the same number again.
+        Ok(Json(Node::Scalar(format!("{value:?}"))))
+    }
+
+    fn visit_unit<E>(self) -> Result<Json, E> {
+        Ok(Json(Node::Scalar(String::new())))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Json, A::Error> {
+        let mut nodes = Vec::new();
+        while let Some(Json(node)) = items.next_element()? {
+            nodes.push(node);
+        }
+        Ok(Json(Node::List(nodes)))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut items: A) -> Result<Json, A::Error> {
+        let mut entries: Vec<(String, Node)> = Vec::new();
+        while let Some((name, Json(node))) = items.next_entry::<String, Json>()? {
+            if entries.len() == MAX_ENTRIES {
+                return Err(de::Error::custom("has too many entries for a calibration"));
+            }
+            if entries.iter().any(|(other, _)| *other == name) {
+                return Err(de::Error::custom(format_args!("{} is there twice; keep one", quoted(&name))));
+            }
+            entries.push((name, node));
+        }
+        Ok(Json(Node::Map(entries)))
+    }
+}
+
+/// Whether a text begins with a section such as `[LEFT_CAM_HD]`.
+pub(super) fn is_ini(text: &str) -> bool {
+    let first = text.lines().next().unwrap_or_default().trim();
+    let name = first.strip_prefix('[').and_then(|line| line.strip_suffix(']')).unwrap_or_default();
+    name.starts_with(char::is_alphabetic) && name.chars().all(|c| c.is_alphanumeric() || c == '_')
+}
+
+/// An INI file: sections are groups of entries. The error is one line.
+pub(super) fn ini(text: &str) -> Result<Node, String> {
+    let mut sections: Vec<(String, Node)> = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let line = line.split(['#', ';']).next().unwrap_or_default().trim();
+        let wrong = |reason: &str| Err(format!("line {}: {reason}", i + 1));
+        if let Some(name) = line.strip_prefix('[').and_then(|line| line.strip_suffix(']')) {
+            if sections.iter().any(|(other, _)| other == name) {
+                return wrong(&format!("{} is there twice; keep one", quoted(name)));
+            }
+            sections.push((name.into(), Node::Map(Vec::new())));
+        } else if let Some((name, value)) = line.split_once('=') {
+            let Some((_, Node::Map(entries))) = sections.last_mut() else {
+                return wrong("expected a section such as [STEREO]");
+            };
+            if entries.iter().any(|(other, _)| other == name.trim()) {
+                return wrong(&format!("{} is there twice; keep one", quoted(name)));
+            }
+            entries.push((name.trim().into(), Node::Scalar(value.trim().into())));
+        }
+        if sections.len() > MAX_ENTRIES
+            || matches!(sections.last(), Some((_, Node::Map(e))) if e.len() > MAX_ENTRIES)
+        {
+            return wrong("has too many entries for a calibration");
+        }
+    }
+    Ok(Node::Map(sections))
 }
 
 /// An XML file: elements are entries, and elements called `_` a list. The error is one line.

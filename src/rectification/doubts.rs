@@ -1,6 +1,9 @@
 //! What is probably wrong with a calibration.
 
+use crate::calibration::cameras::Views;
 use crate::calibration::lens::Lens;
+
+use super::views::seen;
 
 /// A probable mistake in a calibration. It displays as one line with the cause and the remedy.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -25,10 +28,40 @@ pub enum Doubt {
         /// Width and height of the images.
         size: (usize, usize),
     },
+    /// A rectification that shows the images far from the middle of its views.
+    #[error(
+        "shows the middle of the images at ({}, {}) in rectified views of {} x {}, so its projections may be for views of about \
+         {} x {}: say their size by newImageSize: [{}, {}], or make them for {} x {}",
+        at[0], at[1], size.0, size.1, 2 * at[0], 2 * at[1], 2 * at[0], 2 * at[1], size.0, size.1
+    )]
+    Middle {
+        /// Where the middle of the images is in the rectified views, in the mean of both, in pixels.
+        at: [i64; 2],
+        /// Width and height of the views.
+        size: (usize, usize),
+    },
 }
 
 /// Cameras have it within a twentieth of the size; a calibration for 3/4 of the size is an eighth away.
 const FAR: f64 = 0.1;
+
+/// A doubt about `views`, of images of `size`, that may be for another size of the rectified images.
+pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, size: (usize, usize)) -> Option<Doubt> {
+    let rectified = views.size.unwrap_or(size);
+    let [images, ends] = [size, rectified].map(|(width, height)| [width as f64, height as f64]);
+    let middle = images.map(|end| (end - 1.0) / 2.0);
+    let at = [0, 1].map(|view| {
+        let point = seen(&lenses[view], &views.rotations[view], middle);
+        let camera = &views.cameras[view];
+        [0, 1].map(|i| camera.focal_length[i] * point[i] + camera.principal_point[i])
+    });
+    // Cameras that look towards each other show it to the left and to the right.
+    let mean = [0, 1].map(|i| f64::midpoint(at[0][i], at[1][i]));
+    let far = |i: usize| (mean[i] / ends[i] - 0.5).abs() > FAR;
+    let known = mean.iter().all(|v| v.abs() < 1e6);
+    (known && (far(0) || far(1)))
+        .then(|| Doubt::Middle { at: mean.map(|v| v.round() as i64), size: rectified })
+}
 
 /// A doubt about `lenses` that may be for images of another size than `size`.
 pub(super) fn of_lenses(lenses: &[Lens; 2], size: (usize, usize)) -> Option<Doubt> {

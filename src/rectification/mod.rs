@@ -45,7 +45,7 @@ pub struct Rectification {
     lenses: [Lens; 2],
     /// Their epipolar lines are rows.
     views: Views,
-    /// Of the images, and of the rectified ones.
+    /// Of the images, and of the rectified ones: the same, unless the calibration says another.
     sizes: [(usize, usize); 2],
     unit: Unit,
     doubts: Vec<Doubt>,
@@ -66,6 +66,7 @@ impl Rectification {
     /// the left one, or no rectified views exist; [`Error::Mismatch`] when it is for images of another size.
     pub fn new(calibration: &StereoCalibration, size: (usize, usize), options: &Options) -> Result<Self> {
         options.check()?;
+        let calibration = calibration.of_size(size);
         let error = |reason: &str| Error::Calibration(reason.into());
         if let Some((width, height)) = calibration.size.filter(|known| *known != size) {
             return Err(Error::Mismatch(format!(
@@ -84,14 +85,43 @@ impl Rectification {
             (_, Some(pose)) => views::choose(&lenses, pose, size, options)?,
             _ => return Err(error("does not say how the cameras stand to each other, R and T")),
         };
-        let (views, rectified) = turned(views, size);
+        let mut doubts = Vec::new();
+        if calibration.size.is_none() {
+            doubts.extend(doubts::of_lenses(&lenses, size));
+        }
+        // Views that are chosen here are around the middle of the images.
+        if calibration.views.is_some() && options.alpha.is_none() {
+            doubts.extend(doubts::of_views(&lenses, &views, size));
+        }
+        let (views, rectified) = turned(views, views.size.unwrap_or(size));
         // Says where the right camera is on the left.
         views.calibration(None, calibration.unit)?;
-        let doubts = match calibration.size {
-            None => doubts::of_lenses(&lenses, size).into_iter().collect(),
-            Some(_) => Vec::new(),
-        };
-        Ok(Self { lenses, views, sizes: [size, rectified], unit: calibration.unit, doubts, places: None })
+        let unit = calibration.unit;
+        let found = Self { lenses, views, sizes: [size, rectified], unit, doubts, places: None };
+        found.check_shown().map(|()| found)
+    }
+
+    /// An error where a view shows next to nothing of its image.
+    fn check_shown(&self) -> Result<()> {
+        const STEPS: usize = 48;
+        const LEAST: f64 = 0.05;
+        let [images, views] = self.sizes.map(|(width, height)| [width as f64, height as f64]);
+        for (view, name) in ["left", "right"].into_iter().enumerate() {
+            let at = |step: usize, i: usize| (step as f64 + 0.5) / STEPS as f64 * views[i] - 0.5;
+            let steps = (0..STEPS).flat_map(|y| (0..STEPS).map(move |x| [x, y]));
+            let inside = |source: [f64; 2]| (0..2).all(|i| (0.0..=images[i] - 1.0).contains(&source[i]));
+            let shown =
+                steps.filter(|[x, y]| self.source(view, at(*x, 0), at(*y, 1)).is_some_and(inside)).count();
+            let share = shown as f64 / (STEPS * STEPS) as f64;
+            if share < LEAST {
+                return Err(Error::Calibration(format!(
+                    "leads to a {name} view of which {:.1} % shows the image, as of cameras that look past each other; check its \
+                     rotations, its projections and that it is of these cameras",
+                    100.0 * share
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// What is probably wrong with the calibration.
@@ -209,7 +239,7 @@ fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usiz
         return (views, (width, height));
     }
     let (right, bottom) = (width as f64 - 1.0, height as f64 - 1.0);
-    let Views { rotations, cameras, translation: [_, down] } = views;
+    let Views { rotations, cameras, translation: [_, down], size } = views;
     // The left camera is above the right one where it is up in the frame of the right view.
     let above = down < 0.0;
     let turn: Matrix = if above {
@@ -222,5 +252,6 @@ fn turned(views: Views, (width, height): (usize, usize)) -> (Views, (usize, usiz
         principal_point: if above { [cy, right - cx] } else { [bottom - cy, cx] },
     });
     let rotations = rotations.map(|rotation| product(&turn, &rotation));
-    (Views { rotations, cameras, translation: [-down.abs(), 0.0] }, (height, width))
+    let size = size.map(|(width, height)| (height, width));
+    (Views { rotations, cameras, translation: [-down.abs(), 0.0], size }, (height, width))
 }

@@ -44,13 +44,13 @@ pub(super) fn choose(
     let turn = rotation(turn);
     let rotations = [product(&turn, &transposed(&half)), product(&turn, &half)];
     let t = rotated(&rotations[1], pose.translation);
-    let mut cameras = if lenses.iter().any(Lens::is_fisheye) {
+    let mut cameras = if lenses.iter().any(Lens::is_wide) {
         fisheye(lenses, &rotations, size, options.alpha.unwrap_or(0.0))
     } else {
         pinhole(lenses, &rotations, size, axis)
     };
     share(&mut cameras, axis, options.zero_disparity);
-    if let Some(alpha) = options.alpha.filter(|_| !lenses.iter().any(Lens::is_fisheye)) {
+    if let Some(alpha) = options.alpha.filter(|_| !lenses.iter().any(Lens::is_wide)) {
         let scale = scale(lenses, &rotations, &cameras, size, alpha);
         for camera in &mut cameras {
             camera.focal_length = camera.focal_length.map(|f| scale * f);
@@ -69,7 +69,7 @@ pub(super) fn choose(
     }
     let mut translation = [0.0; 2];
     translation[axis] = t[axis];
-    Ok(Views { rotations, cameras, translation })
+    Ok(Views { rotations, cameras, translation, size: None })
 }
 
 /// Lets both cameras share the principal point, or at least the coordinate across the epipolar lines.
@@ -83,7 +83,7 @@ fn share([left, right]: &mut [Camera; 2], axis: usize, zero_disparity: bool) {
 }
 
 /// Where a pixel of a real camera is in the plane z = 1 of its rectified view.
-fn seen(lens: &Lens, rotation: &Matrix, pixel: [f64; 2]) -> [f64; 2] {
+pub(super) fn seen(lens: &Lens, rotation: &Matrix, pixel: [f64; 2]) -> [f64; 2] {
     let [x, y] = lens.nearly_undistorted(pixel);
     let [x, y, z] = rotated(rotation, [x, y, 1.0]);
     [x / z, y / z]
@@ -143,7 +143,7 @@ fn scale(
     all_known * (1.0 - alpha) + all_kept * alpha
 }
 
-/// The cameras of fisheyes: from the middles of the edges of the images. `balance` is 0 where the nearest of them limits the
+/// The cameras of fisheyes and other wide lenses: from the middles of the edges of the images. `balance` is 0 where the nearest of them limits the
 /// view, and 1 where the farthest does.
 fn fisheye(lenses: &[Lens; 2], rotations: &[Matrix; 2], size: (usize, usize), balance: f64) -> [Camera; 2] {
     let (width, height) = (size.0 as f64, size.1 as f64);

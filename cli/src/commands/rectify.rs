@@ -27,9 +27,11 @@ Examples:
 /// where there is no source), mask0.png and mask1.png (white where there is none), and the calibration of the
 /// rectified pair twice: calib.txt in Middlebury's form and cameras.yml in OpenCV's.
 ///
-/// CALIB is OpenCV's YAML or XML (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's
-/// camera chain (cam0 is the left camera), or Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes
-/// with radial and tangential distortion, or fisheyes (equidistant); OpenCV's files say `fisheye: 1`.
+/// CALIB is OpenCV's YAML, XML or JSON (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's
+/// camera chain (cam0 is the left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK or COLMAP, or
+/// Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes with radial and tangential distortion,
+/// fisheyes (equidistant; OpenCV's files say `fisheye: 1`), omni, double sphere, extended unified or field of view; the guide
+/// has a table.
 ///
 /// The method is that of OpenCV's `stereoRectify`. Infinitely far points have a disparity of 0. If one camera
 /// is above the other, both images are rotated by 90 degrees, so that rows are epipolar lines:
@@ -45,7 +47,7 @@ pub(crate) struct Args {
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 
-    /// Calibration of the cameras; give the files of ROS, or the two of OpenCV's example program, one after the other
+    /// Calibration of the cameras; where it has several files, such as those of ROS, one after the other
     #[arg(long, value_name = "CALIB", required = true)]
     calib: Vec<PathBuf>,
     #[command(flatten)]

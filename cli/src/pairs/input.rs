@@ -29,7 +29,7 @@ pub(crate) struct PairArgs {
     #[command(flatten)]
     pub(crate) search: Search,
     /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; of OpenCV, ROS (two files, each
-    /// with --calib), Kalibr or Middlebury [default: a calib.txt beside LEFT]
+    /// with --calib), Kalibr, KITTI, Middlebury and others [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
     pub(crate) calib: Vec<PathBuf>,
     /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid

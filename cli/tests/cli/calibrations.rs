@@ -11,7 +11,7 @@ fn opencv() -> String {
 }
 
 /// The numbers of an entry of it.
-fn numbers(name: &str) -> Vec<String> {
+pub(super) fn numbers(name: &str) -> Vec<String> {
     let text = opencv();
     let entry = text.split(&format!("\n{name}: ")).nth(1).unwrap();
     let data = entry.split("data: [ ").nth(1).unwrap().split(" ]").next().unwrap();
@@ -187,7 +187,18 @@ fn every_format_gives_the_same_depths() {
         fs::read(folder.join("d.depth-mm.png")).unwrap()
     };
     let first = depths("txt");
-    for files in ["left right", "right left", "cv"] {
+    // KITTI's pairs in grey and in colour, of which one is twice as far apart.
+    let kitti = |text: &str, columns: [&str; 4]| {
+        let row = |(n, tx): (usize, &str)| {
+            format!("P{n}: 2.155e+02 0 1.185e+02 {tx} 0 2.155e+02 8.95e+01 0 0 0 1 0\n")
+        };
+        columns.into_iter().enumerate().map(row).collect::<String>() + text
+    };
+    write("colour", &kitti("Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n", ["0", "-68.96", "5.00", "-29.48"]));
+    write("grey", &kitti("pair: grey\n", ["0", "-34.48", "5.00", "-63.96"]));
+    let all = kitti("", ["0", "-34.48", "0", "0"]);
+    write("two", &all[..all.find("P2").unwrap()]);
+    for files in ["left right", "right left", "cv", "colour", "grey", "two"] {
         assert!(depths(files) == first, "{files}");
     }
 }
@@ -209,13 +220,13 @@ const WRONG: &[Row] = &[
         "cv",
         "5\n   dt: d\n   data: [ -0.16,",
         "6\n   dt: d\n   data: [ 0, -0.16,",
-        "D1: expected 4, 5 or 8 & 6 numbers",
+        "D1: expected 4, 5, 8, 12 or 14 & 6 numbers",
     ),
     (
         "cv",
         "5\n   dt: d\n   data: [ -0.16,",
-        "12\n   dt: d\n   data: [ 1, 2, 3, 4, 5, 6, 7, -0.16,",
-        "D1: expected no thin prism",
+        "13\n   dt: d\n   data: [ 1, 2, 3, 4, 5, 6, 7, 8, 9,",
+        "D1: expected 4, 5, 8, 12 or 14 & 13 numbers",
     ),
     ("cv", "[ 0.998908116030631", "[ 0.798908116030631", "R: expected a rotation"),
     ("cv", "[ -0.16356857928250576,", "[ .Nan,", "T: expected 3 numbers"),
@@ -248,8 +259,14 @@ const WRONG: &[Row] = &[
     ("xml", "<opencv_storage>", "<!DOCTYPE a [<!ENTITY b \"c\">]><opencv_storage>", "is no XML"),
     ("xml", "<rows>3</rows>", "<rows>4</rows>", "K1: expected 9 numbers & a damaged matrix"),
     ("chain", "cam1:", "cam2:", "cam1 is missing"),
-    ("chain", "pinhole", "omni", "cam0.camera_model: expected pinhole, found `omni`"),
-    ("chain", "radtan", "fov", "cam0.distortion_model: expected radtan, equidistant or none, found `fov`"),
+    ("chain", "pinhole", "mirror", "cam0.camera_model: expected a lens model & `mirror`"),
+    ("chain", "pinhole", "omni", "cam0.intrinsics: expected 5 numbers: xi, fu & 4 numbers"),
+    (
+        "chain",
+        "radtan",
+        "cubic",
+        "cam0.distortion_model: expected radtan, equidistant, fov or none, found `cubic`",
+    ),
     ("chain", "T_cn_cnm1", "T_other", "cam1.T_cn_cnm1 is missing & 4 x 4"),
     ("chain", "[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 0.0, 2.0]", "cam1.T_cn_cnm1: expected a rotation"),
     ("chain", "[240, 180]", "[320, 240]", "cam1.resolution: expected 320 x 240 & 240 x 180"),
@@ -290,7 +307,7 @@ fn what_is_wrong_in_a_calibration_is_told() {
 }
 
 /// A rectification for `testdata/raw` of its own making, with the lenses and the pose that it is of.
-fn stored() -> String {
+pub(super) fn stored() -> String {
     let by = mrfgs::calibration::of_texts(&[(Path::new("cameras"), opencv())]).unwrap();
     let by = Rectification::new(&by, (240, 180), &Options::default()).unwrap();
     let matrix = |name: &str, rows: usize, numbers: &[f64]| {
@@ -364,6 +381,15 @@ fn with_numbers(text: &str, name: &str, change: impl Fn(&[f64]) -> Vec<f64>) -> 
     [&text[..start], changed.trim_matches(['[', ']']), &text[end..]].concat()
 }
 
+/// `text` with a rotation turned about the y axis.
+fn turned(text: &str, name: &str, degrees: f64) -> String {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    with_numbers(text, name, |m| {
+        let row = |a: f64, b: f64| (0..3).map(move |x| a * m[x] + b * m[6 + x]);
+        row(cos, sin).chain(m[3..6].iter().copied()).chain(row(-sin, cos)).collect()
+    })
+}
+
 #[test]
 fn calibrations_that_contradict_themselves_are_told() {
     let folder = Folder::new();
@@ -379,13 +405,7 @@ fn calibrations_that_contradict_themselves_are_told() {
                     let factor: f64 = factor.parse().unwrap();
                     with_numbers(&stored(), name, |numbers| numbers.iter().map(|v| v * factor).collect())
                 }
-                [name, _, degrees] => {
-                    let (sin, cos) = degrees.parse::<f64>().unwrap().to_radians().sin_cos();
-                    with_numbers(&stored(), name, |m| {
-                        let row = |a: f64, b: f64| (0..3).map(move |x| a * m[x] + b * m[6 + x]);
-                        row(cos, sin).chain(m[3..6].iter().copied()).chain(row(-sin, cos)).collect()
-                    })
-                }
+                [name, _, degrees] => turned(&stored(), name, degrees.parse().unwrap()),
                 _ => unreachable!("{change}"),
             },
         };
@@ -420,6 +440,127 @@ fn a_calibration_for_another_size_is_told() {
     }
 }
 
+/// Projections of another size than that of the images.
+#[test]
+fn a_rectification_of_another_size_is_made_or_doubted() {
+    let folder = Folder::new();
+    let doubled = |numbers: &[f64]| numbers.iter().take(11).map(|v| 2.0 * v).chain([0.0]).collect::<Vec<_>>();
+    let doubled = |numbers: &[f64]| {
+        let mut numbers = doubled(numbers);
+        numbers[10] = 1.0;
+        numbers
+    };
+    let text = with_numbers(&with_numbers(&stored(), "P1", doubled), "P2", doubled);
+    fs::write(folder.join("silent"), &text).unwrap();
+    fs::write(folder.join("stated"), text.replace("unit: m", "unit: m\nnewImageSize: [ 480, 360 ]")).unwrap();
+    let told = rectify(&folder, "stated").succeeded();
+    told.says("480 x 360, 98.");
+    assert!(!told.stderr.contains("warning"), "{}", told.stderr);
+    let calib = fs::read_to_string(folder.join("out/calib.txt")).unwrap();
+    assert!(calib.contains("width=480\nheight=360\n"), "{calib}");
+    fs::remove_dir_all(folder.join("out")).unwrap();
+    let told = rectify(&folder, "silent").succeeded();
+    told.says("warning: silent: shows the middle of the images at (2");
+    told.says("in rectified views of 240 x 180 & newImageSize: [4");
+    // A rectification that is chosen has the size of the images.
+    fs::remove_dir_all(folder.join("out")).unwrap();
+    run(&folder, "rectify @raw/left.png @raw/right.png out --calib stated --alpha 0")
+        .succeeded()
+        .says("240 x 180");
+}
+
+/// Cameras that look past each other.
+#[test]
+fn a_view_that_shows_nothing_is_told() {
+    let folder = Folder::new();
+    fs::write(folder.join("a-file"), turned(&opencv(), "R", 70.0)).unwrap();
+    rectify(&folder, "a-file").failed(1, "a-file & view of which & % shows the image & check its rotations");
+}
+
+/// KITTI's `calib_cam_to_cam.txt` of the cameras of `testdata/raw`: the colour ones, which stand away from camera 0.
+fn kitti() -> String {
+    let row = |name: &str, numbers: &[f64]| {
+        let numbers = numbers.iter().map(|v| format!("{v:.15e}")).collect::<Vec<_>>();
+        format!("{name}: {}\n", numbers.join(" "))
+    };
+    let of = |text: &str, name: &str| {
+        let found = std::cell::RefCell::new(Vec::new());
+        with_numbers(text, name, |numbers| {
+            *found.borrow_mut() = numbers.to_vec();
+            numbers.to_vec()
+        });
+        found.into_inner()
+    };
+    let text = stored();
+    let [r, t] = ["R", "T"].map(|name| of(&text, name));
+    // Camera 2 looks along the x axis of camera 0, half a metre away.
+    let (turn, moved) = ([0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0], [0.5, 0.25, -0.125]);
+    let r3: Vec<f64> = (0..9).map(|i| (0..3).map(|k| r[i / 3 * 3 + k] * turn[3 * k + i % 3]).sum()).collect();
+    let t3: Vec<f64> = (0..3).map(|i| t[i] + (0..3).map(|k| r[3 * i + k] * moved[k]).sum::<f64>()).collect();
+    let mut out = "calib_time: 09-Jan-2012 13:57:47\ncorner_dist: 9.950000e-02\n".to_owned();
+    for (i, (rotation, translation)) in [(turn.to_vec(), moved.to_vec()), (r3, t3)].into_iter().enumerate() {
+        let (n, camera) = (i + 1, i + 2);
+        let name = |stem: &str| format!("{stem}_0{camera}");
+        out += &row(&name("S"), &[240.0, 180.0]);
+        out += &row(&name("K"), &of(&text, &format!("K{n}")));
+        out += &row(&name("D"), &of(&text, &format!("D{n}")));
+        out += &row(&name("R"), &rotation);
+        out += &row(&name("T"), &translation);
+        out += &row(&name("S_rect"), &[240.0, 180.0]);
+        out += &row(&name("R_rect"), &of(&text, &format!("R{n}")));
+        // The origin is camera 0, which is not in the plane of the image either.
+        let mut p = of(&text, &format!("P{n}"));
+        let (f, cx, cy, z) = (p[0], p[2], p[6], 0.003);
+        p[3] += 0.06 * f + cx * z;
+        p[7] += 0.001 * f + cy * z;
+        p[11] = z;
+        out += &row(&name("P_rect"), &p);
+    }
+    out
+}
+
+/// Whether two folders hold rectified pairs that differ by no more than the last bits of their calibrations.
+pub(super) fn alike(a: &Path, b: &Path, what: &str) {
+    for file in ["im0.png", "im1.png"] {
+        let [a, b] = [a, b].map(|folder| image::open(folder.join(file)).unwrap().into_rgba8());
+        assert_eq!(a.dimensions(), b.dimensions(), "{what}");
+        let pixels = a.pixels().zip(b.pixels());
+        let differ = pixels.filter(|(a, b)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1)).count();
+        assert!(differ < 20, "{what}: {differ} pixels of {file}");
+    }
+    let numbers = |folder: &Path| -> Vec<f64> {
+        let text = fs::read_to_string(folder.join("calib.txt")).unwrap();
+        text.split(['=', '[', ' ', ';', ']', '\n']).filter_map(|word| word.parse().ok()).collect()
+    };
+    let (a, b) = (numbers(a), numbers(b));
+    let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-6 * (1.0 + a.abs());
+    assert!(a.len() == b.len() && a.iter().zip(&b).all(close), "{what}: {a:?}, {b:?}");
+}
+
+#[test]
+fn kitti_is_read() {
+    let folder = Folder::new();
+    fs::write(folder.join("opencv"), stored()).unwrap();
+    fs::write(folder.join("kitti"), kitti()).unwrap();
+    for name in ["opencv", "kitti"] {
+        run(&folder, &format!("rectify @raw/left.png @raw/right.png {name}.out --calib {name}")).succeeded();
+    }
+    alike(&folder.join("opencv.out"), &folder.join("kitti.out"), "kitti");
+    for (from, to, words) in [
+        ("P_rect_03", "P_rect_04", "P3 is missing"),
+        ("S_rect_03: 2.4", "S_rect_03: 2.5", "S_rect_03: expected the size that camera 2 has"),
+        ("S_03: 2.4", "S_03: 2.5", "S_03: expected the size that camera 2 has"),
+        ("D_03", "D_3", "D_03 is missing"),
+        ("calib_time", "pair: blue\ncalib_time", "pair: expected grey (cameras 0 and 1) or colour"),
+        ("calib_time", "pair: grey\ncalib_time", "P0 is missing"),
+        ("R_rect_03", "R_rect_05", "that contradicts R by"),
+        ("T_03: ", "T_03: 1 ", "T_03: expected 3 numbers"),
+    ] {
+        fs::write(folder.join("a-file"), kitti().replace(from, to)).unwrap();
+        rectify(&folder, "a-file").failed(1, &format!("a-file & {words}"));
+    }
+}
+
 #[test]
 fn files_that_are_no_calibration_are_told() {
     let folder = Folder::new();
@@ -449,7 +590,8 @@ fn files_that_are_no_calibration_are_told() {
         ("none", "none & no such file"),
         ("left left", "left & expected focal length times baseline"),
         ("left words", "words & does not belong"),
-        ("opencv opencv opencv", "opencv & one too many"),
+        ("opencv opencv opencv", "opencv & does not belong to the other files"),
+        ("opencv opencv opencv opencv", "opencv & one too many"),
     ];
     let wrong = wrong.map(|(name, _, words)| (name, format!("{name} & {words}")));
     for (files, words) in wrong.into_iter().chain(more.map(|(files, words)| (files, words.to_owned()))) {

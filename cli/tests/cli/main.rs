@@ -10,6 +10,7 @@ mod evaluate;
 mod failures;
 #[path = "../../../tests/common/files.rs"]
 mod files;
+mod formats;
 mod geotiff;
 mod hostile;
 mod matching;

@@ -89,7 +89,9 @@ fn offset_principal_points_move_the_depth() {
     let at = |name: &str| folder.join(name);
     let calib = fs::read_to_string(scene("slanted/calib.txt")).unwrap();
     for doffs in [2.5, -12.0] {
-        fs::write(at("other.txt"), calib.replace("doffs=0", &format!("doffs={doffs}"))).unwrap();
+        let right = format!("cam1=[180 0 {}", 119.5 + doffs);
+        let calib = calib.replace("cam1=[180 0 119.5", &right).replace("doffs=0", &format!("doffs={doffs}"));
+        fs::write(at("other.txt"), calib).unwrap();
         for output in ["d.pfm", "d.tif"] {
             matched(&folder, "slanted", &format!("{output} --calib other.txt --quiet --also depth"));
         }

@@ -1,0 +1,126 @@
+//! COLMAP's `cameras.txt` and `images.txt` of two images, the left one first.
+
+use super::cameras::{Pose, StereoCalibration};
+use super::lens::{Distortion, Lens, RadialTangential};
+use super::node::{Entries, Entry, Node};
+use super::posed::{Posed, pair};
+use crate::error::Result;
+use crate::image::calib::Unit;
+
+/// Names of models, each with the number of its parameters.
+const MODELS: [(&str, usize); 11] = [
+    ("SIMPLE_PINHOLE", 3),
+    ("PINHOLE", 4),
+    ("SIMPLE_RADIAL", 4),
+    ("RADIAL", 5),
+    ("OPENCV", 8),
+    ("FULL_OPENCV", 12),
+    ("SIMPLE_RADIAL_FISHEYE", 4),
+    ("RADIAL_FISHEYE", 5),
+    ("OPENCV_FISHEYE", 8),
+    ("FOV", 5),
+    ("THIN_PRISM_FISHEYE", 12),
+];
+
+// What `parse` calls them.
+const CAMERAS: &str = "cameras.txt";
+const IMAGES: &str = "images.txt";
+
+/// The lines of one of these files as entries; `None` where it is neither.
+pub(super) fn parse(text: &str) -> Option<Node> {
+    let words =
+        |line: &str| Node::List(line.split_whitespace().map(|word| Node::Scalar(word.into())).collect());
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let first: Vec<&str> = lines.clone().find(|line| !line.trim().is_empty())?.split_whitespace().collect();
+    let numbers = |words: &[&str]| words.iter().all(|word| word.parse::<f64>().is_ok());
+    let mut rows = Vec::new();
+    let name = match first[..] {
+        [id, model, ref rest @ ..]
+            if numbers(&[id]) && numbers(rest) && MODELS.iter().any(|(name, _)| *name == model) =>
+        {
+            rows.extend(lines.filter(|line| !line.trim().is_empty()).map(words));
+            CAMERAS
+        }
+        [ref placed @ .., _] if placed.len() == 9 && numbers(placed) => {
+            // Every second line has the points that the image shows, and may be empty.
+            while let Some(line) = lines.next() {
+                if !line.trim().is_empty() {
+                    rows.push(words(line));
+                    lines.next();
+                }
+            }
+            IMAGES
+        }
+        _ => return None,
+    };
+    Some(Node::Map(vec![(name.into(), Node::List(rows))]))
+}
+
+/// Whether these entries are of one of the files.
+pub(super) fn is(entries: &Entries) -> bool {
+    entries.find("cameras.txt images.txt").is_some()
+}
+
+pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
+    let cameras = entries.require(CAMERAS, CAMERAS, "COLMAP's cameras, in the other file")?;
+    let entry = entries.require(IMAGES, IMAGES, "COLMAP's images, in the other file")?;
+    let images = entry.items()?;
+    let Ok([left, right]) = <[Entry; 2]>::try_from(images) else {
+        return Err(entry.error("has not two images; keep the two of the pair, the left one first"));
+    };
+    pair(&image(left, &cameras)?, &image(right, &cameras)?, Unit::Unknown)
+}
+
+/// A line of `images.txt`: its number, a quaternion, a translation, the number of its camera, its name.
+fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
+    let expected = "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME";
+    let words = entry.items()?;
+    let [_, numbers @ .., _] = &words[..] else { return Err(entry.wrong(expected)) };
+    let numbers = numbers.iter().map(Entry::number).collect::<Result<Vec<_>>>()?;
+    let [w, x, y, z, tx, ty, tz, id] = numbers[..] else { return Err(entry.wrong(expected)) };
+    let pose = Pose { rotation: entry.quaternion([w, x, y, z])?, translation: [tx, ty, tz] };
+    for camera in cameras.items()? {
+        if camera.items()?.first().map(Entry::number).transpose()? == Some(id) {
+            let (lens, size) = self::camera(&camera)?;
+            return Ok(Posed { lens, size: Some(size), pose, entry });
+        }
+    }
+    Err(entry.error(format_args!("is of camera {id}, which {CAMERAS} has not")))
+}
+
+/// A line of `cameras.txt`: its number, its model, width, height and the parameters.
+fn camera(entry: &Entry) -> Result<(Lens, (usize, usize))> {
+    let wrong = || entry.wrong("CAMERA_ID, MODEL, WIDTH, HEIGHT and the parameters of the model");
+    let words = entry.items()?;
+    let [_, model, width, height, parameters @ ..] = &words[..] else { return Err(wrong()) };
+    let p = parameters.iter().map(Entry::number).collect::<Result<Vec<_>>>()?;
+    let name = model.word()?;
+    if MODELS.iter().all(|known| *known != (name, p.len())) {
+        return Err(wrong());
+    }
+    let simple = matches!(
+        name,
+        "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE"
+    );
+    let (focal_length, [cx, cy], k) = match p[..] {
+        [f, cx, cy, ref k @ ..] if simple => ([f, f], [cx, cy], k),
+        [fx, fy, cx, cy, ref k @ ..] => ([fx, fy], [cx, cy], k),
+        _ => return Err(wrong()),
+    };
+    let c = |i: usize| k.get(i).copied().unwrap_or(0.0);
+    let distortion = match name {
+        "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE" | "OPENCV_FISHEYE" => {
+            Distortion::Equidistant([c(0), c(1), c(2), c(3)])
+        }
+        "FOV" => Distortion::FieldOfView(c(0)),
+        "THIN_PRISM_FISHEYE" => return Err(model.wrong("another lens model; undistort the images in COLMAP")),
+        // OPENCV has no k3; RADIAL has no more than k1 and k2.
+        _ => {
+            let all = [c(0), c(1), c(2), c(3), c(4), c(5), c(6), c(7)];
+            Distortion::RadialTangential(RadialTangential::polynomials(all))
+        }
+    };
+    // The centre of the top left pixel is at (0.5, 0.5).
+    let lens = Lens::new(focal_length, [cx - 0.5, cy - 0.5], distortion).map_err(|_| wrong())?;
+    Ok((lens, (width.count()?, height.count()?)))
+}

@@ -1,0 +1,48 @@
+//! Cameras that a file places in a frame of the rig, such as that of an inertial sensor.
+
+use super::cameras::{Pose, StereoCalibration};
+use super::lens::Lens;
+use super::matrix::length;
+use super::node::Entry;
+use crate::error::Result;
+use crate::image::calib::Unit;
+
+/// A camera of a rig.
+pub(super) struct Posed<'a> {
+    pub(super) lens: Lens,
+    pub(super) size: Option<(usize, usize)>,
+    /// From the frame of the rig to that of the camera.
+    pub(super) pose: Pose,
+    /// What says the pose.
+    pub(super) entry: Entry<'a>,
+}
+
+/// The calibration of two of them.
+pub(super) fn pair(left: &Posed, right: &Posed, unit: Unit) -> Result<StereoCalibration> {
+    if let (Some((width, height)), Some(size)) = (left.size, right.size)
+        && size != (width, height)
+    {
+        let reason = format_args!(
+            "is of a camera with images of {} x {}, and those of the left one are {width} x {height}; give a pair of one size",
+            size.0, size.1
+        );
+        return Err(right.entry.error(reason));
+    }
+    let pose = Pose::between(&left.pose, &right.pose);
+    apart(&right.entry, &pose)?;
+    Ok(StereoCalibration {
+        lenses: Some([left.lens, right.lens]),
+        pose: Some(pose),
+        size: left.size,
+        unit,
+        ..StereoCalibration::default()
+    })
+}
+
+/// An error about `entry` where both cameras are in one place.
+pub(super) fn apart(entry: &Entry, pose: &Pose) -> Result<()> {
+    if length(pose.translation) == 0.0 {
+        return Err(entry.error("puts both cameras in one place; expected a translation other than 0"));
+    }
+    Ok(())
+}
