@@ -63,7 +63,8 @@ impl Rectification {
     ///
     /// # Errors
     /// [`Error::Calibration`] when the calibration lacks the lenses or how they stand, when the right camera is on the left of
-    /// the left one, or no rectified views exist; [`Error::Mismatch`] when it is for images of another size.
+    /// the left one, when its rectification contradicts how they stand, or when no rectified views exist or one of them shows
+    /// next to nothing; [`Error::Mismatch`] when it is for images of another size.
     pub fn new(calibration: &StereoCalibration, size: (usize, usize), options: &Options) -> Result<Self> {
         options.check()?;
         let calibration = calibration.of_size(size);
