@@ -4,12 +4,15 @@ mod check;
 mod job;
 mod matched;
 mod search;
+mod sequence;
+#[cfg(not(target_arch = "wasm32"))]
+mod side_by_side;
 mod threads;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, FaultInjection, Gpu};
-use crate::engine::{self, Inspector, Match};
+use crate::engine::{self, Inspector};
 use crate::error::{BudgetError, Error, Result};
 use crate::image::Pair;
 use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
@@ -22,8 +25,6 @@ pub use job::{Answer, Job};
 use matched::summed;
 pub use matched::{Matched, Timing};
 pub use search::Search;
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
 use threads::Threads;
 
 /// Chooses what a [`Matcher`] does, and where.
@@ -97,7 +98,8 @@ impl Builder {
 pub struct Matcher {
     method: Method,
     threads: Threads,
-    cpu: Cpu,
+    /// The CPU path, with what it keeps from match to match: one for each pair that was matched beside others.
+    cpus: Vec<Cpu>,
     gpu: Option<Gpu>,
     /// The last method that the device was seen to compute as the CPU path does.
     checked: Option<Method>,
@@ -146,7 +148,7 @@ impl Matcher {
         Ok(Self {
             method,
             threads,
-            cpu: Cpu::default(),
+            cpus: Vec::new(),
             gpu,
             checked: None,
             falls_back,
@@ -194,125 +196,14 @@ impl Matcher {
                 served => return served,
             }
         }
-        let Self { threads, cpu, given_up, timings, .. } = self;
+        let Self { threads, cpus, given_up, timings, .. } = self;
         let note = note.or_else(|| given_up.clone());
-        let served = async || timed(cpu, *timings, &tiles, pair, observer, inspector).await;
-        let matched = threads.run(served).await?;
+        let mut cpu = cpus.pop().unwrap_or_default();
+        let served = async || timed(&mut cpu, *timings, &tiles, pair, observer, inspector).await;
+        let matched = threads.run(served).await;
+        cpus.push(cpu);
+        let matched = matched?;
         Ok(Matched { note, ..matched })
-    }
-
-    /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks. While a
-    /// device is at one pair, the next one's graphs are built and go up, and the maps of the one before come down. (Not when
-    /// the stages are timed, nor where a pair is cut into tiles or matched at twice its size.)
-    ///
-    /// # Errors
-    /// Those of [`Job::run`]; the results of all pairs before have been handed out then.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn run_all(
-        &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
-        take: impl FnMut(Matched) -> ControlFlow<()>,
-    ) -> Result<()> {
-        pollster::block_on(self.run_all_async(pairs, take))
-    }
-
-    /// As `run_all`, and ends with [`Error::Interrupted`] soon after `cancel` becomes true.
-    ///
-    /// # Errors
-    /// Those of [`Job::run`]; the results of all pairs before have been handed out then.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn run_all_until(
-        &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
-        cancel: &AtomicBool,
-        take: impl FnMut(Matched) -> ControlFlow<()>,
-    ) -> Result<()> {
-        pollster::block_on(self.run_each(pairs, cancel, take))
-    }
-
-    /// As `run_all`, for a browser.
-    ///
-    /// # Errors
-    /// Those of [`Job::run_async`]; the results of all pairs before have been handed out then.
-    pub async fn run_all_async(
-        &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
-        take: impl FnMut(Matched) -> ControlFlow<()>,
-    ) -> Result<()> {
-        self.run_each(pairs, &AtomicBool::new(false), take).await
-    }
-
-    async fn run_each(
-        &mut self,
-        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
-        cancel: &AtomicBool,
-        mut take: impl FnMut(Matched) -> ControlFlow<()>,
-    ) -> Result<()> {
-        let method = &self.method.clone();
-        let observer: Observer = &mut |_| {
-            let stopped = cancel.load(Ordering::Relaxed);
-            if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let mut last: Option<Flight> = None;
-        for (pair, range) in pairs {
-            let started = self.start(&pair, range, method, &mut *observer).await;
-            if let Some(last) = last.take()
-                && take(self.land(last, method, &mut *observer).await?).is_break()
-            {
-                return Ok(());
-            }
-            match started? {
-                Some((tiles, started)) => last = Some(Flight { pair, range, tiles, started }),
-                None => {
-                    if take(self.solve(&pair, range, method, &mut *observer, None).await?).is_break() {
-                        return Ok(());
-                    }
-                }
-            }
-        }
-        if let Some(last) = last {
-            let _ = take(self.land(last, method, observer).await?);
-        }
-        Ok(())
-    }
-
-    /// Starts a match on the device, where it can be left to itself.
-    async fn start(
-        &mut self,
-        pair: &Pair,
-        range: DisparityRange,
-        method: &Method,
-        observer: Observer<'_>,
-    ) -> Result<Option<(Tiles, Match)>> {
-        let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
-        let (width, height) = pair.size();
-        let plan = Plan::new(width, height, range, method)?;
-        let tiles = Tiles::new(&plan)?;
-        let program = Program::new(&tiles)?;
-        if !program.waits_once() {
-            return Ok(None);
-        }
-        let started = async || {
-            check(device, &plan.method, checked).await?;
-            device.keep_time(false)?;
-            engine::start(device, &program, pair, observer).await
-        };
-        match threads.run(started).await {
-            Ok(started) => Ok(Some((tiles, started))),
-            Err(e) => self.without_device(e).map(|_| None),
-        }
-    }
-
-    /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
-    async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
-        let Flight { pair, range, tiles, started } = flight;
-        if let Some(device) = &mut self.gpu {
-            match self.threads.run(async || engine::finish(device, started, &pair).await).await {
-                Ok(solution) => return Ok(Matched::new(device, &tiles, solution, Vec::new())),
-                Err(e) => self.without_device(e)?,
-            };
-        }
-        self.solve(&pair, range, method, observer, None).await
     }
 
     /// The failure of a device as a note, where the CPU path may step in: the bits are the same there, so it costs only time.
@@ -330,14 +221,6 @@ impl Matcher {
         }
         Ok(failure)
     }
-}
-
-/// A match that was started on a device.
-struct Flight {
-    pair: Pair,
-    range: DisparityRange,
-    tiles: Tiles,
-    started: Match,
 }
 
 async fn timed(

@@ -48,6 +48,16 @@ impl Threads {
     pub(super) async fn run<T: Send>(&self, work: impl AsyncFnOnce() -> T + Send) -> T {
         self.pool.install(|| pollster::block_on(work()))
     }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// Runs `begin` in the current thread, and waits for what it has spawned there.
+    pub(super) fn scope<'scope, T>(&self, begin: impl FnOnce(&rayon::Scope<'scope>) -> T) -> T {
+        self.pool.in_place_scope(begin)
+    }
 }
 
 #[cfg(target_arch = "wasm32")]

@@ -28,7 +28,7 @@ Examples:
   # Raw images and a calibration, to depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
-/// Match the frames of a video, one after the other
+/// Match the frames of a video
 ///
 /// LEFT and RIGHT are each a folder of images, a pattern of their names ('left/*.png'), a stream in YUV4MPEG2 as ffmpeg writes it
 /// (-f yuv4mpegpipe), or - for a stream on standard input. Images come in the order of their numbers, and those of the two cameras
@@ -39,8 +39,9 @@ Examples:
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
 /// with --also side-by-side, LEFT stands beside it. ffmpeg and ffplay read it.
 ///
-/// Without --max-disparity the range is that of the first frame. While a frame is matched, the next ones are
-/// read and rectified, and the last one is written. If an error or Ctrl-C ends a sequence early, the maps of
+/// Without --max-disparity the range is that of the first frame. While frames are matched, the next ones are
+/// read and rectified, and the last one is written. The CPU path matches as many at once as it has threads, as
+/// far as --memory allows. If an error or Ctrl-C ends a sequence early, the maps of
 /// all frames before are complete.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]

@@ -109,11 +109,12 @@ impl Pipeline {
             Some((frame.pair, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
-        let ended = self.matcher.run_all_until(pairs, stop::flag(), |matched| {
+        let told = &mut ran;
+        let ended = self.matcher.run_all_until(pairs, stop::flag(), move |matched| {
             let Ok((name, georeferences, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
-            ran.note =
-                matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)).or(ran.note.take());
-            ran.on = Some(matched.ran_on);
+            let note = matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS));
+            told.note = note.or(told.note.take());
+            told.on = Some(matched.ran_on);
             match found.send(Found { name, georeferences, maps: matched.maps, pair }) {
                 Ok(()) => ControlFlow::Continue(()),
                 // It tells why.

@@ -1,0 +1,152 @@
+//! Pair after pair: a device is never left without work, and the CPU path matches several pairs side by side.
+
+use super::check::check;
+use super::{Matched, Matcher};
+use crate::backend::Backend;
+use crate::engine::{self, Match};
+use crate::error::Result;
+use crate::image::Pair;
+use crate::options::{DisparityRange, Method};
+use crate::plan::Plan;
+use crate::program::Program;
+use crate::program::tiles::Tiles;
+use crate::watch::Observer;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+impl Matcher {
+    /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks.
+    ///
+    /// While a device is at one pair, the next one's graphs are built and go up, and the maps of the one before come down. (Not
+    /// where a pair is cut into tiles or matched at twice its size.) The CPU path matches as many pairs side by side as it has
+    /// threads, if so many come and fit in the method's memory and in that of the machine; `take` has a thread of its own there.
+    /// Where the stages are timed, one pair is matched after the other.
+    ///
+    /// # Errors
+    /// Those of [`Job::run`](super::Job::run); the results of all pairs before have been handed out then.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn run_all(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        take: impl FnMut(Matched) -> ControlFlow<()> + Send,
+    ) -> Result<()> {
+        pollster::block_on(self.run_all_async(pairs, take))
+    }
+
+    /// As `run_all`, and ends with [`Error::Interrupted`](crate::Error::Interrupted) soon after `cancel` becomes true.
+    ///
+    /// # Errors
+    /// Those of [`Job::run`](super::Job::run); the results of all pairs before have been handed out then.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn run_all_until(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        cancel: &AtomicBool,
+        take: impl FnMut(Matched) -> ControlFlow<()> + Send,
+    ) -> Result<()> {
+        pollster::block_on(self.run_each(pairs, cancel, take))
+    }
+
+    /// As `run_all`, for a browser: one pair after the other, and `take` in the thread that there is.
+    ///
+    /// # Errors
+    /// Those of [`Job::run_async`](super::Job::run_async); the results of all pairs before have been handed out then.
+    pub async fn run_all_async(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        take: impl FnMut(Matched) -> ControlFlow<()> + Send,
+    ) -> Result<()> {
+        self.run_each(pairs, &AtomicBool::new(false), take).await
+    }
+
+    async fn run_each(
+        &mut self,
+        pairs: impl IntoIterator<Item = (Pair, DisparityRange)>,
+        cancel: &AtomicBool,
+        mut take: impl FnMut(Matched) -> ControlFlow<()> + Send,
+    ) -> Result<()> {
+        let mut pairs = pairs.into_iter().fuse();
+        let method = &self.method.clone();
+        let observer: Observer = &mut |_| goes_on([cancel]);
+        let mut last: Option<Flight> = None;
+        // A device may be lost on the way.
+        while self.gpu.is_some() || self.timings || cfg!(target_arch = "wasm32") {
+            let Some((pair, range)) = pairs.next() else { break };
+            let started = self.start(&pair, range, method, &mut *observer).await;
+            if let Some(last) = last.take()
+                && take(self.land(last, method, &mut *observer).await?).is_break()
+            {
+                return Ok(());
+            }
+            match started? {
+                Some((tiles, started)) => last = Some(Flight { pair, range, tiles, started }),
+                None => {
+                    if take(self.solve(&pair, range, method, &mut *observer, None).await?).is_break() {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        if let Some(last) = last
+            && take(self.land(last, method, observer).await?).is_break()
+        {
+            return Ok(());
+        }
+        #[cfg(not(target_arch = "wasm32"))]
+        super::side_by_side::side_by_side(self, pairs, cancel, take)?;
+        Ok(())
+    }
+
+    /// Starts a match on the device, where it can be left to itself.
+    async fn start(
+        &mut self,
+        pair: &Pair,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer<'_>,
+    ) -> Result<Option<(Tiles, Match)>> {
+        let Self { threads, gpu: Some(device), checked, timings: false, .. } = self else { return Ok(None) };
+        let (width, height) = pair.size();
+        let plan = Plan::new(width, height, range, method)?;
+        let tiles = Tiles::new(&plan)?;
+        let program = Program::new(&tiles)?;
+        if !program.waits_once() {
+            return Ok(None);
+        }
+        let started = async || {
+            check(device, &plan.method, checked).await?;
+            device.keep_time(false)?;
+            engine::start(device, &program, pair, observer).await
+        };
+        match threads.run(started).await {
+            Ok(started) => Ok(Some((tiles, started))),
+            Err(e) => self.without_device(e).map(|_| None),
+        }
+    }
+
+    /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
+    async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
+        let Flight { pair, range, tiles, started } = flight;
+        if let Some(device) = &mut self.gpu {
+            match self.threads.run(async || engine::finish(device, started, &pair).await).await {
+                Ok(solution) => return Ok(Matched::new(device, &tiles, solution, Vec::new())),
+                Err(e) => self.without_device(e)?,
+            };
+        }
+        self.solve(&pair, range, method, observer, None).await
+    }
+}
+
+/// A match that was started on a device.
+struct Flight {
+    pair: Pair,
+    range: DisparityRange,
+    tiles: Tiles,
+    started: Match,
+}
+
+/// A break once one of `stops` is true.
+pub(super) fn goes_on<const N: usize>(stops: [&AtomicBool; N]) -> ControlFlow<()> {
+    let stopped = stops.iter().any(|stop| stop.load(Ordering::Relaxed));
+    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}

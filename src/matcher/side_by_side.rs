@@ -1,0 +1,186 @@
+//! The pairs of a sequence side by side on the CPU path.
+//!
+//! Some steps of a match cannot be shared among threads, and others are too short for it where images are small. So each thread
+//! takes a pair of its own where enough of them wait, and helps with the rows of another one where none does.
+
+use super::sequence::goes_on;
+use super::{Matched, Matcher, timed};
+use crate::error::{ExecutionError, Purpose, Result};
+use crate::image::Pair;
+use crate::memory;
+use crate::options::{DisparityRange, Method};
+use crate::plan::Plan;
+use crate::program::tiles::Tiles;
+use crate::watch::Observer;
+use std::ops::ControlFlow;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel, sync_channel};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+/// Matches `pairs`, and hands the results to `take`, in order, until it breaks.
+///
+/// # Errors
+/// Those of a match; the results of all pairs before have been handed out then.
+pub(super) fn side_by_side(
+    matcher: &mut Matcher,
+    pairs: impl Iterator<Item = (Pair, DisparityRange)>,
+    cancel: &AtomicBool,
+    take: impl FnMut(Matched) -> ControlFlow<()> + Send,
+) -> Result<()> {
+    let Matcher { method, threads, cpus, given_up, .. } = matcher;
+    let (method, given_up) = (&*method, &*given_up);
+    let room = Room::new(threads.count(), u64::from(method.tiles.memory) << 20);
+    let (cpus, stop) = (Mutex::new(cpus), AtomicBool::new(false));
+    let matched = |pair: &Pair, tiles: &Tiles, bytes: u64| {
+        let observer: Observer = &mut |_| goes_on([cancel, &stop]);
+        let mut cpu = {
+            let mut idle = locked(&cpus);
+            let cpu = idle.pop().unwrap_or_default();
+            // What idle ones keep must not be too much beside this one.
+            idle.truncate(
+                usize::try_from(room.most.1 / bytes.max(1)).unwrap_or(usize::MAX).saturating_sub(1),
+            );
+            cpu
+        };
+        let matched = pollster::block_on(timed(&mut cpu, false, tiles, pair, observer, None));
+        locked(&cpus).push(cpu);
+        Ok(Matched { note: given_up.clone(), ..matched? })
+    };
+    let (matched, stop) = (&matched, &stop);
+    let (begun, answers) = channel();
+    let ended = thread::scope(|scope| {
+        let taking = thread::Builder::new().spawn_scoped(scope, move || {
+            let ended = hand_out(&answers, take);
+            stop.store(true, Ordering::Relaxed);
+            ended
+        });
+        let taking = taking.map_err(|e| ExecutionError::Threads(e.to_string()))?;
+        threads.scope(|scope| {
+            for (pair, range) in pairs {
+                let planned = planned(&pair, range, method);
+                let share = room.share(planned.as_ref().map_or(0, |(_, bytes)| *bytes));
+                let (answer, answered) = sync_channel(1);
+                if begun.send(answered).is_err() {
+                    // Nobody takes any more.
+                    break;
+                }
+                scope.spawn(move |_| {
+                    let _ = answer.send(planned.and_then(|(tiles, bytes)| matched(&pair, &tiles, bytes)));
+                    drop(share);
+                });
+            }
+            drop(begun);
+        });
+        taking.join().unwrap_or_else(|panic| resume_unwind(panic))
+    });
+    // Pairs that come one by one need no more.
+    locked(&cpus).truncate(1);
+    ended
+}
+
+/// The tiles of a match, and the most bytes that it takes.
+fn planned(pair: &Pair, range: DisparityRange, method: &Method) -> Result<(Tiles, u64)> {
+    let (width, height) = pair.size();
+    let plan = Plan::new(width, height, range, method)?;
+    let tiles = Tiles::new(&plan)?;
+    let doubled = plan.doubled()?.map(|double| Tiles::new(&double)).transpose()?;
+    let bytes = tiles.bytes().max(doubled.map_or(0, |tiles| tiles.bytes()));
+    Ok((tiles, bytes))
+}
+
+/// Hands what was found to `take`, in the order in which it was begun.
+///
+/// # Errors
+/// That of the first match that failed.
+fn hand_out(
+    answers: &Receiver<Receiver<Result<Matched>>>,
+    mut take: impl FnMut(Matched) -> ControlFlow<()>,
+) -> Result<()> {
+    for answered in answers {
+        // Where there is no answer its match has panicked, and whoever began it does so, too.
+        let Ok(matched) = answered.recv() else { break };
+        if take(matched?).is_break() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// What the matches that are under way may take together, and what they do.
+struct Room {
+    /// Matches and bytes.
+    most: (usize, u64),
+    taken: Mutex<(usize, u64)>,
+    freed: Condvar,
+}
+
+impl Room {
+    fn new(matches: usize, bytes: u64) -> Self {
+        Self { most: (matches, bytes), taken: Mutex::new((0, 0)), freed: Condvar::new() }
+    }
+
+    /// Waits until a match that takes `bytes` may begin: beside no other one it always may.
+    fn share(&self, bytes: u64) -> Share<'_> {
+        let waits = |&mut (matches, taken): &mut (usize, u64)| {
+            let all = taken.saturating_add(bytes);
+            let fits = || matches < self.most.0 && all <= self.most.1;
+            matches > 0 && !(fits() && memory::check(all, Purpose::Match).is_ok())
+        };
+        let mut taken =
+            self.freed.wait_while(locked(&self.taken), waits).unwrap_or_else(PoisonError::into_inner);
+        *taken = (taken.0 + 1, taken.1.saturating_add(bytes));
+        Share { room: self, bytes }
+    }
+}
+
+/// What one match takes of a [`Room`].
+struct Share<'a> {
+    room: &'a Room,
+    bytes: u64,
+}
+
+impl Drop for Share<'_> {
+    fn drop(&mut self) {
+        let mut taken = locked(&self.room.taken);
+        *taken = (taken.0 - 1, taken.1 - self.bytes);
+        self.room.freed.notify_one();
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matches_share_what_there_is() {
+        let room = Room::new(2, 100);
+        let taken = || *locked(&room.taken);
+        let first = room.share(60);
+        let second = room.share(40);
+        assert_eq!(taken(), (2, 100));
+        thread::scope(|scope| {
+            // A third one is too many, whatever it takes.
+            let third = scope.spawn(|| drop(room.share(0)));
+            assert!(!third.is_finished());
+            drop(first);
+            third.join().unwrap();
+        });
+        drop(second);
+        assert_eq!(taken(), (0, 0));
+        // One that takes more than there is has the room for itself.
+        let large = room.share(1000);
+        thread::scope(|scope| {
+            let small = scope.spawn(|| drop(room.share(1)));
+            assert!(!small.is_finished());
+            drop(large);
+            small.join().unwrap();
+        });
+        assert_eq!(taken(), (0, 0));
+    }
+}
