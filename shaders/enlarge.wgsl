@@ -105,7 +105,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             value = centre + sum / weights;
         }
     }
-    full_raw[out] = 2 * raw[own_at];
+    full_raw[out] = clamp(2 * raw[own_at], params.low, params.high);
     full_disparity[out] = params.low + value;
     full_flags[out] = select(flags[like], MASKED, masked);
 }

@@ -7,7 +7,7 @@
 use mrfgs::Matcher;
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
 use mrfgs::low_level::front::check::{self, Warning};
-use mrfgs::maps::Maps;
+use mrfgs::maps::{FRACTION, Maps};
 use mrfgs::options::{DisparityRange, Method};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -143,12 +143,16 @@ fn a_range_that_cuts_off_the_scene_is_told() {
         });
         assert!(cut.iter().any(|warnings| ends(warnings, false)), "{}: {cut:?}", case.name);
     }
-    // Matched at half the size, disparities may end beyond the range.
+    // Matched at half the size, disparities are kept in the range at the end.
     let case = Case::load(Path::new("testdata/mixed"));
     let mut matcher = Matcher::builder().method(Method::fast()).device("cpu").build().unwrap();
     let mut told = |max: i32| {
         let range = DisparityRange::new(0, max).unwrap();
-        check::clipped(&matcher.run(&case.pair, range).unwrap().maps, range)
+        let maps = matcher.run(&case.pair, range).unwrap().maps;
+        for map in [&maps.raw, &maps.disparity] {
+            assert!(map.data().iter().all(|d| (0..=max * FRACTION).contains(d)), "0 to {max}");
+        }
+        check::clipped(&maps, range)
     };
     assert!(matches!(told(20)[..], [Warning::Clipped { end: 20, upper: true, percent: 20..35 }]));
     assert_eq!(told(case.range.max), []);

@@ -225,7 +225,6 @@ pub fn clipped(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
     let (mut all, mut at) = (0, [0; 2]);
     for (disparity, _) in measured {
         all += 1;
-        // What was matched at half the size may end a few pixels beyond.
         at[0] += usize::from(*disparity <= range.min * FRACTION);
         at[1] += usize::from(*disparity >= range.max * FRACTION);
     }

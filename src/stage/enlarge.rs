@@ -28,8 +28,8 @@
 //!
 //!    and the disparity is d(q*) + (sum of w(q) (d(q) - d(q*))) / (sum of w(q)), rounded towards 0.
 //!
-//! [`FullDisparity`](crate::backend::Map::FullDisparity) is the disparity, [`FullRaw`](crate::backend::Map::FullRaw) is twice the raw
-//! disparity of q0, and [`FullValidity`](crate::backend::Map::FullValidity) and
+//! [`FullDisparity`](crate::backend::Map::FullDisparity) is the disparity, [`FullRaw`](crate::backend::Map::FullRaw) is
+//! clamp(2 Raw(q0), low, high), and [`FullValidity`](crate::backend::Map::FullValidity) and
 //! [`FullConfidence`](crate::backend::Map::FullConfidence) are those of q*. Where p is masked, they are
 //! [`MASKED`](crate::maps::flag::MASKED) and 0.
 

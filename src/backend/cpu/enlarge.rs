@@ -28,7 +28,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
         .zip(full_validity.data_mut().par_chunks_mut(4 * width));
     maps.zip(flags).enumerate().for_each_init(Scratch::default, |scratch, (y, (maps, flags))| {
         let ((disparity, full_raw), (confidence, validity)) = (maps, flags);
-        twice(raw.row(y), full_raw, |raw| 2 * raw);
+        twice(raw.row(y), full_raw, |raw| (2 * raw).clamp(low, high));
         twice(half.confidence.row(y), confidence, |confidence| confidence);
         twice(half.validity.row(y), validity, |validity| validity);
         half.interpolate(y, scratch, disparity);

@@ -30,9 +30,9 @@ pub fn enlarge_by(edges: &Edges, plan: &Plan, pair: &Pair, maps: &Finest) -> Vec
     let range = plan.of_pair().range;
     let (width, height) = maps.disparity.size();
     let known = |at: (usize, usize)| has_disparity(maps.validity[at] as u8);
-    let d = |at: (usize, usize)| {
-        (2 * i64::from(maps.disparity[at])).clamp(256 * i64::from(range.min), 256 * i64::from(range.max))
-    };
+    let within =
+        |half: i32| (2 * i64::from(half)).clamp(256 * i64::from(range.min), 256 * i64::from(range.max));
+    let d = |at: (usize, usize)| within(maps.disparity[at]);
     // Disparity, and the pixel whose flags count.
     let at_full = |x: usize, y: usize| -> (i64, (usize, usize)) {
         let own = (x / 2, y / 2);
@@ -79,7 +79,7 @@ pub fn enlarge_by(edges: &Edges, plan: &Plan, pair: &Pair, maps: &Finest) -> Vec
         )
     };
     vec![
-        (Map::FullRaw, Plane::from_fn(2 * width, 2 * height, |x, y| 2 * maps.raw[(x / 2, y / 2)])),
+        (Map::FullRaw, Plane::from_fn(2 * width, 2 * height, |x, y| within(maps.raw[(x / 2, y / 2)]) as i32)),
         (Map::FullDisparity, places.map(|place| place.0 as i32)),
         (Map::FullValidity, flags(&maps.validity, flag::MASKED.into())),
         (Map::FullConfidence, flags(&maps.confidence, 0)),
