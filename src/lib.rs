@@ -118,7 +118,7 @@ pub use error::{Error, Result};
 pub use front::check;
 pub use front::conditioning::Conditioning;
 pub use image::Pair;
-pub use matcher::{Answer, Builder, Job, Matched, Matcher, Search, Timing};
+pub use matcher::{Answer, Builder, Found, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use watch::Progress;
 

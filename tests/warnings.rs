@@ -4,11 +4,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::Matcher;
 use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
+use mrfgs::low_level::engine::Inspection;
 use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::maps::{FRACTION, Maps};
 use mrfgs::options::{DisparityRange, Method};
+use mrfgs::{Found, Matched, Matcher};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -75,7 +76,7 @@ fn cases() -> Vec<Case> {
 fn nothing_is_said_where_nothing_is_wrong() {
     for case in cases() {
         assert_eq!(check::warnings(&case.pair, Some(case.range)), [], "{}", case.name);
-        assert_eq!(check::clipped(&case.maps(case.range), case.range), [], "{}", case.name);
+        assert_eq!(check::warnings_of(&case.maps(case.range), case.range), [], "{}", case.name);
         // A little darker or brighter does no harm.
         for (gain, offset) in [(0.72, 14.0), (0.5, 0.0), (1.0, 20.0), (1.0, -20.0)] {
             assert_eq!(case.exposed(|v| gain * v + offset), [], "{}, {gain} {offset}", case.name);
@@ -123,14 +124,91 @@ fn a_view_of_one_colour_is_told() {
     }
     assert_eq!(told(&mostly, case.pair.right()), [left]);
     mostly.masked = Plane::filled(width, height, true);
-    assert_eq!(told(&mostly, case.pair.right()), []);
+    let left = Warning::Masked { view: "left" };
+    assert_eq!(told(&mostly, case.pair.right()), [left]);
+    assert_eq!(told(case.pair.left(), &mostly), [Warning::Masked { view: "right" }]);
+}
+
+/// Views that do not belong together have a full map all the same, so it must say what it is worth.
+#[test]
+fn views_that_hardly_match_are_told() {
+    let scene = |name: &str| Case::load(&Path::new("testdata").join(name)).pair;
+    let (slanted, mixed, thin) = (scene("slanted"), scene("mixed"), scene("thin"));
+    let inverted = |image: &Image| Image {
+        pixels: image.pixels.map(|[r, g, b, _]| {
+            let [r, g, b] = [r, g, b].map(|v| 0xff00 - (v & 0xff00));
+            [r, g, b, grey(r, g, b)]
+        }),
+        ..image.clone()
+    };
+    let lower = |image: &Image| {
+        let (width, height) = image.pixels.size();
+        let pixels = Plane::from_fn(width, height, |x, y| image.pixels[(x, (y + height - 24) % height)]);
+        Image { pixels, ..image.clone() }
+    };
+    let with_right = |pair: &Pair, right: Image| Pair::new(pair.left().clone(), right).unwrap();
+    let wrong = [
+        ("two scenes", with_right(&slanted, thin.right().clone())),
+        ("inverted", with_right(&slanted, inverted(slanted.right()))),
+        ("24 rows lower", with_right(&mixed, lower(mixed.right()))),
+    ];
+    for method in [Method::default(), Method::fast()] {
+        let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
+        let mut told = |pair: &Pair| matcher.run(pair, 0..=47).unwrap().warnings();
+        for (what, pair) in &wrong {
+            let warnings = told(pair);
+            assert!(
+                matches!(warnings[..], [Warning::HardlyMatch { percent: 0..35 }]),
+                "{what}: {warnings:?}"
+            );
+        }
+        // Controls.
+        assert_eq!(told(&slanted), []);
+        assert_eq!(told(&mixed), []);
+        let mut masked = mixed.left().clone();
+        masked.masked = Plane::filled(320, 240, true);
+        assert_eq!(told(&Pair::new(masked, mixed.right().clone()).unwrap()), []);
+    }
+}
+
+/// A range that sparse matches found and that cuts off the scene becomes wider; one that a user gave stays.
+#[test]
+fn a_range_that_was_found_becomes_wider() {
+    let case = Case::load(Path::new("testdata/mixed"));
+    for method in [Method::default(), Method::fast()] {
+        let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
+        let cut = DisparityRange::new(0, 25).unwrap();
+        let again = matcher.run(&case.pair, Found(cut)).unwrap();
+        assert_eq!((again.range().min, again.range().max, again.range_found), (0, 38, true));
+        let wider = matcher.run(&case.pair, 0..=38).unwrap();
+        assert!(again.maps == wider.maps && !wider.range_found);
+        let given = matcher.run(&case.pair, cut).unwrap();
+        assert!(given.range() == cut && !given.warnings().is_empty());
+        // A range that holds the scene stays, and so does one beyond which nothing is found.
+        let enough = matcher.run(&case.pair, Found(case.range)).unwrap();
+        assert_eq!(enough.range(), case.range);
+        // The lower end of a range that was found does not count: what is far away has matches.
+        let high = DisparityRange::new(22, 47).unwrap();
+        let lower = |found: &Matched| {
+            found.warnings().iter().any(|w| matches!(w, Warning::Clipped { upper: false, .. }))
+        };
+        assert!(lower(&matcher.run(&case.pair, high).unwrap()));
+        assert!(!lower(&matcher.run(&case.pair, Found(high)).unwrap()));
+        // Who looks in sees one match.
+        let mut prepared = 0;
+        let job = matcher.job(&case.pair, Found(cut)).inspect(|seen| {
+            prepared += usize::from(matches!(seen, Inspection::Prepared(_)));
+            Ok(())
+        });
+        assert_eq!((job.run().unwrap().range(), prepared), (cut, 1));
+    }
 }
 
 #[test]
 fn a_range_that_cuts_off_the_scene_is_told() {
     for case in cases() {
         // A tenth or a third of the truth is beyond the end; some surfaces end just there.
-        let told = |range: DisparityRange| check::clipped(&case.maps(range), range);
+        let told = |range: DisparityRange| check::warnings_of(&case.maps(range), range);
         let ends = |warnings: &[Warning], at_top: bool| {
             warnings.iter().any(|w| matches!(w, Warning::Clipped { upper, .. } if *upper == at_top))
         };
@@ -152,7 +230,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
         for map in [&maps.raw, &maps.disparity] {
             assert!(map.data().iter().all(|d| (0..=max * FRACTION).contains(d)), "0 to {max}");
         }
-        check::clipped(&maps, range)
+        check::warnings_of(&maps, range)
     };
     assert!(matches!(told(20)[..], [Warning::Clipped { end: 20, upper: true, percent: 20..35 }]));
     assert_eq!(told(case.range.max), []);
@@ -160,9 +238,9 @@ fn a_range_that_cuts_off_the_scene_is_told() {
     let case = Case::load(Path::new("testdata/mixed"));
     let mut maps = case.maps(case.range);
     maps.raw = Plane::filled(case.pair.size().0, case.pair.size().1, 0);
-    assert_eq!(check::clipped(&maps, case.range), []);
-    assert_eq!(check::clipped(&maps, DisparityRange::new(0, 0).unwrap()), []);
-    let told = check::clipped(&maps, DisparityRange::new(-9, 0).unwrap());
+    assert_eq!(check::warnings_of(&maps, case.range), []);
+    assert_eq!(check::warnings_of(&maps, DisparityRange::new(0, 0).unwrap()), []);
+    let told = check::warnings_of(&maps, DisparityRange::new(-9, 0).unwrap());
     assert_eq!(told, [Warning::Clipped { end: 0, upper: true, percent: 100 }]);
 }
 

@@ -4,8 +4,6 @@ use std::ffi::c_char;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use mrfgs::check;
-
 use crate::frame::{self, Image};
 use crate::maps::Maps;
 use crate::options::Options;
@@ -102,7 +100,7 @@ pub unsafe extern "C" fn mrfgs_match(
         let matched = matched?;
         // SAFETY: they were checked for this size, and the caller promises that they are as large as their fields say.
         unsafe { maps.write(&matched) };
-        warnings::say(&check::clipped(&matched.maps, matched.range()));
+        warnings::say(&matched.warnings());
         DEVICE.with(|device| device.say(&matched.ran_on));
         NOTE.with(|note| note.say(&matched.note.as_ref().map(words::error).unwrap_or_default()));
         Ok(())

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mrfgs::image::Pair;
 use mrfgs::low_level::engine::Inspector;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Matched, Matcher};
+use mrfgs::{Found, Job, Matched, Matcher};
 
 use crate::console;
 use crate::failure::Result;
@@ -13,12 +13,33 @@ use crate::progress::Bar;
 use crate::remedy;
 use crate::text::plural;
 
+/// The disparities that a match searches.
+#[derive(Clone, Copy)]
+pub(crate) struct Searched {
+    pub(crate) range: DisparityRange,
+    /// Whether it may become [wider](mrfgs::check::wider): sparse matches found it, and the outputs can hold more.
+    pub(crate) may_widen: bool,
+}
+
+impl From<DisparityRange> for Searched {
+    fn from(range: DisparityRange) -> Self {
+        Self { range, may_widen: false }
+    }
+}
+
+impl Searched {
+    /// A match of `pair` over it.
+    pub(crate) fn job<'a>(self, matcher: &'a mut Matcher, pair: &'a Pair) -> Job<'a> {
+        if self.may_widen { matcher.job(pair, Found(self.range)) } else { matcher.job(pair, self.range) }
+    }
+}
+
 /// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and says on standard error what ran where and how
 /// long. `name` tells pairs apart where there are several.
 pub(crate) fn run(
     matcher: &mut Matcher,
     pair: &Pair,
-    range: DisparityRange,
+    searched: Searched,
     method: &Method,
     name: Option<&str>,
     quiet: bool,
@@ -26,7 +47,7 @@ pub(crate) fn run(
 ) -> Result<(Matched, Duration)> {
     let start = Instant::now();
     let mut bar = Bar::new(name, quiet);
-    let mut job = matcher.job(pair, range).method(method).on_progress(|progress| bar.update(progress));
+    let mut job = searched.job(matcher, pair).method(method).on_progress(|progress| bar.update(progress));
     if let Some(inspector) = inspector {
         job = job.inspect(inspector);
     }
@@ -39,7 +60,7 @@ pub(crate) fn run(
         }
         let (width, height) = matched.maps.disparity.size();
         let name = name.map(|name| format!("{name}: ")).unwrap_or_default();
-        let (labels, iterations) = (range.labels(), matched.iterations);
+        let (labels, iterations) = (matched.range().labels(), matched.iterations);
         let tiles = match matched.tiles.count() {
             1 => String::new(),
             count => format!(", {count} tiles"),

@@ -131,9 +131,11 @@ mod tests {
     }
 
     /// Every warning, and what is said of it.
-    const WARNINGS: [(Warning, &str); 9] = [
+    const WARNINGS: [(Warning, &str); 11] = [
         (Warning::Identical, "give the right view"),
         (Warning::Plain { view: "left" }, "the left view"),
+        (Warning::Masked { view: "right" }, "the right view is masked"),
+        (Warning::HardlyMatch { percent: 7 }, "only 7 % ... rectified"),
         (Warning::Contrast { percent: 12 }, "12 %"),
         (Warning::Saturated { percent: [1, 37] }, ", or --mask"),
         (Warning::Turned { how: "upside down" }, "upside down"),

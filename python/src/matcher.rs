@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use mrfgs::options::Execution;
-use mrfgs::{Matched, Matcher, check};
+use mrfgs::{Found, Matched, Matcher, check};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -44,14 +44,14 @@ impl PyMatcher {
     ///     they are; 16 bits fill their range with the largest value of both; floats run from the least to the largest value of
     ///     both. Ignored are pixels of alpha 0, values that are not finite, and what a masked array masks.
     /// max_disparity, min_disparity: the range to search in pixels, both ends included. Without max_disparity sparse matches
-    ///     find the range; min_disparity is 0 where max_disparity is given alone.
+    ///     find the range, and where the scene goes beyond it the pair is matched once more, over half as many labels more; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
     /// preset: the name of a preset; mrfgs.presets() lists them, and tells what each is for.
     /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
     ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
-    /// warn: whether to look for what is probably wrong (views swapped, turned or not rectified, a range that cuts off part of
-    ///     the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
+    /// warn: whether to look for what is probably wrong (views swapped, turned, not rectified or of two scenes, a range that cuts off
+    ///     part of the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
     ///
     /// Other threads run meanwhile; Ctrl-C ends it. Raises ValueError for what makes no sense, TypeError for other arrays,
     /// RuntimeError where the wanted device fails, and MemoryError where it does not fit.
@@ -86,11 +86,15 @@ impl PyMatcher {
         let matched = py.detach(|| {
             interruptible(|stop| {
                 let mut matcher = self.0.matcher.lock().unwrap_or_else(PoisonError::into_inner);
-                matcher.job(&pair, range).method(&method).cancel(stop).run()
+                let job = match given {
+                    Some(range) => matcher.job(&pair, range),
+                    None => matcher.job(&pair, Found(range)),
+                };
+                job.method(&method).cancel(stop).run()
             })
         })?;
         if warn {
-            exceptions::warn(py, check::clipped(&matched.maps, range))?;
+            exceptions::warn(py, matched.warnings())?;
         }
         PyMatched::of(py, matched)
     }

@@ -4,6 +4,7 @@ use super::search::Search;
 use super::{Matched, Matcher};
 use crate::engine::Inspection;
 use crate::error::{Error, Result};
+use crate::front::check;
 use crate::image::Pair;
 use crate::options::{DisparityRange, Method};
 use crate::watch::Progress;
@@ -38,6 +39,8 @@ pub struct Job<'a> {
     matcher: &'a mut Matcher,
     pair: &'a Pair,
     find: Find<'a>,
+    /// Whether sparse matches find the range.
+    found: bool,
     method: Option<&'a Method>,
     cancel: Option<&'a AtomicBool>,
     listener: Option<Listener<'a>>,
@@ -61,9 +64,18 @@ impl Matcher {
 }
 
 impl<'a> Job<'a> {
-    pub(super) fn new(matcher: &'a mut Matcher, pair: &'a Pair, search: impl Search + 'a) -> Self {
+    pub(super) fn new<S: Search + 'a>(matcher: &'a mut Matcher, pair: &'a Pair, search: S) -> Self {
         let find = Box::new(move |pair: &Pair| search.range(pair));
-        Self { matcher, pair, find, method: None, cancel: None, listener: None, inspect: None }
+        Self {
+            matcher,
+            pair,
+            find,
+            found: S::FOUND,
+            method: None,
+            cancel: None,
+            listener: None,
+            inspect: None,
+        }
     }
 
     /// By `method` instead of the matcher's own.
@@ -71,7 +83,7 @@ impl<'a> Job<'a> {
         Self { method: Some(method), ..self }
     }
 
-    /// `listener` hears of progress as each stage begins. It may answer with a [`ControlFlow`]; a break ends the match with
+    /// `listener` hears of progress as each stage begins; where the pair is matched [once more](Search::FOUND), from 0 on again. It may answer with a [`ControlFlow`]; a break ends the match with
     /// [`Error::Interrupted`].
     pub fn on_progress<A: Answer>(self, mut listener: impl FnMut(Progress) -> A + Send + 'a) -> Self {
         Self { listener: Some(Box::new(move |progress| listener(progress).goes_on())), ..self }
@@ -105,7 +117,7 @@ impl<'a> Job<'a> {
     /// # Errors
     /// Those of `run`.
     pub async fn run_async(self) -> Result<Matched> {
-        let Self { matcher, pair, find, method, cancel, mut listener, mut inspect } = self;
+        let Self { matcher, pair, find, found, method, cancel, mut listener, mut inspect } = self;
         let range = matcher.threads.run(async || find(pair)).await?;
         let own = matcher.method.clone();
         let mut observer = |progress| {
@@ -114,7 +126,21 @@ impl<'a> Job<'a> {
             if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
         let inspector = inspect.as_mut().map(|inspect| &mut **inspect as _);
-        matcher.solve(pair, range, method.unwrap_or(&own), &mut observer, inspector).await
+        let method = method.unwrap_or(&own);
+        // Who looks in sees one match.
+        let once = !found || inspector.is_some();
+        let matched = matcher.solve(pair, range, method, &mut observer, inspector).await?;
+        let matched = Matched { range_found: found, ..matched };
+        let Some(wider) = check::wider(&matched.maps, range).filter(|_| !once) else { return Ok(matched) };
+        match matcher.solve(pair, wider, method, &mut observer, None).await {
+            Ok(again) if check::goes_beyond(&again.maps, range) => {
+                Ok(Matched { range_found: found, ..again })
+            }
+            Ok(_) => Ok(matched),
+            // Too large a match is none that was asked for.
+            Err(Error::Range(_) | Error::Budget(_) | Error::Memory(_)) => Ok(matched),
+            Err(e) => Err(e),
+        }
     }
 
     /// Matches the pair, and writes the disparities to `out` as well, row by row, in pixels, `+inf` where there is none.

@@ -24,6 +24,8 @@ pub struct Matched {
     pub conditioning: Conditioning,
     /// The plan that was followed, for the whole image; [`Plan::doubled`] says by which it was matched at twice its size.
     pub plan: Plan,
+    /// Whether sparse matches found the range.
+    pub range_found: bool,
     /// How the image was cut for it: one tile where it was not.
     pub tiles: Tiles,
     /// What ran the stages, for people.
@@ -68,6 +70,7 @@ impl Matched {
             iterations: solution.iterations,
             conditioning: solution.conditioning,
             plan: tiles.whole().clone(),
+            range_found: false,
             tiles: tiles.clone(),
             ran_on: backend.describe(),
             driver: backend.driver(),
@@ -105,10 +108,13 @@ impl Matched {
         self.plan.of_pair().range
     }
 
-    /// Whether the range probably cuts off a part of the scene.
+    /// What is probably wrong with the pair or the range, as the maps show.
     #[must_use]
     pub fn warnings(&self) -> Vec<Warning> {
-        check::clipped(&self.maps, self.range())
+        let mut warnings = check::warnings_of(&self.maps, self.range());
+        // What is far away has matches: what ends there is wrong, and not cut off.
+        warnings.retain(|w| !self.range_found || !matches!(w, Warning::Clipped { upper: false, .. }));
+        warnings
     }
 }
 

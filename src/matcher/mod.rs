@@ -24,7 +24,7 @@ use check::check;
 pub use job::{Answer, Job};
 use matched::summed;
 pub use matched::{Matched, Timing};
-pub use search::Search;
+pub use search::{Found, Search};
 use threads::Threads;
 
 /// Chooses what a [`Matcher`] does, and where.

@@ -2,18 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::Error;
 use mrfgs::calibration::{self, cameras::StereoCalibration, matrix::Matrix};
 use mrfgs::check::{self, Warning};
 use mrfgs::depth::Rig;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
+use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Options, Rectification};
+use mrfgs::{Error, Matched};
 
 use crate::args::{Found, ReadingArgs, Search, Sign, shown};
 use crate::console;
 use crate::failure::{self, Failure, Result};
+use crate::matching::Searched;
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::CALIBRATION;
 use crate::remedy;
@@ -152,13 +154,40 @@ impl Input {
         }
     }
 
+    /// What is searched, where a range that `fits` can be written.
+    pub(crate) fn searched(&self, fits: impl Fn(DisparityRange) -> bool) -> Searched {
+        let may_widen = self.by_matches && check::beyond(self.range).is_some_and(fits);
+        Searched { range: self.range, may_widen }
+    }
+
+    /// Says so where a range that was found became the wider one of `matched`.
+    pub(crate) fn say_wider(&self, matched: &Matched, sign: Sign, place: &str) {
+        if matched.range() != self.range {
+            let DisparityRange { min, max } = sign.range(matched.range());
+            console::say(&format!(
+                "disparities {min} to {max} in a second match, because the scene{place} goes beyond the sparse matches"
+            ));
+        }
+    }
+
     /// Says what is probably wrong with the pair.
     pub(crate) fn warn(&self) {
         if let (Some(by), Some(known)) = (&self.rectification, &self.calibration) {
             doubt(by, &known.files);
         }
         // A range that was found does not show what the user knows.
-        warn(check::warnings(&self.pair, (!self.by_matches).then_some(self.range)));
+        let warnings = check::warnings(&self.pair, (!self.by_matches).then_some(self.range));
+        let (off_rows, others): (Vec<_>, Vec<_>) = warnings.into_iter().partition(|warning| {
+            self.rectification.is_some() && matches!(warning, Warning::NotRectified { .. })
+        });
+        warn(others);
+        if let Some(Warning::NotRectified { offset }) = off_rows.first() {
+            console::say(&format!(
+                "warning: after rectification matches lie {:.1} px above or below their row: the calibration is not of these \
+                 cameras as they are now, or not of images of this size",
+                f64::from(*offset) / f64::from(FRACTION)
+            ));
+        }
     }
 }
 

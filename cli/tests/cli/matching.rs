@@ -116,6 +116,48 @@ fn a_range_is_found_where_none_is_given() {
     run(&folder, line).succeeded().says("disparities 2 to ");
 }
 
+/// Two surfaces that are far away have sparse matches. A near one is too noisy for these, but not for the match.
+#[test]
+fn a_range_that_was_found_is_widened_where_the_scene_goes_beyond_it() {
+    let folder = Folder::new();
+    let noise = |x: u32, y: u32, seed: u32| {
+        let v = (x.wrapping_mul(7919) + y.wrapping_mul(104_729) + seed.wrapping_mul(15_485_863))
+            .wrapping_mul(0x9e37_79b9);
+        ((v ^ (v >> 15)).wrapping_mul(0x85eb_ca6b) >> 20) & 0xff
+    };
+    for (view, name) in [(0, "left.png"), (1, "right.png")] {
+        let image = image::GrayImage::from_fn(320, 240, |x, y| {
+            let disparity = if y < 80 { 5 } else { 30 };
+            let near = y >= 150;
+            let x = x + view * if near { 48 } else { disparity };
+            let texture = noise(x, y, 1);
+            let level = if near { texture.midpoint(noise(x, y, 2 + view)) } else { texture };
+            image::Luma([level as u8])
+        });
+        image.save(folder.join(name)).unwrap();
+    }
+    let line = "match left.png right.png out.pfm --method fast --json out.json";
+    let found = run(&folder, line).succeeded();
+    found.says("disparities 0 to 40, by sparse matches");
+    found.says("disparities 0 to 60 in a second match, because the scene goes beyond the sparse matches");
+    found.says("61 labels");
+    assert!(fs::read_to_string(folder.join("out.json")).unwrap().contains("\"labels\": 61"));
+    let map = read::read_disparity(&folder.join("out.pfm")).unwrap();
+    assert!((47.0..49.0).contains(&map[(200, 200)]), "{}", map[(200, 200)]);
+    // Frames are matched over the same range as that of the first one.
+    for name in ["left", "right"] {
+        fs::create_dir(folder.join(name)).unwrap();
+        fs::copy(folder.join(format!("{name}.png")), folder.join(name).join("1.png")).unwrap();
+    }
+    let sequence = run(&folder, "sequence left right maps --method fast").succeeded();
+    sequence.says("disparities 0 to 60 in a second match, because the scene of the first frame goes beyond");
+    assert_eq!(fs::read(folder.join("maps/1.pfm")).unwrap(), fs::read(folder.join("out.pfm")).unwrap());
+    // A user's own range stays.
+    run(&folder, "match left.png right.png out.pfm --method fast --max-disparity 40")
+        .succeeded()
+        .says("41 labels");
+}
+
 #[test]
 fn a_pair_that_is_not_rectified_is_named() {
     let folder = Folder::new();

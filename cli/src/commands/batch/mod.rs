@@ -18,6 +18,7 @@ use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, Sign};
 use crate::failure::{self, Failure, Result};
+use crate::matching::Searched;
 use crate::outputs::{Claim, Format, MapArgs, MatchRecord, Outcome, also, files};
 use crate::progress::Counter;
 use crate::{console, remedy, stop};
@@ -281,7 +282,8 @@ impl Batch<'_> {
                 return Ok(Err(error));
             }
         };
-        let Input { pair, range, rig, mut files, .. } = input;
+        let Input { pair, rig, mut files, .. } = input;
+        let range = matched.range();
         let wanted = &self.args.maps;
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
@@ -307,10 +309,13 @@ impl Batch<'_> {
         // The folder is there, so what can be wrong is the range.
         self.named(claim, wanted.check(claim.folder(), &listed.name, range))?;
         let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
+        let fits = |wider| wanted.check(claim.folder(), &listed.name, wider).is_ok();
+        let searched =
+            Searched { range, may_widen: input.by_matches && check::beyond(range).is_some_and(fits) };
         let start = Instant::now();
-        let matched = matcher.job(pair, range).on_progress(|_| stop::go_on()).run()?;
+        let matched = searched.job(matcher, pair).on_progress(|_| stop::go_on()).run()?;
         let time = start.elapsed();
-        warnings.extend(check::clipped(&matched.maps, range));
+        warnings.extend(matched.warnings());
         let warnings = warnings.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)).collect();
         Ok((input, matched, time, warnings))
     }

@@ -72,7 +72,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         Some(look) => Some(look),
         None => None,
     };
-    let (matched, time) = matching::run(&mut matcher, &input.pair, input.range, &method, None, false, look)?;
+    let (matched, time) =
+        matching::run(&mut matcher, &input.pair, input.range.into(), &method, None, false, look)?;
     let files = args.pair.files(&input, None);
     let record = MatchRecord::new(&files, &matched, time, Sign::default());
     files::deliver(args.json.as_deref(), &record, &times(&matched, time), |written| {

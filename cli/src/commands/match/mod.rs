@@ -5,9 +5,9 @@ mod plan;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Matcher;
-use mrfgs::check;
 use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
+use mrfgs::options::DisparityRange;
 
 use crate::args::{ExecutionArgs, MethodArgs, RectificationArgs, Sign};
 use crate::failure::{Failure, Result};
@@ -116,11 +116,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let mut matcher = Matcher::builder().execution(execution).build()?;
-    let (matched, time) = matching::run(&mut matcher, &input.pair, range, &method, None, args.quiet, None)?;
+    let searched = input.searched(|wider| check_range(args, wider).is_ok());
+    let (matched, time) =
+        matching::run(&mut matcher, &input.pair, searched, &method, None, args.quiet, None)?;
+    let range = matched.range();
     if !args.quiet {
-        input::warn(
-            check::clipped(&matched.maps, range).into_iter().map(|warning| args.sign.warning(warning)),
-        );
+        input.say_wider(&matched, args.sign, "");
+        input::warn(matched.warnings().into_iter().map(|warning| args.sign.warning(warning)));
     }
     // Outputs take memory too.
     drop(matcher);
@@ -143,18 +145,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Finds out before any computing whether all outputs can be written. Returns the files of `--also`.
 fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathBuf)>> {
-    let (output, range) = (args.output.as_path(), args.sign.range(input.range));
+    let output = args.output.as_path();
     if files::is_printed(output) {
         if let Some(word) = args.also.wanted().next() {
             let reason = "is written beside OUTPUT, and `-` is no file; give OUTPUT a name";
             return Err(Failure::usage(word.flag(), reason));
         }
         console::check_takes_data()?;
-    } else {
-        write::check_disparity_path(output, range.min, range.max)?;
     }
+    check_range(args, input.range)?;
     let also: Vec<_> = args.also.wanted().map(|word| (word, word.beside(output))).collect();
-    also.iter().try_for_each(|(word, path)| word.check(path, range))?;
     files::json_file(args.json.as_deref()).map_or(Ok(()), write::check_path)?;
     let mut inputs = args.pair.inputs(input);
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
@@ -164,6 +164,15 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
         .chain(args.json.as_deref().map(|path| ("--json", path)));
     files::distinct(&inputs, &outputs.collect::<Vec<_>>())?;
     Ok(also)
+}
+
+/// Finds out whether the outputs can hold disparities of `range`.
+fn check_range(args: &Args, range: DisparityRange) -> Result<()> {
+    let (output, range) = (args.output.as_path(), args.sign.range(range));
+    if !files::is_printed(output) {
+        write::check_disparity_path(output, range.min, range.max)?;
+    }
+    Ok(args.also.wanted().try_for_each(|word| word.check(&word.beside(output), range))?)
 }
 
 /// Writes all outputs, or leaves none of them. Returns what there is to say of depths and points.

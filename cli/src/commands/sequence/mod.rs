@@ -5,6 +5,7 @@ mod writer;
 
 use std::path::{Path, PathBuf};
 
+use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Search, Sign};
@@ -124,12 +125,27 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         input.warn();
     }
     let rig = input.rig(args.maps.also.take_cameras(), &args.left)?;
-    let (range, rectifying) = (input.range, input.rectifying());
+    let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
+    let range = range_of_all(&mut matcher, &input, args)?;
+    let rectifying = input.rectifying();
     let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying };
-    let matcher = Matcher::builder().method(method).execution(execution).build()?;
     let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
     let pipeline = Pipeline { matcher, range, quiet: args.quiet };
     pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
+}
+
+/// The range for all frames: where sparse matches found it, a match of the first frame shows whether that is enough.
+fn range_of_all(matcher: &mut Matcher, first: &Input, args: &Args) -> Result<DisparityRange> {
+    // The folder is not there yet, and does not matter.
+    let searched = first.searched(|wider| args.maps.check(Path::new(""), "000000", wider).is_ok());
+    if !searched.may_widen {
+        return Ok(first.range);
+    }
+    let matched = searched.job(matcher, &first.pair).on_progress(|_| stop::go_on()).run()?;
+    if !args.quiet {
+        first.say_wider(&matched, Sign::default(), " of the first frame");
+    }
+    Ok(matched.range())
 }
 
 /// Refuses what would mean nothing, and the name of a film that is not written.
