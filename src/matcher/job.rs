@@ -136,9 +136,8 @@ impl<'a> Job<'a> {
             Ok(again) if check::goes_beyond(&again.maps, range) => {
                 Ok(Matched { range_found: found, ..again })
             }
-            Ok(_) => Ok(matched),
-            // Too large a match is none that was asked for.
-            Err(Error::Range(_) | Error::Budget(_) | Error::Memory(_)) => Ok(matched),
+            // One that finds nothing beyond, or that is too large: nobody asked for it.
+            Ok(_) | Err(Error::Range(_) | Error::Budget(_) | Error::Memory(_)) => Ok(matched),
             Err(e) => Err(e),
         }
     }
