@@ -333,7 +333,11 @@ fn status_tells_and_runs_nothing() {
     fs::write(&image, "").unwrap();
     assert_eq!(batch(&folder, "list.csv out").code, Some(1));
     fs::remove_file(folder.join("out/pair-1.json")).unwrap();
-    let (told, out) = (status(), folder.join("out"));
+    // A script that asks must hear of it.
+    let failed = batch(&folder, "list.csv out --status");
+    assert_eq!(failed.code, Some(1));
+    failed.says("1 of 4 failed");
+    let (told, out) = (failed.stdout, folder.join("out"));
     let lines: Vec<_> = told.lines().collect();
     assert_eq!(lines[..3], ["complete  pair-0", "missing   pair-1", "complete  pair-2"]);
     assert!(lines[3].starts_with("failed    pair-3: cannot read images/3-left.png"), "{told}");
@@ -344,6 +348,19 @@ fn status_tells_and_runs_nothing() {
     assert_eq!(status(), all("complete") + "4 complete, 0 failed, 0 missing\n");
     let other = batch(&folder, "list.csv out --status --also validity").succeeded().stdout;
     assert!(other.ends_with("0 complete, 0 failed, 4 missing\n"), "of other maps: {other}");
+}
+
+#[test]
+fn warnings_are_told_and_counted() {
+    let folder = pairs(3, (120, 90));
+    fs::copy(folder.join("images/1-left.png"), folder.join("images/1-right.png")).unwrap();
+    let told = batch(&folder, "list.csv out").succeeded();
+    told.says("pair-1: warning: the two images are the same");
+    told.says("3 done, 0 skipped, 0 failed, 1 with warnings");
+    assert_eq!(record(&folder.join("out"), "pair-1")["warnings"].as_array().unwrap().len(), 1);
+    assert_eq!(told.stderr.lines().count(), 2, "the other pairs have none: {}", told.stderr);
+    let quiet = batch(&folder, "list.csv other --quiet").succeeded();
+    assert_eq!(quiet.stderr, "");
 }
 
 #[test]

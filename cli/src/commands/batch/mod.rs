@@ -195,7 +195,11 @@ impl Batch<'_> {
             let _ = writeln!(text, "{state:<9} {}{reason}", listed.name);
         }
         let _ = writeln!(text, "{complete} complete, {failed} failed, {missing} missing");
-        Ok(console::print(&text)?)
+        console::print(&text)?;
+        match failed {
+            0 => Ok(()),
+            _ => Err(Failure::Failed(format!("{failed} of {} failed; run without --status to try again", pairs.len()))),
+        }
     }
 
     /// Matches every pair that is not complete.
@@ -208,7 +212,7 @@ impl Batch<'_> {
         let all = pairs.len();
         let (mut done, mut skipped, mut failed) = (0, all - left.len(), Vec::new());
         let mut bar = Counter::of_pairs(all, skipped, self.args.quiet);
-        let mut told = None;
+        let (mut told, mut doubtful) = (None, 0);
         // How many pairs in a row other runs had claimed.
         let mut taken = 0;
         while let Some(listed) = left.pop_front() {
@@ -238,8 +242,13 @@ impl Batch<'_> {
                 continue;
             }
             match self.pair(listed, &claim, &mut matcher) {
-                Ok(Ok(note)) => {
+                Ok(Ok((note, warnings))) => {
                     done += 1;
+                    doubtful += usize::from(!warnings.is_empty());
+                    if !self.args.quiet {
+                        let say = |warning| console::say(&format!("{name}: warning: {warning}"));
+                        bar.past(|| warnings.iter().for_each(say));
+                    }
                     // Why there is no device is the same for all that follow.
                     if note.is_some() && note != told && !self.args.quiet {
                         bar.past(|| note.iter().for_each(|note| console::say(note)));
@@ -262,16 +271,17 @@ impl Batch<'_> {
             return Err(Failure::Failed(text));
         }
         if !self.args.quiet {
-            console::say(&summary);
+            let doubtful = if doubtful == 0 { String::new() } else { format!(", {doubtful} with warnings") };
+            console::say(&format!("{summary}{doubtful}"));
         }
         Ok(())
     }
 
-    /// Matches one pair and writes its outputs, or why it failed. Returns the note of the match.
+    /// Matches one pair and writes its outputs, or why it failed. Returns the note of the match, and the warnings.
     ///
     /// # Errors
     /// An error that concerns all pairs; inside, one that concerns this pair.
-    fn pair(&self, listed: &Listed, claim: &Claim, matcher: &mut Matcher) -> Result<Result<Option<String>>> {
+    fn pair(&self, listed: &Listed, claim: &Claim, matcher: &mut Matcher) -> Result<Result<(Option<String>, Vec<String>)>> {
         let (request, record) = (self.request(listed), self.record(listed));
         let (input, matched, time, warnings) = match self.compute(listed, matcher, claim) {
             Ok(computed) => computed,
@@ -294,7 +304,7 @@ impl Batch<'_> {
         let found = MatchRecord::new(&files, &matched, time, sign);
         let text = request.done(&record, claim.folder(), found, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
-        Ok(Ok(matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS))))
+        Ok(Ok((matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)), warnings)))
     }
 
     fn compute(
