@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use web_time::Instant;
 
@@ -19,6 +20,12 @@ pub struct Progress {
 
 /// Receives the progress of a match, and decides whether it continues.
 pub type Observer<'a> = &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + Send);
+
+/// A break once one of `stops` is true.
+pub(crate) fn goes_on<const N: usize>(stops: [&AtomicBool; N]) -> ControlFlow<()> {
+    let stopped = stops.iter().any(|stop| stop.load(Ordering::Relaxed));
+    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
 
 /// How far a match has come.
 #[derive(Clone, Debug, Default)]

@@ -10,9 +10,9 @@ use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
 use crate::program::Program;
 use crate::program::tiles::Tiles;
-use crate::watch::Observer;
+use crate::watch::{Observer, goes_on};
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 impl Matcher {
     /// Matches pair after pair, each over its range, and hands the results to `take`, in order, until it breaks.
@@ -143,10 +143,4 @@ struct Flight {
     range: DisparityRange,
     tiles: Tiles,
     started: Match,
-}
-
-/// A break once one of `stops` is true.
-pub(super) fn goes_on<const N: usize>(stops: [&AtomicBool; N]) -> ControlFlow<()> {
-    let stopped = stops.iter().any(|stop| stop.load(Ordering::Relaxed));
-    if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

@@ -3,7 +3,6 @@
 //! Some steps of a match cannot be shared among threads, and others are too short for it where images are small. So each thread
 //! takes a pair of its own where enough of them wait, and helps with the rows of another one where none does.
 
-use super::sequence::goes_on;
 use super::{Matched, Matcher, timed};
 use crate::error::{ExecutionError, Purpose, Result};
 use crate::image::Pair;
@@ -11,7 +10,7 @@ use crate::memory;
 use crate::options::{DisparityRange, Method};
 use crate::plan::Plan;
 use crate::program::tiles::Tiles;
-use crate::watch::Observer;
+use crate::watch::{Observer, goes_on};
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};

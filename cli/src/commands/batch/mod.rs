@@ -198,7 +198,10 @@ impl Batch<'_> {
         console::print(&text)?;
         match failed {
             0 => Ok(()),
-            _ => Err(Failure::Failed(format!("{failed} of {} failed; run without --status to try again", pairs.len()))),
+            _ => Err(Failure::Failed(format!(
+                "{failed} of {} failed; run without --status to try again",
+                pairs.len()
+            ))),
         }
     }
 
@@ -281,7 +284,12 @@ impl Batch<'_> {
     ///
     /// # Errors
     /// An error that concerns all pairs; inside, one that concerns this pair.
-    fn pair(&self, listed: &Listed, claim: &Claim, matcher: &mut Matcher) -> Result<Result<(Option<String>, Vec<String>)>> {
+    fn pair(
+        &self,
+        listed: &Listed,
+        claim: &Claim,
+        matcher: &mut Matcher,
+    ) -> Result<Result<(Option<String>, Vec<String>)>> {
         let (request, record) = (self.request(listed), self.record(listed));
         let (input, matched, time, warnings) = match self.compute(listed, matcher, claim) {
             Ok(computed) => computed,
