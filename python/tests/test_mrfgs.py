@@ -271,6 +271,8 @@ class Match(unittest.TestCase):
         self.assertIn("upside down", told(left, right[::-1], 15)[0])
         self.assertIn("the same", told(left, left, 15)[0])
         self.assertIn("raise max_disparity", " ".join(told(left, right, 9)))
+        self.assertRegex(" ".join(told(left, 255 - right, 15)), r"only \d+ % of the pixels were found in both views")
+        self.assertIn("the left view is masked everywhere", told(left, right, 15, mask=np.ones((200, 300), bool))[0])
         self.assertEqual(told(right, left, 15, warn=False), [])
         self.assertTrue(issubclass(mrfgs.MatchWarning, UserWarning))
         with warnings.catch_warnings():
@@ -666,7 +668,8 @@ class Rectification(Folder):
             (ValueError, "Calibration.of_texts", lambda: mrfgs.Rectification(text)),
             (TypeError, "calibration: give the path", lambda: mrfgs.Rectification(7)),
             (TypeError, "calibration: give the path", lambda: mrfgs.Rectification([7])),
-            (ValueError, "one too many", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS)),
+            (ValueError, "does not belong to the other files", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS)),
+            (ValueError, "one too many", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS, CAMERAS)),
             (ValueError, "the text: K1", lambda: of_texts(text.replace("214.0, 0.0, 121.4", "wide, 0.0, 121.4"))),
             (ValueError, "the text: R is missing", lambda: mrfgs.Rectification(of_texts(text.split("R: ")[0]), (240, 180))),
             (ValueError, "right camera on the left", lambda: mrfgs.Rectification(of_texts(swapped))),
