@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mrfgs::image::Pair;
 use mrfgs::low_level::engine::Inspector;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Found, Job, Matched, Matcher};
+use mrfgs::{Found, Job, Matched, Matcher, check};
 
 use crate::console;
 use crate::failure::Result;
@@ -16,8 +16,8 @@ use crate::text::plural;
 /// The disparities that a match searches.
 #[derive(Clone, Copy)]
 pub(crate) struct Searched {
-    pub(crate) range: DisparityRange,
-    /// Whether it may become [wider](mrfgs::check::wider): sparse matches found it, and the outputs can hold more.
+    range: DisparityRange,
+    /// Whether it may become [wider](check::wider).
     pub(crate) may_widen: bool,
 }
 
@@ -28,6 +28,15 @@ impl From<DisparityRange> for Searched {
 }
 
 impl Searched {
+    /// `range`, which may become wider where sparse matches found it and the wider one `fits` the outputs.
+    pub(crate) fn new(
+        range: DisparityRange,
+        by_matches: bool,
+        fits: impl Fn(DisparityRange) -> bool,
+    ) -> Self {
+        Self { range, may_widen: by_matches && check::beyond(range).is_some_and(fits) }
+    }
+
     /// A match of `pair` over it.
     pub(crate) fn job<'a>(self, matcher: &'a mut Matcher, pair: &'a Pair) -> Job<'a> {
         if self.may_widen { matcher.job(pair, Found(self.range)) } else { matcher.job(pair, self.range) }

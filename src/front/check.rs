@@ -45,8 +45,8 @@ const CLIPPED_PERCENT: usize = 2;
 /// by `fast`.
 const MEASURED_PERCENT: usize = 35;
 /// Pixels in a thousand at the upper end of a range that sparse matches found from which on it is [`wider`] (open). Of 54 ranges, two cut
-/// off a road: these have 11 and 12 by the default, 23 and 25 by `fast`. Of the others three have more than 8 in a thousand (one of them
-/// lacks the nearest 3 px), and 47 less than 4.
+/// off a road: these have 11 and 12 by the default, 23 and 25 by `fast`. By `fast`, three of the others have more than 8 (one of them lacks
+/// the nearest 3 px), and 47 less than 4.
 const ENDING: usize = 8;
 /// Ranges with fewer labels consist of nothing but ends.
 const MIN_LABELS: usize = 3;

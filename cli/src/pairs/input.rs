@@ -156,8 +156,7 @@ impl Input {
 
     /// What is searched, where a range that `fits` can be written.
     pub(crate) fn searched(&self, fits: impl Fn(DisparityRange) -> bool) -> Searched {
-        let may_widen = self.by_matches && check::beyond(self.range).is_some_and(fits);
-        Searched { range: self.range, may_widen }
+        Searched::new(self.range, self.by_matches, fits)
     }
 
     /// Says so where a range that was found became the wider one of `matched`.
@@ -176,17 +175,16 @@ impl Input {
             doubt(by, &known.files);
         }
         // A range that was found does not show what the user knows.
-        let warnings = check::warnings(&self.pair, (!self.by_matches).then_some(self.range));
-        let (off_rows, others): (Vec<_>, Vec<_>) = warnings.into_iter().partition(|warning| {
-            self.rectification.is_some() && matches!(warning, Warning::NotRectified { .. })
-        });
-        warn(others);
-        if let Some(Warning::NotRectified { offset }) = off_rows.first() {
-            console::say(&format!(
-                "warning: after rectification matches lie {:.1} px above or below their row: the calibration is not of these \
-                 cameras as they are now, or not of images of this size",
-                f64::from(*offset) / f64::from(FRACTION)
-            ));
+        for warning in check::warnings(&self.pair, (!self.by_matches).then_some(self.range)) {
+            match warning {
+                // To rectify is no remedy any more.
+                Warning::NotRectified { offset } if self.rectification.is_some() => console::say(&format!(
+                    "warning: after rectification matches lie {:.1} px above or below their row: the calibration is not of \
+                     these cameras as they are now, or not of images of this size",
+                    f64::from(offset) / f64::from(FRACTION)
+                )),
+                other => warn([other]),
+            }
         }
     }
 }

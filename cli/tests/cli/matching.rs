@@ -158,6 +158,27 @@ fn a_range_that_was_found_is_widened_where_the_scene_goes_beyond_it() {
         .says("41 labels");
 }
 
+/// Whoever has rectified a pair by a calibration that is not of these cameras is not told to rectify it.
+#[test]
+fn rows_that_do_not_line_up_after_rectification_are_told() {
+    let folder = Folder::new();
+    let raw = |name: &str| scene("raw").join(name).display().to_string();
+    let right = image::open(raw("right.png")).unwrap();
+    let (width, height) = (right.width(), right.height());
+    let mut lower = right.clone();
+    image::imageops::replace(&mut lower, &right.crop_imm(0, 0, width, height - 3), 0, 3);
+    lower.save(folder.join("lower.png")).unwrap();
+    let line = |right: &str| {
+        let (left, calib) = (raw("left.png"), raw("cameras.yml"));
+        format!("match {left} {right} out.pfm --rectify --calib {calib} --max-disparity 40 --method fast")
+    };
+    let told = run(&folder, &line("lower.png")).succeeded();
+    told.says("warning: after rectification matches lie & px above or below their row: the calibration");
+    assert!(!told.stderr.contains("rectify it first"), "{}", told.stderr);
+    let good = run(&folder, &line(&raw("right.png"))).succeeded();
+    assert!(!good.stderr.contains("warning"), "{}", good.stderr);
+}
+
 #[test]
 fn a_pair_that_is_not_rectified_is_named() {
     let folder = Folder::new();

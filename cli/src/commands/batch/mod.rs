@@ -328,8 +328,7 @@ impl Batch<'_> {
         self.named(claim, wanted.check(claim.folder(), &listed.name, range))?;
         let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
         let fits = |wider| wanted.check(claim.folder(), &listed.name, wider).is_ok();
-        let searched =
-            Searched { range, may_widen: input.by_matches && check::beyond(range).is_some_and(fits) };
+        let searched = Searched::new(range, input.by_matches, fits);
         let start = Instant::now();
         let matched = searched.job(matcher, pair).on_progress(|_| stop::go_on()).run()?;
         let time = start.elapsed();
