@@ -55,6 +55,12 @@ pub(crate) struct Search {
     pub(crate) min_disparity: Option<i32>,
 }
 
+impl From<DisparityRange> for Search {
+    fn from(DisparityRange { min, max }: DisparityRange) -> Self {
+        Self { max_disparity: Some(Largest::Pixels(max)), min_disparity: Some(min) }
+    }
+}
+
 /// A range, and how it was found.
 pub(crate) struct Found {
     pub(crate) range: DisparityRange,

@@ -1,4 +1,4 @@
-//! Films of maps, as YUV4MPEG2 for ffmpeg and players.
+//! Films of maps: YUV4MPEG2, or what ffmpeg makes of it.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -7,6 +7,7 @@ use mrfgs::image::{Plane, write::Growing};
 use mrfgs::{Error, Result};
 
 use crate::console;
+use crate::ffmpeg::{self, Encoder};
 use crate::outputs::files::is_printed;
 
 /// Frames a second where the input does not say it.
@@ -24,6 +25,19 @@ pub(crate) struct Film {
 enum Sink {
     Printed,
     File(Growing),
+    Encoded(Encoder),
+}
+
+impl Sink {
+    fn new(path: &Path) -> Result<Self> {
+        if is_printed(path) {
+            Ok(Self::Printed)
+        } else if ffmpeg::writes(path) {
+            Encoder::new(path).map(Self::Encoded)
+        } else {
+            Growing::new(path).map(Self::File)
+        }
+    }
 }
 
 impl Film {
@@ -46,11 +60,7 @@ impl Film {
                 "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED\n"
             );
             bytes.extend_from_slice(header.as_bytes());
-            self.sink.insert(if is_printed(&self.path) {
-                Sink::Printed
-            } else {
-                Sink::File(Growing::new(&self.path)?)
-            })
+            self.sink.insert(Sink::new(&self.path)?)
         };
         bytes.extend_from_slice(b"FRAME\n");
         let yuv: Vec<[u8; 3]> = picture.data().iter().map(|rgb| to_yuv(*rgb)).collect();
@@ -58,6 +68,7 @@ impl Film {
         match sink {
             Sink::Printed => console::print_data(&bytes, "film"),
             Sink::File(file) => file.write_all(&bytes).map_err(|e| Error::write(&self.path, e)),
+            Sink::Encoded(film) => film.add(&bytes),
         }
     }
 
@@ -68,6 +79,7 @@ impl Film {
     pub(crate) fn finish(self) -> Result<()> {
         match self.sink {
             Some(Sink::File(file)) => file.finish(),
+            Some(Sink::Encoded(film)) => film.finish(),
             _ => Ok(()),
         }
     }

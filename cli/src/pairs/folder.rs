@@ -114,7 +114,7 @@ impl<'a> Folder<'a> {
         [left, right]
     }
 
-    fn views(&self, reader: Reader) -> Result<Pair> {
+    pub(crate) fn views(&self, reader: Reader) -> Result<Pair> {
         let [left, right] = self.view_names().map(|file| self.dir.join(file));
         reader.pair(&left, &right, None)
     }

@@ -82,7 +82,7 @@ impl PairArgs {
             left: path(&self.left),
             right: path(&self.right),
             mask: self.mask.as_deref().map(path),
-            calibration: input.calibration.as_ref().map(|known| shown(&known.files)),
+            calibration: input.calibration_files(),
             output: output.map(path),
         }
     }
@@ -128,6 +128,11 @@ impl Input {
         Ok(Self { pair, range, by_matches, calibration, rectification })
     }
 
+    /// The files of the calibration, for a record.
+    pub(crate) fn calibration_files(&self) -> Option<String> {
+        self.calibration.as_ref().map(|known| shown(&known.files))
+    }
+
     /// The calibration file.
     pub(crate) fn calibration_file(&self) -> Option<&Path> {
         self.calibration.as_ref().map(|known| known.named().0)
@@ -171,21 +176,27 @@ impl Input {
 
     /// Says what is probably wrong with the pair.
     pub(crate) fn warn(&self) {
+        self.warnings(&remedy::FLAGS).iter().for_each(|warning| say(warning));
+    }
+
+    /// What is probably wrong with the pair and its calibration, in these `words`.
+    pub(crate) fn warnings(&self, words: &remedy::Words) -> Vec<String> {
+        let mut said = Vec::new();
         if let (Some(by), Some(known)) = (&self.rectification, &self.calibration) {
-            doubt(by, &known.files);
+            said.extend(doubts(by, &known.files));
         }
         // A range that was found does not show what the user knows.
-        for warning in check::warnings(&self.pair, (!self.by_matches).then_some(self.range)) {
-            match warning {
-                // To rectify is no remedy any more.
-                Warning::NotRectified { offset } if self.rectification.is_some() => console::say(&format!(
-                    "warning: after rectification matches lie {:.1} px above or below their row: the calibration is not of \
-                     these cameras as they are now, or not of images of this size",
-                    f64::from(offset) / f64::from(FRACTION)
-                )),
-                other => warn([other]),
-            }
-        }
+        let warnings = check::warnings(&self.pair, (!self.by_matches).then_some(self.range));
+        said.extend(warnings.iter().map(|warning| match warning {
+            // To rectify is no remedy any more.
+            Warning::NotRectified { offset } if self.rectification.is_some() => format!(
+                "after rectification matches lie {:.1} px above or below their row: the calibration is not of these \
+                 cameras as they are now, or not of images of this size",
+                f64::from(*offset) / f64::from(FRACTION)
+            ),
+            other => remedy::warning(other, words),
+        }));
+        said
     }
 }
 
@@ -202,16 +213,20 @@ fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
 
 /// Says on standard error what is probably wrong.
 pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
-    for warning in warnings {
-        console::say(&format!("warning: {}", remedy::warning(&warning, &remedy::FLAGS)));
-    }
+    warnings.into_iter().for_each(|warning| say(&remedy::warning(&warning, &remedy::FLAGS)));
 }
 
 /// Says on standard error what is probably wrong with the calibration of `files`.
 pub(crate) fn doubt(by: &Rectification, files: &[PathBuf]) {
-    for doubt in by.doubts() {
-        console::say(&format!("warning: {}: {doubt}", shown(files)));
-    }
+    doubts(by, files).for_each(|doubt| say(&doubt));
+}
+
+fn doubts(by: &Rectification, files: &[PathBuf]) -> impl Iterator<Item = String> {
+    by.doubts().iter().map(move |doubt| format!("{}: {doubt}", shown(files)))
+}
+
+fn say(warning: &str) {
+    console::say(&format!("warning: {warning}"));
 }
 
 /// Rectifies `pair` by the `calibration` of `files`. Errors name these.

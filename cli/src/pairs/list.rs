@@ -1,6 +1,6 @@
 //! Lists of pairs: CSV files in UTF-8 whose header names their columns.
 //!
-//! The columns are name, left and right, and optionally `max_disparity`, `min_disparity` and mask. An empty field counts as
+//! The columns are name, left and right, and optionally `max_disparity`, `min_disparity`, mask and calibration. An empty field counts as
 //! missing. Empty lines and lines that begin with # are skipped.
 
 use std::collections::HashMap;
@@ -17,7 +17,7 @@ use crate::outputs::also;
 use crate::remedy;
 
 /// The columns of a list; the first three are required.
-const COLUMNS: [&str; 6] = ["name", "left", "right", "max_disparity", "min_disparity", "mask"];
+const COLUMNS: [&str; 7] = ["name", "left", "right", "max_disparity", "min_disparity", "mask", "calibration"];
 const REQUIRED: usize = 3;
 
 /// The longest name of a pair, in bytes: file systems allow more, which leaves room for the endings of its files.
@@ -36,6 +36,8 @@ pub struct Row {
     pub right: String,
     /// Path of the mask, if there is one.
     pub mask: Option<String>,
+    /// Paths of the files of the calibration; none where the list does not say it.
+    pub calibration: Vec<String>,
     /// Largest disparity to search, where the list says it.
     pub max_disparity: Option<Largest>,
     /// Smallest disparity to search, in pixels, where the list says it; at most the largest.
@@ -111,11 +113,13 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     let within = |column: &str, reason: String| format!("{column}: {reason}");
     let max = field("max_disparity").map(str::parse).transpose();
     let min = field("min_disparity").map(pixels).transpose();
+    let files = field("calibration").into_iter().flat_map(|files| files.split(';'));
     let row = Row {
         name: required("name")?,
         left: required("left")?,
         right: required("right")?,
         mask: field("mask").map(str::to_owned),
+        calibration: files.map(|file| file.trim().to_owned()).filter(|file| !file.is_empty()).collect(),
         max_disparity: max.map_err(|reason| within("max_disparity", reason))?,
         min_disparity: min.map_err(|reason| within("min_disparity", reason))?,
     };

@@ -21,10 +21,7 @@ pub(super) fn list(path: &Path) -> Result<Option<Vec<PathBuf>>> {
     } else if text.contains(['*', '?', '[']) && !path.exists() {
         (of_pattern(path, &text)?, "no image has such a name")
     } else if text.contains('%') && !path.exists() {
-        return Err(Error::read(
-            path,
-            "there is no such file; where numbers differ, write * as in 'left/*.png'",
-        ));
+        (of_numbers(path, &text)?, "no image has such a name")
     } else {
         return Ok(None);
     };
@@ -68,6 +65,37 @@ fn of_pattern(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
         Error::read(path, std::io::Error::from(e))
     })?;
     Ok(found.into_iter().filter(|file| file.is_file()).collect())
+}
+
+/// The images that a pattern of C's printf names: frame_%04d.png, as ffmpeg and OpenCV take them.
+fn of_numbers(path: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
+    let no_pattern = || {
+        let reason = "there is no such file; numbers are written as %d or %04d, and whatever differs as * in 'left/*.png'";
+        Error::read(path, reason)
+    };
+    let (before, rest) = pattern.split_once('%').ok_or_else(no_pattern)?;
+    let (width, after) = rest.split_once('d').ok_or_else(no_pattern)?;
+    let digits = match width.strip_prefix('0') {
+        None if width.is_empty() => 1,
+        Some(digits) => digits.parse::<usize>().ok().filter(|digits| *digits > 0).ok_or_else(no_pattern)?,
+        None => return Err(no_pattern()),
+    };
+    if after.contains('%') {
+        return Err(no_pattern());
+    }
+    let [start, end] = [before, after].map(glob::Pattern::escape);
+    let mut found = of_pattern(path, &format!("{start}*{end}"))?;
+    // More digits than it says have no zeros in front.
+    let fits = |number: &str| {
+        let few = digits == 1 || number.len() == digits;
+        let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+        is_number && (few || number.len() > digits && !number.starts_with('0'))
+    };
+    found.retain(|file| {
+        let name = file.to_string_lossy();
+        name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after)).is_some_and(fits)
+    });
+    Ok(found)
 }
 
 /// The name of a file without its last extension.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use mrfgs::image::raster::Raster;
 use mrfgs::image::read::Reader;
-use mrfgs::image::{Pair, Rect};
+use mrfgs::image::{Pair, Plane, Rect};
 use mrfgs::{Error, Result};
 
 pub(crate) use pairing::Pairing;
@@ -100,6 +100,8 @@ pub(crate) struct Frames {
     layout: Layout,
     /// How many came so far.
     count: usize,
+    /// Where the left view of every frame is ignored.
+    mask: Option<Plane<bool>>,
     /// (width, height) of the first pair.
     size: Option<(usize, usize)>,
     /// The names of both sources.
@@ -133,7 +135,7 @@ impl Frames {
             let pairs = pairing::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
             [*l, *r] = pairs.map(Into::into);
         }
-        Ok(Self { left, right, layout, count: 0, size: None, names })
+        Ok(Self { left, right, layout, count: 0, mask: None, size: None, names })
     }
 
     /// How many there are, where that is known.
@@ -160,6 +162,28 @@ impl Frames {
     /// Whether a stream is among the sources.
     pub(crate) fn have_stream(&self) -> bool {
         std::iter::once(&self.left).chain(&self.right).any(|source| matches!(source, Source::Stream(_)))
+    }
+
+    /// The first image of the left camera, where frames are images.
+    pub(crate) fn first_image(&self) -> Option<&Path> {
+        match &self.left {
+            Source::Files { left, .. } => left.front().map(PathBuf::as_path),
+            Source::Stream(_) => None,
+        }
+    }
+
+    /// The films that ffmpeg decodes.
+    pub(crate) fn films(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.left).chain(&self.right).filter_map(|source| match source {
+            Source::Files { .. } => None,
+            Source::Stream(stream) => stream.film(),
+        })
+    }
+
+    /// Ignores the left view of every frame where `mask` is `true`.
+    pub(crate) fn masked_by(mut self, mask: Plane<bool>) -> Self {
+        self.mask = Some(mask);
+        self
     }
 
     /// The files that are read, none of which an output may overwrite.
@@ -191,6 +215,10 @@ impl Frames {
 
     fn frame(&mut self, (name, [left, right]): Rasters) -> Result<Frame> {
         let name = name.unwrap_or_else(|| format!("{:06}", self.count));
+        let left = match &self.mask {
+            Some(mask) => left.masked_by(mask.clone()).map_err(|e| named(e, &name))?,
+            None => left,
+        };
         let pair = Pair::of_frames(left, right).map_err(|e| named(e, &name))?;
         let (size, (width, height)) = (*self.size.get_or_insert(pair.size()), pair.size());
         if size != (width, height) {

@@ -10,6 +10,8 @@ use clap::ValueEnum;
 use mrfgs::image::raster::{Raster, Samples};
 use mrfgs::{Error, Result};
 
+use crate::ffmpeg::{self, Decoder};
+
 /// Frames a second, as a fraction.
 pub(crate) type FrameRate = (usize, usize);
 
@@ -86,6 +88,8 @@ pub(super) struct Stream {
     read: Arc<AtomicU64>,
     whole: u64,
     ended: bool,
+    /// Whether ffmpeg decodes it.
+    decoded: bool,
 }
 
 enum Format {
@@ -113,6 +117,7 @@ impl Stream {
         } else {
             Box::new(BufReader::new(File::open(path).map_err(|e| Error::read(path, e))?))
         };
+        let mut decoded = false;
         if let Some(raw) = raw {
             check_size(raw.size, max_pixels).map_err(error)?;
             let mut start = Vec::new();
@@ -125,6 +130,13 @@ impl Stream {
             let mut header = Vec::new();
             let read = bytes.by_ref().take(MAX_HEADER).read_until(b'\n', &mut header);
             read.map_err(|e| Error::read(&name, e))?;
+            if !stdin && ffmpeg::reads(&header) {
+                bytes = Box::new(BufReader::new(Decoder::new(path)?));
+                header.clear();
+                decoded = true;
+                let read = bytes.by_ref().take(MAX_HEADER).read_until(b'\n', &mut header);
+                read.map_err(|e| Error::read(&name, e))?;
+            }
             check_header(&header, max_pixels).map_err(error)?;
             bytes = Box::new(io::Cursor::new(header).chain(bytes));
         }
@@ -139,7 +151,7 @@ impl Stream {
             Format::Yuv(decoder, if full { Range::Full } else { Range::Limited })
         };
         let whole = read.load(Ordering::Relaxed);
-        Ok(Self { name, frames, count: 0, read, whole, ended: false })
+        Ok(Self { name, frames, count: 0, read, whole, ended: false, decoded })
     }
 
     pub(super) fn rate(&self) -> Option<FrameRate> {
@@ -155,6 +167,11 @@ impl Stream {
     /// The file that it reads.
     pub(super) fn file(&self) -> Option<&Path> {
         self.name.is_file().then_some(&self.name)
+    }
+
+    /// Its file, where ffmpeg decodes it.
+    pub(super) fn film(&self) -> Option<&Path> {
+        self.decoded.then_some(&self.name)
     }
 
     /// The next frame; `None` after the last one, and after an error.
@@ -196,11 +213,8 @@ fn check_start(start: &[u8]) -> Result<(), String> {
     if start.starts_with(b"YUV4MPEG2") {
         return Err("is YUV4MPEG2, which says itself what its frames hold: leave out --raw-frames".into());
     }
-    // MP4 and QuickTime, Matroska and WebM, AVI, PNG.
-    let is_file = start.get(4..8) == Some(b"ftyp")
-        || [&b"\x1a\x45\xdf\xa3"[..], b"RIFF", b"\x89PNG"].iter().any(|magic| start.starts_with(magic));
-    if is_file {
-        return Err("is a film or an image and not pixels alone: let ffmpeg write -f rawvideo".into());
+    if ffmpeg::reads(start) || start.starts_with(b"\x89PNG") {
+        return Err("is a film or an image and not pixels alone: leave out --raw-frames".into());
     }
     Ok(())
 }
@@ -230,7 +244,9 @@ fn check_header(line: &[u8], max_pixels: u64) -> Result<(), String> {
 fn said(error: &y4m::Error) -> String {
     match error {
         y4m::Error::UnknownColorspace => {
-            "its kind of pixels is not supported; let ffmpeg write -pix_fmt gray or yuv444p".into()
+            "its kind of pixels is not supported; let ffmpeg write -pix_fmt gray or yuv444p, or all bits of a grey \
+             camera by -f rawvideo -pix_fmt gray16le for --raw-frames"
+                .into()
         }
         y4m::Error::EOF => "is cut off".into(),
         y4m::Error::IoError(e) => e.to_string(),

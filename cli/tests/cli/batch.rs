@@ -138,6 +138,57 @@ fn a_batch_writes_depth_and_points() {
     assert_eq!(told.code, Some(1));
 }
 
+/// Calibrations of all pairs, or of some in the list; raw pairs are rectified as `match` rectifies them.
+#[test]
+fn a_batch_takes_calibrations() {
+    let folder = Folder::new();
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
+    fs::create_dir(folder.join("raw")).unwrap();
+    for file in ["left.png", "right.png", "cameras.yml"] {
+        fs::copy(scene("raw").join(file), folder.join("raw").join(file)).unwrap();
+    }
+    let also = "--also depth,points-original --alpha 0.5";
+    let pair = "raw/left.png raw/right.png";
+    let given = "--rectify --calib raw/cameras.yml --max-disparity 40 --device cpu --json one.json";
+    run(&folder, &format!("match {pair} one.pfm {given} {also}")).succeeded();
+    let list = |row: &str| {
+        let header = "name,left,right,max_disparity,calibration\n";
+        fs::write(folder.join("list.csv"), format!("{header}{row}\n")).unwrap();
+    };
+    let flags = format!("--rectify {also}");
+    for (row, calib, out) in [
+        ("raw,raw/left.png,raw/right.png,40,", "--calib raw/cameras.yml", "flag"),
+        ("raw,raw/left.png,raw/right.png,40,raw/cameras.yml", "", "column"),
+        // That of the list counts.
+        ("raw,raw/left.png,raw/right.png,40,raw/cameras.yml", "--calib none.yml", "both"),
+    ] {
+        list(row);
+        batch(&folder, &format!("list.csv {out} {flags} {calib}")).succeeded().says("1 done");
+        for end in ["pfm", "depth.pfm", "points-original.ply"] {
+            assert!(at(&format!("one.{end}")) == at(&format!("{out}/raw.{end}")), "{end} of {out}");
+        }
+        let record = record(&folder.join(out), "raw");
+        assert_eq!(
+            (&record["rectified"], &record["files"]["calibration"]),
+            (&true.into(), &"raw/cameras.yml".into())
+        );
+        assert!(record["request"]["inputs"].to_string().contains("cameras.yml"));
+        batch(&folder, &format!("list.csv {out} {flags} {calib}")).succeeded().says("1 skipped");
+    }
+    // Another rectification is another request.
+    batch(&folder, "list.csv column --rectify --also depth").succeeded().says("1 done");
+    assert!(at("one.pfm") != at("column/raw.pfm"));
+    // What is not rectified is no calibration of rectified images; and what has none cannot be rectified.
+    let told = batch(&folder, "list.csv raw-pair --also depth");
+    told.says("raw: cannot read raw/cameras.yml: is of images that are not rectified");
+    assert_eq!(told.code, Some(1));
+    list("raw,raw/left.png,raw/right.png,40,");
+    let told = batch(&folder, "list.csv none --rectify");
+    told.says("raw: --rectify: takes a calibration; give one in the column calibration");
+    assert_eq!(told.code, Some(1));
+    batch(&folder, "list.csv none --alpha 1").failed(2, "--alpha & --rectify");
+}
+
 #[test]
 fn complete_pairs_are_skipped_until_what_they_are_of_changes() {
     let folder = pairs(3, (64, 48));

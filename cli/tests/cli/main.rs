@@ -10,6 +10,8 @@ mod evaluate;
 mod failures;
 #[path = "../../../tests/common/files.rs"]
 mod files;
+#[cfg(unix)]
+mod films;
 mod formats;
 mod geotiff;
 mod hostile;

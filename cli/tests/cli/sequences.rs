@@ -103,6 +103,66 @@ fn files_in_any_order_give_the_maps_of_match() {
     assert_ne!(maps(&folder.join("swapped"), names), wanted);
 }
 
+/// As ffmpeg and OpenCV name them.
+#[test]
+fn numbers_are_named_as_in_c() {
+    let folder = cameras();
+    let wanted = wanted(&folder);
+    for file in ["left/f01.png", "left/f007x.png"] {
+        fs::copy(folder.join("left/f1.png"), folder.join(file)).unwrap();
+    }
+    let line = "sequence left/f%d.png right/f%01d.ppm maps --pairing common --quiet";
+    fs::remove_file(folder.join("left/f01.png")).unwrap();
+    run(&folder, &format!("{line} {RANGE}")).succeeded();
+    assert_eq!(maps(&folder.join("maps"), SCENES.map(|(name, _)| name)), wanted);
+    assert_eq!(listing(&folder.join("maps")).len(), 3, "f007x is no number");
+    // With at least two digits there is one frame.
+    run(&folder, &format!("sequence left/f%02d.png right/f%02d.ppm two --quiet {RANGE}")).succeeded();
+    assert_eq!(listing(&folder.join("two")).into_keys().collect::<Vec<_>>(), [folder.join("two/f10.pfm")]);
+}
+
+/// What `match` takes and writes of a pair, `sequence` does of each frame.
+#[test]
+fn masks_calibrations_and_records_are_those_of_match() {
+    let folder = cameras();
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
+    let mut mask = image::GrayImage::new(SIZE.0, SIZE.1);
+    (0..SIZE.1).for_each(|y| (0..20).for_each(|x| mask.put_pixel(x, y, image::Luma([255]))));
+    mask.save(folder.join("mask.png")).unwrap();
+    let calib = "cam0=[60 0 31.5; 0 60 23.5; 0 0 1]\ncam1=[60 0 31.5; 0 60 23.5; 0 0 1]\ndoffs=0\nbaseline=100\nndisp=24\n";
+    fs::write(folder.join("left/calib.txt"), calib).unwrap();
+    let also = "--mask mask.png --device cpu --quiet --also depth,validity";
+    run(&folder, &format!("match left/f2.png right/f2.ppm one.pfm --json one.json {also}")).succeeded();
+    run(&folder, &format!("sequence left right maps --json all.jsonl {also}")).succeeded();
+    for end in ["pfm", "depth.pfm", "validity.png"] {
+        assert!(at(&format!("one.{end}")) == at(&format!("maps/f2.{end}")), "{end}");
+    }
+    let text = fs::read_to_string(folder.join("all.jsonl")).unwrap();
+    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(
+        lines.iter().map(|line| line["frame"].as_str().unwrap()).collect::<Vec<_>>(),
+        ["f1", "f2", "f10"]
+    );
+    let one = json(folder.join("one.json"));
+    for key in ["width", "range", "labels", "method", "density", "measured", "mean_confidence", "moved_up"] {
+        assert!(!one[key].is_null() && lines[1][key] == one[key], "{key}");
+    }
+    assert_eq!(lines[1]["files"]["calibration"], "left/calib.txt");
+    assert_eq!(lines[1]["files"]["mask"], "mask.png");
+    // Control: another frame has other figures, and without the mask there is another map.
+    assert_ne!(lines[0]["measured"], one["measured"]);
+    run(&folder, "sequence left right maps --device cpu --quiet").succeeded();
+    assert!(at("one.pfm") != at("maps/f2.pfm"));
+    // A plan, and nothing else.
+    let before = listing(&folder);
+    run(&folder, "sequence left right never --device cpu --dry-run")
+        .prints("64 x 48 pixels, disparities 0 to 23");
+    assert_eq!(listing(&folder), before);
+    // Records of a film, on standard output.
+    let told = run(&folder, &format!("sequence left right film.y4m --json - --quiet {RANGE}")).succeeded();
+    assert_eq!(told.stdout.lines().count(), 3);
+}
+
 /// Frames that one camera lacks shift no other.
 #[test]
 fn images_find_their_partners_by_number() {
@@ -264,7 +324,6 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("nowhere right maps", 1, "nowhere"),
         ("none maps", 1, "none & holds no images"),
         ("left/*.jpg right/* maps", 1, "left/*.jpg & no image"),
-        ("left/f%d.png right maps", 1, "left/f%d.png & write *"),
         ("left fewer maps", 1, "left/f2.png has no partner & fewer (nor has one other)"),
         ("left fewer maps --pairing order", 1, "left holds 3 & fewer 1"),
         ("twice maps", 1, "f1.png & F1.ppm"),
@@ -277,7 +336,7 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("wide.y4m maps", 1, "wide.y4m & size"),
         ("none.y4m maps", 1, "none.y4m & size"),
         ("size.y4m maps", 1, "size.y4m & size"),
-        ("kind.y4m maps", 1, "kind.y4m & yuv444p"),
+        ("kind.y4m maps", 1, "kind.y4m & yuv444p & gray16le"),
         ("rate.y4m maps", 1, "rate.y4m & damaged"),
         ("head.y4m maps --raw-frames 8000x8000,rgb24 --max-pixels 1000", 1, "head.y4m & limit of 1000"),
         ("head.y4m maps --raw-frames 80x80,yuv420p", 2, "--raw-frames & gray16le"),
@@ -295,11 +354,18 @@ fn sequences_that_make_no_sense_are_told_in_one_line() {
         ("left right maps --format png --min-disparity -9", 1, "png"),
         ("left", 2, "OUTPUT"),
         ("head.y4m maps --raw-frames 64x48,gray", 1, "head.y4m & YUV4MPEG2 & --raw-frames"),
-        ("left/f1.png maps --raw-frames 8x8,gray", 1, "f1.png & rawvideo"),
+        ("left/f1.png maps --raw-frames 8x8,gray", 1, "f1.png & leave out --raw-frames"),
         ("left right maps --raw-frames 64x48,gray", 2, "--raw-frames & streams"),
         ("left right maps --layout top-bottom", 2, "--layout & RIGHT"),
         ("left right none/film.y4m --format png", 2, "--format & folder"),
-        ("left right film.MP4", 2, "OUTPUT & NAME.y4m & ffmpeg -i - film.MP4"),
+        ("left right film.GIF", 2, "OUTPUT & NAME.y4m & ffmpeg -i - film.GIF"),
+        ("left/f%02.png right maps", 1, "f%02.png & left/*.png & %04d"),
+        ("left/g%d.png right maps", 1, "g%d.png & no image has such a name"),
+        ("left right maps --mask none.png", 1, "none.png"),
+        ("left right maps --mask above/f1.tif", 1, "frame f1 & the mask is 64 x 96"),
+        ("left right - --json -", 2, "--json & film"),
+        ("left right maps --json left/f1.png", 2, "--json & an input"),
+        ("left right maps --json nowhere/file", 1, "nowhere"),
         ("beside maps --pairing common", 2, "--pairing & two cameras"),
     ] {
         let range = if line.contains("--max-disparity") { "" } else { " --max-disparity 23" };

@@ -5,13 +5,11 @@ use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
 use mrfgs::depth::Rig;
-use mrfgs::image::Pair;
-use mrfgs::image::calib::Calibration;
 use mrfgs::image::read::Reader;
-use mrfgs::options::DisparityRange;
+use mrfgs::rectification::Options;
 
-use crate::args::{Found, Search, Sign};
-use crate::failure::Result;
+use crate::args::{Search, Sign};
+use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
@@ -37,12 +35,19 @@ enum Source {
     Folder,
 }
 
+/// What all pairs have in common that the list does not say.
+pub(super) struct Given<'a> {
+    /// The calibration of pairs for which the list has none.
+    pub(super) calib: &'a [PathBuf],
+    /// How the images are rectified, where they are as the cameras took them.
+    pub(super) rectify: Option<Options>,
+    /// The output that takes the cameras.
+    pub(super) cameras: Option<&'a Also>,
+}
+
 /// A pair, read.
 pub(super) struct Input {
-    pub(super) pair: Pair,
-    pub(super) range: DisparityRange,
-    /// Whether sparse matches gave the range.
-    pub(super) by_matches: bool,
+    pub(super) input: input::Input,
     /// The cameras, where an output takes them.
     pub(super) rig: Option<Rig>,
     /// Without the output, which the reader does not know.
@@ -92,20 +97,29 @@ impl List {
 }
 
 impl Listed {
-    /// Every file that is there and may be read of it, as the list has it; with its calibration if an output takes the
-    /// `cameras`.
-    pub(super) fn inputs(&self, base: &Path, cameras: bool) -> Vec<String> {
+    /// Every file that is there and may be read of it, as the list has it, or the flags.
+    pub(super) fn inputs(&self, base: &Path, given: &Given) -> Vec<String> {
         let inputs = match &self.source {
-            Source::Row(Row { left, right, mask, max_disparity, .. }) => {
-                let calibrated = cameras || max_disparity.is_none();
-                let calibration = calibrated.then(|| calibration_beside(left));
-                [left, right].into_iter().cloned().chain(calibration).chain(mask.clone()).collect()
+            Source::Row(Row { left, right, mask, calibration, max_disparity, .. }) => {
+                let takes_calibration = given.cameras.is_some() || max_disparity.is_none();
+                let beside = Some(calibration_beside(left))
+                    .filter(|_| takes_calibration && calibration.is_empty() && given.calib.is_empty());
+                [left, right].into_iter().chain(mask).chain(calibration).cloned().chain(beside).collect()
             }
             Source::Folder => {
                 folder::inputs(Path::new(&self.name)).map(|path| shown(&path)).collect::<Vec<_>>()
             }
         };
-        inputs.into_iter().filter(|path| base.join(path).exists()).collect()
+        let own = inputs.into_iter().filter(|path| base.join(path).exists());
+        let shared = given.calib.iter().filter(|_| !self.has_calibration());
+        // Those of the flags do not start at the list.
+        let shared = shared.filter_map(|path| path.canonicalize().ok()).map(|path| shown(&path));
+        own.chain(shared).collect()
+    }
+
+    /// Whether the list says its calibration.
+    fn has_calibration(&self) -> bool {
+        matches!(&self.source, Source::Row(row) if !row.calibration.is_empty())
     }
 
     /// What the list says of its range.
@@ -116,36 +130,55 @@ impl Listed {
         }
     }
 
-    /// Reads its images and what else its range takes, and the cameras for the output `cameras`.
-    pub(super) fn read(&self, base: &Path, reader: Reader, cameras: Option<&Also>) -> Result<Input> {
+    /// Reads its images and what else its range takes, and the cameras where an output takes them.
+    pub(super) fn read(&self, base: &Path, reader: Reader, given: &Given) -> Result<Input> {
         let at = |path: &String| base.join(path);
+        let mut calib = given.calib.to_vec();
         let (pair, range, [left, right], mask) = match &self.source {
-            Source::Row(Row { left, right, mask, .. }) => {
+            Source::Row(Row { left, right, mask, calibration, .. }) => {
+                if !calibration.is_empty() {
+                    calib = calibration.iter().map(at).collect();
+                }
                 let pair = reader.pair(&at(left), &at(right), mask.as_ref().map(at).as_deref())?;
                 (pair, None, [left, right].map(Clone::clone), mask.clone())
             }
+            // Its calibration and its truth are of rectified images.
+            Source::Folder if given.rectify.is_some() => {
+                let dir = at(&self.name);
+                let pair = Folder::to_match(&dir)?.views(reader)?;
+                (pair, None, self.views_of(&dir)?, None)
+            }
             Source::Folder => {
                 let dir = at(&self.name);
-                let folder = Folder::to_match(&dir)?;
-                let (pair, range) = folder.read_pair(reader)?;
-                let views = folder.view_names().map(|file| shown(&Path::new(&self.name).join(file)));
-                (pair, Some(range), views, None)
+                let (pair, range) = Folder::to_match(&dir)?.read_pair(reader)?;
+                (pair, Some(range), self.views_of(&dir)?, None)
             }
         };
-        let beside = calibration_beside(&left);
-        let (path, search, is_folder) = (at(&beside), self.search(), range.is_some());
-        let is_calibrated = cameras.is_some() || search.max_disparity.is_none() && !is_folder;
-        let calibration = if is_calibrated { Calibration::beside(&at(&left))? } else { None };
-        let known = calibration.as_ref().map(|known| (path.as_path(), known));
-        let Found { range, by_matches } = match range {
-            Some(range) => Found { range, by_matches: false },
-            None => search.range(&pair, known, Sign::default())?,
+        let search = range.map_or_else(|| self.search(), Search::from);
+        if given.rectify.is_some() && calib.is_empty() {
+            let reason =
+                "takes a calibration; give one in the column calibration, or one for all with --calib";
+            return Err(Failure::usage("--rectify", reason));
+        }
+        let left_image = at(&left);
+        let beside = Some(&*left_image).filter(|_| given.cameras.is_some() || search.max_disparity.is_none());
+        let input =
+            input::Input::new(pair, &search, Sign::default(), &calib, given.rectify.as_ref(), beside)?;
+        let rig = input.rig(given.cameras, &left_image)?;
+        let calibration = match &self.source {
+            Source::Row(row) if self.has_calibration() => Some(row.calibration.join(", ")),
+            _ if !calib.is_empty() => input.calibration_files(),
+            Source::Row(_) => input.calibration_files().map(|_| calibration_beside(&left)),
+            Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
         };
-        let rig = |word| input::rig(word, known, &at(&left), pair.size(), "put one there");
-        let rig = cameras.map(rig).transpose()?;
-        let calibration = (known.is_some() || is_folder && path.exists()).then_some(beside);
         let files = Files { left, right, mask, calibration, output: None };
-        Ok(Input { pair, range, by_matches, rig, files })
+        Ok(Input { input, rig, files })
+    }
+
+    /// The paths of the views in the folder `dir`, as a list would have them.
+    fn views_of(&self, dir: &Path) -> Result<[String; 2]> {
+        let names = Folder::to_match(dir)?.view_names();
+        Ok(names.map(|file| shown(&Path::new(&self.name).join(file))))
     }
 }
 

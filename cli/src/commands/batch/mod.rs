@@ -10,20 +10,18 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
-use mrfgs::check;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, write};
 use mrfgs::options::Method;
 use mrfgs::{Error, Matched, Matcher};
 
-use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, Sign};
+use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Sign};
 use crate::failure::{self, Failure, Result};
-use crate::matching::Searched;
 use crate::outputs::{Claim, Format, MapArgs, MatchRecord, Outcome, also, files};
 use crate::progress::Counter;
 use crate::{console, remedy, stop};
 
-use listed::{Input, List, Listed, shown};
+use listed::{Given, Input, List, Listed, shown};
 use request::{Request, State};
 use shard::{Shard, shard};
 
@@ -32,6 +30,7 @@ Examples:
   mrfgs batch pairs.csv maps
   mrfgs batch pairs.csv maps              # again: resumes what was stopped
   mrfgs batch MiddEval3/trainingQ maps --format png --also validity
+  mrfgs batch pairs.csv maps --rectify --calib rig.yml
   mrfgs batch pairs.csv maps --status
   mrfgs batch pairs.csv maps --shard 3/8  # the third of eight machines
 
@@ -43,9 +42,10 @@ A list:
 
 /// Match many pairs, and resume where an earlier run was stopped
 ///
-/// LIST is a CSV file whose header names its columns: name, left, right, and optionally `max_disparity`, `min_disparity`
-/// and mask, which mean what the flags of `mrfgs match` mean. An empty field counts as a flag that is not given; without
-/// a range, that of a calib.txt beside the left image is searched, or else that of sparse matches. Relative paths start at
+/// LIST is a CSV file whose header names its columns: name, left, right, and optionally `max_disparity`, `min_disparity`,
+/// mask and calibration, which mean what the flags of `mrfgs match` mean; two files of a calibration have a ; between them.
+/// An empty field counts as a flag that is not given; without a range, that of the calibration is searched, or else that of
+/// sparse matches. Relative paths start at
 /// the folder of LIST; lines that begin with # are comments. LIST may also be a folder: each folder in it that is not hidden
 /// is a pair, in one of the layouts of `mrfgs evaluate`; without a calib.txt the range is that of the truth.
 ///
@@ -67,6 +67,14 @@ pub(crate) struct Args {
     #[arg(value_name = "OUTDIR")]
     folder: PathBuf,
 
+    /// Calibration of all pairs for which LIST has none, as `mrfgs match` takes it [default: a calib.txt beside the left image]
+    #[arg(long, value_name = "FILE")]
+    calib: Vec<PathBuf>,
+    /// The images are raw: rectifies each pair by its calibration first, as `mrfgs rectify` does
+    #[arg(long)]
+    rectify: bool,
+    #[command(flatten)]
+    rectification: RectificationArgs,
     #[command(flatten)]
     maps: MapArgs,
     /// Matches the K-th of N parts of the list (K from 1 on), such as 2/8
@@ -98,6 +106,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// What all pairs have in common.
 struct Batch<'a> {
     args: &'a Args,
+    given: Given<'a>,
     method: Method,
     reader: Reader,
     base: PathBuf,
@@ -105,15 +114,19 @@ struct Batch<'a> {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();
-    // A batch takes rectified pairs.
-    args.maps.also.check(false)?;
+    args.maps.also.check(args.rectify)?;
     let method = args.maps.also.made_by(args.method.method()?)?;
     let List { base, mut pairs } = List::read(&args.list)?;
-    check_folder(args, &base, &pairs)?;
+    let given = Given {
+        calib: &args.calib,
+        rectify: args.rectification.options_if(args.rectify)?,
+        cameras: args.maps.also.take_cameras(),
+    };
+    check_folder(args, &base, &pairs, &given)?;
     if let Some(shard) = args.shard {
         pairs.retain(|listed| shard.holds(&listed.name));
     }
-    let batch = Batch { args, method: method.clone(), reader: args.reading.reader(), base };
+    let batch = Batch { args, given, method: method.clone(), reader: args.reading.reader(), base };
     if args.status {
         return batch.print_status(&pairs);
     }
@@ -124,7 +137,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 }
 
 /// Refuses an output folder that could not be one, and outputs that would overwrite an input.
-fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
+fn check_folder(args: &Args, base: &Path, pairs: &[Listed], given: &Given) -> Result<()> {
     let folder = &args.folder;
     let place = files::folder_place(folder)?;
     if args.list.is_dir() {
@@ -134,9 +147,8 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed]) -> Result<()> {
         }
         return Ok(());
     }
-    let cameras = args.maps.also.take_cameras().is_some();
     // What lies elsewhere cannot be overwritten.
-    let inputs = pairs.iter().flat_map(|listed| listed.inputs(base, cameras)).map(|path| base.join(path));
+    let inputs = pairs.iter().flat_map(|listed| listed.inputs(base, given)).map(|path| base.join(path));
     let inputs = inputs.chain([args.list.clone()]).chain(args.method.files().map(Path::to_owned));
     let inside = inputs.filter_map(|path| {
         let path = path.canonicalize().ok()?;
@@ -170,7 +182,7 @@ impl Batch<'_> {
     fn request(&self, listed: &Listed) -> Request {
         let (maps, name) = (&self.args.maps, &listed.name);
         let outputs = std::iter::once(maps.map(name)).chain(maps.also(name).map(|(_, file)| file));
-        Request::new(listed, &self.base, maps.also.take_cameras().is_some(), outputs.collect())
+        Request::new(listed, &self.base, &self.given, outputs.collect())
     }
 
     fn record(&self, listed: &Listed) -> PathBuf {
@@ -300,16 +312,18 @@ impl Batch<'_> {
                 return Ok(Err(error));
             }
         };
-        let Input { pair, rig, mut files, .. } = input;
-        let range = matched.range();
+        let Input { input, rig, mut files } = input;
+        let (range, rectifying) = (matched.range(), input.rectifying());
+        let pair = input.pair;
         let wanted = &self.args.maps;
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign, left) = (&matched.maps, Sign::default(), pair.as_ref().map(Pair::left));
-        let outcome = Outcome { maps, range, sign, left, rig, rectifying: None, georeferences };
+        let outcome = Outcome { maps, range, sign, left, rig, rectifying, georeferences };
         self.named(claim, wanted.write(claim.folder(), &listed.name, &outcome))?;
         files.output = Some(wanted.map(&listed.name));
-        let found = MatchRecord::new(&files, &matched, time, sign);
+        let mut found = MatchRecord::new(&files, &matched, time, sign);
+        found.rectified = self.args.rectify;
         let text = request.done(&record, claim.folder(), found, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
         Ok(Ok((matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)), warnings)))
@@ -322,19 +336,18 @@ impl Batch<'_> {
         claim: &Claim,
     ) -> Result<(Input, Matched, Duration, Vec<String>)> {
         let wanted = &self.args.maps;
-        let input = listed.read(&self.base, self.reader, wanted.also.take_cameras())?;
-        let (pair, range) = (&input.pair, input.range);
+        let read = listed.read(&self.base, self.reader, &self.given)?;
+        let (input, pair) = (&read.input, &read.input.pair);
         // The folder is there, so what can be wrong is the range.
-        self.named(claim, wanted.check(claim.folder(), &listed.name, range))?;
-        let mut warnings = check::warnings(pair, (!input.by_matches).then_some(range));
-        let fits = |wider| wanted.check(claim.folder(), &listed.name, wider).is_ok();
-        let searched = Searched::new(range, input.by_matches, fits);
+        self.named(claim, wanted.check(claim.folder(), &listed.name, input.range))?;
+        let mut warnings = input.warnings(&remedy::COLUMNS);
+        let searched = input.searched(|wider| wanted.check(claim.folder(), &listed.name, wider).is_ok());
         let start = Instant::now();
         let matched = searched.job(matcher, pair).on_progress(|_| stop::go_on()).run()?;
         let time = start.elapsed();
-        warnings.extend(matched.warnings());
-        let warnings = warnings.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)).collect();
-        Ok((input, matched, time, warnings))
+        let found = matched.warnings();
+        warnings.extend(found.iter().map(|warning| remedy::warning(warning, &remedy::COLUMNS)));
+        Ok((read, matched, time, warnings))
     }
 
     /// The user knows a file by its place in the output folder.

@@ -15,7 +15,7 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{MatchRecord, files};
 use crate::remedy;
 
-use super::listed::Listed;
+use super::listed::{Given, Listed};
 
 /// What a batch is asked to make of a pair. The record of a complete pair holds the same request.
 #[derive(Serialize)]
@@ -23,8 +23,17 @@ pub(super) struct Request {
     inputs: Vec<InputFile>,
     #[serde(flatten)]
     search: Search,
+    /// How much the rectified views show, where the images are as the cameras took them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rectified: Option<Rectified>,
     /// The names of the maps, in the output folder.
     outputs: Vec<String>,
+}
+
+/// That images are rectified first, and how.
+#[derive(Serialize)]
+struct Rectified {
+    alpha: Option<f64>,
 }
 
 /// A file as it was when it was read.
@@ -68,8 +77,9 @@ struct Failed<'a> {
 }
 
 impl Request {
-    pub(super) fn new(listed: &Listed, base: &Path, cameras: bool, outputs: Vec<String>) -> Self {
-        let inputs = listed.inputs(base, cameras).into_iter().map(|path| {
+    pub(super) fn new(listed: &Listed, base: &Path, given: &Given, outputs: Vec<String>) -> Self {
+        let rectified = given.rectify.as_ref().map(|options| Rectified { alpha: options.alpha });
+        let inputs = listed.inputs(base, given).into_iter().map(|path| {
             let about = fs::metadata(base.join(&path)).ok();
             let modified =
                 about.as_ref().and_then(|about| about.modified().ok()?.duration_since(UNIX_EPOCH).ok());
@@ -79,7 +89,7 @@ impl Request {
                 modified: modified.and_then(|time| u64::try_from(time.as_millis()).ok()),
             }
         });
-        Self { inputs: inputs.collect(), search: listed.search(), outputs }
+        Self { inputs: inputs.collect(), search: listed.search(), rectified, outputs }
     }
 
     pub(super) fn outputs(&self) -> &[String] {

@@ -1,7 +1,5 @@
 //! `mrfgs match`.
 
-mod plan;
-
 use std::path::{Path, PathBuf};
 
 use mrfgs::Matcher;
@@ -13,7 +11,7 @@ use crate::args::{ExecutionArgs, MethodArgs, RectificationArgs, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, AlsoArgs, MatchRecord, Outcome, View, Written, files};
 use crate::pairs::input::{self, Input, PairArgs};
-use crate::{console, matching, stop};
+use crate::{console, matching, plan, stop};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -5,23 +5,27 @@ mod writer;
 
 use std::path::{Path, PathBuf};
 
+use mrfgs::image::write;
+use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Search, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::{MapArgs, files, is_printed};
+use crate::outputs::{Files, MapArgs, files, is_printed};
+use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::Input;
 use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, raw_frames};
-use crate::{console, stop};
+use crate::{console, ffmpeg, plan, stop};
 
 use pipeline::Pipeline;
-use writer::Writer;
+use writer::{Records, Writer};
 
 const EXAMPLES: &str = "\
 Examples:
   mrfgs sequence left right maps --max-disparity 127
   mrfgs sequence 'cam/*_L.png' 'cam/*_R.png' maps --method fast
+  mrfgs sequence left.mp4 right.mp4 disparity.mp4 --method fast
   # Frames with both views, to a film:
   mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
   # What ffmpeg -pix_fmt yuv444p -f yuv4mpegpipe sends, matched and played:
@@ -31,16 +35,18 @@ Examples:
 
 /// Match the frames of a video
 ///
-/// LEFT and RIGHT are each a folder of images, a pattern of their names ('left/*.png'), a stream in YUV4MPEG2 as ffmpeg writes it
-/// (-f yuv4mpegpipe), or - for a stream on standard input. Images come in the order of their numbers, and those of the two cameras
+/// LEFT and RIGHT are each a folder of images, a pattern of their names ('left/*.png', left/%04d.png), a film (MP4, Matroska,
+/// AVI) where ffmpeg is installed, a stream in YUV4MPEG2 as ffmpeg writes it (-f yuv4mpegpipe), or - for a stream on standard
+/// input. Images come in the order of their numbers, and those of the two cameras
 /// that have the same number are a pair (--pairing). Without RIGHT each frame holds both views, as --layout says. All frames have
 /// one size.
 ///
-/// OUTPUT is a folder, or a film: NAME.y4m, or - for a film on standard output. A folder gets a map of each frame, named after
+/// OUTPUT is a folder, or a film: NAME.y4m, - for such a film on standard output, and where ffmpeg is installed NAME.mp4, .mkv,
+/// .mov, .webm or .avi. A folder gets a map of each frame, named after
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
-/// with --also side-by-side, LEFT stands beside it. ffmpeg and ffplay read it.
+/// with --also side-by-side, LEFT stands beside it.
 ///
-/// Without --max-disparity the range is that of the first frame. While frames are matched, the next ones are
+/// Without --max-disparity the range is that of the calibration, or that of the first frame. While frames are matched, the next ones are
 /// read and rectified, and the last one is written. The CPU path matches as many at once as it has threads, as
 /// far as --memory allows. If an error or Ctrl-C ends a sequence early, the maps of
 /// all frames before are complete.
@@ -51,7 +57,7 @@ pub(crate) struct Args {
     left: PathBuf,
     /// Frames of the right camera
     right: Option<PathBuf>,
-    /// Folder for the maps, or film to write: NAME.y4m or -
+    /// Folder for the maps, or film to write: NAME.y4m, NAME.mp4 or -
     #[arg(required = true)]
     output: PathBuf,
 
@@ -68,8 +74,12 @@ pub(crate) struct Args {
     #[command(flatten)]
     search: Search,
     /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; as `mrfgs match` takes it
+    /// [default: a calib.txt beside the left images]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
+    /// Image of the size of a left frame: where it is not black, LEFT is ignored in all frames
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
     /// Frames are raw images: rectifies them by --calib first
     #[arg(long, requires = "calib")]
     rectify: bool,
@@ -77,6 +87,13 @@ pub(crate) struct Args {
     rectification: RectificationArgs,
     #[command(flatten)]
     maps: MapArgs,
+    /// Writes a line of JSON for each frame: its `frame` (name), and the fields of `match --json`, where `seconds` count from
+    /// the first frame on; `-` prints them
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Checks everything up to the first frame and prints its plan (levels, schedule, memory), but matches and writes nothing
+    #[arg(long)]
+    dry_run: bool,
     #[command(flatten)]
     reading: ReadingArgs,
     /// Prints errors only
@@ -89,12 +106,27 @@ pub(crate) struct Args {
     execution: ExecutionArgs,
 }
 
+impl Args {
+    /// The paths for the records.
+    fn files(&self, input: &Input) -> Files {
+        let path = |path: &Path| path.display().to_string();
+        Files {
+            left: path(&self.left),
+            right: path(self.right.as_deref().unwrap_or(&self.left)),
+            mask: self.mask.as_deref().map(path),
+            calibration: input.calibration_files(),
+            output: Some(path(&self.output)),
+        }
+    }
+}
+
 /// What films are called that are not written here.
-const OTHER_FILMS: [&str; 10] = ["mp4", "mkv", "avi", "mov", "webm", "m4v", "mpg", "mpeg", "wmv", "gif"];
+const OTHER_FILMS: [&str; 4] = ["mpg", "mpeg", "wmv", "gif"];
 
 /// Whether an output is a film.
 fn is_film(output: &Path) -> bool {
-    is_printed(output) || output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m"))
+    let is_y4m = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m"));
+    is_printed(output) || is_y4m || ffmpeg::writes(output) && !output.is_dir()
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -110,13 +142,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     check_flags(args)?;
     stop::listen();
     let mut frames = open(args)?;
-    check_output(args, &frames)?;
+    let first_image = frames.first_image().map(Path::to_owned);
+    check_outputs(args, &frames, first_image.as_deref())?;
     let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
     let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
     let Frame { name, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let sign = Sign::default();
-    let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), None)?;
+    let cameras = args.maps.also.take_cameras();
+    let beside = first_image.as_deref().filter(|_| cameras.is_some() || args.search.max_disparity.is_none());
+    let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), beside)?;
     if let Some(by) = &mut input.rectification {
         by.keep_places()?;
     }
@@ -124,13 +159,20 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         input.say_range(sign, " in the first frame");
         input.warn();
     }
-    let rig = input.rig(args.maps.also.take_cameras(), &args.left)?;
+    let rig = input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?;
+    if args.dry_run {
+        let (width, height) = input.pair.size();
+        let plan = Plan::new(width, height, input.range, &method)?;
+        return Ok(console::print(&plan::describe(&plan)?)?);
+    }
     let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
     let range = range_of_all(&mut matcher, &input, args)?;
     let rectifying = input.rectifying();
     let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying };
-    let mut sink = if film { writer.begin_film(rate)? } else { writer.begin_folder()? };
-    let pipeline = Pipeline { matcher, range, quiet: args.quiet };
+    let records = args.json.as_deref().map(Records::new).transpose()?;
+    let mut sink = if film { writer.begin_film(rate, records)? } else { writer.begin_folder(records)? };
+    let files = args.files(&input);
+    let pipeline = Pipeline { matcher, range, files, rectified: args.rectify, quiet: args.quiet };
     pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
 }
 
@@ -161,7 +203,7 @@ fn check_flags(args: &Args) -> Result<()> {
     let extension = args.output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if OTHER_FILMS.contains(&extension.as_str()) && !args.output.is_dir() {
         let reason = format!(
-            "films are NAME.y4m here; ffmpeg makes a .{extension} of what goes to -: mrfgs sequence ... - | ffmpeg -i - {}",
+            "films are NAME.y4m or NAME.mp4 here; ffmpeg makes a .{extension} of what goes to -: mrfgs sequence ... - | ffmpeg -i - {}",
             args.output.display()
         );
         return Err(Failure::usage("OUTPUT", reason));
@@ -181,7 +223,13 @@ fn open(args: &Args) -> Result<Frames> {
     let (pairing, layout) = (args.pairing.unwrap_or_default(), args.layout.unwrap_or_default());
     let (raw, reader) = (args.raw_frames, args.reading.reader());
     let open = move || Frames::open(&left, right.as_deref(), pairing, layout, raw, reader);
-    let frames = pipeline::patiently(open)??;
+    let mut frames = pipeline::patiently(open)??;
+    if let Some(mask) = &args.mask {
+        frames = frames.masked_by(args.reading.reader().mask(mask)?);
+    }
+    if !args.quiet {
+        frames.films().for_each(|film| console::say(&format!("ffmpeg decodes {}", film.display())));
+    }
     if args.pairing.is_some() && !frames.are_images_of_two() {
         return Err(Failure::usage(
             "--pairing",
@@ -197,16 +245,28 @@ fn open(args: &Args) -> Result<Frames> {
     Ok(frames)
 }
 
-/// Refuses an output that is an input, a terminal, or a file where it must be a folder.
-fn check_output(args: &Args, frames: &Frames) -> Result<()> {
+/// Refuses outputs that are an input, a terminal, or a file where it must be a folder.
+fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Result<()> {
     let output = args.output.as_path();
+    let mut inputs = frames.files();
+    let beside = first_image.map(|image| image.with_file_name(CALIBRATION));
+    inputs.extend(args.mask.iter().chain(&args.calib).chain(&beside).map(PathBuf::as_path));
+    let named: Vec<_> = inputs.iter().map(|file| ("an input", *file)).collect();
+    if let Some(json) = files::json_file(args.json.as_deref()) {
+        write::check_path(json)?;
+        files::distinct(&named, &[("OUTPUT", output), ("--json", json)])?;
+    }
     if is_printed(output) {
+        if args.json.as_deref().is_some_and(is_printed) {
+            return Err(Failure::usage("--json", "`-` is the film already; give the name of a file"));
+        }
         return Ok(console::check_takes_data()?);
     }
-    let inputs = frames.files();
     if is_film(output) {
-        let inputs: Vec<_> = inputs.into_iter().map(|file| ("an input", file)).collect();
-        return files::distinct(&inputs, &[("OUTPUT", output)]);
+        if ffmpeg::writes(output) {
+            ffmpeg::check(output)?;
+        }
+        return files::distinct(&named, &[("OUTPUT", output)]);
     }
     let place = files::folder_place(output)?;
     let inside = |file: &&Path| file.canonicalize().is_ok_and(|file| file.parent() == Some(&place));

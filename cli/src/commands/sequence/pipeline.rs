@@ -8,8 +8,11 @@ use std::time::{Duration, Instant};
 use mrfgs::Matcher;
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::Rectification;
+use serde::Serialize;
 
+use crate::args::Sign;
 use crate::failure::{Failure, Result};
+use crate::outputs::{Files, MatchRecord};
 use crate::progress::Counter;
 use crate::sequences::{Frame, Frames};
 use crate::text::plural;
@@ -26,7 +29,17 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub(super) struct Pipeline {
     pub(super) matcher: Matcher,
     pub(super) range: DisparityRange,
+    /// What the records say of the inputs.
+    pub(super) files: Files,
+    pub(super) rectified: bool,
     pub(super) quiet: bool,
+}
+
+/// What the writer takes beside the maps.
+#[derive(Clone, Copy)]
+struct Takes {
+    pair: bool,
+    record: bool,
 }
 
 /// A frame, or why there is none.
@@ -45,7 +58,8 @@ impl Pipeline {
         sink: &mut Sink,
     ) -> Result<()> {
         let start = Instant::now();
-        let (size, takes_pair) = (first.pair.size(), sink.takes_pair());
+        let size = first.pair.size();
+        let takes = Takes { pair: sink.takes_pair(), record: sink.takes_records() };
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         // It may wait for standard input for ever, so nobody waits for it.
@@ -53,7 +67,7 @@ impl Pipeline {
         let (found, to_write) = sync_channel::<Found>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
-            let matched = self.matched(first, &receiver, takes_pair, found);
+            let matched = self.matched(first, &receiver, takes, start, found);
             (matched, writing.join())
         });
         drop(bar);
@@ -87,10 +101,12 @@ impl Pipeline {
         &mut self,
         first: Frame,
         frames: &Receiver<Next>,
-        takes_pair: bool,
+        takes: Takes,
+        start: Instant,
         found: SyncSender<Found>,
     ) -> Ran {
-        let range = self.range;
+        let Self { matcher, range, files, rectified, .. } = self;
+        let range = *range;
         // The frames that are being matched.
         let (started, under_way) = channel();
         let mut failure = None;
@@ -104,18 +120,23 @@ impl Pipeline {
                 }
             };
             // The receiver lives as long as this.
-            let pair = takes_pair.then(|| frame.pair.clone());
+            let pair = takes.pair.then(|| frame.pair.clone());
             let _ = started.send((frame.name, frame.pair.georeferences(), pair));
             Some((frame.pair, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
         let told = &mut ran;
-        let ended = self.matcher.run_all_until(pairs, stop::flag(), move |matched| {
+        let ended = matcher.run_all_until(pairs, stop::flag(), move |matched| {
             let Ok((name, georeferences, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
             let note = matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS));
             told.note = note.or(told.note.take());
+            let record = takes.record.then(|| {
+                let mut record = MatchRecord::new(files, &matched, start.elapsed(), Sign::default());
+                record.rectified = *rectified;
+                line(&name, &record)
+            });
             told.on = Some(matched.ran_on);
-            match found.send(Found { name, georeferences, maps: matched.maps, pair }) {
+            match found.send(Found { name, georeferences, maps: matched.maps, pair, record }) {
                 Ok(()) => ControlFlow::Continue(()),
                 // It tells why.
                 Err(_) => ControlFlow::Break(()),
@@ -128,6 +149,18 @@ impl Pipeline {
         };
         ran
     }
+}
+
+/// The record of a frame in a line of JSON.
+fn line(frame: &str, record: &MatchRecord) -> String {
+    #[derive(Serialize)]
+    struct Line<'a> {
+        frame: &'a str,
+        #[serde(flatten)]
+        record: &'a MatchRecord<'a>,
+    }
+    // Its fields are numbers, texts and maps of texts, which JSON holds.
+    serde_json::to_string(&Line { frame, record }).unwrap_or_default() + "\n"
 }
 
 /// What came of the matching.

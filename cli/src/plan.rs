@@ -11,7 +11,7 @@ use crate::table::Table;
 use crate::text::{bytes, plural};
 
 /// The plan in words and tables, with that for twice the size, if there is one.
-pub(super) fn describe(plan: &Plan) -> Result<String> {
+pub(crate) fn describe(plan: &Plan) -> Result<String> {
     let own = at_one_size(&Tiles::new(plan)?);
     let Some(double) = plan.doubled()? else { return Ok(own) };
     Ok(format!("{own}\nThen at twice the size:\n\n{}", at_one_size(&Tiles::new(&double)?)))
