@@ -54,6 +54,14 @@ impl Rig {
         Self { to_original: Some(transposed(rectifying)), ..self }
     }
 
+    /// The rig of a part of the images, whose first pixel is (x, y).
+    #[must_use]
+    pub fn of_part(mut self, x: usize, y: usize) -> Self {
+        self.camera.principal_point[0] -= x as f64;
+        self.camera.principal_point[1] -= y as f64;
+        self
+    }
+
     /// The depth at disparity `d` (pixels), along the optical axis and in the unit of the baseline. `None`
     /// where `d` is not finite or d + doffs is not above 0: such a point is at infinity or beyond.
     #[must_use]
@@ -61,6 +69,12 @@ impl Rig {
         let apart = d + self.doffs;
         let depth = self.baseline * self.camera.focal_length[0] / apart;
         (apart > 0.0 && d.is_finite() && depth.is_finite()).then_some(depth)
+    }
+
+    /// The disparity, in pixels, of what is at `depth` along the optical axis, in the unit of the baseline: the other way round.
+    #[must_use]
+    pub fn disparity(&self, depth: f64) -> f64 {
+        self.baseline * self.camera.focal_length[0] / depth - self.doffs
     }
 
     /// The point that the left pixel (x, y) shows at disparity `d`: x to the right, y down, z forward, in the unit of the
@@ -120,7 +134,7 @@ impl Rig {
             }));
         }
         let frame = if self.to_original.is_some() { Frame::Original } else { Frame::Matched };
-        Cloud { points, frame }
+        Cloud { points, frame, unit: self.unit }
     }
 }
 

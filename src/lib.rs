@@ -77,6 +77,7 @@
 //! - [`colour`] shows maps as pictures.
 //! - [`check`] warns of what is probably wrong with a pair, and finds its range.
 //! - [`calibration`] reads what is known of the cameras, and [`rectification`] makes rectified pairs of their images.
+//! - [`region`] matches a part of the left view alone.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
@@ -106,6 +107,7 @@ mod pause;
 mod plan;
 mod program;
 pub mod rectification;
+pub mod region;
 #[doc(hidden)]
 pub mod remedy;
 mod roofline;

@@ -1,6 +1,6 @@
 //! The maps that a match leaves behind, and what a pixel of them means.
 
-use crate::image::Plane;
+use crate::image::{Plane, Rect};
 
 /// Fixed-point units of disparity in one pixel.
 pub const FRACTION: i32 = 256;
@@ -82,6 +82,21 @@ impl Maps {
             right: self.right.map(|right| RightMap {
                 disparity: right.disparity.cut_to(size),
                 validity: right.validity.cut_to(size),
+            }),
+        }
+    }
+
+    /// Those of `part`.
+    #[must_use]
+    pub fn crop(&self, part: &Rect) -> Self {
+        Self {
+            disparity: self.disparity.crop(part),
+            raw: self.raw.crop(part),
+            confidence: self.confidence.crop(part),
+            validity: self.validity.crop(part),
+            right: self.right.as_ref().map(|right| RightMap {
+                disparity: right.disparity.crop(part),
+                validity: right.validity.crop(part),
             }),
         }
     }

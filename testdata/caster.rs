@@ -53,14 +53,14 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// What `calib.txt` holds: the cameras, in world units, and the labels to search.
+    /// What `calib.txt` holds: the cameras, in world units, which are metres, and the labels to search.
     pub fn calibration(&self) -> String {
         let (width, height) = self.left.size();
         // An image is one unit high at depth 1.
         let camera = format!("[{height} 0 {}; 0 {height} {}; 0 0 1]", middle(width), middle(height));
         let baseline = REACH * f64::from(self.labels - 1) / height as f64;
         format!(
-            "cam0={camera}\ncam1={camera}\ndoffs=0\nbaseline={baseline}\nwidth={width}\nheight={height}\nndisp={}\n",
+            "cam0={camera}\ncam1={camera}\ndoffs=0\nbaseline={baseline}\nwidth={width}\nheight={height}\nndisp={}\nunit=m\n",
             self.labels
         )
     }

@@ -27,7 +27,7 @@ use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use commands::{
-    batch, bench, completions, devices, evaluate, inspect, man, r#match, presets, rectify, sequence,
+    batch, bench, completions, depth, devices, evaluate, inspect, man, r#match, presets, rectify, sequence,
 };
 use failure::Failure;
 pub use pairs::list;
@@ -66,6 +66,7 @@ struct Cli {
 enum Command {
     Match(r#match::Args),
     Rectify(rectify::Args),
+    Depth(depth::Args),
     Sequence(sequence::Args),
     Batch(batch::Args),
     Evaluate(evaluate::Args),
@@ -103,6 +104,7 @@ fn run() -> Result<(), Failure> {
     match cli.command {
         Command::Match(args) => r#match::run(&args)?,
         Command::Rectify(args) => rectify::run(&args)?,
+        Command::Depth(args) => depth::run(&args)?,
         Command::Sequence(args) => sequence::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,

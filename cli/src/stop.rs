@@ -11,6 +11,8 @@ use signal_hook::flag;
 pub(crate) const STOPPED: u8 = 130;
 
 static STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// Whether the first signal ends the program.
+static AT_ONCE: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// From now on the first signal makes [`go_on`] break, so that what was begun can be tidied up, and the second ends the program
 /// as it is.
@@ -18,8 +20,17 @@ pub(crate) fn listen() {
     for signal in [SIGINT, SIGTERM] {
         // The order counts: the first signal must find the flag down. Where that fails a signal ends the program at once.
         let _ = flag::register_conditional_shutdown(signal, STOPPED.into(), Arc::clone(&STOP))
+            .and_then(|_| flag::register_conditional_shutdown(signal, STOPPED.into(), Arc::clone(&AT_ONCE)))
             .and_then(|_| flag::register(signal, Arc::clone(&STOP)));
     }
+}
+
+/// Does `work` that waits for input, maybe for ever, and has begun nothing to be tidied up: a signal ends the program at once.
+pub(crate) fn at_once<T>(work: impl FnOnce() -> T) -> T {
+    AT_ONCE.store(true, Ordering::Relaxed);
+    let done = work();
+    AT_ONCE.store(false, Ordering::Relaxed);
+    done
 }
 
 /// What becomes true with the first signal.

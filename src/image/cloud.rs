@@ -1,5 +1,7 @@
 //! Clouds of points, and what their files say of them.
 
+use super::calib::Unit;
+
 /// A point of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
@@ -28,6 +30,8 @@ pub struct Cloud {
     pub points: Vec<Point>,
     /// What positions count from.
     pub frame: Frame,
+    /// The unit of positions.
+    pub unit: Unit,
 }
 
 impl Cloud {
@@ -38,7 +42,7 @@ impl Cloud {
             Frame::Matched => "the left camera",
             Frame::Original => "the original left camera, before rectification",
         };
-        format!("frame of {camera}: x right, y down, z forward; unit that of the baseline")
+        format!("frame of {camera}: x right, y down, z forward; unit {}", self.unit.of_baseline())
     }
 }
 
@@ -72,7 +76,7 @@ mod tests {
         let confidence = 200.0_f32.to_le_bytes();
         let position = [1.5_f32, -2.0, 1e6].map(f32::to_le_bytes).concat();
         for frame in [Frame::Matched, Frame::Original] {
-            let cloud = Cloud { points: vec![point, other], frame };
+            let cloud = Cloud { points: vec![point, other], frame, unit: Unit::Metre };
             let split = |bytes: Vec<u8>, end: &str| {
                 let start =
                     bytes.windows(end.len()).position(|window| window == end.as_bytes()).unwrap() + end.len();
@@ -111,7 +115,7 @@ mod tests {
 
     #[test]
     fn the_frame_is_that_of_a_camera() {
-        let about = |frame| Cloud { points: Vec::new(), frame }.about();
+        let about = |frame| Cloud { frame, ..Cloud::default() }.about();
         assert!(about(Frame::Matched).starts_with("frame of the left camera: x right, y down"));
         assert!(about(Frame::Original).starts_with("frame of the original left camera, before"));
     }

@@ -334,7 +334,7 @@ impl Pair {
     }
 
     /// The georeferences of the left and the right image, where they are from TIFF files that have one; maps have the pixels
-    /// of the image, and so its georeference. Parts and mirror images of a pair have none.
+    /// of the image, and so its georeference. Mirror images of a pair have none.
     #[must_use]
     pub fn georeferences(&self) -> [Option<Georeference>; 2] {
         self.georeferences.clone()
@@ -398,7 +398,10 @@ impl Pair {
         let double = |ends: &Range<usize>| 2 * ends.start..2 * ends.end;
         let larger = Rect { x: double(&part.x), y: double(&part.y) };
         let full = self.full.as_ref().map(|full| Box::new(full.crop(&larger)));
-        Self { full, ..self.map(|view| view.crop(part)) }
+        let georeferences = self.georeferences.each_ref().map(|georeference| {
+            georeference.as_ref().map(|georeference| georeference.moved(part.x.start, part.y.start))
+        });
+        Self { full, georeferences, ..self.map(|view| view.crop(part)) }
     }
 
     /// (width, height) of both views.

@@ -5,8 +5,10 @@ use super::{Matched, Matcher};
 use crate::engine::Inspection;
 use crate::error::{Error, Result};
 use crate::front::check;
-use crate::image::Pair;
+use crate::image::{Pair, Rect};
 use crate::options::{DisparityRange, Method};
+#[cfg(doc)]
+use crate::region::Region;
 use crate::watch::Progress;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,6 +44,7 @@ pub struct Job<'a> {
     /// Whether sparse matches find the range.
     found: bool,
     method: Option<&'a Method>,
+    region: Option<Rect>,
     cancel: Option<&'a AtomicBool>,
     listener: Option<Listener<'a>>,
     inspect: Option<Inspect<'a>>,
@@ -72,6 +75,7 @@ impl<'a> Job<'a> {
             find,
             found: S::FOUND,
             method: None,
+            region: None,
             cancel: None,
             listener: None,
             inspect: None,
@@ -81,6 +85,12 @@ impl<'a> Job<'a> {
     /// By `method` instead of the matcher's own.
     pub fn method(self, method: &'a Method) -> Self {
         Self { method: Some(method), ..self }
+    }
+
+    /// Matches this part of the left view alone, with what the right view has of it, in the time of that part; the maps have its
+    /// size. See [`Region`].
+    pub fn region(self, part: Rect) -> Self {
+        Self { region: Some(part), ..self }
     }
 
     /// `listener` hears of progress as each stage begins; where the pair is matched [once more](Search::FOUND), from 0 on again. It may answer with a [`ControlFlow`]; a break ends the match with
@@ -105,8 +115,8 @@ impl<'a> Job<'a> {
     /// # Errors
     /// [`Error::Range`] for the disparities to search, [`Error::Option`] for options out of range, [`Error::Budget`] where no
     /// tile is small enough for the method's memory, [`Error::Device`] where the wanted device fails, [`Error::Memory`] when
-    /// the machine or the device cannot hold the match, [`Error::Interrupted`] when it was stopped, and those of
-    /// [`Job::inspect`].
+    /// the machine or the device cannot hold the match, [`Error::Interrupted`] when it was stopped, [`Error::Mismatch`] for a
+    /// [region](Job::region) that is not inside the view, and those of [`Job::inspect`].
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run(self) -> Result<Matched> {
         pollster::block_on(self.run_async())
@@ -117,7 +127,7 @@ impl<'a> Job<'a> {
     /// # Errors
     /// Those of `run`.
     pub async fn run_async(self) -> Result<Matched> {
-        let Self { matcher, pair, find, found, method, cancel, mut listener, mut inspect } = self;
+        let Self { matcher, pair, find, found, method, region, cancel, mut listener, mut inspect } = self;
         let range = matcher.threads.run(async || find(pair)).await?;
         let own = matcher.method.clone();
         let mut observer = |progress| {
@@ -129,10 +139,11 @@ impl<'a> Job<'a> {
         let method = method.unwrap_or(&own);
         // Who looks in sees one match.
         let once = !found || inspector.is_some();
-        let matched = matcher.solve(pair, range, method, &mut observer, inspector).await?;
+        let region = region.as_ref();
+        let matched = matcher.solve_part(pair, region, range, method, &mut observer, inspector).await?;
         let matched = Matched { range_found: found, ..matched };
         let Some(wider) = check::wider(&matched.maps, range).filter(|_| !once) else { return Ok(matched) };
-        match matcher.solve(pair, wider, method, &mut observer, None).await {
+        match matcher.solve_part(pair, region, wider, method, &mut observer, None).await {
             Ok(again) if check::goes_beyond(&again.maps, range) => {
                 Ok(Matched { range_found: found, ..again })
             }
@@ -145,7 +156,7 @@ impl<'a> Job<'a> {
     /// Matches the pair, and writes the disparities to `out` as well, row by row, in pixels, `+inf` where there is none.
     ///
     /// # Errors
-    /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` has not as many elements as the images have pixels.
+    /// Those of [`Job::run`], and [`Error::Mismatch`] when `out` has not as many elements as the maps have pixels.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn run_into(self, out: &mut [f32]) -> Result<Matched> {
         pollster::block_on(self.run_into_async(out))
@@ -156,7 +167,7 @@ impl<'a> Job<'a> {
     /// # Errors
     /// Those of `run_into`.
     pub async fn run_into_async(self, out: &mut [f32]) -> Result<Matched> {
-        let (width, height) = self.pair.size();
+        let (width, height) = self.region.as_ref().map_or(self.pair.size(), Rect::size);
         if out.len() != width * height {
             let reason = format!("{} values for a map of {width} x {height} pixels", out.len());
             return Err(Error::Mismatch(reason));

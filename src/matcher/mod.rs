@@ -14,11 +14,12 @@ use crate::backend::cpu::Cpu;
 use crate::backend::gpu::{self, FaultInjection, Gpu};
 use crate::engine::{self, Inspector};
 use crate::error::{BudgetError, Error, Result};
-use crate::image::Pair;
+use crate::image::{Pair, Rect};
 use crate::options::{DeviceChoice, DisparityRange, Execution, Method};
 use crate::plan::Plan;
 use crate::program::Program;
 use crate::program::tiles::Tiles;
+use crate::region::Region;
 use crate::watch::Observer;
 use check::check;
 pub use job::{Answer, Job};
@@ -165,6 +166,23 @@ impl Matcher {
     /// Measures the time of every stage from now on, or no longer.
     pub fn keep_time(&mut self, on: bool) {
         self.timings = on;
+    }
+
+    /// Matches a region of the left view of `pair`, or all of it.
+    async fn solve_part(
+        &mut self,
+        pair: &Pair,
+        part: Option<&Rect>,
+        range: DisparityRange,
+        method: &Method,
+        observer: Observer<'_>,
+        inspector: Option<Inspector<'_>>,
+    ) -> Result<Matched> {
+        let Some(part) = part else { return self.solve(pair, range, method, observer, inspector).await };
+        let region = Region::new(part.clone(), pair.size(), range)?;
+        let window = region.window_of(pair);
+        let matched = self.solve(&window, range, method, observer, inspector).await?;
+        Ok(Matched { maps: region.maps_of(&matched.maps), ..matched })
     }
 
     /// Matches `pair`, and tells of it as asked.

@@ -4,6 +4,7 @@ mod execution;
 mod method;
 mod reading;
 mod rectification;
+mod region;
 pub(crate) mod search;
 mod sign;
 
@@ -11,5 +12,6 @@ pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
 pub(crate) use reading::ReadingArgs;
 pub(crate) use rectification::{RectificationArgs, shown};
-pub(crate) use search::{Found, Search, calibrated_range};
+pub(crate) use region::RegionArgs;
+pub(crate) use search::{Found, Search, calibrated_range, depth};
 pub(crate) use sign::Sign;

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use mrfgs::Error;
 use mrfgs::check;
+use mrfgs::depth::Rig;
 use mrfgs::error::RangeError;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
@@ -12,7 +13,7 @@ use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use serde::Serialize;
 
 use crate::args::sign::Sign;
-use crate::failure::{self, Result};
+use crate::failure::{self, Failure, Result};
 
 /// The largest disparity to search, as users give it: a number of pixels, or `auto`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -44,7 +45,7 @@ pub fn pixels(text: &str) -> std::result::Result<i32, String> {
 }
 
 /// What the user says of the range.
-#[derive(clap::Args, Clone, Copy, Serialize)]
+#[derive(clap::Args, Clone, Copy, Default, Serialize)]
 pub(crate) struct Search {
     /// Largest disparity to search, in pixels, itself included; `auto` takes the range from sparse matches [default: ndisp
     /// - 1 of the calibration file, or auto without one]
@@ -53,11 +54,25 @@ pub(crate) struct Search {
     /// Smallest disparity to search, in pixels; may be negative [default: 0, or that of the range found]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = pixels)]
     pub(crate) min_disparity: Option<i32>,
+    /// Nearest depth to search, in the unit of the baseline, in the place of --max-disparity. It takes the cameras of a calibration
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, conflicts_with = "max_disparity", value_parser = depth)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) min_depth: Option<f64>,
+    /// Farthest depth to search, in the place of --min-disparity
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, conflicts_with = "min_disparity", value_parser = depth)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) max_depth: Option<f64>,
+}
+
+/// A depth, as users give it.
+pub(crate) fn depth(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| "give a number above 0, in the unit of the baseline".into())
 }
 
 impl From<DisparityRange> for Search {
     fn from(DisparityRange { min, max }: DisparityRange) -> Self {
-        Self { max_disparity: Some(Largest::Pixels(max)), min_disparity: Some(min) }
+        Self { max_disparity: Some(Largest::Pixels(max)), min_disparity: Some(min), ..Self::default() }
     }
 }
 
@@ -69,6 +84,40 @@ pub(crate) struct Found {
 }
 
 impl Search {
+    /// Whether a calibration may have a say.
+    pub(crate) fn takes_calibration(&self) -> bool {
+        self.max_disparity.is_none() || self.takes_cameras().is_some()
+    }
+
+    /// The flag that takes the cameras.
+    fn takes_cameras(&self) -> Option<&'static str> {
+        let nearest = self.min_depth.map(|_| "--min-depth");
+        nearest.or(self.max_depth.map(|_| "--max-depth"))
+    }
+
+    /// The disparities of the nearest and the farthest depth, rounded so that both are in the range.
+    fn of_depths(&self, calibration: Option<(&Path, &Calibration)>) -> Result<[Option<i32>; 2]> {
+        let Some(flag) = self.takes_cameras() else { return Ok([None, None]) };
+        if let (Some(nearest), Some(farthest)) = (self.min_depth, self.max_depth)
+            && nearest > farthest
+        {
+            return Err(Failure::usage(
+                "--max-depth",
+                format!("{farthest} is nearer than --min-depth {nearest}"),
+            ));
+        }
+        let (path, calibration) = calibration.ok_or_else(|| {
+            Failure::usage(
+                flag,
+                "takes the cameras of a calibration; give one with --calib, or --max-disparity",
+            )
+        })?;
+        let rig = Rig::new(calibration).map_err(|e| failure::in_file(e, path, ""))?;
+        // What does not fit is far outside of what may be searched, which says so.
+        let nearest = self.min_depth.map(|depth| rig.disparity(depth).ceil() as i32);
+        Ok([nearest, self.max_depth.map(|depth| rig.disparity(depth).floor() as i32)])
+    }
+
     /// The range to search in `pair`, where the user counts by `sign`; a `calibration` comes with its path.
     pub(crate) fn range(
         &self,
@@ -85,6 +134,8 @@ impl Search {
             Sign::LeftMinusRight => (max, self.min_disparity),
             Sign::RightMinusLeft => (self.min_disparity, max),
         };
+        let [nearest, farthest] = self.of_depths(calibration)?.map(|end| end.map(|end| sign.disparity(end)));
+        let (near, far) = (nearest.or(near), farthest.or(far));
         let between = |near: i32, far: i32| {
             let range = match sign {
                 Sign::LeftMinusRight => DisparityRange::new(far, near),

@@ -11,10 +11,11 @@ use mrfgs::depth::Rig;
 use mrfgs::image::cloud::Frame;
 use mrfgs::image::write::Writer;
 use mrfgs::image::{Georeference, Image, Plane, write};
-use mrfgs::maps::Maps;
+use mrfgs::maps::{FRACTION, Maps, flag};
 use mrfgs::options::{DisparityRange, Method};
+use serde::Serialize;
 
-use crate::args::Sign;
+use crate::args::{Sign, depth};
 use crate::failure::{Failure, Result};
 use crate::outputs::cloud;
 use crate::outputs::files::Written;
@@ -134,6 +135,62 @@ pub(crate) struct AlsoArgs {
     /// Colours of the previews, from far to near [default: turbo]
     #[arg(long, value_name = "NAME", value_parser = colours())]
     colours: Option<ColourMap>,
+    #[command(flatten)]
+    pub(crate) limits: Limits,
+}
+
+/// What is left out of the outputs.
+#[derive(clap::Args, Clone, Copy, Serialize)]
+pub(crate) struct Limits {
+    /// Pixels of less confidence (0 to 255), and filled ones, have no disparity: in OUTPUT, and in previews, depths and points
+    #[arg(long, value_name = "N")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    min_confidence: Option<u8>,
+    /// Depths beyond this, in the unit of the baseline, are left out of depths and points
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, value_parser = depth)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clip_depth: Option<f64>,
+}
+
+impl Limits {
+    /// `map`, of the disparities of `maps`, without those of too little confidence.
+    fn sure(self, mut map: Plane<f32>, maps: &Maps) -> Plane<f32> {
+        if let Some(least) = self.min_confidence {
+            let pixels = maps.confidence.data().iter().zip(maps.validity.data());
+            for (d, (confidence, validity)) in map.data_mut().iter_mut().zip(pixels) {
+                if *confidence < least || validity & flag::FILLED != 0 {
+                    *d = f32::INFINITY;
+                }
+            }
+        }
+        map
+    }
+
+    /// The depth at disparity `d`, unless it is too far.
+    fn depth(self, rig: &Rig, d: f64) -> Option<f64> {
+        rig.depth(d).filter(|depth| self.clip_depth.is_none_or(|limit| *depth <= limit))
+    }
+
+    /// `map` without disparities that are too far away.
+    fn near(self, map: Plane<f32>, rig: &Rig) -> Plane<f32> {
+        if self.clip_depth.is_none() {
+            return map;
+        }
+        map.map(|d| self.depth(rig, f64::from(*d)).map_or(f32::INFINITY, |_| *d))
+    }
+
+    /// The maps in which what is not sure or too far has low confidence, and so gives no points.
+    fn trusted(self, maps: &Maps, rig: &Rig) -> Maps {
+        let mut maps = maps.clone();
+        let pixels = maps.disparity.data().iter().zip(maps.confidence.data());
+        for (validity, (d, confidence)) in maps.validity.data_mut().iter_mut().zip(pixels) {
+            let is_far = self.depth(rig, f64::from(*d) / f64::from(FRACTION)).is_none();
+            if is_far || self.min_confidence.is_some_and(|least| *confidence < least) {
+                *validity |= flag::LOW_CONFIDENCE;
+            }
+        }
+        maps
+    }
 }
 
 fn parser() -> impl TypedValueParser<Value = &'static Also> {
@@ -170,6 +227,11 @@ pub(crate) struct Outcome<'a> {
 }
 
 impl Outcome<'_> {
+    /// The disparity map, without what is not sure.
+    pub(crate) fn final_map(&self, limits: Limits) -> Plane<f32> {
+        limits.sure(self.maps.final_map(), self.maps)
+    }
+
     /// What writes a map with the pixels of `view`.
     pub(crate) fn writer(&self, view: View) -> Writer {
         Writer { georeference: self.georeferences[view as usize].clone() }
@@ -184,6 +246,7 @@ impl AlsoArgs {
 
     /// Refuses colours without a picture, and the original camera where the images are not rectified.
     pub(crate) fn check(&self, rectifies: bool) -> Result<()> {
+        self.check_clip()?;
         let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
         if self.colours.is_some() && !self.wanted().any(is_picture) {
             let reason = "are those of a preview; add --also preview, or leave --colours out";
@@ -215,9 +278,42 @@ impl AlsoArgs {
         self.wanted().any(|also| matches!(also.kind, Kind::Points(..) | Kind::Picture { beside: true }))
     }
 
+    /// The wanted outputs of a map that is there: depth where none are named.
+    ///
+    /// # Errors
+    /// For an output that takes more than the map.
+    pub(crate) fn of_map(&self) -> Result<Vec<&'static Also>> {
+        let mut wanted: Vec<_> = self.wanted().collect();
+        if wanted.is_empty() {
+            wanted.extend(ALL.iter().find(|also| also.word == "depth"));
+        }
+        let is_of_map = |also: &&Also| {
+            matches!(
+                also.kind,
+                Kind::Depth | Kind::Millimetres | Kind::Points(Frame::Matched) | Kind::Picture { .. }
+            )
+        };
+        match wanted.iter().find(|also| !is_of_map(also)) {
+            Some(word) => Err(Failure::usage(
+                word.flag(),
+                "is found by a match, and MAP does not hold it; leave it out",
+            )),
+            None => Ok(wanted),
+        }
+    }
+
+    /// Refuses a limit of depths without depths.
+    fn check_clip(&self) -> Result<()> {
+        if self.limits.clip_depth.is_some() && self.take_cameras().is_none() {
+            let reason = "is of depths and points; add --also depth or points, or leave it out";
+            return Err(Failure::usage("--clip-depth", reason));
+        }
+        Ok(())
+    }
+
     /// The disparity map in colours, with the left image `beside` it.
     fn picture(&self, beside: bool, outcome: &Outcome) -> Plane<[u8; 3]> {
-        let (DisparityRange { min, max }, map) = (outcome.range, outcome.maps.final_map());
+        let (DisparityRange { min, max }, map) = (outcome.range, outcome.final_map(self.limits));
         let colours = self.colours.unwrap_or_default();
         let preview = colour::preview(&map, min as f32, max as f32, colours);
         match outcome.left.filter(|_| beside) {
@@ -233,6 +329,7 @@ impl AlsoArgs {
 
     /// Refuses outputs that no film shows.
     pub(crate) fn check_film(&self) -> Result<()> {
+        self.check_clip()?;
         match self.wanted().find(|also| !matches!(also.kind, Kind::Picture { .. })) {
             Some(also) => Err(Failure::usage(
                 also.flag(),
@@ -253,7 +350,7 @@ impl AlsoArgs {
             Kind::Bytes(map) => write::picture(path, map(maps))?,
             Kind::Depth => {
                 let Some(rig) = rig else { return Ok(None) };
-                let depths = rig.depths(&maps.final_map());
+                let depths = rig.depths(&self.limits.near(outcome.final_map(self.limits), &rig));
                 outcome.writer(View::Left).depth(path, &depths)?;
                 let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
                 return Ok(Some(match known().reduce(f32::min).zip(known().reduce(f32::max)) {
@@ -262,9 +359,8 @@ impl AlsoArgs {
                 }));
             }
             Kind::Millimetres => {
-                let Some(depths) = rig.and_then(|rig| rig.millimetres(&maps.final_map())) else {
-                    return Ok(None);
-                };
+                let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
+                let Some(depths) = rig.and_then(|rig| rig.millimetres(&near(&rig))) else { return Ok(None) };
                 write::picture(path, &depths)?;
             }
             Kind::Points(frame) => {
@@ -273,7 +369,7 @@ impl AlsoArgs {
                     Frame::Original => rig.zip(rectifying).map(|(rig, by)| rig.in_original_frame(&by)),
                 };
                 let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
-                let cloud = rig.cloud(maps, left);
+                let cloud = rig.cloud(&self.limits.trusted(maps, &rig), left);
                 cloud::write(path, &cloud)?;
                 let count = cloud.points.len();
                 return Ok(Some(format!("{count} point{}", plural(count))));
@@ -357,7 +453,8 @@ impl MapArgs {
     pub(crate) fn write(&self, folder: &Path, name: &str, outcome: &Outcome) -> Result<()> {
         let map = folder.join(self.map(name));
         let mut written = Written::default();
-        written.note(&map, outcome.writer(View::Left).disparity(&map, &outcome.maps.final_map()))?;
+        written
+            .note(&map, outcome.writer(View::Left).disparity(&map, &outcome.final_map(self.also.limits)))?;
         for (word, file) in self.also(name) {
             let path = folder.join(file);
             written.note(&path, self.also.write(word, &path, outcome))?;

@@ -41,7 +41,10 @@ fn encode_las(cloud: &Cloud, compressed: bool) -> las::Result<Vec<u8>> {
     let header: Header = header.into_header()?;
     let mut writer = las::Writer::new(Cursor::new(Vec::new()), header)?;
     for &Point { position, colour, confidence } in &cloud.points {
-        let [x, y, z] = position.map(f64::from);
+        // As they are stored: the bounds in the header are those of what a reader reads.
+        let stored = |v: f32| transform.inverse(f64::from(v)).map(|steps| transform.direct(steps));
+        let [x, y, z] = position.map(stored);
+        let (x, y, z) = (x?, y?, z?);
         // All 16 bits, as the standard wants levels of 8.
         let [red, green, blue] = colour.map(|level| u16::from(level) * 257);
         writer.write_point(las::Point {

@@ -8,7 +8,7 @@ mod film;
 mod record;
 mod staged;
 
-pub(crate) use also::{Also, AlsoArgs, Format, MapArgs, Outcome, View};
+pub(crate) use also::{Also, AlsoArgs, Format, Limits, MapArgs, Outcome, View};
 pub(crate) use claim::Claim;
 pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;

@@ -29,6 +29,9 @@ pub(crate) struct MatchRecord<'a> {
     files: &'a Files,
     /// Whether the images were rectified before.
     pub(crate) rectified: bool,
+    /// The first column and row of the maps in the left view, where they are of a region.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) region: Option<[usize; 2]>,
     width: usize,
     height: usize,
     sign: Sign,
@@ -70,6 +73,7 @@ impl<'a> MatchRecord<'a> {
             version: env!("CARGO_PKG_VERSION"),
             files,
             rectified: false,
+            region: None,
             width,
             height,
             sign,

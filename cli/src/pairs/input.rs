@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use mrfgs::calibration::{self, cameras::StereoCalibration, matrix::Matrix};
 use mrfgs::check::{self, Warning};
 use mrfgs::depth::Rig;
-use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
+use mrfgs::image::{Pair, Rect};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Options, Rectification};
+use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
 
 use crate::args::{Found, ReadingArgs, Search, Sign, shown};
@@ -51,6 +52,8 @@ pub(crate) struct Input {
     calibration: Option<Known>,
     /// What has rectified the pair, where it was not.
     pub(crate) rectification: Option<Rectification>,
+    /// The region that is wanted, where it is not all; the pair is its window.
+    region: Option<Region>,
 }
 
 /// A calibration of a rectified pair, and where it comes from.
@@ -71,7 +74,7 @@ impl PairArgs {
     /// by `sign`. With `rectify`, the images are as the cameras took them, and are rectified.
     pub(crate) fn read(&self, sign: Sign, cameras: bool, rectify: Option<&Options>) -> Result<Input> {
         let pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
-        let beside = Some(&*self.left).filter(|_| cameras || self.search.max_disparity.is_none());
+        let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
         Input::new(pair, &self.search, sign, &self.calib, rectify, beside)
     }
 
@@ -125,12 +128,36 @@ impl Input {
         };
         let known = calibration.as_ref().map(Known::named);
         let Found { range, by_matches } = search.range(&pair, known, sign)?;
-        Ok(Self { pair, range, by_matches, calibration, rectification })
+        Ok(Self { pair, range, by_matches, calibration, rectification, region: None })
     }
 
     /// The files of the calibration, for a record.
     pub(crate) fn calibration_files(&self) -> Option<String> {
         self.calibration.as_ref().map(|known| shown(&known.files))
+    }
+
+    /// Narrows it to the window of the region `part` of the left view, where there is one; the range may become wider where that
+    /// `fits`.
+    ///
+    /// # Errors
+    /// Where the region is not inside the view.
+    pub(crate) fn narrow(
+        &mut self,
+        part: Option<&Rect>,
+        fits: impl Fn(DisparityRange) -> bool,
+    ) -> Result<()> {
+        let Some(part) = part else { return Ok(()) };
+        let wider = check::beyond(self.range).filter(|_| self.searched(fits).may_widen);
+        let region = Region::new(part.clone(), self.pair.size(), wider.unwrap_or(self.range));
+        let region = region.map_err(|e| Failure::usage("--roi", e))?;
+        self.pair = region.window_of(&self.pair);
+        self.region = Some(region);
+        Ok(())
+    }
+
+    /// The region that it is narrowed to.
+    pub(crate) fn region(&self) -> Option<&Region> {
+        self.region.as_ref()
     }
 
     /// The calibration file.
@@ -141,7 +168,8 @@ impl Input {
     /// The cameras for the output `word`, if there is one; the left image is `left`.
     pub(crate) fn rig(&self, word: Option<&Also>, left: &Path) -> Result<Option<Rig>> {
         let known = self.calibration.as_ref().map(Known::named);
-        word.map(|word| rig(word, known, left, self.pair.size(), "give one with --calib")).transpose()
+        let rig = |word| rig(word, known, left, self.pair.size(), "give one with --calib");
+        word.map(rig).transpose()
     }
 
     /// The rotation from the frame of the left camera to the rectified one, where the pair was rectified.
@@ -201,7 +229,7 @@ impl Input {
 }
 
 /// What the calibration in `files` says of images that are rectified.
-fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
+pub(crate) fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
     let named = |reason: &str| Error::read(shown(files), reason);
     let known = calibration::read(files)?;
     let calibration =

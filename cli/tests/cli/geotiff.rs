@@ -23,9 +23,15 @@ fn write_view(path: &Path, from: &str, east: f64) {
         (33_550, Double(&[0.5, 0.5, 0.0])),
         (33_922, Double(&[0.0, 0.0, 0.0, east, 5e6, 0.0])),
         (34_735, Short(&KEYS)),
+        (50_844, Double(&polynomials(east))),
     ];
     fs::write(path, Tiff { big_endian: true, tiled: false, tags: &tags, chunks: &[grey.as_raw()] }.bytes())
         .unwrap();
+}
+
+/// The rational polynomials of a satellite: 92 numbers, the third and fourth of which are offsets of line and sample.
+fn polynomials(first: f64) -> [f64; 92] {
+    std::array::from_fn(|i| first + i as f64)
 }
 
 /// How far east a map begins, and that it has all tags.
@@ -34,7 +40,9 @@ fn east(path: &Path) -> f64 {
     assert_eq!(map.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap(), [0.5, 0.5, 0.0]);
     assert_eq!(map.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap(), KEYS);
     assert_eq!(map.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
-    map.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap()[3]
+    let east = map.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap()[3];
+    assert_eq!(map.get_tag_f64_vec(Tag::Unknown(50_844)).unwrap(), polynomials(east));
+    east
 }
 
 #[test]
@@ -65,4 +73,24 @@ fn maps_lie_where_their_views_lie() {
         "match left.tif right.tif tiled.tif --device cpu --method fast --set match-size=full --memory 12MiB";
     run(&folder, tiled).succeeded().says(" tiles, ");
     assert!((east(&at("tiled.tif")) - 4e5).abs() < 1e-9);
+}
+
+/// A part of a map lies where it lies in the whole map.
+#[test]
+fn regions_lie_in_their_place() {
+    let folder = Folder::new();
+    write_view(&folder.join("left.tif"), "im0.png", 4e5);
+    write_view(&folder.join("right.tif"), "im1.png", 7e5);
+    let line = "match left.tif right.tif d.tif --roi 40,30,100,50 --max-disparity 31 --device cpu --quiet --also right";
+    run(&folder, line).succeeded();
+    for (name, east) in [("d.tif", 4e5), ("d.right.tif", 7e5)] {
+        let mut map = Decoder::new(Cursor::new(fs::read(folder.join(name)).unwrap())).unwrap();
+        assert_eq!(map.dimensions().unwrap(), (100, 50));
+        // The pixel (0, 0) of the whole is (-40, -30) of the part.
+        assert_eq!(map.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap(), [-40.0, -30.0, 0.0, east, 5e6, 0.0]);
+        let mut expected = polynomials(east);
+        expected[2] -= 30.0;
+        expected[3] -= 40.0;
+        assert_eq!(map.get_tag_f64_vec(Tag::Unknown(50_844)).unwrap(), expected);
+    }
 }

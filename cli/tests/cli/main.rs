@@ -321,10 +321,11 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and theirs.
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "",
     "match",
     "rectify",
+    "depth",
     "sequence",
     "batch",
     "evaluate",

@@ -41,7 +41,7 @@ fn depth_is_that_of_the_cameras() {
     let folder = Folder::new();
     let said = matched(&folder, "repetitive", "d.pfm --also depth --set fill=none");
     let told = said.lines().find(|line| line.contains("depths ")).unwrap();
-    assert!(told.contains("unit: that of the baseline in ") && told.ends_with("calib.txt"), "{told}");
+    assert!(told.contains("unit: m, by ") && told.ends_with("calib.txt"), "{told}");
     let (disparities, depths) = (read_pfm(folder.join("d.pfm")), read_pfm(folder.join("d.depth.pfm")));
     assert!(depth_error(&depths, &disparities, 0.0) < 1e-6);
     assert!(depth_error(&depths, &disparities, 0.1) > 1e-3, "the comparison sees a tenth of a pixel");
@@ -55,6 +55,121 @@ fn depth_is_that_of_the_cameras() {
     let known: Vec<f64> = known.map(|(z, _)| f64::from(*z)).collect();
     assert!(known.len() > 1000, "{} pixels", known.len());
     assert!((median(known.clone()) - 2.8).abs() < 0.02, "{}", median(known));
+}
+
+/// What `match` writes beside its map, `depth` makes of the map afterwards.
+#[test]
+fn depth_and_points_of_a_map_that_is_there() {
+    let folder = Folder::new();
+    let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
+    let also = "--also depth,depth-mm,points,points.las,side-by-side";
+    matched(&folder, "mixed", &format!("d.pfm {also},confidence --set fill=none --set confidence-floor=0"));
+    fs::create_dir(folder.join("again")).unwrap();
+    for file in ["d.pfm", "d.confidence.png"] {
+        fs::copy(folder.join(file), folder.join("again").join(file)).unwrap();
+    }
+    let more = "--left @mixed/im0.png --calib @mixed/calib.txt --confidence again/d.confidence.png";
+    let told = run(&folder, &format!("depth again/d.pfm {more} {also}")).succeeded();
+    told.says("unit: m, by");
+    for end in ["depth.pfm", "depth-mm.png", "points.ply", "points.las"] {
+        assert!(bytes(&format!("d.{end}")) == bytes(&format!("again/d.{end}")), "{end}");
+    }
+    // The other sign is another map.
+    run(&folder, &format!("depth again/d.pfm {more} --sign right-minus-left --quiet")).succeeded();
+    assert!(read_pfm(folder.join("again/d.depth.pfm")).data().iter().all(|depth| depth.is_infinite()));
+    // Limits, here and in a match.
+    run(
+        &folder,
+        &format!("depth again/d.pfm {more} --also depth,points --clip-depth 2 --min-confidence 60 --quiet"),
+    )
+    .succeeded();
+    matched(
+        &folder,
+        "mixed",
+        "near.pfm --also depth,points --clip-depth 2 --min-confidence 60 --set fill=none",
+    );
+    let (near, all) = (read_pfm(folder.join("near.depth.pfm")), read_pfm(folder.join("d.depth.pfm")));
+    let confidence = read::grey8(&folder.join("d.confidence.png")).unwrap();
+    let mut kept = 0;
+    for ((near, all), confidence) in near.data().iter().zip(all.data()).zip(confidence.data()) {
+        let is_kept = *all <= 2.0 && *confidence >= 60;
+        assert!(if is_kept { near.total_cmp(all).is_eq() } else { near.is_infinite() }, "{all} {confidence}");
+        kept += usize::from(is_kept);
+    }
+    assert!(
+        kept > 5000 && kept < all.data().iter().filter(|depth| depth.is_finite()).count() - 5000,
+        "{kept}"
+    );
+    assert!(bytes("near.depth.pfm") == bytes("again/d.depth.pfm"));
+    assert!(bytes("near.points.ply") == bytes("again/d.points.ply"));
+    assert!(bytes("near.points.ply").len() < bytes("d.points.ply").len());
+    for (line, code, words) in [
+        ("d.pfm", 2, "--calib & no calib.txt beside d.pfm"),
+        ("d.pfm --calib @mixed/calib.txt --also points", 2, "--left & left image"),
+        ("d.pfm --calib @mixed/calib.txt --also validity", 2, "--also validity & a match"),
+        ("d.pfm --calib @wall/calib.txt", 1, "calib.txt is for images of 240 x 180 & d.pfm is 320 x 240"),
+        (
+            "d.pfm --calib @mixed/calib.txt --left @wall/im0.png --also points",
+            1,
+            "im0.png is 240 x 180 & d.pfm",
+        ),
+        ("none.pfm --calib @mixed/calib.txt", 1, "none.pfm"),
+        ("d.points.ply --calib @mixed/calib.txt", 1, "d.points.ply"),
+    ] {
+        let before = listing(&folder);
+        run(&folder, &format!("depth {line}")).failed(code, words);
+        assert_eq!(listing(&folder), before, "{line}");
+    }
+    run(&folder, "match @mixed/im0.png @mixed/im1.png e.pfm --clip-depth 2")
+        .failed(2, "--clip-depth & --also depth");
+}
+
+/// Ranges by depth are those by disparity.
+#[test]
+fn ranges_may_be_depths() {
+    let folder = Folder::new();
+    let disparity = |depth: f64| BASELINE * FOCAL_LENGTH / depth;
+    let (nearest, farthest) = (disparity(1.3).ceil(), disparity(2.9).floor());
+    assert!(farthest > 5.0 && nearest > farthest + 5.0);
+    matched(
+        &folder,
+        "repetitive",
+        &format!("by-disparity.pfm --max-disparity {nearest} --min-disparity {farthest}"),
+    );
+    let said = matched(&folder, "repetitive", "by-depth.pfm --min-depth 1.3 --max-depth 2.9 --json d.json");
+    assert!(said.contains(&format!("{} labels", nearest - farthest + 1.0)), "{said}");
+    let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
+    assert!(bytes("by-depth.pfm") == bytes("by-disparity.pfm"));
+    // The other sign means the same depths.
+    matched(
+        &folder,
+        "repetitive",
+        "other.pfm --min-depth 1.3 --max-depth 2.9 --sign right-minus-left --json o.json",
+    );
+    let range = |name: &str| json(folder.join(name))["range"].clone();
+    assert_eq!(range("d.json")["max"].as_f64(), Some(nearest));
+    assert_eq!(range("o.json")["min"].as_f64(), Some(-nearest));
+    // One end alone: infinitely far is at 0, and the nearest is that of calib.txt.
+    matched(&folder, "repetitive", "one.pfm --min-depth 1.3 --json one.json");
+    assert_eq!(
+        (range("one.json")["min"].as_f64(), range("one.json")["max"].as_f64()),
+        (Some(0.0), Some(nearest))
+    );
+    matched(&folder, "repetitive", "end.pfm --max-depth 2.9 --json end.json");
+    assert_eq!(range("end.json")["min"].as_f64(), Some(farthest));
+    assert_ne!(range("end.json")["max"].as_f64(), Some(nearest));
+    for (flags, code, words) in [
+        ("--min-depth 3 --max-depth 2", 2, "--max-depth: 2 is nearer than --min-depth 3"),
+        ("--min-depth -1", 2, "--min-depth & above 0"),
+        ("--min-depth 2 --max-disparity 9", 2, "--min-depth & --max-disparity"),
+        ("--min-depth 1e-9", 2, "--max-disparity"),
+    ] {
+        let pair = "@repetitive/im0.png @repetitive/im1.png no.pfm --device cpu";
+        run(&folder, &format!("match {pair} {flags}")).failed(code, words);
+    }
+    fs::copy(scene("repetitive/im0.png"), folder.join("l.png")).unwrap();
+    run(&folder, "match l.png @repetitive/im1.png no.pfm --min-depth 1")
+        .failed(2, "--min-depth & cameras & --calib");
 }
 
 /// How many percent of the pixels of `left` find their own disparity in `right`, moved by it, to a pixel.

@@ -126,7 +126,7 @@ fn las(path: &Path) -> (f64, Vec<Point>) {
         let values = || points.iter().map(|point| point.0[axis]);
         let ends = [values().fold(f64::MIN, f64::max), values().fold(f64::MAX, f64::min)];
         assert!(
-            (f64_at(at) - ends[0]).abs() < 1.001 * step && (f64_at(at + 8) - ends[1]).abs() < 1.001 * step,
+            (f64_at(at) - ends[0]).abs() < 1e-6 * step && (f64_at(at + 8) - ends[1]).abs() < 1e-6 * step,
             "bounds"
         );
     }

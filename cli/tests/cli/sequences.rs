@@ -163,6 +163,59 @@ fn masks_calibrations_and_records_are_those_of_match() {
     assert_eq!(told.stdout.lines().count(), 3);
 }
 
+/// A region of every frame is that of `match`, with its record, depth and picture.
+#[test]
+fn regions_are_those_of_match() {
+    let folder = cameras();
+    let at = |name: &str| fs::read(folder.join(name)).unwrap();
+    let camera = "[60 0 31.5; 0 60 23.5; 0 0 1]";
+    let calib = format!("cam0={camera}\ncam1={camera}\ndoffs=0\nbaseline=100\n");
+    fs::write(folder.join("calib.txt"), calib).unwrap();
+    let line =
+        format!("{RANGE} --quiet --roi 30,8,20,24 --calib calib.txt --also depth,points,side-by-side,raw");
+    run(&folder, &format!("match left/f2.png right/f2.ppm one.pfm --json one.json {line}")).succeeded();
+    run(&folder, &format!("sequence left right maps --json maps.jsonl {line}")).succeeded();
+    for end in ["pfm", "raw.pfm", "depth.pfm", "points.ply", "side-by-side.png"] {
+        assert!(at(&format!("one.{end}")) == at(&format!("maps/f2.{end}")), "{end}");
+    }
+    let map = read_pfm(folder.join("one.pfm"));
+    assert_eq!(map.size(), (20, 24));
+    let one = json(folder.join("one.json"));
+    assert_eq!((one["width"].as_u64(), one["region"].to_string()), (Some(20), "[30,8]".into()));
+    assert!(fs::read_to_string(folder.join("maps.jsonl")).unwrap().contains("\"region\":[30,8]"));
+    // Points lie where those of the whole view lie, and the picture shows the part.
+    run(
+        &folder,
+        &format!("match left/f2.png right/f2.ppm whole.pfm {RANGE} --quiet --calib calib.txt --also points"),
+    )
+    .succeeded();
+    let x_and_depth = |name: &str| {
+        let text = String::from_utf8_lossy(&at(name)).into_owned();
+        let start = text.find("end_header").unwrap() + 11;
+        let bytes = at(name)[start..].to_vec();
+        bytes
+            .chunks_exact(19)
+            .map(|p| [0, 8].map(|i| f32::from_le_bytes(p[i..i + 4].try_into().unwrap())))
+            .collect::<Vec<_>>()
+    };
+    let columns = |points: Vec<[f32; 2]>| {
+        let columns = points.into_iter().map(|[x, z]| 60.0 * x / z + 31.5);
+        columns.fold([f32::MAX, f32::MIN], |[a, b], x| [a.min(x), b.max(x)])
+    };
+    let [first, last] = columns(x_and_depth("one.points.ply"));
+    assert!((first - 30.0).abs() < 0.01 && (last - 49.0).abs() < 0.01, "{first} to {last}");
+    // Control.
+    assert!(columns(x_and_depth("whole.points.ply"))[0] < 29.0);
+    for (roi, code, words) in
+        [("1,2,3", 2, "--roi & such as 200,100"), ("60,0,5,5", 2, "--roi & not inside a view of 64 x 48")]
+    {
+        for line in ["match left/f2.png right/f2.ppm no.pfm", "sequence left right no"] {
+            run(&folder, &format!("{line} {RANGE} --quiet --roi {roi}")).failed(code, words);
+            assert!(!folder.join("no").exists() && !folder.join("no.pfm").exists());
+        }
+    }
+}
+
 /// Frames that one camera lacks shift no other.
 #[test]
 fn images_find_their_partners_by_number() {

@@ -3,16 +3,17 @@
 use tiff::tags::{ByteOrder, Tag, Type};
 
 use super::directory::Directory;
-use crate::image::georeference::{Field, Georeference};
+use crate::image::georeference::{Field, Georeference, RATIONAL_POLYNOMIALS};
 
-/// The tags of GeoTIFF and their types.
-const TAGS: [(Tag, Type); 6] = [
+/// The tags of GeoTIFF and their types, and that of the rational polynomials of satellites (GDAL's RFC 22).
+const TAGS: [(Tag, Type); 7] = [
     (Tag::ModelPixelScaleTag, Type::DOUBLE),
     (Tag::ModelTiepointTag, Type::DOUBLE),
     (Tag::ModelTransformationTag, Type::DOUBLE),
     (Tag::GeoKeyDirectoryTag, Type::SHORT),
     (Tag::GeoDoubleParamsTag, Type::DOUBLE),
     (Tag::GeoAsciiParamsTag, Type::ASCII),
+    (RATIONAL_POLYNOMIALS, Type::DOUBLE),
 ];
 /// Most bytes of a tag: room for twenty thousand tie points.
 const MAX_BYTES: usize = 1 << 20;

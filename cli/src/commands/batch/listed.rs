@@ -10,7 +10,7 @@ use mrfgs::rectification::Options;
 
 use crate::args::{Search, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::{Also, Files};
+use crate::outputs::{Also, Files, Limits};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
 use crate::pairs::list::{self, Names, Row};
@@ -43,6 +43,8 @@ pub(super) struct Given<'a> {
     pub(super) rectify: Option<Options>,
     /// The output that takes the cameras.
     pub(super) cameras: Option<&'a Also>,
+    /// What is left out of the outputs.
+    pub(super) limits: Limits,
 }
 
 /// A pair, read.
@@ -125,8 +127,10 @@ impl Listed {
     /// What the list says of its range.
     pub(super) fn search(&self) -> Search {
         match &self.source {
-            &Source::Row(Row { max_disparity, min_disparity, .. }) => Search { max_disparity, min_disparity },
-            Source::Folder => Search { max_disparity: None, min_disparity: None },
+            &Source::Row(Row { max_disparity, min_disparity, .. }) => {
+                Search { max_disparity, min_disparity, ..Search::default() }
+            }
+            Source::Folder => Search::default(),
         }
     }
 
@@ -161,7 +165,7 @@ impl Listed {
             return Err(Failure::usage("--rectify", reason));
         }
         let left_image = at(&left);
-        let beside = Some(&*left_image).filter(|_| given.cameras.is_some() || search.max_disparity.is_none());
+        let beside = Some(&*left_image).filter(|_| given.cameras.is_some() || search.takes_calibration());
         let input =
             input::Input::new(pair, &search, Sign::default(), &calib, given.rectify.as_ref(), beside)?;
         let rig = input.rig(given.cameras, &left_image)?;

@@ -121,6 +121,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         calib: &args.calib,
         rectify: args.rectification.options_if(args.rectify)?,
         cameras: args.maps.also.take_cameras(),
+        limits: args.maps.also.limits,
     };
     check_folder(args, &base, &pairs, &given)?;
     if let Some(shard) = args.shard {

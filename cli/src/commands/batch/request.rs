@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::args::Search;
 use crate::failure::{Failure, Result};
-use crate::outputs::{MatchRecord, files};
+use crate::outputs::{Limits, MatchRecord, files};
 use crate::remedy;
 
 use super::listed::{Given, Listed};
@@ -26,6 +26,9 @@ pub(super) struct Request {
     /// How much the rectified views show, where the images are as the cameras took them.
     #[serde(skip_serializing_if = "Option::is_none")]
     rectified: Option<Rectified>,
+    /// What is left out of the outputs, where the user says it.
+    #[serde(flatten)]
+    limits: Limits,
     /// The names of the maps, in the output folder.
     outputs: Vec<String>,
 }
@@ -89,7 +92,7 @@ impl Request {
                 modified: modified.and_then(|time| u64::try_from(time.as_millis()).ok()),
             }
         });
-        Self { inputs: inputs.collect(), search: listed.search(), rectified, outputs }
+        Self { inputs: inputs.collect(), search: listed.search(), rectified, limits: given.limits, outputs }
     }
 
     pub(super) fn outputs(&self) -> &[String] {

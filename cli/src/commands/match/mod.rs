@@ -7,7 +7,7 @@ use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 
-use crate::args::{ExecutionArgs, MethodArgs, RectificationArgs, Sign};
+use crate::args::{ExecutionArgs, MethodArgs, RectificationArgs, RegionArgs, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, AlsoArgs, MatchRecord, Outcome, View, Written, files};
 use crate::pairs::input::{self, Input, PairArgs};
@@ -25,6 +25,8 @@ Examples:
   mrfgs match l.png r.png d.pfm --max-disparity 255 --dry-run
   # Range and cameras from the calib.txt beside im0.png:
   mrfgs match im0.png im1.png d.pfm --also depth,points
+  # A part of a large pair:
+  mrfgs match l.tif r.tif d.tif --max-disparity 255 --roi 4000,2500,800,600
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Points as LAZ, in the frame of the left camera as it took the image:
@@ -52,6 +54,8 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     pair: PairArgs,
+    #[command(flatten)]
+    region: RegionArgs,
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: PathBuf,
 
@@ -82,6 +86,7 @@ pub(crate) struct Args {
     /// Writes what ran and what it found as JSON; `-` prints it
     ///
     /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`,
+    /// `region` (its first column and row in LEFT, with --roi),
     /// `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver`
     /// (of the device), `note` (why another device was taken), `tiles`, `moved_up` (by how many pixels the
     /// right view was moved up), `smoothed` (how much the left and the right view were smoothed: standard
@@ -99,12 +104,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let cameras = args.also.take_cameras();
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
-    let input = args.pair.read(args.sign, cameras.is_some(), rectifying.as_ref())?;
+    let mut input = stop::at_once(|| args.pair.read(args.sign, cameras.is_some(), rectifying.as_ref()))?;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign, "");
     }
-    let rig = input.rig(cameras, &args.pair.left)?;
+    let mut rig = input.rig(cameras, &args.pair.left)?;
+    input.narrow(args.region.roi.as_ref(), |wider| check_range(args, wider).is_ok())?;
     let also = check_outputs(args, &input)?;
     if !args.quiet {
         input.warn();
@@ -115,9 +121,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let mut matcher = Matcher::builder().execution(execution).build()?;
     let searched = input.searched(|wider| check_range(args, wider).is_ok());
-    let (matched, time) =
+    let (mut matched, time) =
         matching::run(&mut matcher, &input.pair, searched, &method, None, args.quiet, None)?;
     let range = matched.range();
+    let mut pair = input.pair.clone();
+    if let Some(region) = input.region() {
+        matched.maps = region.maps_of(&matched.maps);
+        pair = region.part_of(&pair);
+        rig = rig.map(|rig| rig.of_part(region.part().x.start, region.part().y.start));
+    }
     if !args.quiet {
         input.say_wider(&matched, args.sign, "");
         input::warn(matched.warnings().into_iter().map(|warning| args.sign.warning(warning)));
@@ -126,17 +138,20 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     drop(matcher);
     let files = args.pair.files(&input, Some(&args.output));
     let calibration = input.calibration_file().map(|file| file.display().to_string());
-    let georeferences = input.pair.georeferences();
+    let georeferences = pair.georeferences();
     let rectifying = input.rectifying();
-    let pair = Some(input.pair).filter(|_| args.also.show_left());
+    drop(input);
+    let pair = Some(pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
     let outcome =
         Outcome { maps: &matched.maps, range, sign: args.sign, left, rig, rectifying, georeferences };
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
+    record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);
     let said = write_outputs(args, &also, &outcome, &record)?;
     if let Some(file) = calibration.filter(|_| !args.quiet && !said.is_empty()) {
-        console::say(&format!("{}; unit: that of the baseline in {file}", said.join("; ")));
+        let unit = rig.map_or("", |rig| rig.unit().of_baseline());
+        console::say(&format!("{}; unit: {unit}, by {file}", said.join("; ")));
     }
     Ok(())
 }
@@ -181,7 +196,7 @@ fn write_outputs(
     record: &MatchRecord,
 ) -> Result<Vec<String>> {
     let output = args.output.as_path();
-    let map = || outcome.sign.map(outcome.maps.final_map());
+    let map = || outcome.sign.map(outcome.final_map(args.also.limits));
     let mut written = Written::default();
     let mut said = Vec::new();
     if !files::is_printed(output) {

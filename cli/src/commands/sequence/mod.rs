@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use mrfgs::image::write;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
+use mrfgs::region::Region;
 use mrfgs::{Error, Matcher};
 
-use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Search, Sign};
+use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, RegionArgs, Search, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
@@ -73,6 +74,8 @@ pub(crate) struct Args {
     raw_frames: Option<RawFrames>,
     #[command(flatten)]
     search: Search,
+    #[command(flatten)]
+    region: RegionArgs,
     /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; as `mrfgs match` takes it
     /// [default: a calib.txt beside the left images]
     #[arg(long, value_name = "FILE")]
@@ -150,16 +153,25 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let Frame { name, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
-    let beside = first_image.as_deref().filter(|_| cameras.is_some() || args.search.max_disparity.is_none());
+    let beside = first_image.as_deref().filter(|_| cameras.is_some() || args.search.takes_calibration());
     let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), beside)?;
     if let Some(by) = &mut input.rectification {
         by.keep_places()?;
     }
     if !args.quiet {
         input.say_range(sign, " in the first frame");
+    }
+    let mut rig = input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?;
+    // The folder is not there yet, and does not matter.
+    let fits = |wider| args.maps.check(Path::new(""), "000000", wider).is_ok();
+    input.narrow(args.region.roi.as_ref(), fits)?;
+    let region = input.region().cloned();
+    if let Some(part) = region.as_ref().map(Region::part) {
+        rig = rig.map(|rig| rig.of_part(part.x.start, part.y.start));
+    }
+    if !args.quiet {
         input.warn();
     }
-    let rig = input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?;
     if args.dry_run {
         let (width, height) = input.pair.size();
         let plan = Plan::new(width, height, input.range, &method)?;
@@ -172,13 +184,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let records = args.json.as_deref().map(Records::new).transpose()?;
     let mut sink = if film { writer.begin_film(rate, records)? } else { writer.begin_folder(records)? };
     let files = args.files(&input);
-    let pipeline = Pipeline { matcher, range, files, rectified: args.rectify, quiet: args.quiet };
+    let rectified = args.rectify;
+    let pipeline = Pipeline { matcher, range, region, files, rectified, quiet: args.quiet };
     pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
 }
 
 /// The range for all frames: where sparse matches found it, a match of the first frame shows whether that is enough.
 fn range_of_all(matcher: &mut Matcher, first: &Input, args: &Args) -> Result<DisparityRange> {
-    // The folder is not there yet, and does not matter.
     let searched = first.searched(|wider| args.maps.check(Path::new(""), "000000", wider).is_ok());
     if !searched.may_widen {
         return Ok(first.range);

@@ -6,8 +6,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use mrfgs::Matcher;
+use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::Rectification;
+use mrfgs::region::Region;
 use serde::Serialize;
 
 use crate::args::Sign;
@@ -29,6 +31,8 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub(super) struct Pipeline {
     pub(super) matcher: Matcher,
     pub(super) range: DisparityRange,
+    /// The region that is wanted, where it is not all; the first frame is its window.
+    pub(super) region: Option<Region>,
     /// What the records say of the inputs.
     pub(super) files: Files,
     pub(super) rectified: bool,
@@ -58,12 +62,13 @@ impl Pipeline {
         sink: &mut Sink,
     ) -> Result<()> {
         let start = Instant::now();
-        let size = first.pair.size();
+        let region = self.region.clone();
+        let size = region.as_ref().map_or(first.pair.size(), |region| region.part().size());
         let takes = Takes { pair: sink.takes_pair(), record: sink.takes_records() };
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         // It may wait for standard input for ever, so nobody waits for it.
-        thread::spawn(move || read(frames, by, &sender));
+        thread::spawn(move || read(frames, by, region.as_ref(), &sender));
         let (found, to_write) = sync_channel::<Found>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
@@ -105,7 +110,9 @@ impl Pipeline {
         start: Instant,
         found: SyncSender<Found>,
     ) -> Ran {
-        let Self { matcher, range, files, rectified, .. } = self;
+        let Self { matcher, range, region, files, rectified, .. } = self;
+        let region = region.as_ref();
+        let part_of = |pair: &Pair| region.map_or_else(|| pair.clone(), |region| region.part_of(pair));
         let range = *range;
         // The frames that are being matched.
         let (started, under_way) = channel();
@@ -120,19 +127,23 @@ impl Pipeline {
                 }
             };
             // The receiver lives as long as this.
-            let pair = takes.pair.then(|| frame.pair.clone());
-            let _ = started.send((frame.name, frame.pair.georeferences(), pair));
+            let part = part_of(&frame.pair);
+            let _ = started.send((frame.name, part.georeferences(), takes.pair.then_some(part)));
             Some((frame.pair, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
         let told = &mut ran;
-        let ended = matcher.run_all_until(pairs, stop::flag(), move |matched| {
+        let ended = matcher.run_all_until(pairs, stop::flag(), move |mut matched| {
             let Ok((name, georeferences, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
             let note = matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS));
             told.note = note.or(told.note.take());
+            if let Some(region) = region {
+                matched.maps = region.maps_of(&matched.maps);
+            }
             let record = takes.record.then(|| {
                 let mut record = MatchRecord::new(files, &matched, start.elapsed(), Sign::default());
                 record.rectified = *rectified;
+                record.region = region.map(|region| [region.part().x.start, region.part().y.start]);
                 line(&name, &record)
             });
             told.on = Some(matched.ran_on);
@@ -202,14 +213,18 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
     }
 }
 
-/// Reads and rectifies frames until one fails or nobody takes them.
-fn read(frames: Frames, by: Option<Rectification>, to: &SyncSender<Next>) {
+/// Reads and rectifies frames, and narrows them to the window of the region, until one fails or nobody takes them.
+fn read(frames: Frames, by: Option<Rectification>, region: Option<&Region>, to: &SyncSender<Next>) {
     for frame in frames {
         let rectified = |frame: Frame| match &by {
             Some(by) => Ok(Frame { pair: by.apply(&frame.pair)?, ..frame }),
             None => Ok(frame),
         };
-        let frame = frame.and_then(rectified).map_err(Failure::from);
+        let narrowed = |frame: Frame| match region {
+            Some(region) => Frame { pair: region.window_of(&frame.pair), ..frame },
+            None => frame,
+        };
+        let frame = frame.and_then(rectified).map(narrowed).map_err(Failure::from);
         let failed = frame.is_err();
         if to.send(frame).is_err() || failed {
             return;

@@ -1,0 +1,165 @@
+//! `mrfgs depth`.
+
+use std::path::{Path, PathBuf};
+
+use mrfgs::Error;
+use mrfgs::image::calib::Calibration;
+use mrfgs::image::{Image, Pair, Plane};
+use mrfgs::maps::{FRACTION, Maps, flag};
+use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+
+use crate::args::{ReadingArgs, Sign};
+use crate::console;
+use crate::failure::{Failure, Result};
+use crate::outputs::{AlsoArgs, Outcome, Written, files};
+use crate::pairs::folder::CALIBRATION;
+use crate::pairs::input;
+
+const EXAMPLES: &str = "\
+Examples:
+  mrfgs depth d.pfm --calib calib.txt
+  mrfgs depth d.pfm --calib stereo.yml --left im0.png --also points.laz
+  mrfgs depth d.pfm --calib c --left l.png --also points --clip-depth 30
+  mrfgs depth d.png --calib c --confidence d.confidence.png --min-confidence 48";
+
+/// Write depth and points of a disparity map that is there already
+///
+/// MAP is a disparity map in pixels, of this program or another one: .pfm, .tif, or .png with 16 bits as in KITTI. The files
+/// stand beside it, as `mrfgs match --also` would write them: d.pfm gets d.depth.pfm and d.points.ply. The cameras are
+/// those of a rectified pair. Disparities count in 1/256 px.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Args {
+    /// Disparity map of the left view
+    map: PathBuf,
+    /// Calibration of the rectified pair, as `mrfgs match` takes it [default: a calib.txt beside MAP]
+    #[arg(long, value_name = "FILE")]
+    calib: Vec<PathBuf>,
+    /// Left image, whose colours points have
+    #[arg(long, value_name = "FILE")]
+    left: Option<PathBuf>,
+    /// Confidence of each pixel, from 0 to 255, as --also confidence writes it [default: 255]
+    #[arg(long, value_name = "FILE")]
+    confidence: Option<PathBuf>,
+    /// Sign convention of the disparities in MAP
+    #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
+    sign: Sign,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    /// Prints errors only
+    #[arg(long)]
+    quiet: bool,
+    #[command(flatten)]
+    also: AlsoArgs,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let also = args.also.of_map()?;
+    if args.also.show_left() && args.left.is_none() {
+        return Err(Failure::usage(
+            "--left",
+            "gives the colours of points and pictures; give the left image of the pair",
+        ));
+    }
+    let calibration = calibration(args)?;
+    let inputs = [Some(&args.map), args.left.as_ref(), args.confidence.as_ref()].into_iter().flatten();
+    let inputs: Vec<_> = inputs.chain(&args.calib).map(|path| ("an input", path.as_path())).collect();
+    let outputs: Vec<_> = also.iter().map(|word| (word.flag(), word.beside(&args.map))).collect();
+    let named: Vec<_> = outputs.iter().map(|(flag, path)| (flag.as_str(), path.as_path())).collect();
+    files::distinct(&inputs, &named)?;
+    let reader = args.reading.reader();
+    let map = args.sign.map(reader.disparity(&args.map)?);
+    let left = args.left.as_deref().map(|path| left(args, path)).transpose()?;
+    let confidence = args.confidence.as_deref().map(|path| reader.grey8(path)).transpose()?;
+    let of_size = |path: &Option<PathBuf>, size: Option<(usize, usize)>| match (path, size) {
+        (Some(path), Some((w, h))) if (w, h) != map.size() => {
+            let (width, height) = map.size();
+            let [path, map] = [path, &args.map].map(|path| path.display());
+            Err(Error::Mismatch(format!(
+                "{path} is {w} x {h} and {map} is {width} x {height}: give files of one view"
+            )))
+        }
+        _ => Ok(()),
+    };
+    of_size(&args.left, left.as_ref().map(|image| image.pixels.size()))?;
+    of_size(&args.confidence, confidence.as_ref().map(Plane::size))?;
+    let (path, calibration) = &calibration;
+    let word = also.first().copied();
+    let rig = word.map(|word| {
+        input::rig(word, Some((path, calibration)), &args.map, map.size(), "give one with --calib")
+    });
+    let maps = maps(&map, confidence);
+    let range = range(&map);
+    for word in &also {
+        word.check(&word.beside(&args.map), range)?;
+    }
+    let outcome = Outcome {
+        maps: &maps,
+        range,
+        sign: Sign::default(),
+        left: left.as_ref(),
+        rig: rig.transpose()?,
+        rectifying: None,
+        georeferences: [None, None],
+    };
+    let mut written = Written::default();
+    let mut said = Vec::new();
+    for word in also {
+        let path = word.beside(&args.map);
+        said.extend(written.note(&path, args.also.write(word, &path, &outcome))?);
+    }
+    written.keep();
+    if !args.quiet && !said.is_empty() {
+        said.dedup();
+        let unit = outcome.rig.map_or("", |rig| rig.unit().of_baseline());
+        console::say(&format!("{}; unit: {unit}, by {}", said.join("; "), path.display()));
+    }
+    Ok(())
+}
+
+/// The calibration, and its file.
+fn calibration(args: &Args) -> Result<(PathBuf, Calibration)> {
+    if !args.calib.is_empty() {
+        return Ok((args.calib[0].clone(), input::of_rectified_images(&args.calib)?));
+    }
+    let beside = args.map.with_file_name(CALIBRATION);
+    match Calibration::beside(&args.map)? {
+        Some(calibration) => Ok((beside, calibration)),
+        None => {
+            let reason =
+                format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());
+            Err(Failure::usage("--calib", reason))
+        }
+    }
+}
+
+/// The left image. Points take its colours alone, so it is read as both views.
+fn left(args: &Args, path: &Path) -> Result<Image> {
+    let raster = args.reading.reader().raster(path)?;
+    Ok(Pair::of_frames(raster.clone(), raster)?.left().clone())
+}
+
+/// What a match would have found.
+fn maps(map: &Plane<f32>, confidence: Option<Plane<u8>>) -> Maps {
+    let known = |d: f32| d.is_finite() && d.abs() <= MAX_DISPARITY as f32;
+    let disparity = map.map(|d| if known(*d) { (d * FRACTION as f32).round() as i32 } else { 0 });
+    let (width, height) = map.size();
+    Maps {
+        raw: disparity.clone(),
+        disparity,
+        confidence: confidence.unwrap_or_else(|| Plane::filled(width, height, u8::MAX)),
+        validity: map.map(|d| if known(*d) { 0 } else { flag::MASKED }),
+        right: None,
+    }
+}
+
+/// The disparities that it holds.
+fn range(map: &Plane<f32>) -> DisparityRange {
+    let known = || map.data().iter().copied().filter(|d| d.is_finite());
+    let (min, max) = (known().fold(f32::MAX, f32::min), known().fold(f32::MIN, f32::max));
+    if min <= max {
+        DisparityRange { min: min.floor() as i32, max: max.ceil() as i32 }
+    } else {
+        DisparityRange { min: 0, max: 0 }
+    }
+}
