@@ -315,7 +315,7 @@ pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Disp
 enum Scale {
     /// 8-bit levels, stored as they are or times 257.
     Level,
-    /// Words with this many free bits at the top.
+    /// Words with this many free bits at the top; 8-bit levels beside them fill the same range.
     Shift(u32),
     /// Floats between these bounds.
     Linear { min: f64, max: f64 },
@@ -335,18 +335,15 @@ impl Scale {
             });
             return Self::Linear { min, max };
         }
-        if images.iter().all(|image| matches!(image.samples, Samples::Byte(_))) {
-            return Self::Level;
-        }
+        // Bytes fill their range by themselves: beside words of 12 bits, only these need more.
         let (mut bits, mut levels) = (0, true);
-        let mut add = |v: u16| {
-            bits |= v;
-            levels &= v.is_multiple_of(257);
-        };
-        each().for_each(|(image, masked)| match &image.samples {
-            Samples::Byte(v) => image.unmasked(v, masked).for_each(|&v| add(stretched(v))),
-            Samples::Word(v) => image.unmasked(v, masked).for_each(|&v| add(v)),
-            Samples::Float(_) | Samples::Double(_) => {}
+        each().for_each(|(image, masked)| {
+            if let Samples::Word(v) = &image.samples {
+                image.unmasked(v, masked).for_each(|&v| {
+                    bits |= v;
+                    levels &= v.is_multiple_of(257);
+                });
+            }
         });
         if levels { Self::Level } else { Self::Shift(bits.leading_zeros().min(8)) }
     }
@@ -354,12 +351,20 @@ impl Scale {
     fn apply(self, raster: &Raster, masked: Plane<bool>) -> Image {
         let n = raster.channels;
         let pixels = match &raster.samples {
-            Samples::Byte(v) => pixels(v, n, &masked, |v| self.word(stretched(v))),
+            Samples::Byte(v) => pixels(v, n, &masked, |v| self.byte(v)),
             Samples::Word(v) => pixels(v, n, &masked, |v| self.word(v)),
             Samples::Float(v) => pixels(v, n, &masked, |v| self.double(v as f64)),
             Samples::Double(v) => pixels(v, n, &masked, |v| self.double(v)),
         };
         Image { pixels, masked }
+    }
+
+    fn byte(self, v: u8) -> u16 {
+        match self {
+            // Words that are no larger than bytes are levels as these are.
+            Self::Shift(free) if free < 8 => stretched(v),
+            _ => u16::from(v) << 8,
+        }
     }
 
     fn word(self, v: u16) -> u16 {

@@ -43,7 +43,7 @@ impl Reader {
     /// - 16 bits: shifted up by as many bits as the largest unmasked value of both images leaves free (at most 8),
     ///   so that an 11-bit pair uses the whole range. Where all values are multiples of 257, they are 8-bit values
     ///   stretched to 16 bits, and give the same picture as those. An 8-bit image that comes with a 16-bit one is
-    ///   stretched first;
+    ///   stretched to the same range, and the largest value is that of the 16-bit one alone;
     /// - float, signed, or wider than 16 bits: linearly, from the least to the largest unmasked value of both images
     ///   to 0 ..= 65280.
     ///

@@ -160,6 +160,25 @@ fn an_8_bit_image_with_a_16_bit_one_is_stretched() {
 }
 
 #[test]
+fn each_of_two_views_of_8_and_of_fewer_than_16_bits_fills_its_range() {
+    let f = Folder::new();
+    let byte = f.grey8("byte.png", RAMP);
+    // 12 bits that show the same.
+    let word = f.grey16("word.png", RAMP.map(|v| u16::from(v) * 16 + 3));
+    for (left, right, bytes) in [(&byte, &word, 0), (&word, &byte, 1)] {
+        let pair = pair(left, right, None).unwrap();
+        let views = [greys(pair.left()), greys(pair.right())];
+        assert_eq!(views[bytes], RAMP.map(stretched));
+        assert_eq!(views[1 - bytes], RAMP.map(|v| (u16::from(v) * 16 + 3) << 4));
+        // Half a level apart.
+        assert!(views[0].iter().zip(&views[1]).all(|(l, r)| l.abs_diff(*r) <= 208));
+    }
+    // Words with the values of bytes are bytes.
+    let wide = f.grey16("wide.png", RAMP.map(u16::from));
+    assert_eq!(pair(&byte, &wide, None).unwrap(), twice(&byte));
+}
+
+#[test]
 fn what_is_masked_influences_nothing() {
     let f = Folder::new();
     let mask = f.grey8("mask.png", [0, 0, 255, 0, 0, 0, 0, 1, 0, 0, 0, 0]);
