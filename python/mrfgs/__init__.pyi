@@ -219,7 +219,7 @@ class Points:
     def confidence(self) -> npt.NDArray[np.uint8]:
         """Their confidence, of shape (N,), in 1/8 nat."""
     def save(self, path: _Path) -> None:
-        """Writes the points as binary PLY, as the program does; the confidence is called `quality`."""
+        """Writes the points as .ply, .pcd, .las or .laz, as the program does; the confidence is `quality` or the intensity."""
     def __len__(self) -> int: ...
 
 def match(

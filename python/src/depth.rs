@@ -253,8 +253,9 @@ impl PyPoints {
         Self::of(py, &points.collect::<Vec<_>>())
     }
 
-    /// Writes the points as binary PLY or PCD, completely or not at all: the file that `mrfgs match --also points` or `points.pcd`
-    /// writes. In PLY the confidence is called `quality`, as MeshLab has it.
+    /// Writes the points as binary PLY or PCD, LAS 1.2 or LAZ, completely or not at all: the file that `mrfgs match` writes for
+    /// `--also points`, `points.pcd`, `points.las` and `points.laz`. In PLY the confidence is called `quality`, as MeshLab has it; in LAS
+    /// and LAZ it is the intensity, times 257, and positions are rounded to steps of a millionth of the distance of the nearest point.
     ///
     /// path: a name that ends in .ply or .pcd.
     ///

@@ -546,7 +546,7 @@ class Rectification(Folder):
     def test_from_raw_frames_to_depth_and_points(self):
         left, right = raw_pair()
         program(self.folder, "match", RAW / "left.png", RAW / "right.png", "d.pfm", "--rectify", "--calib", CAMERAS,
-                "--max-disparity", 31, "--also", "depth,depth-mm,points,points.pcd", "--device", "cpu", "--quiet")
+                "--max-disparity", 31, "--also", "depth,depth-mm,points,points.pcd,points.las,points.laz", "--device", "cpu", "--quiet")
         rectification = mrfgs.Rectification(CAMERAS)
         views = rectification.apply(left, right)
         found = mrfgs.match(*views, 31, device="cpu")
@@ -562,8 +562,9 @@ class Rectification(Folder):
         points = rig.points(found, views[0])
         points.save(self.folder / "python.ply")
         self.assertEqual((self.folder / "python.ply").read_bytes(), (self.folder / "d.points.ply").read_bytes())
-        points.save(self.folder / "python.pcd")
-        self.assertEqual((self.folder / "python.pcd").read_bytes(), (self.folder / "d.points.pcd").read_bytes())
+        for name in ("pcd", "las", "laz"):
+            points.save(self.folder / f"python.{name}")
+            self.assertEqual((self.folder / f"python.{name}").read_bytes(), (self.folder / f"d.points.{name}").read_bytes())
         self.assertEqual((rig.unit, rig.size), ("m", (240, 180)))
         self.assertAlmostEqual(rig.baseline, 0.16361, 5)
         # Control: of another map, other depths and points.

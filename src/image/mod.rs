@@ -9,6 +9,8 @@ mod file;
 mod georeference;
 mod halved;
 mod jpeg;
+#[cfg(feature = "las")]
+mod las;
 pub mod pcd;
 pub mod pfm;
 pub mod picture;

@@ -16,6 +16,9 @@ pub use super::save::{Growing, publish, remove, save};
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;
 
+/// The extensions of clouds.
+const CLOUDS: &str = if cfg!(feature = "las") { ".ply, .pcd, .las or .laz" } else { ".ply or .pcd" };
+
 /// The format of a disparity map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
@@ -136,13 +139,24 @@ pub fn check_path(path: &Path) -> Result<()> {
     check(path)
 }
 
-/// Writes a cloud of points in the format of the extension: `.ply` as [`ply::encode`] has it, `.pcd` as [`pcd::encode`] has it. An
-/// existing path that is not a regular file takes PLY when its name has no such extension.
+/// Writes a cloud of points in the format of the extension: `.ply` as [`ply::encode`] has it, `.pcd` as [`pcd::encode`] has it; with
+/// the feature `las` also LAS 1.2 as `.las` and `.laz`, whose intensity is 257 times the confidence. An existing path that is not a
+/// regular file takes PLY when its name has no such extension.
 ///
 /// # Errors
-/// [`Error::Write`] for another extension, or a file that cannot be written.
+/// [`Error::Write`] for another extension, points that the format cannot hold, or a file that cannot be written.
 pub fn cloud(path: &Path, cloud: &Cloud) -> Result<()> {
-    save(path, &cloud_encoder(path)?(cloud))
+    let bytes = match extension(path).as_deref() {
+        Some("ply") => ply::encode(cloud),
+        Some("pcd") => pcd::encode(cloud),
+        #[cfg(feature = "las")]
+        Some(word @ ("las" | "laz")) => {
+            super::las::encode(cloud, word == "laz").map_err(|reason| Error::write(path, reason))?
+        }
+        _ if is_special(path) => ply::encode(cloud),
+        _ => return Err(Error::write(path, format!("point clouds end in {CLOUDS}"))),
+    };
+    save(path, &bytes)
 }
 
 /// Writes a picture as PNG.
@@ -158,16 +172,6 @@ fn check_float(path: &Path) -> Result<()> {
     match format(path) {
         Ok(Format::Pfm | Format::Tiff) => Ok(()),
         _ => Err(Error::write(path, "depth maps end in .pfm or .tif (float)")),
-    }
-}
-
-/// What makes the bytes of a cloud for `path`.
-fn cloud_encoder(path: &Path) -> Result<fn(&Cloud) -> Vec<u8>> {
-    match extension(path).as_deref() {
-        Some("ply") => Ok(ply::encode),
-        Some("pcd") => Ok(pcd::encode),
-        _ if is_special(path) => Ok(ply::encode),
-        _ => Err(Error::write(path, "point clouds end in .ply or .pcd")),
     }
 }
 
@@ -261,7 +265,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for refused in ["a.xyz", "a"] {
             let error = cloud(&folder.path().join(refused), &Cloud::default()).unwrap_err().to_string();
-            assert!(error.contains(refused) && error.contains(".ply or .pcd"), "{error}");
+            assert!(error.contains(refused) && error.contains(CLOUDS), "{error}");
         }
         // No point is a cloud, too.
         for (name, end) in [("a.PLY", &b"end_header\n"[..]), ("a.pcd", b"DATA binary\n")] {

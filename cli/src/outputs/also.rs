@@ -17,7 +17,6 @@ use serde::Serialize;
 
 use crate::args::{Sign, depth};
 use crate::failure::{Failure, Result};
-use crate::outputs::cloud;
 use crate::outputs::files::Written;
 use crate::text::plural;
 
@@ -370,7 +369,7 @@ impl AlsoArgs {
                 };
                 let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
                 let cloud = rig.cloud(&self.limits.trusted(maps, &rig), left);
-                cloud::write(path, &cloud)?;
+                write::cloud(path, &cloud)?;
                 let count = cloud.points.len();
                 return Ok(Some(format!("{count} point{}", plural(count))));
             }

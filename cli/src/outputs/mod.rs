@@ -2,7 +2,6 @@
 
 pub(crate) mod also;
 mod claim;
-mod cloud;
 pub(crate) mod files;
 mod film;
 mod record;

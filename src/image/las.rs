@@ -1,30 +1,26 @@
-//! Formats of point clouds.
+//! Point clouds as LAS and LAZ files, for PDAL, QGIS and photogrammetry: the feature `las`.
 
 use std::io::Cursor;
-use std::path::Path;
 
 use las::point::{Classification, Format};
 use las::{Color, Header, Transform, Vector};
-use mrfgs::image::cloud::{Cloud, Point};
-use mrfgs::image::write;
-use mrfgs::{Error, Result};
 
-/// Writes `cloud` to `path` in the format of the extension, completely or not at all.
-pub(crate) fn write(path: &Path, cloud: &Cloud) -> Result<()> {
-    let compressed = path.extension().is_some_and(|extension| extension == "laz");
-    if !compressed && path.extension().is_none_or(|extension| extension != "las") {
-        return write::cloud(path, cloud);
-    }
+use super::cloud::{Cloud, Point};
+
+/// A cloud as LAS, or as LAZ where it is `compressed`. Intensity is 257 times the confidence.
+///
+/// # Errors
+/// For a cloud that the format cannot hold, the reason.
+pub(super) fn encode(cloud: &Cloud, compressed: bool) -> Result<Vec<u8>, String> {
     // A writer that cannot write so many panics when it is dropped.
     if u32::try_from(cloud.points.len()).is_err() {
-        return Err(Error::write(path, "LAS 1.2 holds at most 4294967295 points; write PLY"));
+        return Err("LAS 1.2 holds at most 4294967295 points; write PLY".into());
     }
-    let bytes = encode_las(cloud, compressed).map_err(|e| Error::write(path, e.to_string()))?;
-    write::save(path, &bytes)
+    encoded(cloud, compressed).map_err(|error| error.to_string())
 }
 
 /// LAS 1.2, the oldest version with colours, which readers of all ages take.
-fn encode_las(cloud: &Cloud, compressed: bool) -> las::Result<Vec<u8>> {
+fn encoded(cloud: &Cloud, compressed: bool) -> las::Result<Vec<u8>> {
     let transform = Transform { scale: scale(&cloud.points), offset: 0.0 };
     let mut header = las::Builder::from((1, 2));
     header.point_format = Format { is_compressed: compressed, ..Format::new(2)? };
@@ -105,11 +101,8 @@ mod tests {
 
     #[test]
     fn points_that_are_nowhere_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.las");
         let points = cloud(&[[0.0, 0.0, f32::INFINITY]]);
-        let error = write(&path, &Cloud { points, ..Cloud::default() }).unwrap_err();
-        assert!(error.to_string().contains("a.las"), "{error}");
-        assert!(!path.exists());
+        assert!(encode(&Cloud { points, ..Cloud::default() }, false).is_err());
+        assert!(encode(&Cloud::default(), true).is_ok());
     }
 }
