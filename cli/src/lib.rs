@@ -156,9 +156,9 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 19),
+            ("match", 21),
             ("rectify", 7),
-            ("sequence", 19),
+            ("sequence", 21),
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),

@@ -94,7 +94,23 @@ pub struct Camera {
     pub principal_point: [f64; 2],
 }
 
+impl Camera {
+    /// A camera of square pixels that looks at the centre of its images: of this focal length, in pixels, and with images of
+    /// (width, height).
+    #[must_use]
+    pub fn centred(focal_length: f64, (width, height): (usize, usize)) -> Self {
+        let principal_point = [width, height].map(|count| (count as f64 - 1.0) / 2.0);
+        Self { focal_length: [focal_length; 2], principal_point }
+    }
+}
+
 impl Calibration {
+    /// A rectified pair of equal cameras at a distance of `baseline`, in `unit`.
+    #[must_use]
+    pub fn of_cameras(camera: Camera, baseline: f64, unit: Unit) -> Self {
+        Self { camera: Some(camera), doffs: Some(0.0), baseline: Some(baseline), unit, ..Self::default() }
+    }
+
     /// Reads `calib.txt` from the folder of `image`; `None` when there is none.
     ///
     /// # Errors
@@ -309,6 +325,15 @@ mod tests {
             assert!(words.iter().all(|w| reason.contains(w)), "{text:?}: {reason}");
             assert!(!reason.contains('\n'), "{reason}");
         }
+    }
+
+    #[test]
+    fn the_centre_of_an_image_is_between_its_pixels() {
+        let camera = Camera::centred(700.0, (640, 481));
+        assert_eq!(camera, Camera { focal_length: [700.0; 2], principal_point: [319.5, 240.0] });
+        let calibration = Calibration::of_cameras(camera, 0.12, Unit::Metre);
+        let text = "cam0=[700 0 319.5; 0 700 240; 0 0 1]\ndoffs=0\nbaseline=0.12\nunit=m\n";
+        assert_eq!(calibration, Calibration::parse(text).unwrap());
     }
 
     #[test]

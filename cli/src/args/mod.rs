@@ -1,5 +1,6 @@
 //! Groups of flags that several commands share.
 
+mod cameras;
 mod execution;
 mod method;
 mod reading;
@@ -8,6 +9,7 @@ mod region;
 pub(crate) mod search;
 mod sign;
 
+pub(crate) use cameras::CameraArgs;
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
 pub(crate) use reading::ReadingArgs;

@@ -90,7 +90,7 @@ impl Search {
     }
 
     /// The flag that takes the cameras.
-    fn takes_cameras(&self) -> Option<&'static str> {
+    pub(crate) fn takes_cameras(&self) -> Option<&'static str> {
         let nearest = self.min_depth.map(|_| "--min-depth");
         nearest.or(self.max_depth.map(|_| "--max-depth"))
     }

@@ -13,7 +13,7 @@ use mrfgs::rectification::{Options, Rectification};
 use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
 
-use crate::args::{Found, ReadingArgs, Search, Sign, shown};
+use crate::args::{CameraArgs, Found, ReadingArgs, Search, Sign, shown};
 use crate::console;
 use crate::failure::{self, Failure, Result};
 use crate::matching::Searched;
@@ -50,6 +50,10 @@ pub(crate) struct Input {
     by_matches: bool,
     /// The calibration of the rectified pair.
     calibration: Option<Known>,
+    /// Whether the range is one of depths.
+    by_depth: bool,
+    /// How to give one.
+    remedy: &'static str,
     /// What has rectified the pair, where it was not.
     pub(crate) rectification: Option<Rectification>,
     /// The region that is wanted, where it is not all; the pair is its window.
@@ -58,6 +62,7 @@ pub(crate) struct Input {
 
 /// A calibration of a rectified pair, and where it comes from.
 struct Known {
+    /// None where flags give its numbers.
     files: Vec<PathBuf>,
     calibration: Calibration,
 }
@@ -65,17 +70,27 @@ struct Known {
 impl Known {
     /// With the file that messages name.
     fn named(&self) -> (&Path, &Calibration) {
-        (&self.files[0], &self.calibration)
+        (self.files.first().map_or(Path::new("--focal"), PathBuf::as_path), &self.calibration)
+    }
+
+    fn is_of_flags(&self) -> bool {
+        self.files.is_empty()
     }
 }
 
 impl PairArgs {
-    /// Reads the images and what the range takes, and the cameras where `cameras` asks for them. The user counts disparities
-    /// by `sign`. With `rectify`, the images are as the cameras took them, and are rectified.
-    pub(crate) fn read(&self, sign: Sign, cameras: bool, rectify: Option<&Options>) -> Result<Input> {
+    /// Reads the images and what the range takes, and the cameras where `cameras` asks for them, unless the user gives their
+    /// `numbers`. The user counts disparities by `sign`. With `rectify`, the images are as the cameras took them, and are rectified.
+    pub(crate) fn read(
+        &self,
+        sign: Sign,
+        cameras: bool,
+        numbers: Option<&CameraArgs>,
+        rectify: Option<&Options>,
+    ) -> Result<Input> {
         let pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
         let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
-        Input::new(pair, &self.search, sign, &self.calib, rectify, beside)
+        Input::new(pair, &self.search, sign, &self.calib, numbers, rectify, beside)
     }
 
     /// The paths for a record.
@@ -101,13 +116,15 @@ impl PairArgs {
 }
 
 impl Input {
-    /// `pair` with what the user says of it: the range to `search`, counted by `sign`, the files `calib`, and with `rectify` that
-    /// it is as the cameras took it. Without files the calibration is that `beside` a left image, where it is given.
+    /// `pair` with what the user says of it: the range to `search`, counted by `sign`, the files `calib` or the `numbers` of the
+    /// cameras, and with `rectify` that it is as the cameras took it. Without both the calibration is that `beside` a left image,
+    /// where it is given.
     pub(crate) fn new(
         mut pair: Pair,
         search: &Search,
         sign: Sign,
         calib: &[PathBuf],
+        numbers: Option<&CameraArgs>,
         rectify: Option<&Options>,
         beside: Option<&Path>,
     ) -> Result<Self> {
@@ -120,6 +137,8 @@ impl Input {
             Some(Known { files, calibration })
         } else if !calib.is_empty() {
             Some(Known { files, calibration: of_rectified_images(calib)? })
+        } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
+            Some(Known { files, calibration })
         } else if let Some(left) = beside {
             let files = vec![left.with_file_name(CALIBRATION)];
             Calibration::beside(left)?.map(|calibration| Known { files, calibration })
@@ -128,12 +147,17 @@ impl Input {
         };
         let known = calibration.as_ref().map(Known::named);
         let Found { range, by_matches } = search.range(&pair, known, sign)?;
-        Ok(Self { pair, range, by_matches, calibration, rectification, region: None })
+        let remedy = match numbers {
+            Some(_) => "give one with --calib, or --focal and --baseline",
+            None => "give one with --calib",
+        };
+        let by_depth = search.takes_cameras().is_some();
+        Ok(Self { pair, range, by_matches, by_depth, calibration, remedy, rectification, region: None })
     }
 
     /// The files of the calibration, for a record.
     pub(crate) fn calibration_files(&self) -> Option<String> {
-        self.calibration.as_ref().map(|known| shown(&known.files))
+        self.calibration.as_ref().filter(|known| !known.is_of_flags()).map(|known| shown(&known.files))
     }
 
     /// Narrows it to the window of the region `part` of the left view, where there is one; the range may become wider where that
@@ -160,15 +184,34 @@ impl Input {
         self.region.as_ref()
     }
 
-    /// The calibration file.
-    pub(crate) fn calibration_file(&self) -> Option<&Path> {
-        self.calibration.as_ref().map(|known| known.named().0)
+    /// The unit of depths, for people, where there is a calibration.
+    pub(crate) fn unit(&self) -> Option<String> {
+        self.calibration.as_ref().map(|known| {
+            let unit = known.calibration.unit.of_baseline();
+            match known.is_of_flags() {
+                true => format!("{unit}, by --baseline"),
+                false => format!("{unit}, by {}", known.named().0.display()),
+            }
+        })
     }
 
     /// The cameras for the output `word`, if there is one; the left image is `left`.
     pub(crate) fn rig(&self, word: Option<&Also>, left: &Path) -> Result<Option<Rig>> {
+        if let Some(known) = self.calibration.as_ref().filter(|known| known.is_of_flags()) {
+            let Some(word) = word else {
+                if self.by_depth {
+                    return Ok(None);
+                }
+                let reason = "is for depth and points; add --also depth or --also points, or leave it out";
+                return Err(Failure::usage("--focal", reason));
+            };
+            if word.takes_unit() && known.calibration.unit.millimetres().is_none() {
+                let reason = "takes the unit of the baseline; give it with the number: --baseline 120mm, 12cm or 0.12m";
+                return Err(Failure::usage(word.flag(), reason));
+            }
+        }
         let known = self.calibration.as_ref().map(Known::named);
-        let rig = |word| rig(word, known, left, self.pair.size(), "give one with --calib");
+        let rig = |word| rig(word, known, left, self.pair.size(), self.remedy);
         word.map(rig).transpose()
     }
 

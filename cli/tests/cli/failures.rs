@@ -178,6 +178,22 @@ const FAILURES: &[Failure] = &[
         2,
         "--also depth-mm & no-unit.yml & mm, cm or m",
     ),
+    ("M out.pfm --also depth --focal 700", 2, "--baseline"),
+    ("M out.pfm --also depth --baseline 12cm", 2, "--focal"),
+    (
+        "M out.pfm --also depth --focal 700 --baseline 12cm --calib c.txt",
+        2,
+        "--focal & cannot be used with & --calib",
+    ),
+    (
+        "R --rectify --calib @raw/cameras.yml --focal 700 --baseline 12cm",
+        2,
+        "--focal & cannot be used with & --calib",
+    ),
+    ("M out.pfm --focal 700 --baseline 12cm", 2, "--focal & add --also depth"),
+    ("M out.pfm --also depth-mm --focal 700 --baseline 120", 2, "--also depth-mm & unit & --baseline 120mm"),
+    ("M out.pfm --also depth --focal -7 --baseline 12cm", 2, "--focal & above 0"),
+    ("M out.pfm --also depth --focal 700 --baseline 12in", 2, "--baseline & 12in & such as 120mm"),
     ("rectify @raw/left.png @raw/right.png out", 2, "--calib"),
     ("rectify @raw/left.png @raw/right.png @raw/left.png --calib @raw/cameras.yml", 1, "is a file"),
     // Clouds.

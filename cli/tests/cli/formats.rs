@@ -548,3 +548,38 @@ fn settings_of_rectified_pairs_give_depths() {
     let two = format!("%YAML:1.0\n{}{size}Camera.bf: 34.48\n", numbers("Camera"));
     assert!(depths(&three) == first && depths(&two) == first);
 }
+
+/// A focal length and a baseline are a calibration.
+#[test]
+fn numbers_take_the_place_of_a_calibration() {
+    let folder = Folder::new();
+    let text = "cam0=[215.5 0 119.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\n";
+    fs::write(folder.join("a.txt"), text).unwrap();
+    let written = |name: &str, cameras: &str| {
+        let line = format!(
+            "match @slanted/im0.png @slanted/im1.png {name}.pfm --max-disparity 31 --also depth,depth-mm,points {cameras}"
+        );
+        run(&folder, &line).succeeded();
+        ["depth.pfm", "depth-mm.png", "points.ply"]
+            .map(|end| fs::read(folder.join(format!("{name}.{end}"))).unwrap())
+    };
+    let expected = written("file", "--calib a.txt");
+    assert!(written("mm", "--focal 215.5 --baseline 160mm") == expected);
+    let metres = written("m", "--focal 215.5 --baseline 0.16m");
+    assert!(metres[1] == expected[1] && metres[0] != expected[0]);
+    // Control.
+    assert!(written("other", "--focal 216 --baseline 160mm")[1] != expected[1]);
+
+    for (view, from) in [("left", "im0"), ("right", "im1")] {
+        fs::create_dir(folder.join(view)).unwrap();
+        fs::copy(scene("slanted").join(format!("{from}.png")), folder.join(view).join("0.png")).unwrap();
+    }
+    let line = "sequence left right maps --max-disparity 31 --focal 215.5 --baseline 16cm --also depth-mm";
+    run(&folder, line).succeeded();
+    assert!(fs::read(folder.join("maps/0.depth-mm.png")).unwrap() == expected[1]);
+
+    let line = "match left/0.png right/0.png d.pfm --max-disparity 31 --focal 215.5 --baseline 160 --also depth --json -";
+    let run = run(&folder, line).succeeded();
+    run.says("unit: that of --baseline");
+    assert!(run.json()["files"]["calibration"].is_null());
+}

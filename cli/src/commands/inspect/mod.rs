@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = Execution { timings: true, ..args.execution.execution() };
     stop::listen();
     let method = args.method.method()?;
-    let input = args.pair.read(Sign::default(), false, None)?;
+    let input = args.pair.read(Sign::default(), false, None, None)?;
     input.say_range(Sign::default(), "");
     let folder = args.folder.as_deref().map(StagedFolder::new_or_empty).transpose()?;
     check_outputs(args, &input, folder.as_ref())?;

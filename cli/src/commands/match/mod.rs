@@ -7,7 +7,7 @@ use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 
-use crate::args::{ExecutionArgs, MethodArgs, RectificationArgs, RegionArgs, Sign};
+use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, RegionArgs, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, AlsoArgs, MatchRecord, Outcome, View, Written, files};
 use crate::pairs::input::{self, Input, PairArgs};
@@ -27,6 +27,8 @@ Examples:
   mrfgs match im0.png im1.png d.pfm --also depth,points
   # A part of a large pair:
   mrfgs match l.tif r.tif d.tif --max-disparity 255 --roi 4000,2500,800,600
+  # Depth without a calibration file:
+  mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Points as LAZ, in the frame of the left camera as it took the image:
@@ -48,7 +50,7 @@ Examples:
 /// any that `mrfgs rectify` takes. Depth is Z = baseline * f / (d + doffs) along the optical axis, in the
 /// unit of the baseline: metres with ROS and Kalibr, millimetres with Middlebury, that of the chessboard with
 /// OpenCV. Where d + doffs is 0 or less there is no depth. An entry `unit` in the file (mm, cm or m) states
-/// the unit.
+/// the unit. --focal and --baseline take the place of a calibration whose doffs is 0.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
@@ -56,6 +58,8 @@ pub(crate) struct Args {
     pair: PairArgs,
     #[command(flatten)]
     region: RegionArgs,
+    #[command(flatten)]
+    numbers: CameraArgs,
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
     output: PathBuf,
 
@@ -104,7 +108,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let cameras = args.also.take_cameras();
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
-    let mut input = stop::at_once(|| args.pair.read(args.sign, cameras.is_some(), rectifying.as_ref()))?;
+    let read = || args.pair.read(args.sign, cameras.is_some(), Some(&args.numbers), rectifying.as_ref());
+    let mut input = stop::at_once(read)?;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign, "");
@@ -137,7 +142,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     // Outputs take memory too.
     drop(matcher);
     let files = args.pair.files(&input, Some(&args.output));
-    let calibration = input.calibration_file().map(|file| file.display().to_string());
+    let unit = input.unit();
     let georeferences = pair.georeferences();
     let rectifying = input.rectifying();
     drop(input);
@@ -149,9 +154,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     record.rectified = args.rectify;
     record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);
     let said = write_outputs(args, &also, &outcome, &record)?;
-    if let Some(file) = calibration.filter(|_| !args.quiet && !said.is_empty()) {
-        let unit = rig.map_or("", |rig| rig.unit().of_baseline());
-        console::say(&format!("{}; unit: {unit}, by {file}", said.join("; ")));
+    if let Some(unit) = unit.filter(|_| !args.quiet && !said.is_empty()) {
+        console::say(&format!("{}; unit: {unit}", said.join("; ")));
     }
     Ok(())
 }

@@ -11,7 +11,9 @@ use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
 use mrfgs::{Error, Matcher};
 
-use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, RegionArgs, Search, Sign};
+use crate::args::{
+    CameraArgs, ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, RegionArgs, Search, Sign,
+};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
@@ -80,6 +82,8 @@ pub(crate) struct Args {
     /// [default: a calib.txt beside the left images]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
+    #[command(flatten)]
+    numbers: CameraArgs,
     /// Image of the size of a left frame: where it is not black, LEFT is ignored in all frames
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
@@ -154,7 +158,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
     let beside = first_image.as_deref().filter(|_| cameras.is_some() || args.search.takes_calibration());
-    let mut input = Input::new(pair, &args.search, sign, &args.calib, rectifying.as_ref(), beside)?;
+    let numbers = Some(&args.numbers);
+    let mut input = Input::new(pair, &args.search, sign, &args.calib, numbers, rectifying.as_ref(), beside)?;
     if let Some(by) = &mut input.rectification {
         by.keep_places()?;
     }

@@ -1,0 +1,88 @@
+//! The cameras of a rectified pair, where no file says them.
+
+use std::str::FromStr;
+
+use mrfgs::image::calib::{Calibration, Camera, Unit};
+
+/// The cameras of a rectified pair, in the place of a calibration.
+#[derive(clap::Args, Clone, Copy)]
+pub(crate) struct CameraArgs {
+    /// Focal length of the rectified pair in pixels; with --baseline it takes the place of --calib for depth and points. The
+    /// principal point is the centre of the image
+    #[arg(
+        long,
+        value_name = "PIXELS",
+        requires = "baseline",
+        conflicts_with = "calib",
+        allow_negative_numbers = true,
+        value_parser = focal_length
+    )]
+    focal: Option<f64>,
+    /// Distance of the cameras, with --focal: 120mm, 12cm, 0.12m, or a number alone, whose unit is then that of all depths
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        requires = "focal",
+        conflicts_with = "calib",
+        allow_negative_numbers = true,
+        value_parser = str::parse::<Baseline>
+    )]
+    baseline: Option<Baseline>,
+}
+
+impl CameraArgs {
+    /// The calibration of images of this size, where it is given by its numbers.
+    pub(crate) fn calibration(&self, size: (usize, usize)) -> Option<Calibration> {
+        let (focal, Baseline { length, unit }) = self.focal.zip(self.baseline)?;
+        Some(Calibration::of_cameras(Camera::centred(focal, size), length, unit))
+    }
+}
+
+/// The distance of two cameras.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Baseline {
+    length: f64,
+    unit: Unit,
+}
+
+impl FromStr for Baseline {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        // What ends in mm ends in m, too.
+        let units = [Unit::Millimetre, Unit::Centimetre, Unit::Metre];
+        let with_unit = units.into_iter().find_map(|unit| Some((text.strip_suffix(unit.name())?, unit)));
+        let (number, unit) = with_unit.unwrap_or((text, Unit::Unknown));
+        let length =
+            above_zero(number.trim()).ok_or("give a length above 0, such as 120mm, 12cm or 0.12m")?;
+        Ok(Self { length, unit })
+    }
+}
+
+fn focal_length(text: &str) -> Result<f64, String> {
+    above_zero(text).ok_or_else(|| "give a number of pixels above 0".into())
+}
+
+fn above_zero(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_baseline_may_say_its_unit() {
+        for (text, length, unit) in [
+            ("120mm", 120.0, Unit::Millimetre),
+            ("12 cm", 12.0, Unit::Centimetre),
+            ("0.12m", 0.12, Unit::Metre),
+            ("1.2e-1", 0.12, Unit::Unknown),
+        ] {
+            assert_eq!(text.parse(), Ok(Baseline { length, unit }), "{text}");
+        }
+        for text in ["", "mm", "0", "-5cm", "inf", "NaN", "12in", "1 2"] {
+            assert!(text.parse::<Baseline>().is_err(), "{text}");
+        }
+    }
+}
