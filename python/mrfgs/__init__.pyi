@@ -6,7 +6,8 @@ import numpy.typing as npt
 
 __version__: str
 
-# Whatever numpy makes an array of: uint8, uint16, float32 or float64, (height, width) or (height, width, channels).
+# Whatever numpy makes an array of: uint8, uint16, float32, float64, or other whole numbers with the values of the first two; of shape
+# (height, width) or (height, width, channels).
 _Image = npt.ArrayLike
 
 # The path of a calibration file, or those of two that belong together.
@@ -80,9 +81,9 @@ class Matcher:
         self,
         left: _Image,
         right: _Image,
-        max_disparity: int | None = None,
+        max_disparity: float | None = None,
         *,
-        min_disparity: int | None = None,
+        min_disparity: float | None = None,
         mask: npt.ArrayLike | None = None,
         no_data: float | None = None,
         preset: str = "default",
@@ -93,9 +94,9 @@ class Matcher:
     def match_all(
         self,
         pairs: Iterable[Sequence[_Image]],
-        max_disparity: int | None = None,
+        max_disparity: float | None = None,
         *,
-        min_disparity: int | None = None,
+        min_disparity: float | None = None,
         no_data: float | None = None,
         preset: str = "default",
         options: Mapping[str, Any] | None = None,
@@ -225,9 +226,9 @@ class Points:
 def match(
     left: _Image,
     right: _Image,
-    max_disparity: int | None = None,
+    max_disparity: float | None = None,
     *,
-    min_disparity: int | None = None,
+    min_disparity: float | None = None,
     mask: npt.ArrayLike | None = None,
     no_data: float | None = None,
     preset: str = "default",

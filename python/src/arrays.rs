@@ -11,19 +11,18 @@ use numpy::{
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
-use crate::exceptions::exception;
+use crate::exceptions::{self, exception};
 
 /// What is given for `name` as an array, in the byte order of this machine and aligned; copied where it is not. A masked array
 /// stays one.
 fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let numpy = given.py().import("numpy")?;
-    let wrong = |_| PyTypeError::new_err(format!("{name}: give a numpy array"));
-    let array = numpy.call_method1("asanyarray", (given,)).map_err(wrong)?;
-    let array = array
-        .cast_into::<PyUntypedArray>()
-        .map_err(|_| PyTypeError::new_err(format!("{name}: give a numpy array")))?;
+    let py = given.py();
+    let wrong = || PyTypeError::new_err(format!("{name}: give a numpy array"));
+    let array = py.import("numpy")?.call_method1("asanyarray", (given,));
+    let array = array.map_err(|error| exceptions::instead(py, error, wrong()))?;
+    let array = array.cast_into::<PyUntypedArray>().map_err(|_| wrong())?;
     let aligned: bool = array.getattr("flags")?.getattr("aligned")?.extract()?;
     let native = array.dtype().is_native_byteorder() != Some(false);
     if aligned && native {
@@ -56,6 +55,8 @@ fn values<'a, T: Element + Copy>(name: &str, array: &'a PyReadonlyArrayDyn<T>) -
 pub(crate) struct Image<'py> {
     name: &'static str,
     pixels: Pixels<'py>,
+    /// Whether its values, and not its type, say how many bits it has.
+    by_values: bool,
     /// Where a masked array is masked.
     masked: Option<Plane<bool>>,
 }
@@ -67,28 +68,83 @@ enum Pixels<'py> {
     Double(PyReadonlyArrayDyn<'py, f64>),
 }
 
+impl<'py> Pixels<'py> {
+    /// Whole numbers of another type: what arithmetic with numpy makes of images. They are bytes where all of them fit, else words.
+    fn by_values(name: &str, array: &Bound<'py, PyUntypedArray>) -> PyResult<Self> {
+        let kind: char = array.dtype().getattr("kind")?.extract()?;
+        if !"iu".contains(kind) {
+            let kind = array.dtype().to_string();
+            return Err(PyTypeError::new_err(format!(
+                "{name}: give an array of whole numbers, float32 or float64, not {kind}; astype converts it"
+            )));
+        }
+        // What is masked may be anything.
+        let array = if array.hasattr("filled")? {
+            array.call_method1("filled", (0,))?
+        } else {
+            array.as_any().clone()
+        };
+        let keywords = PyDict::new(array.py());
+        keywords.set_item("initial", 0)?;
+        let [least, most] = ["min", "max"].map(|end| array.call_method(end, (), Some(&keywords)));
+        let (least, most) = (least?, most?);
+        let wrong = if least.lt(0)? {
+            Some(least)
+        } else {
+            Some(most.clone()).filter(|_| most.gt(65535).is_ok_and(|v| v))
+        };
+        if let Some(value) = wrong {
+            let kind = array.getattr("dtype")?.to_string();
+            return Err(PyValueError::new_err(format!(
+                "{name}: is {kind} and holds {value}; whole numbers are 0 to 255 or 0 to 65535: give what they mean, such as \
+                 {name}.astype(numpy.float32), or a masked array"
+            )));
+        }
+        if most.gt(255)? { Self::word(&array) } else { converted(&array, "uint8").map(Self::Byte) }
+    }
+
+    fn word(array: &Bound<'py, PyAny>) -> PyResult<Self> {
+        converted(array, "uint16").map(Self::Word)
+    }
+}
+
+/// The same numbers, which fit, in another type.
+fn converted<'py, T: Element>(array: &Bound<'py, PyAny>, kind: &str) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    Ok(array.call_method1("astype", (kind,))?.cast_into::<PyArrayDyn<T>>()?.readonly())
+}
+
+/// The array for reading, where its elements are of this type.
+fn readonly<'py, T: Element>(array: &Bound<'py, PyUntypedArray>) -> Option<PyReadonlyArrayDyn<'py, T>> {
+    array.as_any().cast::<PyArrayDyn<T>>().ok().map(|array| array.readonly())
+}
+
 impl<'py> Image<'py> {
     pub(crate) fn of(name: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Self> {
         let array = array(name, given)?;
         let masked = masked(name, &array)?;
-        let of_kind = |array: &Bound<'py, PyUntypedArray>| {
-            let array = array.as_any();
-            fn readonly<'py, T: Element>(array: &Bound<'py, PyAny>) -> Option<PyReadonlyArrayDyn<'py, T>> {
-                array.cast::<PyArrayDyn<T>>().ok().map(|array| array.readonly())
+        let by_type = readonly(&array)
+            .map(Pixels::Byte)
+            .or_else(|| readonly(&array).map(Pixels::Word))
+            .or_else(|| readonly(&array).map(Pixels::Float))
+            .or_else(|| readonly(&array).map(Pixels::Double));
+        let by_values = by_type.is_none();
+        let pixels = by_type.map_or_else(|| Pixels::by_values(name, &array), Ok)?;
+        Ok(Self { name, pixels, by_values, masked })
+    }
+
+    /// Both views. Where the values of one say its bits, and the other has 16, so has that one.
+    pub(crate) fn both(left: &Bound<'py, PyAny>, right: &Bound<'py, PyAny>) -> PyResult<[Self; 2]> {
+        let mut views = [Self::of("left", left)?, Self::of("right", right)?];
+        if views.iter().any(|view| matches!(view.pixels, Pixels::Word(_))) {
+            for view in &mut views {
+                if let Pixels::Byte(bytes) = &view.pixels
+                    && view.by_values
+                {
+                    view.pixels = Pixels::word(bytes.as_any())?;
+                }
             }
-            readonly(array)
-                .map(Pixels::Byte)
-                .or_else(|| readonly(array).map(Pixels::Word))
-                .or_else(|| readonly(array).map(Pixels::Float))
-                .or_else(|| readonly(array).map(Pixels::Double))
-        };
-        let pixels = of_kind(&array).ok_or_else(|| {
-            let kind = array.dtype().to_string();
-            PyTypeError::new_err(format!(
-                "{name}: give an array of uint8, uint16, float32 or float64, not {kind}"
-            ))
-        })?;
-        Ok(Self { name, pixels, masked })
+        }
+        Ok(views)
     }
 
     pub(crate) fn raster(&self) -> PyResult<Raster<'_>> {
@@ -310,4 +366,14 @@ fn plane<T: Element + Copy>(name: &str, array: &PyReadonlyArrayDyn<T>) -> PyResu
         [height, width] => Ok(Plane::new(width, height, values(name, array)?.into_owned())),
         _ => Err(PyValueError::new_err(format!("{name}: give an array of shape (height, width)"))),
     }
+}
+
+/// Width and height, given as `size`.
+pub(crate) fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
+    let [width, height]: [i64; 2] = given
+        .extract()
+        .map_err(|_| PyTypeError::new_err("size: give (width, height), two whole numbers of pixels"))?;
+    let pixels = |count: i64| usize::try_from(count).ok().filter(|count| *count > 0);
+    let both = pixels(width).zip(pixels(height));
+    both.ok_or_else(|| PyValueError::new_err("size: give (width, height), both above 0"))
 }

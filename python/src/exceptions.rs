@@ -8,8 +8,8 @@ use mrfgs::Error;
 use mrfgs::check::Warning;
 use mrfgs::error::ReadError;
 use pyo3::exceptions::{
-    PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyUserWarning,
-    PyValueError,
+    PyException, PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError,
+    PyUserWarning, PyValueError,
 };
 use pyo3::prelude::*;
 
@@ -35,6 +35,11 @@ pub(crate) fn exception(error: Error) -> PyErr {
         Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         _ => PyValueError::new_err(text),
     }
+}
+
+/// `instead` of an exception, but not of Ctrl-C and the like, which may come while Python runs anything.
+pub(crate) fn instead(py: Python, error: PyErr, instead: PyErr) -> PyErr {
+    if error.is_instance_of::<PyException>(py) { instead } else { error }
 }
 
 /// Whether the system says that there is no such file.

@@ -13,10 +13,14 @@ mod rectification;
 mod sequence;
 mod words;
 
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
+    // The crate `numpy` finds numpy when it is used first, and panics where Ctrl-C comes in between: so it finds it here.
+    module.py().import("numpy")?;
+    let _ = PyArray1::<u8>::zeros(module.py(), 0, false).readonly();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("MatchWarning", module.py().get_type::<exceptions::MatchWarning>())?;
     module.add_function(wrap_pyfunction!(matcher::match_, module)?)?;

@@ -33,6 +33,8 @@ impl PyMatcher {
     fn new(py: Python, device: &str, threads: Option<usize>) -> PyResult<Self> {
         let execution = Execution { device: device.into(), threads, ..Execution::default() };
         let matcher = py.detach(|| Matcher::builder().execution(execution).build()).map_err(exception)?;
+        // To open a device takes a while.
+        py.check_signals()?;
         let matcher = Arc::new(Mutex::new(matcher));
         Ok(Self(Shared { matcher, taken: Arc::new(AtomicBool::new(false)) }))
     }
@@ -42,8 +44,10 @@ impl PyMatcher {
     /// left, right: arrays of shape (height, width) or (height, width, channels): grey, grey and alpha, RGB or RGBA, of uint8,
     ///     uint16, float32 or float64, in any layout. Left (x, y) with disparity d is seen at right (x - d, y). 8 bits are taken as
     ///     they are; 16 bits fill their range with the largest value of both; floats run from the least to the largest value of
-    ///     both. Ignored are pixels of alpha 0, values that are not finite, and what a masked array masks.
-    /// max_disparity, min_disparity: the range to search in pixels, both ends included. Without max_disparity sparse matches
+    ///     both. Where one view has 8 bits and the other one 16, each fills its range. Whole numbers of other types, such as int64,
+    ///     are 8 bits where those of both views are 0 to 255, and 16 bits where they are 0 to 65535; others raise ValueError, because
+    ///     they may mean anything. Ignored are pixels of alpha 0, values that are not finite, and what a masked array masks.
+    /// max_disparity, min_disparity: the range to search in whole pixels, both ends included. Without max_disparity sparse matches
     ///     find the range, and where the scene goes beyond it the pair is matched once more, over half as many labels more; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
@@ -66,8 +70,8 @@ impl PyMatcher {
         py: Python,
         left: &Bound<PyAny>,
         right: &Bound<PyAny>,
-        max_disparity: Option<i32>,
-        min_disparity: Option<i32>,
+        max_disparity: Option<&Bound<PyAny>>,
+        min_disparity: Option<&Bound<PyAny>>,
         mask: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
         preset: &str,
@@ -76,9 +80,10 @@ impl PyMatcher {
     ) -> PyResult<PyMatched> {
         self.0.check()?;
         let method = options::method(preset, options)?;
-        let (left, right) = (Image::of("left", left)?, Image::of("right", right)?);
+        let [left, right] = Image::both(left, right)?;
         let pair = arrays::pair(&left, &right, mask, no_data)?;
-        let given = range::given(max_disparity, min_disparity)?;
+        let min_disparity = range::pixels("min_disparity", min_disparity)?;
+        let given = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
         let range = range::searched(py, &pair, given, min_disparity)?;
         if warn {
             exceptions::warn(py, py.detach(|| check::warnings(&pair, given)))?;
@@ -115,15 +120,16 @@ impl PyMatcher {
     fn match_all(
         &self,
         pairs: &Bound<PyAny>,
-        max_disparity: Option<i32>,
-        min_disparity: Option<i32>,
+        max_disparity: Option<&Bound<PyAny>>,
+        min_disparity: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
         preset: &str,
         options: Option<&Bound<PyDict>>,
         warn: bool,
     ) -> PyResult<PyMatchedSequence> {
         let method = options::method(preset, options)?;
-        let range = range::given(max_disparity, min_disparity)?;
+        let min_disparity = range::pixels("min_disparity", min_disparity)?;
+        let range = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
         let pairs = pairs.try_iter().map_err(|_| {
             PyTypeError::new_err("pairs: give an iterable of pairs of arrays, such as zip(lefts, rights)")
         })?;
@@ -147,8 +153,8 @@ pub(crate) fn match_(
     py: Python,
     left: &Bound<PyAny>,
     right: &Bound<PyAny>,
-    max_disparity: Option<i32>,
-    min_disparity: Option<i32>,
+    max_disparity: Option<&Bound<PyAny>>,
+    min_disparity: Option<&Bound<PyAny>>,
     mask: Option<&Bound<PyAny>>,
     no_data: Option<f64>,
     preset: &str,

@@ -3,10 +3,26 @@
 use mrfgs::check;
 use mrfgs::error::RangeError;
 use mrfgs::image::Pair;
-use mrfgs::options::DisparityRange;
+use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::exceptions::exception;
+
+/// What is given for the disparity `name`: a whole number of pixels, of any type that holds one.
+pub(crate) fn pixels(name: &str, given: Option<&Bound<PyAny>>) -> PyResult<Option<i32>> {
+    let Some(given) = given else { return Ok(None) };
+    let expected = format!("{name}: give a whole number of pixels within {MAX_DISPARITY} of 0");
+    let Ok(number) = given.extract::<f64>() else {
+        return Err(PyTypeError::new_err(format!("{expected}, not {}", given.get_type().name()?)));
+    };
+    // What is no number has no whole part.
+    if number.trunc() == number && number.abs() <= f64::from(MAX_DISPARITY) {
+        Ok(Some(number as i32))
+    } else {
+        Err(PyValueError::new_err(format!("{expected}, not {number}")))
+    }
+}
 
 /// The range that is given.
 pub(crate) fn given(max: Option<i32>, min: Option<i32>) -> PyResult<Option<DisparityRange>> {

@@ -171,7 +171,7 @@ impl State {
         let Some((left, right)) = one(0).zip(one(1)) else {
             return Err(PyTypeError::new_err("give two arrays, left and right"));
         };
-        let (left, right) = (Image::of("left", &left)?, Image::of("right", &right)?);
+        let [left, right] = Image::both(&left, &right)?;
         let pair = arrays::pair(&left, &right, None, no_data)?;
         let found = range::searched(py, &pair, given, min_disparity)?;
         if warn {

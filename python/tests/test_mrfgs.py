@@ -169,6 +169,68 @@ class Match(unittest.TestCase):
         found = mrfgs.match(*grey, 15, device="cpu").disparity
         self.assertLess(abs(np.median(found[32:, 16:]) - 9), 0.1)
 
+    def test_whole_numbers_of_any_type(self):
+        def found(left, right):
+            return mrfgs.match(left, right, 15, device="cpu", warn=False).disparity
+
+        left, right = pair()
+        expected = found(left, right)
+        wide = [image.astype(np.uint16) * 13 + 3 for image in (left, right)]
+        expected_of_wide = found(*wide)
+        # Control: the bits that an image has count.
+        self.assertFalse(np.array_equal(expected_of_wide, expected))
+        for dtype in (np.int16, np.int32, np.int64, np.uint32, np.uint64, ">i4"):
+            for images, same in (((left, right), expected), (wide, expected_of_wide)):
+                others = [image.astype(dtype) for image in images]
+                for one, two in (others, (images[0], others[1]), (others[0], images[1])):
+                    self.assertTrue(np.array_equal(found(one, two), same), dtype)
+        self.assertTrue(np.array_equal(found((left // 2).astype(np.int8), (right // 2).astype(np.int8)), found(left // 2, right // 2)))
+        self.assertTrue(np.array_equal(found(np.asfortranarray(left.astype(int)), right.astype(int)[::-1].copy()[::-1]), expected))
+        # The views of one camera have as many bits, whatever one of them holds.
+        dark, bright = left.astype(np.uint16), right.astype(np.uint16) * 200
+        for one, two in ((dark.astype(int), bright.astype(int)), (dark.astype(int), bright)):
+            self.assertTrue(np.array_equal(found(one, two), found(dark, bright)))
+        self.assertFalse(np.array_equal(found(left, bright), found(dark, bright)))
+        # What is masked may hold anything, and no data is told by value.
+        mask = np.zeros(left.shape, bool)
+        mask[:, :10] = True
+        masked = np.ma.masked_array(np.where(mask, -9999, left.astype(int)), mask)
+        self.assertTrue(np.array_equal(found(masked, right), found(np.ma.masked_array(left, mask), right)))
+        holed = np.where(mask, 7, left)
+        self.assertTrue(np.array_equal(mrfgs.match(holed.astype(int), right, 15, no_data=7, device="cpu").disparity,
+                                       mrfgs.match(holed.astype(np.uint8), right, 15, no_data=7, device="cpu").disparity))
+        views = mrfgs.Rectification(CAMERAS).apply(*(image.astype(int) for image in raw_pair()))
+        for view, same in zip(views, mrfgs.Rectification(CAMERAS).apply(*raw_pair())):
+            self.assertEqual(view.dtype, np.uint8)
+            self.assertTrue(np.array_equal(view.data, same.data))
+
+    def test_views_of_8_and_16_bits(self):
+        left, right = pair(200, 300)
+        expected = mrfgs.match(left, right, 15, device="cpu").disparity
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", mrfgs.MatchWarning)
+            # 8, 12 and 16 bits that show the same.
+            for one, two in ((left, right * np.uint16(16)), (left * np.uint16(16), right), (left, right * np.uint16(257)),
+                             (left, right.astype(np.uint16))):
+                found = mrfgs.match(one, two, 15, device="cpu").disparity
+                self.assertLess(np.abs(found - expected)[:, 16:].mean(), 0.005)
+            self.assertTrue(np.array_equal(found, expected))
+            # Controls: as words of one camera, one of them is dark.
+            for one, two, words in ((left * np.uint16(257) - (left > 0), right.astype(np.uint16), "all one colour"),
+                                    (left.astype(np.uint16), right * np.uint16(16), "far apart")):
+                with self.assertRaisesRegex(mrfgs.MatchWarning, words):
+                    mrfgs.match(one, two, 15, device="cpu")
+
+    def test_disparities_are_whole_numbers_of_any_type(self):
+        left, right = pair()
+        expected = mrfgs.match(left, right, 15, min_disparity=-1, device="cpu").disparity
+        for kind in (float, np.float32, np.float64, np.int64, np.uint8, np.float16, lambda number: np.array(number)):
+            found = mrfgs.match(left, right, kind(15), min_disparity=-1.0, device="cpu")
+            self.assertEqual((found.min_disparity, found.max_disparity), (-1, 15))
+            self.assertTrue(np.array_equal(found.disparity, expected))
+        found = next(mrfgs.Matcher(device="cpu").match_all([(left, right)], 15.0, min_disparity=np.float32(-1)))
+        self.assertTrue(np.array_equal(found.disparity, expected))
+
     def test_layouts_of_memory(self):
         left, right = pair()
         expected = mrfgs.match(left, right, 15, device="cpu").disparity
@@ -352,10 +414,20 @@ class Match(unittest.TestCase):
             (ValueError, "1 to 4 channels", lambda: mrfgs.match(np.dstack([left, left]), right, 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0], right[:0], 15)),
             (ValueError, "float", lambda: mrfgs.match(left, right.astype(np.float32), 15)),
+            (ValueError, "left: is int64 and holds -1; whole numbers are 0 to 255 or 0 to 65535: give what they mean",
+             lambda: mrfgs.match(left.astype(np.int64) - 1 - left.min(), right, 15)),
+            (ValueError, "right: is uint32 and holds 65536; whole", lambda: mrfgs.match(left, np.full((60, 80), 65536, np.uint32), 15)),
+            (ValueError, "has pixels", lambda: mrfgs.match(left[:0].astype(int), right[:0].astype(int), 15)),
+            (TypeError, "left: give an array of whole numbers, float32 or float64, not bool; astype", lambda: mrfgs.match(left > 9, right, 15)),
+            (TypeError, "not float16", lambda: mrfgs.match(left.astype(np.float16), right, 15)),
+            (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 63.5", lambda: mrfgs.match(left, right, 63.5)),
+            (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not NaN", lambda: mrfgs.match(left, right, np.nan)),
+            (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 10000000000", lambda: mrfgs.match(left, right, 10**10)),
+            (ValueError, "min_disparity: give a whole", lambda: mrfgs.match(left, right, 15, min_disparity=-np.inf)),
+            (TypeError, "max_disparity: give a whole number of pixels within 1048576 of 0, not str", lambda: mrfgs.match(left, right, "63")),
+            (TypeError, "max_disparity: give a whole number of pixels within 1048576 of 0, not ndarray", lambda: mrfgs.match(left, right, right)),
             (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((3, 3), bool))),
-            (TypeError, "left: give an array of uint8, uint16, float32 or float64, not int64",
-             lambda: mrfgs.match(left.astype(np.int64), right, 15)),
-            (TypeError, "left", lambda: mrfgs.match([[1]], right, 15)),
+            (TypeError, "left", lambda: mrfgs.match([["1"]], right, 15)),
             (TypeError, "right", lambda: mrfgs.match(left, "right.png", 15)),
             (TypeError, "mask: give an array of bool", lambda: mrfgs.match(left, right, 15, mask=np.full((60, 80), "a"))),
             (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((3, 3), np.uint8))),
@@ -400,6 +472,53 @@ class Match(unittest.TestCase):
             process.send_signal(signal.SIGINT)
             _, told = process.communicate(timeout=60)
         self.assertIn("KeyboardInterrupt", told)
+
+
+class CtrlC(unittest.TestCase):
+    """The first call in a program opens the device, compiles its shaders, and sees whether it is right."""
+
+    CODE = """
+import signal, sys, time
+import numpy as np
+import mrfgs
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+a = np.random.default_rng(1).integers(0, 256, (300, 400), dtype=np.uint8)
+print("ready", flush=True)
+try:
+    mrfgs.match(a, np.roll(a, -5, 1), 63, device=sys.argv[1], warn=False)
+    print("matched", flush=True)
+    time.sleep(60)
+except KeyboardInterrupt:
+    print("told", flush=True)
+"""
+
+    def interrupted(self, device):
+        during = 0
+        for delay in (0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2):
+            with subprocess.Popen([sys.executable, "-c", self.CODE, device], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+                self.addCleanup(process.kill)
+                self.assertEqual(process.stdout.readline(), "ready\n")
+                time.sleep(delay)
+                process.send_signal(signal.SIGINT)
+                said, wrong = process.communicate(timeout=300)
+            self.assertEqual((process.returncode, wrong), (0, ""), f"after {delay} s")
+            self.assertIn(said, ("told\n", "matched\ntold\n"), f"after {delay} s")
+            during += said == "told\n"
+        self.assertGreater(during, 0)
+
+    @unittest.skipIf(sys.platform == "win32", "no signals there")
+    def test_on_the_cpu(self):
+        self.interrupted("cpu")
+
+    @unittest.skipIf(sys.platform == "win32", "no signals there")
+    def test_on_a_device(self):
+        try:
+            mrfgs.Matcher(device="gpu")
+        except RuntimeError as error:
+            self.assertIn(os.environ.get("MRFGS_REQUIRE_GPU", "0"), ("", "0"), error)
+            self.skipTest(f"there is no device: {error}")
+        self.interrupted("gpu")
 
 
 class Folder(unittest.TestCase):
@@ -686,7 +805,7 @@ class Rectification(Folder):
             (ValueError, "alpha", lambda: mrfgs.Rectification(CAMERAS, alpha=float("nan"))),
             (ValueError, "240 x 180 and these are 239 x 180", lambda: by.apply(left[:, 1:], right[:, 1:])),
             (ValueError, "one size", lambda: by.apply(left, right[:, 1:])),
-            (TypeError, "left: give an array of uint8", lambda: by.apply(left.astype(np.int32), right)),
+            (TypeError, "left: give an array of whole numbers", lambda: by.apply(left > 9, right)),
             (TypeError, "right", lambda: by.apply(left, "right.png")),
             (ValueError, "mask", lambda: by.apply(left, right, mask=np.zeros((3, 3), bool))),
             (ValueError, "cameras.yml: is of images that are not rectified; take the rig of a Rectification", lambda: mrfgs.Rig(CAMERAS)),
@@ -785,11 +904,12 @@ class Depth(Folder):
             (ValueError, "disparity: is 80 x 60, and the text is of images of 81 x 60", lambda: sized.depth(found.disparity)),
             (ValueError, "matched: is 80 x 60", lambda: sized.points(found, left)),
             (ValueError, "left: is 79 x 60 and the maps are 80 x 60", lambda: rig.points(found, left[:, 1:])),
-            (TypeError, "left: give an array of uint8", lambda: rig.points(found, left.astype(int))),
+            (TypeError, "left: give an array of whole numbers", lambda: rig.points(found, left > 9)),
             (ValueError, "positions: give an array of shape (N, 3)", lambda: mrfgs.Points(positions[:, :2], colours, confidence)),
             (TypeError, "colours: give an array of shape (N, 3), uint8", lambda: mrfgs.Points(positions, colours / 255, confidence)),
             (ValueError, "4 positions, 3 colours and 4 values", lambda: mrfgs.Points(positions, colours[1:], confidence)),
-            (OSError, "python.xyz", lambda: points.save(self.folder / "python.xyz")),
+            (OSError, "python.xyz: point clouds end in .ply, .pcd, .las or .laz", lambda: points.save(self.folder / "python.xyz")),
+            (OSError, "python.laz", lambda: mrfgs.Points(positions + np.inf, colours, confidence).save(self.folder / "python.laz")),
             (OSError, "there is no folder", lambda: points.save(self.folder / "nowhere" / "python.ply")),
         ):
             with self.subTest(words):
@@ -975,7 +1095,7 @@ class Sequences(Folder):
         self.matcher.match(*pair(), 15)
         left, right = pair()
         for error, words, bad in (
-            (TypeError, "pair 1: left: give an array of uint8", (left.astype(np.int64), right)),
+            (TypeError, "pair 1: left: give an array of whole numbers", (left > 9, right)),
             (ValueError, "pair 1: the left image is 80 x 60 and the right one is 79 x 60", (left, right[:, 1:])),
             (TypeError, "pair 1: give two arrays, left and right", left),
             (TypeError, "pair 1: give two arrays, left and right", None),
