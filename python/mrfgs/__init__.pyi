@@ -183,6 +183,18 @@ class Rig:
     """The cameras of a rectified pair: from disparities to depths and points, in the unit of the baseline."""
 
     def __new__(cls, calibration: _Cameras) -> Rig: ...
+    @staticmethod
+    def of(
+        focal: float,
+        baseline: float,
+        *,
+        principal_point: Sequence[float] | None = None,
+        doffs: float = 0.0,
+        size: Sequence[int] | None = None,
+        unit: str = "unknown",
+    ) -> Rig:
+        """That of a rectified pair by its focal length in pixels and its baseline; the principal point is the centre of images of
+        `size` unless it is given."""
     def depth(self, disparity: npt.ArrayLike) -> npt.NDArray[np.float32]:
         """The depth of every pixel along the optical axis, in the unit of the baseline, +inf where there is none."""
     def millimetres(self, disparity: npt.ArrayLike) -> npt.NDArray[np.uint16]:

@@ -8,7 +8,7 @@ use mrfgs::calibration::cameras::StereoCalibration;
 use mrfgs::image::calib::Unit;
 use pyo3::exceptions::{PyFileNotFoundError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyTuple, PyType};
 
 use crate::exceptions::exception;
 use crate::words;
@@ -28,6 +28,8 @@ pub(crate) struct PyCalibration {
     pub(crate) cameras: StereoCalibration,
     /// The files, as messages name them.
     pub(crate) names: String,
+    /// What it was made of, for copies: the name and the text of each file, and the unit that was given.
+    made_of: (Vec<(String, String)>, Option<String>),
 }
 
 impl PyCalibration {
@@ -65,32 +67,28 @@ impl PyCalibration {
             }
             Ok(path)
         });
-        let files: Vec<PathBuf> = files.collect::<PyResult<_>>()?;
-        let names = files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
-        Self::with_unit(calibration::read(&files), names, unit)
+        let texts = files.map(|file| {
+            let path = file?;
+            let text = calibration::text(&path).map_err(exception)?;
+            Ok((path.display().to_string(), text))
+        });
+        Self::of_named(texts.collect::<PyResult<_>>()?, unit)
     }
 
-    fn with_unit(
-        cameras: mrfgs::Result<StereoCalibration>,
-        names: String,
-        unit: Option<&str>,
-    ) -> PyResult<Self> {
-        let mut cameras = cameras.map_err(|error| match error {
+    /// That of the texts of files, each with the name by which messages call it.
+    fn of_named(files: Vec<(String, String)>, unit: Option<&str>) -> PyResult<Self> {
+        let texts: Vec<_> = files.iter().map(|(name, text)| (Path::new(name), text.clone())).collect();
+        let mut cameras = calibration::of_texts(&texts).map_err(|error| match error {
             Error::Calibration(_) => {
                 PyValueError::new_err("calibration: give the path of a file, or those of two")
             }
             error => exception(error),
         })?;
         if let Some(text) = unit {
-            let unit: Unit = text.parse().map_err(|expected| {
-                PyValueError::new_err(format!("unit: give {expected}, not \"{text}\""))
-            })?;
-            cameras.unit = unit;
-            if let Some(benchmark) = &mut cameras.benchmark {
-                benchmark.unit = unit;
-            }
+            cameras.set_unit(self::unit(text)?);
         }
-        Ok(Self { cameras, names })
+        let names = files.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+        Ok(Self { cameras, names, made_of: (files, unit.map(str::to_owned)) })
     }
 
     /// An error of what the calibration says, with its name.
@@ -100,6 +98,11 @@ impl PyCalibration {
             None => exception(error),
         }
     }
+}
+
+/// The unit of a baseline.
+pub(crate) fn unit(text: &str) -> PyResult<Unit> {
+    text.parse().map_err(|expected| PyValueError::new_err(format!("unit: give {expected}, not \"{text}\"")))
 }
 
 #[pymethods]
@@ -115,12 +118,8 @@ impl PyCalibration {
     #[staticmethod]
     #[pyo3(signature = (*texts, unit=None))]
     fn of_texts(texts: Vec<String>, unit: Option<&str>) -> PyResult<Self> {
-        let names: Vec<String> = match texts.len() {
-            1 => vec!["the text".into()],
-            count => (1..=count).map(|i| format!("text {i}")).collect(),
-        };
-        let files: Vec<_> = names.iter().map(Path::new).zip(texts).collect();
-        Self::with_unit(calibration::of_texts(&files), names.join(", "), unit)
+        let name = |i: usize| if texts.len() == 1 { "the text".into() } else { format!("text {}", i + 1) };
+        Self::of_named((0..).map(name).zip(texts.clone()).collect(), unit)
     }
 
     /// (width, height) of the images as the cameras took them; None where the files do not say it.
@@ -147,5 +146,17 @@ impl PyCalibration {
 
     fn __repr__(&self) -> String {
         format!("<mrfgs.Calibration: {}, unit {}>", self.names, self.unit())
+    }
+
+    /// How `pickle` and `copy` make another one: of the texts, as the files may be gone by then.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (files, unit) = &self.made_of;
+        let again = py.get_type::<Self>().getattr("_again")?;
+        Ok((again, (files.clone(), unit.as_deref()).into_pyobject(py)?))
+    }
+
+    #[classmethod]
+    fn _again(_: &Bound<PyType>, files: Vec<(String, String)>, unit: Option<&str>) -> PyResult<Self> {
+        Self::of_named(files, unit)
     }
 }

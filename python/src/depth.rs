@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 
 use crate::arrays::{self, Image};
-use crate::calibration::PyCalibration;
+use crate::calibration::{self, PyCalibration};
 use crate::exceptions::exception;
 use crate::matched::PyMatched;
 
@@ -23,7 +23,7 @@ use crate::matched::PyMatched;
 ///     P1 and P2, ROS's projections. For raw images, Rectification.rig has it.
 ///
 /// A point at depth Z has the disparity d with d + doffs = baseline * f / Z. Depths and points have the unit of the baseline.
-/// Raises ValueError for a calibration that does not say the rectified cameras.
+/// Raises ValueError for a calibration that does not say the rectified cameras. Rig.of takes numbers in the place of a calibration.
 #[pyclass(name = "Rig", frozen, module = "mrfgs")]
 pub(crate) struct PyRig {
     rig: Rig,
@@ -31,20 +31,39 @@ pub(crate) struct PyRig {
     doffs: f64,
     baseline: f64,
     size: Option<(usize, usize)>,
+    /// What says so, as messages name it.
     names: String,
 }
 
+/// The numbers of a rig: focal lengths, principal point, doffs and baseline, unit, size, and the name of what says so.
+type Numbers = ([f64; 2], [f64; 2], [f64; 2], String, Option<(usize, usize)>, String);
+
 impl PyRig {
     /// That of a rectified pair, by the calibration that it comes from.
-    pub(crate) fn of(rectified: &Calibration, known: &PyCalibration) -> PyResult<Self> {
-        let rig = Rig::new(rectified).map_err(|error| known.wrong(error))?;
+    pub(crate) fn of_rectified(rectified: &Calibration, known: &PyCalibration) -> PyResult<Self> {
+        Self::named(rectified, known.names.clone()).map_err(|error| known.wrong(error))
+    }
+
+    fn named(rectified: &Calibration, names: String) -> mrfgs::Result<Self> {
+        let rig = Rig::new(rectified)?;
         let size =
             rectified.width.zip(rectified.height).map(|(width, height)| (width as usize, height as usize));
-        let names = known.names.clone();
         // What a rig has, its calibration says.
         let camera = rectified.camera.unwrap_or(Camera { focal_length: [0.0; 2], principal_point: [0.0; 2] });
         let (doffs, baseline) = (rectified.doffs.unwrap_or_default(), rectified.baseline.unwrap_or_default());
         Ok(Self { rig, camera, doffs, baseline, size, names })
+    }
+
+    fn of_numbers(numbers: Numbers) -> PyResult<Self> {
+        let (focal_length, principal_point, [doffs, baseline], unit, size, names) = numbers;
+        let unit = calibration::unit(&unit)?;
+        let mut rectified = Calibration::of_cameras(Camera { focal_length, principal_point }, baseline, unit);
+        rectified.doffs = Some(doffs);
+        [rectified.width, rectified.height] = match size {
+            Some((width, height)) => [width, height].map(|count| u32::try_from(count).ok()),
+            None => [None; 2],
+        };
+        Self::named(&rectified, names).map_err(exception)
     }
 
     /// Refuses a map of another size than that of the calibration.
@@ -81,7 +100,50 @@ impl PyRig {
                 known.names
             ))
         })?;
-        Self::of(&rectified, &known)
+        Self::of_rectified(&rectified, &known)
+    }
+
+    /// That of a rectified pair whose cameras no file describes: by their focal length and the distance between them.
+    ///
+    /// focal: the focal length in pixels: that in millimetres divided by the width of a pixel on the sensor.
+    /// baseline: the distance of the cameras, in the unit of all depths.
+    /// principal_point: (cx, cy) of the left camera in pixels; None takes the centre of images of `size`, ((width - 1) / 2,
+    ///     (height - 1) / 2). Depths do not depend on it, points do.
+    /// doffs: cx of the right camera less cx of the left one, in pixels.
+    /// size: (width, height) of the images in pixels, of which maps must be; needed where principal_point is not given.
+    /// unit: the unit of the baseline, "mm", "cm" or "m"; `millimetres` takes it.
+    #[staticmethod]
+    #[pyo3(signature = (focal, baseline, *, principal_point=None, doffs=0.0, size=None, unit="unknown"))]
+    fn of(
+        focal: f64,
+        baseline: f64,
+        principal_point: Option<[f64; 2]>,
+        doffs: f64,
+        size: Option<&Bound<PyAny>>,
+        unit: &str,
+    ) -> PyResult<Self> {
+        for (name, value) in [("focal", focal), ("baseline", baseline)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(PyValueError::new_err(format!("{name}: give a number above 0, not {value}")));
+            }
+        }
+        let size = size.map(arrays::size).transpose()?;
+        let Some(principal_point) =
+            principal_point.or_else(|| size.map(|size| Camera::centred(focal, size).principal_point))
+        else {
+            return Err(PyValueError::new_err(
+                "size: give (width, height) of the images, whose centre is the principal point, or principal_point",
+            ));
+        };
+        let [cx, cy] = principal_point;
+        if let Some(value) = [cx, cy, doffs].into_iter().find(|value| !value.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "principal_point and doffs: give numbers, not {value}"
+            )));
+        }
+        let unit = calibration::unit(unit)?.name().into();
+        let names = "Rig.of".into();
+        Self::of_numbers(([focal; 2], principal_point, [doffs, baseline], unit, size, names))
     }
 
     /// The depth of every pixel along the optical axis, float32 in the unit of the baseline, +inf where there is none: where the
@@ -97,7 +159,7 @@ impl PyRig {
     ///
     /// disparity: as in `depth`.
     ///
-    /// Raises ValueError where the unit of the baseline is not known; Calibration(..., unit="m") states it.
+    /// Raises ValueError where the unit of the baseline is not known; Calibration(..., unit="m") and Rig.of(..., unit="m") state it.
     fn millimetres<'py>(
         &self,
         py: Python<'py>,
@@ -106,8 +168,8 @@ impl PyRig {
         let map = self.disparities(disparity)?;
         let depths = py.detach(|| self.rig.millimetres(&map)).ok_or_else(|| {
             PyValueError::new_err(format!(
-                "{}: does not say the unit of the baseline; give it by Calibration(..., unit=\"m\"), or add an entry `unit` to the \
-                 file: mm, cm or m",
+                "{}: does not say the unit of the baseline; give it by Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\"), or add \
+                 an entry `unit` to the file: mm, cm or m",
                 self.names
             ))
         })?;
@@ -186,6 +248,19 @@ impl PyRig {
             self.baseline, self.camera.focal_length[0]
         )
     }
+
+    /// How `pickle` and `copy` make another one.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Numbers,))> {
+        let Camera { focal_length, principal_point } = self.camera;
+        let (unit, names) = (self.unit().into(), self.names.clone());
+        let numbers = (focal_length, principal_point, [self.doffs, self.baseline], unit, self.size, names);
+        Ok((py.get_type::<Self>().getattr("_again")?, (numbers,)))
+    }
+
+    #[classmethod]
+    fn _again(_: &Bound<PyType>, numbers: Numbers) -> PyResult<Self> {
+        Self::of_numbers(numbers)
+    }
 }
 
 /// A cloud of points.
@@ -257,7 +332,7 @@ impl PyPoints {
     /// `--also points`, `points.pcd`, `points.las` and `points.laz`. In PLY the confidence is called `quality`, as MeshLab has it; in LAS
     /// and LAZ it is the intensity, times 257, and positions are rounded to steps of a millionth of the distance of the nearest point.
     ///
-    /// path: a name that ends in .ply or .pcd.
+    /// path: a name that ends in .ply, .pcd, .las or .laz.
     ///
     /// Raises OSError where it cannot be written.
     fn save(&self, py: Python, path: PathBuf) -> PyResult<()> {

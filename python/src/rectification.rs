@@ -5,9 +5,9 @@ use std::sync::OnceLock;
 use mrfgs::calibration::write;
 use mrfgs::image::calib::Calibration;
 use mrfgs::rectification::{Options, Rectification};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyTuple, PyType};
 
 use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
@@ -30,12 +30,20 @@ pub(crate) struct PyRectification {
     by: Rectification,
     /// The same with its places, from the first pair on.
     kept: OnceLock<Rectification>,
-    raw_size: (usize, usize),
+    /// What it was made of, for copies: the calibration, the size of the images, and the options.
+    made_of: (PyCalibration, (usize, usize), Options),
     calibration: Calibration,
     rig: Py<PyRig>,
 }
 
 impl PyRectification {
+    fn of(py: Python, known: PyCalibration, size: (usize, usize), options: Options) -> PyResult<Self> {
+        let by = Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
+        let calibration = by.calibration().map_err(|error| known.wrong(error))?;
+        let rig = Py::new(py, PyRig::of_rectified(&calibration, &known)?)?;
+        Ok(Self { by, kept: OnceLock::new(), made_of: (known, size, options), calibration, rig })
+    }
+
     /// Many pairs may follow the first, so it finds out once where pixels come from.
     fn with_places(&self) -> mrfgs::Result<&Rectification> {
         if let Some(kept) = self.kept.get() {
@@ -63,7 +71,7 @@ impl PyRectification {
         }
         let known = PyCalibration::of(calibration)?;
         let size = match size {
-            Some(size) => self::size(size)?,
+            Some(size) => arrays::size(size)?,
             None => known.cameras.size.ok_or_else(|| {
                 let names = &known.names;
                 PyValueError::new_err(format!(
@@ -71,12 +79,10 @@ impl PyRectification {
                 ))
             })?,
         };
-        let by = Rectification::new(&known.cameras, size, &Options { alpha, zero_disparity })
-            .map_err(|error| known.wrong(error))?;
-        exceptions::tell(py, by.doubts().iter().map(|doubt| format!("{}: {doubt}", known.names)))?;
-        let calibration = by.calibration().map_err(|error| known.wrong(error))?;
-        let rig = Py::new(py, PyRig::of(&calibration, &known)?)?;
-        Ok(Self { by, kept: OnceLock::new(), raw_size: size, calibration, rig })
+        let made = Self::of(py, known, size, Options { alpha, zero_disparity })?;
+        let names = &made.made_of.0.names;
+        exceptions::tell(py, made.by.doubts().iter().map(|doubt| format!("{names}: {doubt}")))?;
+        Ok(made)
     }
 
     /// Rectifies a pair, and returns the left and the right view as masked arrays: masked where there is no source, or where the
@@ -98,7 +104,7 @@ impl PyRectification {
         mask: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let (left, right) = (Image::of("left", left)?, Image::of("right", right)?);
+        let [left, right] = Image::both(left, right)?;
         let stored = [left.stored(&right), right.stored(&left)];
         let pair = arrays::pair(&left, &right, mask, no_data)?;
         let pair = py.detach(|| self.with_places()?.apply(&pair)).map_err(exception)?;
@@ -123,7 +129,7 @@ impl PyRectification {
     /// (width, height) of the images that it rectifies, in pixels.
     #[getter]
     fn raw_size(&self) -> (usize, usize) {
-        self.raw_size
+        self.made_of.1
     }
 
     /// The rotations from the frame of each camera to that of its rectified view: two arrays (3, 3), left and right, R1 and R2 of
@@ -151,17 +157,26 @@ impl PyRectification {
     }
 
     fn __repr__(&self) -> String {
-        let ((w, h), (width, height)) = (self.raw_size, self.size());
+        let ((w, h), (width, height)) = (self.raw_size(), self.size());
         format!("<mrfgs.Rectification: {w} x {h} to {width} x {height}>")
     }
-}
 
-/// Width and height.
-fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
-    let [width, height]: [i64; 2] = given
-        .extract()
-        .map_err(|_| PyTypeError::new_err("size: give (width, height), two whole numbers of pixels"))?;
-    let pixels = |count: i64| usize::try_from(count).ok().filter(|count| *count > 0);
-    let both = pixels(width).zip(pixels(height));
-    both.ok_or_else(|| PyValueError::new_err("size: give (width, height), both above 0"))
+    /// How `pickle` and `copy` make another one. It is found again: the same calibration gives the same bits everywhere.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (calibration, size, Options { alpha, zero_disparity }) = self.made_of.clone();
+        let again = py.get_type::<Self>().getattr("_again")?;
+        Ok((again, (calibration, size, alpha, zero_disparity).into_pyobject(py)?))
+    }
+
+    /// As the constructor, without saying a second time what is probably wrong.
+    #[classmethod]
+    fn _again(
+        of: &Bound<PyType>,
+        calibration: &PyCalibration,
+        size: (usize, usize),
+        alpha: Option<f64>,
+        zero_disparity: bool,
+    ) -> PyResult<Self> {
+        Self::of(of.py(), calibration.clone(), size, Options { alpha, zero_disparity })
+    }
 }

@@ -6,6 +6,7 @@ import gc
 import inspect
 import itertools
 import json
+import multiprocessing
 import os
 import pickle
 import signal
@@ -754,6 +755,76 @@ class Rectification(Folder):
         self.assertEqual(views[0].shape, (240, 180, 3))
         self.assertEqual(by.rig.baseline, 0.2)
 
+    def copies(self, thing):
+        yield copy.copy(thing)
+        yield copy.deepcopy(thing)
+        for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+            yield pickle.loads(pickle.dumps(thing, protocol))
+
+    def test_calibrations_pickle_and_copy(self):
+        path = self.folder / "here.yml"
+        path.write_text(CAMERAS.read_text())
+        lenses, pose = CAMERAS.read_text().split("R: ")
+        two = self.write("intrinsics.yml", lenses), self.write("extrinsics.yml", "%YAML:1.0\n---\nunit: m\nR: " + pose)
+        made = [mrfgs.Calibration(path), mrfgs.Calibration(path, unit="cm"), mrfgs.Calibration(*two),
+                mrfgs.Calibration.of_texts(CAMERAS.read_text()), mrfgs.Calibration(TESTDATA / "mixed" / "calib.txt")]
+        pickled = [pickle.dumps(calibration) for calibration in made]
+        # The files may be gone, and other ones in their place.
+        path.unlink()
+        two[0].write_text(two[1].read_text())
+        for calibration, bytes_ in zip(made, pickled):
+            for other in (pickle.loads(bytes_), *self.copies(calibration)):
+                self.assertIsInstance(other, mrfgs.Calibration)
+                for name in ("size", "unit", "max_disparity"):
+                    self.assertEqual(getattr(other, name), getattr(calibration, name))
+                self.assertEqual(repr(other), repr(calibration))
+                if calibration.max_disparity is None:
+                    self.assertTrue(np.array_equal(mrfgs.Rectification(other).maps(), mrfgs.Rectification(calibration).maps()))
+                    self.assertEqual(mrfgs.Rectification(other).cameras_yml(), mrfgs.Rectification(calibration).cameras_yml())
+        # Errors name the same files.
+        self.refused(ValueError, str(path), lambda: mrfgs.Rectification(pickle.loads(pickled[0]), (7, 5)))
+
+    def test_rectifications_and_rigs_pickle_and_copy(self):
+        raw = raw_pair()
+        disparity = np.random.default_rng(3).uniform(1, 31, (180, 240)).astype(np.float32)
+        path = self.write("here.yml", CAMERAS.read_text())
+        sizeless = mrfgs.Calibration.of_texts(CAMERAS.read_text().replace("imageSize: [ 240, 180 ]\n", ""))
+        seen = []
+        for calibration, size, keywords in ((path, None, {}), (path, (240, 180), {"alpha": 0.3}), (path, None, {"zero_disparity": False}),
+                                            (sizeless, (240, 180), {"alpha": 1}), (mrfgs.Calibration(path, unit="cm"), None, {})):
+            by = mrfgs.Rectification(calibration, size, **keywords)
+            views = by.apply(*raw)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                for other in self.copies(by):
+                    self.assertEqual((other.size, other.raw_size, repr(other)), (by.size, by.raw_size, repr(by)))
+                    self.assertTrue(np.array_equal(other.maps(), by.maps()))
+                    self.assertTrue(np.array_equal(other.rotations, by.rotations))
+                    self.assertEqual((other.calib_txt(), other.cameras_yml()), (by.calib_txt(), by.cameras_yml()))
+                    self.assertTrue(np.array_equal(other.rig.depth(disparity), by.rig.depth(disparity)))
+                for one, same in zip(other.apply(*raw), views):
+                    self.assertTrue(np.array_equal(one.data, same.data) and np.array_equal(one.mask, same.mask))
+            # Control: they are not all the same.
+            seen.append((by.rig.unit, by.maps()[0][0].tobytes(), by.rig.doffs))
+        self.assertEqual(len(set(seen)), 5)
+        ours = mrfgs.Rectification(path).rig
+        rigs = [ours, mrfgs.Rig(TESTDATA / "mixed" / "calib.txt"), mrfgs.Rig.of(700, 0.1, size=(240, 180), doffs=0.1, unit="m"),
+                mrfgs.Rig.of(1 / 3, 0.1, principal_point=(1 / 7, 3)),
+                mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 90 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))]
+        for rig in rigs:
+            for other in self.copies(rig):
+                for name in ("doffs", "baseline", "unit", "size"):
+                    self.assertEqual(getattr(other, name), getattr(rig, name))
+                self.assertTrue(np.array_equal(other.cameras, rig.cameras))
+                map_ = disparity if rig.size in (None, (240, 180)) else np.full(rig.size[::-1], 9.5)
+                self.assertTrue(np.array_equal(other.depth(map_), rig.depth(map_)))
+        self.refused(ValueError, f"{path} is of images of 240 x 180", lambda: pickle.loads(pickle.dumps(ours)).depth(disparity[1:]))
+
+    def test_workers_take_them(self):
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            by = mrfgs.Rectification(CAMERAS)
+            self.assertTrue(np.array_equal(pool.apply(mrfgs.Rectification.maps, (by,)), by.maps()))
+
     def test_units(self):
         text = CAMERAS.read_text().replace("unit: m\n", "")
         disparity = np.full((180, 240), 10, np.float32)
@@ -871,6 +942,26 @@ class Depth(Folder):
             self.assertTrue(np.array_equal(other.millimetres(disparity), rig.millimetres(disparity)))
             self.assertLess(np.abs(other.depth(disparity) / factor - rig.depth(disparity)).max(), 1e-5)
 
+    def test_a_rig_of_numbers(self):
+        left, right = pair()
+        found = mrfgs.match(left, right, 15, device="cpu")
+        text = "cam0=[700 0 39.5; 0 700 29.5; 0 0 1]\ndoffs={}\nbaseline=120\nwidth=80\nheight=60\n"
+        for doffs, keywords in ((0, {}), (3, {"doffs": 3}), (0, {"principal_point": (39.5, 29.5)})):
+            expected = mrfgs.Rig(mrfgs.Calibration.of_texts(text.format(doffs)))
+            rig = mrfgs.Rig.of(700, 120, size=(80, 60), unit="mm", **keywords)
+            self.assertTrue(np.array_equal(rig.cameras, expected.cameras))
+            self.assertEqual((rig.baseline, rig.doffs, rig.unit, rig.size), (120, doffs, "mm", (80, 60)))
+            self.assertTrue(np.array_equal(rig.depth(found.disparity), expected.depth(found.disparity)))
+            self.assertTrue(np.array_equal(rig.millimetres(found.disparity), expected.millimetres(found.disparity)))
+            self.assertTrue(np.array_equal(rig.points(found, left).positions, expected.points(found, left).positions))
+        # Controls.
+        other = mrfgs.Rig.of(700, 120, principal_point=(30, 29.5))
+        self.assertIsNone(other.size)
+        self.assertTrue(np.array_equal(other.depth(found.disparity), mrfgs.Rig.of(700, 120, size=(80, 60)).depth(found.disparity)))
+        self.assertFalse(np.array_equal(other.points(found, left).positions, rig.points(found, left).positions))
+        self.assertFalse(np.array_equal(mrfgs.Rig.of(701, 120, size=(80, 60)).depth(found.disparity), rig.depth(found.disparity)))
+        self.refused(ValueError, "Rig.of: does not say the unit of the baseline", lambda: other.millimetres(found.disparity))
+
     def test_where_there_is_no_depth(self):
         rig = mrfgs.Rig(mrfgs.Calibration.of_texts("cam0=[100 0 2; 0 100 2; 0 0 1]\ndoffs=5\nbaseline=20\n"))
         self.assertIsNone(rig.size)
@@ -910,6 +1001,13 @@ class Depth(Folder):
             (ValueError, "4 positions, 3 colours and 4 values", lambda: mrfgs.Points(positions, colours[1:], confidence)),
             (OSError, "python.xyz: point clouds end in .ply, .pcd, .las or .laz", lambda: points.save(self.folder / "python.xyz")),
             (OSError, "python.laz", lambda: mrfgs.Points(positions + np.inf, colours, confidence).save(self.folder / "python.laz")),
+            (ValueError, "focal: give a number above 0, not -7", lambda: mrfgs.Rig.of(-7, 0.1, size=(8, 6))),
+            (ValueError, "baseline: give a number above 0, not inf", lambda: mrfgs.Rig.of(7, np.inf, size=(8, 6))),
+            (ValueError, "size: give (width, height) of the images, whose centre", lambda: mrfgs.Rig.of(7, 0.1)),
+            (ValueError, "size: give (width, height), both above 0", lambda: mrfgs.Rig.of(7, 0.1, size=(0, 6))),
+            (ValueError, "principal_point and doffs: give numbers, not NaN", lambda: mrfgs.Rig.of(7, 0.1, principal_point=(1, np.nan))),
+            (ValueError, "unit: give mm, cm, m or unknown, not \"feet\"", lambda: mrfgs.Rig.of(7, 0.1, size=(8, 6), unit="feet")),
+            (ValueError, "disparity: is 80 x 60, and Rig.of is of images of 8 x 6", lambda: mrfgs.Rig.of(7, 0.1, size=(8, 6)).depth(found.disparity)),
             (OSError, "there is no folder", lambda: points.save(self.folder / "nowhere" / "python.ply")),
         ):
             with self.subTest(words):

@@ -120,6 +120,15 @@ impl Views {
 }
 
 impl StereoCalibration {
+    /// States the unit of the baseline, whatever the files say.
+    pub fn set_unit(&mut self, unit: Unit) {
+        self.unit = unit;
+        if let Some(benchmark) = &mut self.benchmark {
+            benchmark.unit = unit;
+        }
+        self.others.iter_mut().for_each(|other| other.set_unit(unit));
+    }
+
     /// What it says of images of this size, where it is for several; else itself.
     pub(crate) fn of_size(&self, size: (usize, usize)) -> &Self {
         std::iter::once(self).chain(&self.others).find(|one| one.size == Some(size)).unwrap_or(self)

@@ -110,11 +110,16 @@ fn other_missing(one: &Entries, entry: &str) -> Result<StereoCalibration> {
 /// # Errors
 /// [`Error::Read`] when a file cannot be read, or an entry is wrong or missing; the error names the file and the entry.
 pub fn read(files: &[PathBuf]) -> Result<StereoCalibration> {
-    let texts = files.iter().map(|path| {
-        let bytes = unpacked(path, text::read(path, MAX_BYTES, "calibration file")?)?;
-        Ok((path.as_path(), String::from_utf8_lossy(&bytes).into_owned()))
-    });
-    of_texts(&texts.collect::<Result<Vec<_>>>()?)
+    of_texts(&files.iter().map(|path| Ok((path.as_path(), text(path)?))).collect::<Result<Vec<_>>>()?)
+}
+
+/// What a calibration file holds, unpacked where it is packed by gzip: [`of_texts`] takes it.
+///
+/// # Errors
+/// [`Error::Read`] when it cannot be read, or is larger than any calibration.
+pub fn text(file: &Path) -> Result<String> {
+    let bytes = unpacked(file, text::read(file, MAX_BYTES, "calibration file")?)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// As [`read`], of files that are in memory, each with the name by which errors call it.
