@@ -156,3 +156,18 @@ impl StereoCalibration {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_that_is_stated_holds_for_images_of_every_size() {
+        let other = StereoCalibration { size: Some((320, 240)), unit: Unit::Metre, ..Default::default() };
+        let benchmark = Some(Calibration::default());
+        let mut all = StereoCalibration { others: vec![other], benchmark, ..Default::default() };
+        all.set_unit(Unit::Centimetre);
+        assert_eq!([all.unit, all.of_size((320, 240)).unit], [Unit::Centimetre; 2]);
+        assert_eq!(all.of_rectified_images().unwrap().unwrap().unit, Unit::Centimetre);
+    }
+}
