@@ -3,7 +3,6 @@
 //     c++ sgbm.cpp $(pkg-config --cflags --libs mrfgs opencv4) && ./a.out left.png right.png 64 disparity.png
 #include <mrfgs.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include <cstdlib>
 #include <iostream>
@@ -11,14 +10,12 @@
 // In place of cv::StereoSGBM::create(0, labels)->compute(left, right, disparity). Disparities are floats in pixels, +infinity where
 // there is none; SGBM's are 16-bit integers in 1/16 px.
 static void compute(mrfgs_matcher *matcher, const cv::Mat &left, const cv::Mat &right, int labels, cv::Mat &disparity) {
-    cv::Mat views[2];
-    cv::cvtColor(left, views[0], cv::COLOR_BGR2RGB);
-    cv::cvtColor(right, views[1], cv::COLOR_BGR2RGB);
+    const cv::Mat *views[] = {&left, &right};
     mrfgs_image images[2];
     for (int i = 0; i < 2; i++)
-        images[i] = {views[i].data, views[i].step, std::uint32_t(views[i].cols), std::uint32_t(views[i].rows), MRFGS_FORMAT_RGB8};
+        images[i] = {views[i]->data, views[i]->step, std::uint32_t(views[i]->cols), std::uint32_t(views[i]->rows), MRFGS_FORMAT_BGR8};
     disparity.create(left.size(), CV_32F);
-    mrfgs_maps maps{sizeof maps, disparity.ptr<float>(), disparity.step, nullptr, 0, nullptr, 0};
+    mrfgs_maps maps{sizeof maps, disparity.ptr<float>(), disparity.step, nullptr, 0, nullptr, 0, nullptr, 0};
     const mrfgs_range range{0, labels - 1};
     if (mrfgs_match(matcher, &images[0], &images[1], &range, &maps) != MRFGS_STATUS_OK) CV_Error(cv::Error::StsError, mrfgs_last_error());
 }

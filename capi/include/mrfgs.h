@@ -18,7 +18,7 @@
  * function says that it may be null. What mrfgs_..._new() made is freed by mrfgs_..._free(), once, when nobody uses it any more.
  * Texts are UTF-8 and end with a 0.
  * Versions: a program that was built with this header works with every later library of the same soname. Fields may be added to
- * mrfgs_maps, which says its size; nothing is added to the other structures. */
+ * mrfgs_maps and mrfgs_view, which say their size; nothing is added to the other structures. */
 
 #ifndef MRFGS_H
 #define MRFGS_H
@@ -46,8 +46,9 @@ typedef enum mrfgs_status {
   MRFGS_STATUS_DEFECT = 6,
 } mrfgs_status;
 
-// How the pixels of an image are stored. Samples of 16 bits are in the byte order of the machine; they fill their range with the
-// largest value of both images. A pixel whose alpha is 0 is ignored.
+// How the pixels of an image are stored. Samples of more than 8 bits are in the byte order of the machine. Those of 16 bits fill their
+// range with the largest value of both images; floats run from the least to the largest value of both, and those that are not finite
+// are ignored. A pixel whose alpha is 0 is ignored.
 enum mrfgs_format
 #ifdef __cplusplus
   : uint32_t
@@ -65,6 +66,16 @@ enum mrfgs_format
   MRFGS_FORMAT_RGBA8 = 5,
   // Red, green, blue and alpha, 16 bits each.
   MRFGS_FORMAT_RGBA16 = 6,
+  // Grey, float of 32 bits.
+  MRFGS_FORMAT_GREY32F = 7,
+  // Blue, green and red, 8 bits each, as OpenCV has them.
+  MRFGS_FORMAT_BGR8 = 8,
+  // Blue, green and red, 16 bits each.
+  MRFGS_FORMAT_BGR16 = 9,
+  // Blue, green, red and alpha, 8 bits each.
+  MRFGS_FORMAT_BGRA8 = 10,
+  // Blue, green, red and alpha, 16 bits each.
+  MRFGS_FORMAT_BGRA16 = 11,
 };
 #ifndef __cplusplus
 typedef uint32_t mrfgs_format;
@@ -97,11 +108,20 @@ enum mrfgs_flag
 typedef uint8_t mrfgs_flag;
 #endif // __cplusplus
 
+// What is known of a pair of cameras.
+typedef struct mrfgs_calibration mrfgs_calibration;
+
 // Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 typedef struct mrfgs_matcher mrfgs_matcher;
 
 // What a matcher is to do, and where.
 typedef struct mrfgs_options mrfgs_options;
+
+// How images as the cameras took them become a rectified pair. It is found once, and applied to any number of pairs.
+typedef struct mrfgs_rectification mrfgs_rectification;
+
+// The cameras of a rectified pair: from disparities to depths.
+typedef struct mrfgs_rig mrfgs_rig;
 
 // An image in memory.
 typedef struct mrfgs_image {
@@ -137,7 +157,26 @@ typedef struct mrfgs_maps {
   // Why each pixel is what it is: the sum of mrfgs_flag.
   uint8_t *validity;
   size_t validity_stride;
+  // The disparity of the right view in pixels, +infinity where there is none: right (x, y) with disparity d is seen at left (x + d, y).
+  // A match that writes it takes longer.
+  float *right;
+  size_t right_stride;
 } mrfgs_maps;
+
+// Where a rectified view is written; it has the size of mrfgs_rectification_size(). Strides are in bytes, from a row to the next one.
+typedef struct mrfgs_view {
+  // sizeof(mrfgs_view).
+  size_t size;
+  // The pixels; 0 where there is no source. Null leaves them out.
+  void *data;
+  size_t stride;
+  // The mrfgs_format of the pixels, of 8 or 16 bits. Of views of more than 8 bits, 8 bits are the upper ones; alpha is 0 where there is
+  // no source.
+  uint32_t format;
+  // 255 where there is no source, else 0: a mask for mrfgs_match_masked(). Null leaves it out.
+  uint8_t *mask;
+  size_t mask_stride;
+} mrfgs_view;
 
 #ifdef __cplusplus
 extern "C" {
@@ -145,6 +184,23 @@ extern "C" {
 
 // The version of the library, such as "0.1.0".
 const char *mrfgs_version(void);
+
+// Reads a calibration from one file, or from several that belong together (ROS has one for each camera), in any form that `mrfgs match`
+// takes: the content tells it.
+enum mrfgs_status mrfgs_calibration_read(const char *const *paths,
+                                         size_t count,
+                                         struct mrfgs_calibration **calibration);
+
+// The same of the texts of such files. Errors call them "texts[0]" and so on.
+enum mrfgs_status mrfgs_calibration_of_texts(const char *const *texts,
+                                             size_t count,
+                                             struct mrfgs_calibration **calibration);
+
+// States the unit of the baseline, where the files do not or wrongly: "mm", "cm" or "m".
+enum mrfgs_status mrfgs_calibration_unit(struct mrfgs_calibration *calibration, const char *unit);
+
+// Frees a calibration; it may be null.
+void mrfgs_calibration_free(struct mrfgs_calibration *calibration);
 
 // Opens the device, and makes *matcher; options may be null, and are not needed afterwards. Where it fails, *matcher is null.
 enum mrfgs_status mrfgs_matcher_new(const struct mrfgs_options *options,
@@ -162,6 +218,16 @@ enum mrfgs_status mrfgs_match(const struct mrfgs_matcher *matcher,
                               const struct mrfgs_image *right,
                               const struct mrfgs_range *range,
                               const struct mrfgs_maps *maps);
+
+// The same with masks, MRFGS_FORMAT_GREY8 and of the size of the images: where one is not 0, the pixel of its image is ignored. Each
+// may be null.
+enum mrfgs_status mrfgs_match_masked(const struct mrfgs_matcher *matcher,
+                                     const struct mrfgs_image *left,
+                                     const struct mrfgs_image *right,
+                                     const struct mrfgs_image *left_mask,
+                                     const struct mrfgs_image *right_mask,
+                                     const struct mrfgs_range *range,
+                                     const struct mrfgs_maps *maps);
 
 // What ran the last match of this thread that succeeded, for people; "" before the first. It stays until the next one.
 const char *mrfgs_last_device(void);
@@ -197,6 +263,61 @@ enum mrfgs_status mrfgs_options_device(struct mrfgs_options *options,
 // The threads of a match on the CPU, up to 1024; 0 takes one for each core.
 enum mrfgs_status mrfgs_options_threads(struct mrfgs_options *options, uint32_t threads);
 
+// The rectification of images of so many pixels (0 and 0: those of the calibration), as OpenCV's stereoRectify chooses it. Alpha is from
+// 0, where every pixel of the views has a source, to 1, where no pixel of the images is lost; below 0 it is the rectification of the
+// calibration where it has one, else one that keeps the focal length. zero_disparity is 1 where what is infinitely far is to have a
+// disparity of 0, else 0. mrfgs_last_warnings() says what is probably wrong with the calibration.
+enum mrfgs_status mrfgs_rectification_new(const struct mrfgs_calibration *calibration,
+                                          uint32_t width,
+                                          uint32_t height,
+                                          double alpha,
+                                          uint32_t zero_disparity,
+                                          struct mrfgs_rectification **rectification);
+
+// Width and height of the rectified views, in pixels; turned by a quarter where one camera is above the other.
+enum mrfgs_status mrfgs_rectification_size(const struct mrfgs_rectification *rectification,
+                                           uint32_t *width,
+                                           uint32_t *height);
+
+// Rectifies a pair of images, and writes both views.
+enum mrfgs_status mrfgs_rectify(const struct mrfgs_rectification *rectification,
+                                const struct mrfgs_image *left,
+                                const struct mrfgs_image *right,
+                                const struct mrfgs_view *left_view,
+                                const struct mrfgs_view *right_view);
+
+// Frees a rectification; it may be null.
+void mrfgs_rectification_free(struct mrfgs_rectification *rectification);
+
+// The rig of a pair that is rectified already, by its focal length and doffs (cx of the right camera less cx of the left one; mostly 0) in
+// pixels, and by its baseline, whose unit is that of all depths.
+enum mrfgs_status mrfgs_rig_new(double focal,
+                                double baseline,
+                                double doffs,
+                                struct mrfgs_rig **rig);
+
+// The rig of a pair that is rectified already, by its calibration.
+enum mrfgs_status mrfgs_rig_of_calibration(const struct mrfgs_calibration *calibration, struct mrfgs_rig **rig);
+
+// The rig of what a rectification makes.
+enum mrfgs_status mrfgs_rig_of_rectification(const struct mrfgs_rectification *rectification, struct mrfgs_rig **rig);
+
+// The unit of the baseline, and so of depths: "mm", "cm", "m", or "unknown"; null for a rig that is null. It stays as it is.
+const char *mrfgs_rig_unit(const struct mrfgs_rig *rig);
+
+// The depth of every pixel along the optical axis, in the unit of the baseline, of a map of disparities in pixels: +infinity where there
+// is none. Strides are in bytes. Both maps may be one.
+enum mrfgs_status mrfgs_depth(const struct mrfgs_rig *rig,
+                              uint32_t width,
+                              uint32_t height,
+                              const float *disparity,
+                              size_t disparity_stride,
+                              float *depth,
+                              size_t depth_stride);
+
+// Frees a rig; it may be null.
+void mrfgs_rig_free(struct mrfgs_rig *rig);
+
 // What was wrong with the last call of this thread that failed; "" where none has. It stays until the next call of this thread that
 // fails.
 const char *mrfgs_last_error(void);
@@ -208,8 +329,16 @@ enum mrfgs_status mrfgs_check(const struct mrfgs_image *left,
                               const struct mrfgs_image *right,
                               const struct mrfgs_range *range);
 
+// The same with masks, as mrfgs_match_masked() takes them.
+enum mrfgs_status mrfgs_check_masked(const struct mrfgs_image *left,
+                                     const struct mrfgs_image *right,
+                                     const struct mrfgs_image *left_mask,
+                                     const struct mrfgs_image *right_mask,
+                                     const struct mrfgs_range *range);
+
 // What the last mrfgs_check() of this thread has found to be probably wrong, or the last mrfgs_match(), which sees whether many
-// disparities are at an end of the range; a line for each, "" where all seems well. It stays until the next one that succeeds.
+// disparities are at an end of the range, or the last mrfgs_rectification_new(), which sees whether the calibration is of other images; a
+// line for each, "" where all seems well. It stays until the next one that succeeds.
 const char *mrfgs_last_warnings(void);
 
 #ifdef __cplusplus

@@ -4,14 +4,16 @@ use std::ffi::c_void;
 use std::slice;
 
 use mrfgs::Pair;
+use mrfgs::image::Plane;
 use mrfgs::image::raster::{Raster, Samples};
 
 use crate::status::Failure;
 
-/// How the pixels of an image are stored. Samples of 16 bits are in the byte order of the machine; they fill their range with the
-/// largest value of both images. A pixel whose alpha is 0 is ignored.
+/// How the pixels of an image are stored. Samples of more than 8 bits are in the byte order of the machine. Those of 16 bits fill their
+/// range with the largest value of both images; floats run from the least to the largest value of both, and those that are not finite
+/// are ignored. A pixel whose alpha is 0 is ignored.
 #[repr(u32)]
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub enum Format {
     /// Grey, 8 bits.
     Grey8 = 1,
@@ -25,17 +27,75 @@ pub enum Format {
     Rgba8 = 5,
     /// Red, green, blue and alpha, 16 bits each.
     Rgba16 = 6,
+    /// Grey, float of 32 bits.
+    Grey32f = 7,
+    /// Blue, green and red, 8 bits each, as OpenCV has them.
+    Bgr8 = 8,
+    /// Blue, green and red, 16 bits each.
+    Bgr16 = 9,
+    /// Blue, green, red and alpha, 8 bits each.
+    Bgra8 = 10,
+    /// Blue, green, red and alpha, 16 bits each.
+    Bgra16 = 11,
 }
 
-/// Channels and bytes of a sample.
-const FORMATS: [(Format, usize, usize); 6] = [
-    (Format::Grey8, 1, 1),
-    (Format::Grey16, 1, 2),
-    (Format::Rgb8, 3, 1),
-    (Format::Rgb16, 3, 2),
-    (Format::Rgba8, 4, 1),
-    (Format::Rgba16, 4, 2),
+/// What a sample is.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Sample {
+    Byte,
+    Word,
+    Float,
+}
+
+impl Sample {
+    pub(crate) fn bytes(self) -> usize {
+        match self {
+            Self::Byte => 1,
+            Self::Word => 2,
+            Self::Float => 4,
+        }
+    }
+}
+
+/// What pixels are made of.
+#[derive(Clone, Copy)]
+pub(crate) struct Layout {
+    pub(crate) sample: Sample,
+    pub(crate) channels: usize,
+    /// Whether blue comes first.
+    pub(crate) is_bgr: bool,
+}
+
+const LAYOUTS: [(Format, Sample, usize, bool); 11] = [
+    (Format::Grey8, Sample::Byte, 1, false),
+    (Format::Grey16, Sample::Word, 1, false),
+    (Format::Rgb8, Sample::Byte, 3, false),
+    (Format::Rgb16, Sample::Word, 3, false),
+    (Format::Rgba8, Sample::Byte, 4, false),
+    (Format::Rgba16, Sample::Word, 4, false),
+    (Format::Grey32f, Sample::Float, 1, false),
+    (Format::Bgr8, Sample::Byte, 3, true),
+    (Format::Bgr16, Sample::Word, 3, true),
+    (Format::Bgra8, Sample::Byte, 4, true),
+    (Format::Bgra16, Sample::Word, 4, true),
 ];
+
+impl Layout {
+    /// That of an mrfgs_format.
+    pub(crate) fn of(format: u32, name: &str) -> Result<Self, Failure> {
+        match LAYOUTS.iter().find(|(known, ..)| *known as u32 == format) {
+            Some(&(_, sample, channels, is_bgr)) => Ok(Self { sample, channels, is_bgr }),
+            None => Err(Failure::argument(format!(
+                "the {name} has the unknown format {format}; give an mrfgs_format, 1 to {}",
+                LAYOUTS.len()
+            ))),
+        }
+    }
+
+    pub(crate) fn pixel_bytes(self) -> usize {
+        self.channels * self.sample.bytes()
+    }
+}
 
 /// An image in memory.
 #[repr(C)]
@@ -53,61 +113,102 @@ pub struct Image {
 }
 
 impl Image {
-    /// Channels and bytes of a sample.
-    fn format(&self, name: &str) -> Result<(usize, usize), Failure> {
-        match FORMATS.iter().find(|(format, ..)| *format as u32 == self.format) {
-            Some(&(_, channels, bytes)) => Ok((channels, bytes)),
-            None => {
-                Err(Failure::argument(format!("the {name} image has the unknown format {}", self.format)))
-            }
-        }
-    }
-
-    /// The image, borrowed where its rows follow each other.
+    /// The bytes of all rows, and those of one.
     ///
     /// # Safety
     /// `data` is null, or holds rows as the fields say, which nobody changes for `'a`.
-    unsafe fn raster<'a>(&self, name: &str) -> Result<Raster<'a>, Failure> {
-        let (channels, bytes) = self.format(name)?;
+    unsafe fn rows<'a>(&self, name: &str, pixel: usize) -> Result<(&'a [u8], usize), Failure> {
         let (width, height) = (self.width as usize, self.height as usize);
-        let (row, length) = extent(self.stride, (width, height), channels * bytes).map_err(|wrong| {
-            Failure::argument(format!("the {name} image of {width} x {height} pixels {wrong}"))
-        })?;
+        let (row, length) = extent(self.stride, (width, height), pixel)
+            .map_err(|wrong| Failure::argument(format!("the {name} of {width} x {height} pixels {wrong}")))?;
         if self.data.is_null() {
-            return Err(Failure::argument(format!("the {name} image has no data: its pointer is null")));
+            return Err(Failure::argument(format!("the {name} has no data: its pointer is null")));
         }
         // SAFETY: it is not null, and the caller promises that the rows are there; their bytes fit into an `isize`.
-        let data = unsafe { slice::from_raw_parts::<'a>(self.data.cast::<u8>(), length) };
-        if bytes == 1 {
-            return Ok(Raster::borrowed(data, (width, height), channels, self.stride)?);
+        Ok((unsafe { slice::from_raw_parts::<'a>(self.data.cast::<u8>(), length) }, row))
+    }
+
+    /// The image, borrowed where its bytes are those of an image of the library.
+    ///
+    /// # Safety
+    /// As for `rows`.
+    unsafe fn raster<'a>(&self, name: &str) -> Result<Raster<'a>, Failure> {
+        let layout = Layout::of(self.format, name)?;
+        let size = (self.width as usize, self.height as usize);
+        // SAFETY: the caller promises it.
+        let (data, row) = unsafe { self.rows(name, layout.pixel_bytes()) }?;
+        if layout.sample == Sample::Byte && !layout.is_bgr {
+            return Ok(Raster::borrowed(data, size, layout.channels, self.stride)?);
         }
-        // Rows may begin at odd addresses.
-        let mut words = Vec::new();
-        let lacking =
-            |_| Failure::memory(format!("a copy of the {name} image cannot be had: give a smaller one"));
-        words.try_reserve_exact(row / 2 * height).map_err(lacking)?;
-        for line in data.chunks(self.stride) {
-            words.extend(line[..row].chunks_exact(2).map(|word| u16::from_ne_bytes([word[0], word[1]])));
+        let lines = || data.chunks(self.stride).map(|line| &line[..row]);
+        let count = row / layout.sample.bytes() * size.1;
+        let samples = match layout.sample {
+            Sample::Byte => Samples::Byte(copied(lines(), count, layout, name, u8::from_ne_bytes)?.into()),
+            Sample::Word => Samples::Word(copied(lines(), count, layout, name, u16::from_ne_bytes)?.into()),
+            Sample::Float => Samples::Float(copied(lines(), count, layout, name, f32::from_ne_bytes)?.into()),
+        };
+        Ok(Raster::new(size.0, size.1, layout.channels, samples)?)
+    }
+
+    /// A mask: where its samples are not 0.
+    ///
+    /// # Safety
+    /// As for `rows`.
+    unsafe fn mask(&self, name: &str) -> Result<Plane<bool>, Failure> {
+        if self.format != Format::Grey8 as u32 {
+            return Err(Failure::argument(format!(
+                "the {name} has the format {}; give MRFGS_FORMAT_GREY8",
+                self.format
+            )));
         }
-        Ok(Raster::new(width, height, channels, Samples::Word(words.into()))?)
+        // SAFETY: the caller promises it.
+        let (data, row) = unsafe { self.rows(name, 1) }?;
+        let masked = data.chunks(self.stride).flat_map(|line| line[..row].iter().map(|v| *v != 0));
+        Ok(Plane::new(self.width as usize, self.height as usize, masked.collect()))
     }
 }
 
-/// The pair of two images.
+/// The samples of rows, which may begin at odd addresses, with red before blue.
+fn copied<'a, T, const BYTES: usize>(
+    lines: impl Iterator<Item = &'a [u8]>,
+    count: usize,
+    layout: Layout,
+    name: &str,
+    value: fn([u8; BYTES]) -> T,
+) -> Result<Vec<T>, Failure> {
+    let mut samples = Vec::new();
+    let lacking = |_| Failure::memory(format!("a copy of the {name} cannot be had: give a smaller one"));
+    samples.try_reserve_exact(count).map_err(lacking)?;
+    for line in lines {
+        samples.extend(line.as_chunks().0.iter().map(|bytes| value(*bytes)));
+    }
+    if layout.is_bgr {
+        samples.chunks_exact_mut(layout.channels).for_each(|pixel| pixel.swap(0, 2));
+    }
+    Ok(samples)
+}
+
+/// The pair of two images, less what their masks say; masks may be null.
 ///
 /// # Safety
-/// The images are null or good, and nobody changes their data until this returns.
-pub(crate) unsafe fn pair(left: *const Image, right: *const Image) -> Result<Pair, Failure> {
-    let null = |name: &str| Failure::argument(format!("the {name} image is null"));
-    // SAFETY: the caller promises it.
-    let left = unsafe { left.as_ref() }.ok_or_else(|| null("left"))?;
-    // SAFETY: the same.
-    let right = unsafe { right.as_ref() }.ok_or_else(|| null("right"))?;
-    // SAFETY: the same.
-    let left = unsafe { left.raster("left") }?;
-    // SAFETY: the same.
-    let right = unsafe { right.raster("right") }?;
-    Ok(Pair::of_frames(left, right)?)
+/// The images and masks are null or good, and nobody changes their data until this returns.
+pub(crate) unsafe fn pair(images: [*const Image; 2], masks: [*const Image; 2]) -> Result<Pair, Failure> {
+    const NAMES: [[&str; 2]; 2] =
+        [["left image", "mask of the left image"], ["right image", "mask of the right image"]];
+    let view = |i: usize| {
+        let [name, mask_name] = NAMES[i];
+        // SAFETY: the caller promises it.
+        let image = unsafe { images[i].as_ref() };
+        let image = image.ok_or_else(|| Failure::argument(format!("the {name} is null")))?;
+        // SAFETY: the same.
+        let raster = unsafe { image.raster(name) }?;
+        // SAFETY: the same.
+        let Some(mask) = (unsafe { masks[i].as_ref() }) else { return Ok(raster) };
+        // SAFETY: the same.
+        let mask = unsafe { mask.mask(mask_name) }?;
+        raster.masked_by(mask).map_err(|error| Failure::argument(format!("the {mask_name}: {error}")))
+    };
+    Ok(Pair::of_frames(view(0)?, view(1)?)?)
 }
 
 /// Bytes of a row, and from the first byte of the first row to the last one of the last row.

@@ -6,11 +6,15 @@
 #![allow(unreachable_pub, reason = "what is in the header is pub")]
 #![allow(clippy::doc_markdown, reason = "the header is no Markdown")]
 
+mod argument;
+mod calibration;
 mod frame;
 mod maps;
 mod matcher;
 mod options;
 mod range;
+mod rectification;
+mod rig;
 mod status;
 mod text;
 mod warnings;

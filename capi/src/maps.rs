@@ -1,5 +1,8 @@
 //! Maps in the memory of C.
 
+use std::mem::offset_of;
+use std::ptr;
+
 use mrfgs::Matched;
 use mrfgs::image::Plane;
 use mrfgs::maps::flag;
@@ -55,22 +58,55 @@ pub struct Maps {
     /// Why each pixel is what it is: the sum of mrfgs_flag.
     pub validity: *mut u8,
     pub validity_stride: usize,
+    /// The disparity of the right view in pixels, +infinity where there is none: right (x, y) with disparity d is seen at left (x + d, y).
+    /// A match that writes it takes longer.
+    pub right: *mut f32,
+    pub right_stride: usize,
 }
 
+/// The sizes that the structure has had, each with more fields than the one before.
+const SIZES: [usize; 2] = [offset_of!(Maps, right), size_of::<Maps>()];
+
 impl Maps {
-    /// Whether maps of this size fit.
-    pub(crate) fn check(&self, size: (usize, usize)) -> Result<(), Failure> {
-        if self.size != size_of::<Self>() {
+    /// What a caller gives, whose header may be older and know fewer fields.
+    ///
+    /// # Safety
+    /// `maps` is null, or holds its size and, where that is one of `SIZES`, as many bytes.
+    pub(crate) unsafe fn given(maps: *const Self) -> Result<Self, Failure> {
+        if maps.is_null() {
+            return Err(Failure::argument("the structure of the maps is null"));
+        }
+        // SAFETY: the caller promises that the size, which is the first field, is there.
+        let size = unsafe { maps.cast::<usize>().read() };
+        if !SIZES.contains(&size) {
             return Err(Failure::argument(format!(
-                "maps.size is {}, and sizeof(mrfgs_maps) is {} in the library: set it, and build with the library's own header",
-                self.size,
+                "maps.size is {size}, and sizeof(mrfgs_maps) is {} in the library: set it, and build with the library's own header",
                 size_of::<Self>()
             )));
         }
+        let mut own = Self {
+            size,
+            disparity: ptr::null_mut(),
+            disparity_stride: 0,
+            confidence: ptr::null_mut(),
+            confidence_stride: 0,
+            validity: ptr::null_mut(),
+            validity_stride: 0,
+            right: ptr::null_mut(),
+            right_stride: 0,
+        };
+        // SAFETY: the caller promises that so many bytes are there; the structure has no fewer, and its fields may hold any bytes.
+        unsafe { maps.cast::<u8>().copy_to_nonoverlapping((&raw mut own).cast::<u8>(), size) };
+        Ok(own)
+    }
+
+    /// Whether maps of this size fit.
+    pub(crate) fn check(&self, size: (usize, usize)) -> Result<(), Failure> {
         for (name, is_null, stride, pixel) in [
             ("disparity", self.disparity.is_null(), self.disparity_stride, size_of::<f32>()),
             ("confidence", self.confidence.is_null(), self.confidence_stride, 1),
             ("validity", self.validity.is_null(), self.validity_stride, 1),
+            ("right", self.right.is_null(), self.right_stride, size_of::<f32>()),
         ] {
             if !is_null {
                 extent(stride, size, pixel)
@@ -97,6 +133,10 @@ impl Maps {
             // SAFETY: the caller promises it.
             unsafe { put(matched.validity(), self.validity, self.validity_stride) };
         }
+        if let Some(right) = matched.maps.right_map().filter(|_| !self.right.is_null()) {
+            // SAFETY: the caller promises it.
+            unsafe { put(&right, self.right, self.right_stride) };
+        }
     }
 }
 
@@ -104,7 +144,7 @@ impl Maps {
 ///
 /// # Safety
 /// `to` is the first of as many rows as `map` has, `stride` bytes apart, each at least as long as its rows.
-unsafe fn put<T: Copy>(map: &Plane<T>, to: *mut T, stride: usize) {
+pub(crate) unsafe fn put<T: Copy>(map: &Plane<T>, to: *mut T, stride: usize) {
     for y in 0..map.height() {
         let row = map.row(y);
         // SAFETY: the row is in the memory of the map, as the caller promises.

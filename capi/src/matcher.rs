@@ -1,14 +1,18 @@
 //! The matcher.
 
 use std::ffi::c_char;
+use std::ptr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use mrfgs::options::Method;
+
+use crate::argument;
 use crate::frame::{self, Image};
 use crate::maps::Maps;
 use crate::options::Options;
 use crate::range::Range;
-use crate::status::{Failure, Status, call};
+use crate::status::{Status, call};
 use crate::text::Said;
 use crate::warnings;
 use crate::words;
@@ -16,6 +20,8 @@ use crate::words;
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
     matcher: Mutex<mrfgs::Matcher>,
+    /// Its method, and the same with the map of the right view.
+    methods: [Method; 2],
     stop: AtomicBool,
 }
 
@@ -27,34 +33,26 @@ thread_local! {
 /// Opens the device, and makes *matcher; options may be null, and are not needed afterwards. Where it fails, *matcher is null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_matcher_new(options: *const Options, matcher: *mut *mut Matcher) -> Status {
-    call(|| {
-        if matcher.is_null() {
-            return Err(Failure::argument("the place for the matcher is null"));
-        }
-        // SAFETY: it is not null, and the caller promises that a pointer can be written there.
-        unsafe { matcher.write(std::ptr::null_mut()) };
-        let mut builder = mrfgs::Matcher::builder();
+    let open = || {
         // SAFETY: the caller promises that the pointer is null or good.
-        if let Some(options) = unsafe { options.as_ref() } {
-            builder = builder.method(options.method.clone()).execution(options.execution.clone());
-        }
-        let made = Box::new(Matcher { matcher: Mutex::new(builder.build()?), stop: AtomicBool::new(false) });
-        // SAFETY: as above.
-        unsafe { matcher.write(Box::into_raw(made)) };
-        Ok(())
-    })
+        let options = unsafe { options.as_ref() };
+        let (method, execution) = options
+            .map_or_else(Default::default, |options| (options.method.clone(), options.execution.clone()));
+        let mut with_right = method.clone();
+        with_right.set("right-map", "true")?;
+        let matcher = mrfgs::Matcher::builder().execution(execution).build()?;
+        let methods = [method, with_right];
+        Ok(Matcher { matcher: Mutex::new(matcher), methods, stop: AtomicBool::new(false) })
+    };
+    // SAFETY: the caller promises that a pointer can be written there.
+    unsafe { argument::make("matcher", matcher, open) }
 }
 
 /// Frees a matcher, when no match of it runs any more; it may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_matcher_free(matcher: *mut Matcher) {
-    if !matcher.is_null() {
-        call(|| {
-            // SAFETY: the caller promises that it is of `mrfgs_matcher_new`, and freed once.
-            drop(unsafe { Box::from_raw(matcher) });
-            Ok(())
-        });
-    }
+    // SAFETY: the caller promises that it is of `mrfgs_matcher_new`, and freed once.
+    unsafe { argument::free(matcher) }
 }
 
 /// Ends the match that runs, from another thread, or else the next one: it returns MRFGS_STATUS_STOPPED.
@@ -62,8 +60,7 @@ pub unsafe extern "C" fn mrfgs_matcher_free(matcher: *mut Matcher) {
 pub unsafe extern "C" fn mrfgs_matcher_stop(matcher: *const Matcher) -> Status {
     call(|| {
         // SAFETY: the caller promises that the pointer is null or good.
-        let matcher = unsafe { matcher.as_ref() };
-        matcher.ok_or_else(|| Failure::argument("the matcher is null"))?.stop.store(true, Ordering::Relaxed);
+        unsafe { argument::thing("matcher", matcher) }?.stop.store(true, Ordering::Relaxed);
         Ok(())
     })
 }
@@ -77,30 +74,46 @@ pub unsafe extern "C" fn mrfgs_match(
     range: *const Range,
     maps: *const Maps,
 ) -> Status {
+    // SAFETY: the caller promises what is needed.
+    unsafe { mrfgs_match_masked(matcher, left, right, ptr::null(), ptr::null(), range, maps) }
+}
+
+/// The same with masks, MRFGS_FORMAT_GREY8 and of the size of the images: where one is not 0, the pixel of its image is ignored. Each
+/// may be null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_match_masked(
+    matcher: *const Matcher,
+    left: *const Image,
+    right: *const Image,
+    left_mask: *const Image,
+    right_mask: *const Image,
+    range: *const Range,
+    maps: *const Maps,
+) -> Status {
     call(|| {
         // SAFETY: the caller promises that the pointer is null or good.
-        let matcher = unsafe { matcher.as_ref() }.ok_or_else(|| Failure::argument("the matcher is null"))?;
+        let matcher = unsafe { argument::thing("matcher", matcher) }?;
         // SAFETY: the caller promises that the images are what their fields say until this returns.
-        let pair = unsafe { frame::pair(left, right) }?;
+        let pair = unsafe { frame::pair([left, right], [left_mask, right_mask]) }?;
         // SAFETY: the caller promises that the pointer is null or good.
         let range = unsafe { Range::searched(range) }?;
         // SAFETY: the same.
-        let maps =
-            unsafe { maps.as_ref() }.ok_or_else(|| Failure::argument("the structure of the maps is null"))?;
+        let maps = unsafe { Maps::given(maps) }?;
         maps.check(pair.size())?;
+        let method = &matcher.methods[usize::from(!maps.right.is_null())];
         let mut matching = matcher.matcher.lock().unwrap_or_else(PoisonError::into_inner);
         let job = match range {
             Some(range) => matching.job(&pair, range),
             None => matching.job(&pair, ..),
         };
-        let matched = job.cancel(&matcher.stop).run();
+        let matched = job.method(method).cancel(&matcher.stop).run();
         // While the lock is held: the next match is not meant any more.
         matcher.stop.store(false, Ordering::Relaxed);
         drop(matching);
         let matched = matched?;
         // SAFETY: they were checked for this size, and the caller promises that they are as large as their fields say.
         unsafe { maps.write(&matched) };
-        warnings::say(&matched.warnings());
+        warnings::say(matched.warnings().iter().map(words::warning));
         DEVICE.with(|device| device.say(&matched.ran_on));
         NOTE.with(|note| note.say(&matched.note.as_ref().map(words::error).unwrap_or_default()));
         Ok(())

@@ -1,12 +1,13 @@
 //! What a matcher is to do, and where.
 
-use std::ffi::{CStr, CString, c_char};
+use std::ffi::{CString, c_char};
 use std::path::Path;
 use std::ptr;
 use std::sync::LazyLock;
 
 use mrfgs::options::{Execution, Method, PRESETS};
 
+use crate::argument;
 use crate::status::{Failure, Status, call};
 
 /// What a matcher is to do, and where.
@@ -28,19 +29,6 @@ unsafe fn change(options: *mut Options, change: impl FnOnce(&mut Options) -> Res
     })
 }
 
-/// The text of the argument `name`.
-///
-/// # Safety
-/// `text` is null or ends with a 0, and stays as it is for `'a`.
-unsafe fn text<'a>(name: &str, text: *const c_char) -> Result<&'a str, Failure> {
-    if text.is_null() {
-        return Err(Failure::argument(format!("{name} is null")));
-    }
-    // SAFETY: it is not null, and the caller promises the rest.
-    let text = unsafe { CStr::from_ptr(text) };
-    text.to_str().map_err(|_| Failure::argument(format!("{name} is no UTF-8")))
-}
-
 /// The preset "default", on a GPU where there is one and else on the CPU, with a thread for each core.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_options_new() -> *mut Options {
@@ -50,10 +38,8 @@ pub extern "C" fn mrfgs_options_new() -> *mut Options {
 /// Frees options; they may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_options_free(options: *mut Options) {
-    if !options.is_null() {
-        // SAFETY: the caller promises that it is of `mrfgs_options_new`, and freed once.
-        drop(unsafe { Box::from_raw(options) });
-    }
+    // SAFETY: the caller promises that it is of `mrfgs_options_new`, and freed once.
+    unsafe { argument::free(options) }
 }
 
 /// The name of the preset with this index, from 0 on; null past the last one. It stays as it is.
@@ -69,7 +55,7 @@ pub extern "C" fn mrfgs_preset_name(index: u32) -> *const c_char {
 pub unsafe extern "C" fn mrfgs_options_preset(options: *mut Options, name: *const c_char) -> Status {
     let set = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        options.method = Method::preset(unsafe { text("the name", name) }?)?;
+        options.method = Method::preset(unsafe { argument::text("the name", name) }?)?;
         Ok(())
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -85,9 +71,9 @@ pub unsafe extern "C" fn mrfgs_options_set(
 ) -> Status {
     let set = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        let key = unsafe { text("the key", key) }?;
+        let key = unsafe { argument::text("the key", key) }?;
         // SAFETY: the caller promises that it is a text.
-        let value = unsafe { text("the value", value) }?;
+        let value = unsafe { argument::text("the value", value) }?;
         Ok(options.method.set(key, value)?)
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -99,7 +85,7 @@ pub unsafe extern "C" fn mrfgs_options_set(
 pub unsafe extern "C" fn mrfgs_options_load(options: *mut Options, path: *const c_char) -> Status {
     let load = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        let path = unsafe { text("the path", path) }?;
+        let path = unsafe { argument::text("the path", path) }?;
         Ok(options.method.load(Path::new(path))?)
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -112,7 +98,7 @@ pub unsafe extern "C" fn mrfgs_options_load(options: *mut Options, path: *const 
 pub unsafe extern "C" fn mrfgs_options_device(options: *mut Options, name: *const c_char) -> Status {
     let set = |options: &mut Options| {
         // SAFETY: the caller promises that it is a text.
-        options.execution.device = unsafe { text("the name", name) }?.into();
+        options.execution.device = unsafe { argument::text("the name", name) }?.into();
         Ok(())
     };
     // SAFETY: the caller promises that the pointer is good.
@@ -123,6 +109,12 @@ pub unsafe extern "C" fn mrfgs_options_device(options: *mut Options, name: *cons
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_options_threads(options: *mut Options, threads: u32) -> Status {
     let set = |options: &mut Options| {
+        if threads as usize > Execution::MOST_THREADS {
+            let most = Execution::MOST_THREADS;
+            return Err(Failure::argument(format!(
+                "threads are {threads}: give 1 to {most}, or 0 for one each core"
+            )));
+        }
         options.execution.threads = (threads > 0).then_some(threads as usize);
         Ok(())
     };

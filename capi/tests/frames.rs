@@ -1,7 +1,9 @@
-//! Frames for the tests in C: `frames KIND FROM TO` writes the middle of a picture as PNM; KIND is `rgb`, `grey`, or `grey16` for 16
-//! bits. `frames map FROM TO` writes a grey map as it is.
+//! Frames for the tests in C: `frames KIND FROM TO` writes the middle of a picture as PNM; KIND is `rgb`, `grey`, `grey16` for 16
+//! bits, or `float` for PFM. `frames map FROM TO` writes a grey map as it is, and `frames whole FROM TO` a picture in colour.
 
-use image::{DynamicImage, ImageError};
+use image::{DynamicImage, ImageBuffer, ImageError, Luma};
+
+type GrayImage16 = ImageBuffer<Luma<u16>, Vec<u16>>;
 
 /// Width and height of a frame.
 const SIZE: (u32, u32) = (122, 90);
@@ -14,7 +16,12 @@ fn main() -> Result<(), ImageError> {
         std::process::exit(2)
     };
     let picture = image::open(from)?;
-    write(to, &if kind == "map" { picture } else { frame(&picture, kind) })
+    match kind {
+        "map" => write(to, &picture),
+        "whole" => write(to, &picture.to_rgb8().into()),
+        "float" => write_float(to, &frame(&picture, "grey16").to_luma16()),
+        kind => write(to, &frame(&picture, kind)),
+    }
 }
 
 fn frame(picture: &DynamicImage, kind: &str) -> DynamicImage {
@@ -42,4 +49,13 @@ fn write(to: &str, picture: &DynamicImage) -> Result<(), ImageError> {
     };
     let head = format!("P{kind}\n{} {}\n{white}\n", picture.width(), picture.height());
     Ok(std::fs::write(to, [head.into_bytes(), samples].concat())?)
+}
+
+/// Rows from the bottom to the top.
+fn write_float(to: &str, picture: &GrayImage16) -> Result<(), ImageError> {
+    let mut bytes = format!("Pf\n{} {}\n-1.0\n", picture.width(), picture.height()).into_bytes();
+    for row in picture.as_raw().chunks(picture.width() as usize).rev() {
+        bytes.extend(row.iter().flat_map(|value| (f32::from(*value) / 7.0).to_le_bytes()));
+    }
+    Ok(std::fs::write(to, bytes)?)
 }

@@ -1,11 +1,14 @@
 /* Matches frames whose rows lie at odd distances and compares the maps with those of the program: bytes must be equal.
  *
- *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm
+ *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm
  *
  * Then it makes every mistake that a caller can make. */
 #include "pnm.h"
 
 #include <mrfgs.h>
+
+/* The first header had no map of the right view. */
+#define FIRST_SIZE offsetof(mrfgs_maps, right)
 
 #define CHECK(condition) check((condition) != 0, #condition, __LINE__)
 
@@ -31,8 +34,9 @@ static mrfgs_image spread(const struct pnm *pnm, size_t more) {
     uint8_t *data = malloc(stride * pnm->height);
     memset(data, 0xa5, stride * pnm->height);
     for (size_t y = 0; y < pnm->height; y++) memcpy(data + y * stride, pnm->data + y * row, row);
-    mrfgs_format format = pnm->bytes == 1 ? (pnm->channels == 1 ? MRFGS_FORMAT_GREY8 : MRFGS_FORMAT_RGB8)
-                                          : (pnm->channels == 1 ? MRFGS_FORMAT_GREY16 : MRFGS_FORMAT_RGB16);
+    mrfgs_format format = pnm->bytes == 4   ? MRFGS_FORMAT_GREY32F
+                          : pnm->bytes == 2 ? MRFGS_FORMAT_GREY16
+                                            : (pnm->channels == 1 ? MRFGS_FORMAT_GREY8 : MRFGS_FORMAT_RGB8);
     mrfgs_image image = {data, stride, (uint32_t)pnm->width, (uint32_t)pnm->height, format};
     return image;
 }
@@ -48,19 +52,29 @@ static int same(const uint8_t *map, size_t stride, const struct pnm *expected) {
     return 1;
 }
 
-static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm maps[3]) {
+static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm maps[4]) {
     for (size_t more = 0; more < 8; more += 7) {
         mrfgs_image left = spread(&frames[0], more), right = spread(&frames[1], 2 * more);
-        uint8_t *found[3];
-        size_t strides[3];
-        for (int i = 0; i < 3; i++) {
+        uint8_t *found[4];
+        size_t strides[4];
+        for (int i = 0; i < 4; i++) {
             strides[i] = maps[i].width * maps[i].bytes + more;
             found[i] = malloc(strides[i] * maps[i].height);
             memset(found[i], 0x5a, strides[i] * maps[i].height);
         }
-        mrfgs_maps all = {sizeof all, (float *)found[0], strides[0], found[1], strides[1], found[2], strides[2]};
+        mrfgs_maps all = {sizeof all, (float *)found[0], strides[0], found[1], strides[1], found[2], strides[2],
+                          (float *)found[3], strides[3]};
         CHECK(mrfgs_match(matcher, &left, &right, &range, &all) == MRFGS_STATUS_OK);
-        for (int i = 0; i < 3; i++) CHECK(same(found[i], strides[i], &maps[i]));
+        for (int i = 0; i < 4; i++) CHECK(same(found[i], strides[i], &maps[i]));
+        CHECK(memcmp(maps[0].data, maps[3].data, maps[0].width * maps[0].height * sizeof(float)) != 0);
+        /* A caller with the first header, whose memory ends where its structure does. */
+        mrfgs_maps *first = malloc(FIRST_SIZE);
+        memcpy(first, &all, FIRST_SIZE);
+        first->size = FIRST_SIZE;
+        for (int i = 0; i < 4; i++) memset(found[i], 0x5a, strides[i] * maps[i].height);
+        CHECK(mrfgs_match(matcher, &left, &right, &range, first) == MRFGS_STATUS_OK);
+        for (int i = 0; i < 4; i++) CHECK(same(found[i], strides[i], &maps[i]) == (i < 3));
+        free(first);
         /* Control: the comparison sees one bit. */
         found[0][strides[0]] ^= 1;
         CHECK(!same(found[0], strides[0], &maps[0]));
@@ -69,11 +83,79 @@ static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
         mrfgs_maps one = {.size = sizeof one, .validity = found[2], .validity_stride = strides[2]};
         CHECK(mrfgs_match(matcher, &left, &right, &range, &one) == MRFGS_STATUS_OK);
         CHECK(same(found[2], strides[2], &maps[2]));
-        for (int i = 0; i < 3; i++) free(found[i]);
+        for (int i = 0; i < 4; i++) free(found[i]);
         free((void *)left.data);
         free((void *)right.data);
     }
     CHECK(strlen(mrfgs_last_device()) > 0 && strlen(mrfgs_last_note()) == 0);
+}
+
+/* A frame of bytes in another format: with blue before red, alpha, or 16 bits. */
+static mrfgs_image converted(const struct pnm *pnm, mrfgs_format format, const uint8_t *mask) {
+    int words = format == MRFGS_FORMAT_RGB16 || format == MRFGS_FORMAT_RGBA16 || format == MRFGS_FORMAT_BGR16 ||
+                format == MRFGS_FORMAT_BGRA16;
+    int bgr = format >= MRFGS_FORMAT_BGR8, alpha = format == MRFGS_FORMAT_RGBA8 || format == MRFGS_FORMAT_RGBA16 ||
+                                                   format == MRFGS_FORMAT_BGRA8 || format == MRFGS_FORMAT_BGRA16;
+    size_t channels = alpha ? 4 : 3, stride = pnm->width * channels * (words ? 2 : 1) + 3;
+    uint8_t *data = malloc(stride * pnm->height);
+    for (size_t y = 0; y < pnm->height; y++)
+        for (size_t x = 0; x < pnm->width; x++)
+            for (size_t c = 0; c < channels; c++) {
+                size_t from = bgr && c < 3 ? 2 - c : c, at = x * channels + c;
+                uint8_t value = c == 3 ? (mask && mask[y * pnm->width + x] ? 0 : 255) : pnm->data[(y * pnm->width + x) * 3 + from];
+                uint16_t word = (uint16_t)(value * 257);
+                memcpy(data + y * stride + at * (words ? 2 : 1), words ? (void *)&word : (void *)&value, words ? 2 : 1);
+            }
+    mrfgs_image image = {data, stride, (uint32_t)pnm->width, (uint32_t)pnm->height, format};
+    return image;
+}
+
+/* Every format of colours gives the map of the first one, and masks are what alpha is. */
+static void formats(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *map) {
+    size_t pixels = map->width * map->height, stride = map->width * sizeof(float);
+    float *found = malloc(pixels * sizeof *found), *masked = malloc(pixels * sizeof *masked);
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = found, .disparity_stride = stride};
+    for (mrfgs_format format = MRFGS_FORMAT_RGB8; format <= MRFGS_FORMAT_BGRA16; format++) {
+        if (format == MRFGS_FORMAT_GREY32F) continue;
+        mrfgs_image left = converted(&frames[0], format, NULL), right = converted(&frames[1], format, NULL);
+        CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
+        CHECK(memcmp(found, map->data, pixels * sizeof *found) == 0);
+        /* Control: the order of the channels counts. */
+        right.format = format == MRFGS_FORMAT_RGB8 ? MRFGS_FORMAT_BGR8 : right.format;
+        CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
+        CHECK((memcmp(found, map->data, pixels * sizeof *found) == 0) == (format != MRFGS_FORMAT_RGB8));
+        free((void *)left.data);
+        free((void *)right.data);
+    }
+    uint8_t *left_mask = calloc(pixels, 1), *right_mask = calloc(pixels, 1);
+    for (size_t i = 0; i < pixels; i++) left_mask[i] = i % map->width < 9, right_mask[i] = i / map->width > 70 ? 255 : 0;
+    mrfgs_image masks[2] = {{left_mask, map->width, (uint32_t)map->width, (uint32_t)map->height, MRFGS_FORMAT_GREY8},
+                            {right_mask, map->width, (uint32_t)map->width, (uint32_t)map->height, MRFGS_FORMAT_GREY8}};
+    mrfgs_image plain[2] = {spread(&frames[0], 1), spread(&frames[1], 2)};
+    mrfgs_image alpha[2] = {converted(&frames[0], MRFGS_FORMAT_BGRA8, left_mask), converted(&frames[1], MRFGS_FORMAT_RGBA8, right_mask)};
+    CHECK(mrfgs_match(matcher, &alpha[0], &alpha[1], &range, &maps) == MRFGS_STATUS_OK);
+    maps.disparity = masked;
+    CHECK(mrfgs_match_masked(matcher, &plain[0], &plain[1], &masks[0], &masks[1], &range, &maps) == MRFGS_STATUS_OK);
+    CHECK(memcmp(found, masked, pixels * sizeof *found) == 0);
+    for (size_t i = 0; i < pixels; i++) CHECK((masked[i] > 1e30f) == (left_mask[i] != 0));
+    /* Control: the mask of the right image counts, too. */
+    CHECK(mrfgs_match_masked(matcher, &plain[0], &plain[1], &masks[0], NULL, &range, &maps) == MRFGS_STATUS_OK);
+    CHECK(memcmp(found, masked, pixels * sizeof *found) != 0);
+    memset(left_mask, 1, pixels);
+    CHECK(mrfgs_check_masked(&plain[0], &plain[1], &masks[0], NULL, &range) == MRFGS_STATUS_OK);
+    CHECK(strstr(mrfgs_last_warnings(), "masked everywhere"));
+    mrfgs_image bad = masks[0];
+    bad.format = MRFGS_FORMAT_GREY16, bad.stride = 999;
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_match_masked(matcher, &plain[0], &plain[1], &bad, NULL, &range, &maps), "mask of the left", "GREY8");
+    bad = masks[1], bad.height -= 1;
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_match_masked(matcher, &plain[0], &plain[1], NULL, &bad, &range, &maps), "mask of the right", "89");
+    bad = masks[1], bad.data = NULL;
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_check_masked(&plain[0], &plain[1], NULL, &bad, &range), "mask of the right", "null");
+    for (int i = 0; i < 2; i++) free((void *)plain[i].data), free((void *)alpha[i].data);
+    free(left_mask);
+    free(right_mask);
+    free(found);
+    free(masked);
 }
 
 /* What is probably wrong is said, and only that. */
@@ -114,6 +196,9 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     refused(wrong, mrfgs_options_preset(options, "\xff\xfe"), "name", "UTF-8");
     refused(wrong, mrfgs_options_set(options, "fil", "none"), "\"fil\"", "no such key");
     refused(wrong, mrfgs_options_set(options, "fill", "sand"), "\"fill\"", "sand");
+    refused(wrong, mrfgs_options_set(options, "fill", "sand"), "none", "row");
+    refused(wrong, mrfgs_options_set(options, "levels", "17"), "\"levels\"", "1 to 16");
+    refused(wrong, mrfgs_options_threads(options, 1025), "threads are 1025", "1 to 1024");
     refused(wrong, mrfgs_options_set(options, NULL, "none"), "key", "null");
     refused(wrong, mrfgs_options_set(options, "fill", NULL), "value", "null");
     refused(wrong, mrfgs_options_device(options, NULL), "name", "null");
@@ -142,7 +227,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     bad = image, bad.data = NULL;
     refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "null");
     bad = image, bad.format = 77;
-    refused(wrong, mrfgs_match(matcher, &image, &bad, &range, &maps), "right", "format 77");
+    refused(wrong, mrfgs_match(matcher, &image, &bad, &range, &maps), "right", "format 77; give an mrfgs_format, 1 to 11");
     bad = image, bad.stride = 1;
     refused(wrong, mrfgs_match(matcher, &bad, &image, &range, &maps), "left", "stride of 1");
     bad = image, bad.stride = SIZE_MAX / 2;
@@ -157,6 +242,10 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     mrfgs_maps small = maps;
     small.disparity_stride -= 1;
     refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.disparity", "stride");
+    small = maps, small.right = disparity, small.right_stride = 3;
+    refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.right", "stride");
+    small = maps, small.size = FIRST_SIZE + 1;
+    refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 57", "sizeof(mrfgs_maps) is 72");
     small = maps, small.size = 8;
     refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 8", "header");
     /* The next match is stopped, and the one after it is not. */
@@ -170,11 +259,11 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
 }
 
 int main(int argc, char **argv) {
-    if (argc != 7) return 2;
+    if (argc != 8) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
     presets();
     struct pnm frames[2] = {pnm_read(argv[1]), pnm_read(argv[2])};
-    struct pnm maps[3] = {pnm_read(argv[4]), pnm_read(argv[5]), pnm_read(argv[6])};
+    struct pnm maps[4] = {pnm_read(argv[4]), pnm_read(argv[5]), pnm_read(argv[6]), pnm_read(argv[7])};
     mrfgs_options *options = mrfgs_options_new();
     mrfgs_matcher *matcher;
     CHECK(mrfgs_options_preset(options, "fast") == MRFGS_STATUS_OK);
@@ -184,12 +273,13 @@ int main(int argc, char **argv) {
     CHECK(mrfgs_matcher_new(options, &matcher) == MRFGS_STATUS_OK);
     mrfgs_range range = {0, atoi(argv[3])};
     compare(matcher, frames, range, maps);
+    if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
     warnings(matcher, frames, range);
     mistakes(options, matcher, frames);
     mrfgs_options_free(options);
     mrfgs_matcher_free(matcher);
     for (int i = 0; i < 2; i++) free(frames[i].data);
-    for (int i = 0; i < 3; i++) free(maps[i].data);
+    for (int i = 0; i < 4; i++) free(maps[i].data);
     printf("match.c: mrfgs %s, %zu x %zu, %zu channels of %zu bytes: all maps are equal\n", mrfgs_version(), frames[0].width,
            frames[0].height, frames[0].channels, frames[0].bytes);
     return 0;

@@ -6,6 +6,7 @@
 
 #include <mrfgs.h>
 
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -16,7 +17,9 @@
 #include <vector>
 
 static_assert(sizeof(mrfgs_image) == 2 * sizeof(void *) + 16 || sizeof(void *) != 8, "no field moves");
-static_assert(sizeof(mrfgs_maps) == 7 * sizeof(void *), "no field moves");
+static_assert(offsetof(mrfgs_maps, right) == 7 * sizeof(void *), "no field moves");
+static_assert(sizeof(mrfgs_maps) == 9 * sizeof(void *), "no field moves");
+static_assert(sizeof(mrfgs_view) == 6 * sizeof(void *), "no field moves");
 
 namespace {
 
@@ -41,7 +44,7 @@ Matcher matcher_of(const char *preset) {
 }
 
 mrfgs_image image_of(const pnm &frame) {
-    const mrfgs_format format = frame.bytes == 2 ? MRFGS_FORMAT_GREY16 : frame.channels == 3 ? MRFGS_FORMAT_RGB8 : MRFGS_FORMAT_GREY8;
+    const mrfgs_format format = frame.bytes == 4 ? MRFGS_FORMAT_GREY32F : frame.bytes == 2 ? MRFGS_FORMAT_GREY16 : frame.channels == 3 ? MRFGS_FORMAT_RGB8 : MRFGS_FORMAT_GREY8;
     return {frame.data, frame.width * frame.channels * frame.bytes, std::uint32_t(frame.width), std::uint32_t(frame.height), format};
 }
 

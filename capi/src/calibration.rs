@@ -1,0 +1,75 @@
+//! What is known of two cameras.
+
+use std::ffi::c_char;
+use std::path::{Path, PathBuf};
+
+use mrfgs::calibration::{self, cameras::StereoCalibration};
+
+use crate::argument;
+use crate::status::{Failure, Status, call};
+
+/// What is known of a pair of cameras.
+pub struct Calibration(pub(crate) StereoCalibration);
+
+/// Reads a calibration from one file, or from several that belong together (ROS has one for each camera), in any form that `mrfgs match`
+/// takes: the content tells it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_calibration_read(
+    paths: *const *const c_char,
+    count: usize,
+    calibration: *mut *mut Calibration,
+) -> Status {
+    let read = || {
+        // SAFETY: the caller promises that so many texts are there.
+        let paths = unsafe { argument::texts("paths", paths, count) }?;
+        let paths: Vec<PathBuf> = paths.into_iter().map(PathBuf::from).collect();
+        Ok(Calibration(calibration::read(&paths)?))
+    };
+    // SAFETY: the caller promises that a pointer can be written there.
+    unsafe { argument::make("calibration", calibration, read) }
+}
+
+/// The same of the texts of such files. Errors call them "texts[0]" and so on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_calibration_of_texts(
+    texts: *const *const c_char,
+    count: usize,
+    calibration: *mut *mut Calibration,
+) -> Status {
+    let read = || {
+        // SAFETY: the caller promises that so many texts are there.
+        let texts = unsafe { argument::texts("texts", texts, count) }?;
+        let names: Vec<String> = (0..count).map(|i| format!("texts[{i}]")).collect();
+        let files: Vec<_> = names.iter().map(Path::new).zip(texts.into_iter().map(str::to_owned)).collect();
+        Ok(Calibration(calibration::of_texts(&files)?))
+    };
+    // SAFETY: the caller promises that a pointer can be written there.
+    unsafe { argument::make("calibration", calibration, read) }
+}
+
+/// States the unit of the baseline, where the files do not or wrongly: "mm", "cm" or "m".
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_calibration_unit(
+    calibration: *mut Calibration,
+    unit: *const c_char,
+) -> Status {
+    call(|| {
+        // SAFETY: the caller promises that it is null, or good and used by nobody else.
+        let calibration = unsafe { calibration.as_mut() };
+        let calibration = calibration.ok_or_else(|| Failure::argument("the calibration is null"))?;
+        // SAFETY: the caller promises that it is a text.
+        let unit = unsafe { argument::text("the unit", unit) }?;
+        let known = unit.parse();
+        calibration.0.set_unit(
+            known.map_err(|expected| Failure::argument(format!("the unit is {unit:?}: give {expected}")))?,
+        );
+        Ok(())
+    })
+}
+
+/// Frees a calibration; it may be null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_calibration_free(calibration: *mut Calibration) {
+    // SAFETY: the caller promises that it was made here, and is freed once.
+    unsafe { argument::free(calibration) }
+}

@@ -1,0 +1,154 @@
+//! Depth.
+
+use std::ffi::c_char;
+
+use mrfgs::depth;
+use mrfgs::image::calib::{self, Camera, Unit};
+
+use crate::argument;
+use crate::calibration::Calibration;
+use crate::frame::extent;
+use crate::rectification::Rectification;
+use crate::status::{Failure, Status, call};
+
+/// The cameras of a rectified pair: from disparities to depths.
+pub struct Rig {
+    rig: depth::Rig,
+    /// (width, height) of the images, where it is known.
+    size: Option<(usize, usize)>,
+}
+
+impl Rig {
+    fn of(calibration: &calib::Calibration) -> mrfgs::Result<Self> {
+        let size = calibration.width.zip(calibration.height);
+        let size = size.map(|(width, height)| (width as usize, height as usize));
+        Ok(Self { rig: depth::Rig::new(calibration)?, size })
+    }
+}
+
+/// The rig of a pair that is rectified already, by its focal length and doffs (cx of the right camera less cx of the left one; mostly 0) in
+/// pixels, and by its baseline, whose unit is that of all depths.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_rig_new(focal: f64, baseline: f64, doffs: f64, rig: *mut *mut Rig) -> Status {
+    let make = || {
+        for (name, value, fits) in
+            [("focal", focal, focal > 0.0), ("baseline", baseline, baseline > 0.0), ("doffs", doffs, true)]
+        {
+            if !fits || !value.is_finite() {
+                let expected = if name == "doffs" { "a number" } else { "a number above 0" };
+                return Err(Failure::argument(format!("{name} is {value}: give {expected}")));
+            }
+        }
+        // Depths do not depend on the principal point.
+        let camera = Camera { focal_length: [focal; 2], principal_point: [0.0; 2] };
+        let mut calibration = calib::Calibration::of_cameras(camera, baseline, Unit::Unknown);
+        calibration.doffs = Some(doffs);
+        Ok(Rig::of(&calibration)?)
+    };
+    // SAFETY: the caller promises that a pointer can be written there.
+    unsafe { argument::make("rig", rig, make) }
+}
+
+/// The rig of a pair that is rectified already, by its calibration.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_rig_of_calibration(
+    calibration: *const Calibration,
+    rig: *mut *mut Rig,
+) -> Status {
+    let make = || {
+        // SAFETY: the caller promises that the pointer is null or good.
+        let calibration = unsafe { argument::thing("calibration", calibration) }?;
+        let rectified = calibration.0.of_rectified_images()?.ok_or_else(|| {
+            Failure::argument(
+                "the calibration is of images that are not rectified: use mrfgs_rig_of_rectification(), or give that of the \
+                 rectified pair",
+            )
+        })?;
+        Ok(Rig::of(&rectified)?)
+    };
+    // SAFETY: the caller promises that a pointer can be written there.
+    unsafe { argument::make("rig", rig, make) }
+}
+
+/// The rig of what a rectification makes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_rig_of_rectification(
+    rectification: *const Rectification,
+    rig: *mut *mut Rig,
+) -> Status {
+    let make = || {
+        // SAFETY: the caller promises that the pointer is null or good.
+        let rectification = unsafe { argument::thing("rectification", rectification) }?;
+        Ok(Rig::of(&rectification.by.calibration()?)?)
+    };
+    // SAFETY: the caller promises that a pointer can be written there.
+    unsafe { argument::make("rig", rig, make) }
+}
+
+/// The unit of the baseline, and so of depths: "mm", "cm", "m", or "unknown"; null for a rig that is null. It stays as it is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_rig_unit(rig: *const Rig) -> *const c_char {
+    // SAFETY: the caller promises that the pointer is null or good.
+    let unit = unsafe { rig.as_ref() }.map(|rig| match rig.rig.unit() {
+        Unit::Millimetre => c"mm",
+        Unit::Centimetre => c"cm",
+        Unit::Metre => c"m",
+        Unit::Unknown => c"unknown",
+    });
+    unit.map_or(std::ptr::null(), std::ffi::CStr::as_ptr)
+}
+
+/// The depth of every pixel along the optical axis, in the unit of the baseline, of a map of disparities in pixels: +infinity where there
+/// is none. Strides are in bytes. Both maps may be one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_depth(
+    rig: *const Rig,
+    width: u32,
+    height: u32,
+    disparity: *const f32,
+    disparity_stride: usize,
+    depth: *mut f32,
+    depth_stride: usize,
+) -> Status {
+    call(|| {
+        // SAFETY: the caller promises that the pointer is null or good.
+        let rig = unsafe { argument::thing("rig", rig) }?;
+        let size = (width as usize, height as usize);
+        if let Some((w, h)) = rig.size.filter(|known| *known != size) {
+            return Err(Failure::argument(format!(
+                "the map is {width} x {height} and the calibration of images of {w} x {h}: depth takes the calibration of this size"
+            )));
+        }
+        for (name, is_null, stride) in
+            [("disparity", disparity.is_null(), disparity_stride), ("depth", depth.is_null(), depth_stride)]
+        {
+            if is_null {
+                return Err(Failure::argument(format!("the map of {name} is null")));
+            }
+            extent(stride, size, size_of::<f32>())
+                .map_err(|wrong| Failure::argument(format!("the map of {name} {wrong}")))?;
+        }
+        for y in 0..size.1 {
+            for x in 0..size.0 {
+                let offset = |stride: usize| y * stride + x * size_of::<f32>();
+                // SAFETY: the caller promises that the map is as large as the arguments say.
+                let from = unsafe { disparity.byte_add(offset(disparity_stride)) };
+                // SAFETY: the same.
+                let d = unsafe { from.read_unaligned() };
+                let found = rig.rig.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32);
+                // SAFETY: the same.
+                let to = unsafe { depth.byte_add(offset(depth_stride)) };
+                // SAFETY: the same.
+                unsafe { to.write_unaligned(found) };
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Frees a rig; it may be null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_rig_free(rig: *mut Rig) {
+    // SAFETY: the caller promises that it was made here, and is freed once.
+    unsafe { argument::free(rig) }
+}
