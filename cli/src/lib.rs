@@ -158,7 +158,7 @@ mod tests {
         let caps = [
             ("match", 21),
             ("rectify", 7),
-            ("sequence", 21),
+            ("sequence", 24),
             ("batch", 13),
             ("evaluate", 11),
             ("evaluate map", 7),
