@@ -47,16 +47,16 @@ impl Region {
         &self.part
     }
 
+    /// What is matched for it, in pixels of both views.
+    #[must_use]
+    pub fn window(&self) -> &Rect {
+        &self.window
+    }
+
     /// What is matched of a pair: the region with what the right view has of it, and a margin.
     #[must_use]
     pub fn window_of(&self, pair: &Pair) -> Pair {
         pair.crop(&self.window)
-    }
-
-    /// The region itself, from that window.
-    #[must_use]
-    pub fn part_of(&self, window: &Pair) -> Pair {
-        window.crop(&self.part.within(&self.window))
     }
 
     /// The maps of the region, from those of its window.

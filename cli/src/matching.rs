@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use mrfgs::image::Pair;
+use mrfgs::image::{Pair, Rect};
 use mrfgs::low_level::engine::Inspector;
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Found, Job, Matched, Matcher, check};
@@ -44,11 +44,12 @@ impl Searched {
 }
 
 /// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and says on standard error what ran where and how
-/// long. `name` tells pairs apart where there are several.
+/// long. A `part` of the left view may be all that is wanted. `name` tells pairs apart where there are several.
 pub(crate) fn run(
     matcher: &mut Matcher,
     pair: &Pair,
     searched: Searched,
+    part: Option<&Rect>,
     method: &Method,
     name: Option<&str>,
     quiet: bool,
@@ -57,6 +58,9 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut bar = Bar::new(name, quiet);
     let mut job = searched.job(matcher, pair).method(method).on_progress(|progress| bar.update(progress));
+    if let Some(part) = part {
+        job = job.region(part.clone());
+    }
     if let Some(inspector) = inspector {
         job = job.inspect(inspector);
     }

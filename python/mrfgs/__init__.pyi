@@ -86,6 +86,7 @@ class Matcher:
         min_disparity: float | None = None,
         mask: npt.ArrayLike | None = None,
         no_data: float | None = None,
+        roi: Sequence[int] | None = None,
         preset: str = "default",
         options: Mapping[str, Any] | None = None,
         warn: bool = True,
@@ -183,6 +184,8 @@ class Rig:
     """The cameras of a rectified pair: from disparities to depths and points, in the unit of the baseline."""
 
     def __new__(cls, calibration: _Cameras) -> Rig: ...
+    def of_part(self, x: int, y: int) -> Rig:
+        """That of a part of the images, whose first pixel is (x, y), such as the roi of match."""
     @staticmethod
     def of(
         focal: float,
@@ -243,6 +246,7 @@ def match(
     min_disparity: float | None = None,
     mask: npt.ArrayLike | None = None,
     no_data: float | None = None,
+    roi: Sequence[int] | None = None,
     preset: str = "default",
     options: Mapping[str, Any] | None = None,
     warn: bool = True,

@@ -146,6 +146,23 @@ impl PyRig {
         Self::of_numbers(([focal; 2], principal_point, [doffs, baseline], unit, size, names))
     }
 
+    /// That of a part of the images, whose first pixel is (x, y), such as the roi of `match`: for the maps and the left image of that
+    /// part. It takes maps of any size.
+    fn of_part(&self, x: usize, y: usize) -> PyResult<Self> {
+        let mut camera = self.camera;
+        camera.principal_point = [camera.principal_point[0] - x as f64, camera.principal_point[1] - y as f64];
+        let numbers = [self.doffs, self.baseline];
+        let unit = self.rig.unit().name().into();
+        Self::of_numbers((
+            camera.focal_length,
+            camera.principal_point,
+            numbers,
+            unit,
+            None,
+            self.names.clone(),
+        ))
+    }
+
     /// The depth of every pixel along the optical axis, float32 in the unit of the baseline, +inf where there is none: where the
     /// disparity is not finite or masked, and where d + doffs is 0 or less.
     ///

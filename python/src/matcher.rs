@@ -5,9 +5,11 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use mrfgs::options::Execution;
-use mrfgs::{Found, Matched, Matcher, check};
-use pyo3::exceptions::{PyRuntimeError, PyTypeError};
+use mrfgs::image::Rect;
+use mrfgs::options::{DisparityRange, Execution};
+use mrfgs::region::Region;
+use mrfgs::{Found, Matched, Matcher, Pair, check};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -51,6 +53,8 @@ impl PyMatcher {
     ///     find the range, and where the scene goes beyond it the pair is matched once more, over half as many labels more; min_disparity is 0 where max_disparity is given alone.
     /// mask: array of shape (height, width): where it is not 0 the left image is ignored, and the maps are invalid.
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
+    /// roi: (x, y, width, height) of a part of the left image in pixels, which alone is matched, in the time of that part; the maps have
+    ///     its size. Rig.of_part gives its depths and points.
     /// preset: the name of a preset; mrfgs.presets() lists them, and tells what each is for.
     /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
     ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
@@ -61,7 +65,7 @@ impl PyMatcher {
     /// RuntimeError where the wanted device fails, and MemoryError where it does not fit.
     #[pyo3(
         name = "match",
-        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
+        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, preset="default",
                      options=None, warn=true)
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -74,6 +78,7 @@ impl PyMatcher {
         min_disparity: Option<&Bound<PyAny>>,
         mask: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
+        roi: Option<&Bound<PyAny>>,
         preset: &str,
         options: Option<&Bound<PyDict>>,
         warn: bool,
@@ -85,8 +90,10 @@ impl PyMatcher {
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let given = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
         let range = range::searched(py, &pair, given, min_disparity)?;
+        let part = roi.map(|roi| region(roi, &pair, range)).transpose()?;
         if warn {
-            exceptions::warn(py, py.detach(|| check::warnings(&pair, given)))?;
+            let seen = part.as_ref().map_or_else(|| pair.clone(), |part| part.window_of(&pair));
+            exceptions::warn(py, py.detach(|| check::warnings(&seen, given)))?;
         }
         let matched = py.detach(|| {
             interruptible(|stop| {
@@ -94,6 +101,10 @@ impl PyMatcher {
                 let job = match given {
                     Some(range) => matcher.job(&pair, range),
                     None => matcher.job(&pair, Found(range)),
+                };
+                let job = match &part {
+                    Some(part) => job.region(part.part().clone()),
+                    None => job,
                 };
                 job.method(&method).cancel(stop).run()
             })
@@ -145,7 +156,7 @@ impl PyMatcher {
 #[pyfunction]
 #[pyo3(
     name = "match",
-    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, preset="default",
+    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, preset="default",
                  options=None, warn=true, device="auto", threads=None)
 )]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -157,6 +168,7 @@ pub(crate) fn match_(
     min_disparity: Option<&Bound<PyAny>>,
     mask: Option<&Bound<PyAny>>,
     no_data: Option<f64>,
+    roi: Option<&Bound<PyAny>>,
     preset: &str,
     options: Option<&Bound<PyDict>>,
     warn: bool,
@@ -164,7 +176,16 @@ pub(crate) fn match_(
     threads: Option<usize>,
 ) -> PyResult<PyMatched> {
     let matcher = PyMatcher::new(py, device, threads)?;
-    matcher.run(py, left, right, max_disparity, min_disparity, mask, no_data, preset, options, warn)
+    matcher.run(py, left, right, max_disparity, min_disparity, mask, no_data, roi, preset, options, warn)
+}
+
+/// The region (x, y, width, height) of the left view of `pair`.
+fn region(given: &Bound<PyAny>, pair: &Pair, range: DisparityRange) -> PyResult<Region> {
+    let [x, y, width, height]: [usize; 4] = given.extract().map_err(|_| {
+        PyTypeError::new_err("roi: give (x, y, width, height), four whole numbers of pixels from 0 on")
+    })?;
+    let part = Rect { x: x..x.saturating_add(width), y: y..y.saturating_add(height) };
+    Region::new(part, pair.size(), range).map_err(|error| PyValueError::new_err(format!("roi: {error}")))
 }
 
 /// Does `run` on a thread of its own, while this one, to which alone Python tells of Ctrl-C, looks for that.

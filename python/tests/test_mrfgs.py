@@ -386,6 +386,30 @@ class Match(unittest.TestCase):
         self.assertFalse(np.array_equal(matched.right, matched.disparity))
         self.assertTrue(np.array_equal(pickle.loads(pickle.dumps(matched)).right, matched.right))
 
+    def test_a_region_alone(self):
+        left, right = pair()
+        height, width = left.shape[:2]
+        x, y, w, h = width // 3, height // 4, width // 4, height // 3
+        matched = mrfgs.match(left, right, 15, device="cpu", roi=(x, y, w, h))
+        expected = by_program(left, right, "--max-disparity", "15", "--roi", f"{x},{y},{w},{h}")
+        self.assertTrue(np.array_equal(matched.disparity, expected))
+        self.assertEqual(matched.validity.shape, (h, w))
+        # Control: another part is another map.
+        self.assertFalse(np.array_equal(mrfgs.match(left, right, 15, device="cpu", roi=(x + 1, y, w, h)).disparity, expected))
+        # Its points lie where those of the whole lie.
+        rig = mrfgs.Rig.of(100.0, 0.1, size=(width, height))
+        part = rig.of_part(x, y)
+        points = part.points(matched, left[y : y + h, x : x + w])
+        columns = points.positions[:, 0] / points.positions[:, 2] * 100 + (width - 1) / 2
+        self.assertGreater(len(points), 0)
+        self.assertGreater(columns.min(), x - 0.01)
+        self.assertLess(columns.max(), x + w - 0.99)
+        whole = rig.points(mrfgs.match(left, right, 15, device="cpu"), left).positions
+        self.assertLess((whole[:, 0] / whole[:, 2] * 100 + (width - 1) / 2).min(), x - 1)
+        for roi in [(x, y, width, h), (0, 0, 0, 3), (x, y, w), (-1, 0, 2, 2), (0.5, 0, 2, 2), "abcd"]:
+            with self.assertRaisesRegex((TypeError, ValueError), "roi: "):
+                mrfgs.match(left, right, 15, device="cpu", roi=roi)
+
     def test_options_are_described(self):
         described = mrfgs.options()
         self.assertEqual(mrfgs.presets()["default"], "few errors in little time: for most pairs")

@@ -57,12 +57,6 @@ impl Unit {
         Self::ALL.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
     }
 
-    /// In words: its sign, or where it comes from.
-    #[must_use]
-    pub fn of_baseline(self) -> &'static str {
-        if self == Self::Unknown { "that of the baseline" } else { self.name() }
-    }
-
     /// How many millimetres it has, where that is known.
     #[must_use]
     pub fn millimetres(self) -> Option<f64> {

@@ -38,11 +38,12 @@ impl Cloud {
     /// What a file says of positions: frame and unit, in one line.
     #[must_use]
     pub fn about(&self) -> String {
+        let unit = if self.unit == Unit::Unknown { "that of the baseline" } else { self.unit.name() };
         let camera = match self.frame {
             Frame::Matched => "the left camera",
             Frame::Original => "the original left camera, before rectification",
         };
-        format!("frame of {camera}: x right, y down, z forward; unit {}", self.unit.of_baseline())
+        format!("frame of {camera}: x right, y down, z forward; unit {unit}")
     }
 }
 

@@ -8,7 +8,7 @@ use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::{FRACTION, Maps, flag};
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 
-use crate::args::{ReadingArgs, Sign};
+use crate::args::{CameraArgs, ReadingArgs, Sign};
 use crate::console;
 use crate::failure::{Failure, Result};
 use crate::outputs::{AlsoArgs, Outcome, Written, files};
@@ -35,6 +35,8 @@ pub(crate) struct Args {
     /// Calibration of the rectified pair, as `mrfgs match` takes it [default: a calib.txt beside MAP]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
+    #[command(flatten)]
+    numbers: CameraArgs,
     /// Left image, whose colours points have
     #[arg(long, value_name = "FILE")]
     left: Option<PathBuf>,
@@ -61,7 +63,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             "gives the colours of points and pictures; give the left image of the pair",
         ));
     }
-    let calibration = calibration(args)?;
     let inputs = [Some(&args.map), args.left.as_ref(), args.confidence.as_ref()].into_iter().flatten();
     let inputs: Vec<_> = inputs.chain(&args.calib).map(|path| ("an input", path.as_path())).collect();
     let outputs: Vec<_> = also.iter().map(|word| (word.flag(), word.beside(&args.map))).collect();
@@ -83,11 +84,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     of_size(&args.left, left.as_ref().map(|image| image.pixels.size()))?;
     of_size(&args.confidence, confidence.as_ref().map(Plane::size))?;
-    let (path, calibration) = &calibration;
-    let word = also.first().copied();
-    let rig = word.map(|word| {
-        input::rig(word, Some((path, calibration)), &args.map, map.size(), "give one with --calib")
-    });
+    let (path, calibration) = calibration(args, map.size())?;
+    let known = Some((path.as_deref().unwrap_or("--focal".as_ref()), &calibration));
+    let takes_unit = also.iter().find(|word| word.takes_unit()).or(also.first());
+    let rig = takes_unit.map(|word| input::rig(word, known, &args.map, map.size(), "give one with --calib"));
     let maps = maps(&map, confidence);
     let range = range(&map);
     for word in &also {
@@ -111,20 +111,22 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     written.keep();
     if !args.quiet && !said.is_empty() {
         said.dedup();
-        let unit = outcome.rig.map_or("", |rig| rig.unit().of_baseline());
-        console::say(&format!("{}; unit: {unit}, by {}", said.join("; "), path.display()));
+        let unit = input::unit(calibration.unit, path.as_deref());
+        console::say(&format!("{}; unit: {unit}", said.join("; ")));
     }
     Ok(())
 }
 
-/// The calibration, and its file.
-fn calibration(args: &Args) -> Result<(PathBuf, Calibration)> {
-    if !args.calib.is_empty() {
-        return Ok((args.calib[0].clone(), input::of_rectified_images(&args.calib)?));
+/// The calibration of a map of this size, and its file, where it has one.
+fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Calibration)> {
+    if let Some(calibration) = args.numbers.calibration(size) {
+        return Ok((None, calibration));
     }
-    let beside = args.map.with_file_name(CALIBRATION);
+    if let Some(first) = args.calib.first() {
+        return Ok((Some(first.clone()), input::of_rectified_images(&args.calib)?));
+    }
     match Calibration::beside(&args.map)? {
-        Some(calibration) => Ok((beside, calibration)),
+        Some(calibration) => Ok((Some(args.map.with_file_name(CALIBRATION)), calibration)),
         None => {
             let reason =
                 format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mrfgs::calibration::{self, cameras::StereoCalibration, matrix::Matrix};
 use mrfgs::check::{self, Warning};
 use mrfgs::depth::Rig;
-use mrfgs::image::calib::Calibration;
+use mrfgs::image::calib::{Calibration, Unit};
 use mrfgs::image::{Pair, Rect};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
@@ -56,8 +56,6 @@ pub(crate) struct Input {
     remedy: &'static str,
     /// What has rectified the pair, where it was not.
     pub(crate) rectification: Option<Rectification>,
-    /// The region that is wanted, where it is not all; the pair is its window.
-    region: Option<Region>,
 }
 
 /// A calibration of a rectified pair, and where it comes from.
@@ -152,7 +150,7 @@ impl Input {
             None => "give one with --calib",
         };
         let by_depth = search.takes_cameras().is_some();
-        Ok(Self { pair, range, by_matches, by_depth, calibration, remedy, rectification, region: None })
+        Ok(Self { pair, range, by_matches, by_depth, calibration, remedy, rectification })
     }
 
     /// The files of the calibration, for a record.
@@ -160,38 +158,20 @@ impl Input {
         self.calibration.as_ref().filter(|known| !known.is_of_flags()).map(|known| shown(&known.files))
     }
 
-    /// Narrows it to the window of the region `part` of the left view, where there is one; the range may become wider where that
-    /// `fits`.
+    /// What is matched for the region `part` of the left view.
     ///
     /// # Errors
-    /// Where the region is not inside the view.
-    pub(crate) fn narrow(
-        &mut self,
-        part: Option<&Rect>,
-        fits: impl Fn(DisparityRange) -> bool,
-    ) -> Result<()> {
-        let Some(part) = part else { return Ok(()) };
-        let wider = check::beyond(self.range).filter(|_| self.searched(fits).may_widen);
-        let region = Region::new(part.clone(), self.pair.size(), wider.unwrap_or(self.range));
-        let region = region.map_err(|e| Failure::usage("--roi", e))?;
-        self.pair = region.window_of(&self.pair);
-        self.region = Some(region);
-        Ok(())
-    }
-
-    /// The region that it is narrowed to.
-    pub(crate) fn region(&self) -> Option<&Region> {
-        self.region.as_ref()
+    /// Where it is not inside the view.
+    pub(crate) fn region(&self, part: &Rect) -> Result<Region> {
+        let region = Region::new(part.clone(), self.pair.size(), self.range);
+        region.map_err(|e| Failure::usage("--roi", e))
     }
 
     /// The unit of depths, for people, where there is a calibration.
     pub(crate) fn unit(&self) -> Option<String> {
         self.calibration.as_ref().map(|known| {
-            let unit = known.calibration.unit.of_baseline();
-            match known.is_of_flags() {
-                true => format!("{unit}, by --baseline"),
-                false => format!("{unit}, by {}", known.named().0.display()),
-            }
+            let by = known.named().0;
+            unit(known.calibration.unit, (!known.is_of_flags()).then_some(by))
         })
     }
 
@@ -245,19 +225,25 @@ impl Input {
         }
     }
 
-    /// Says what is probably wrong with the pair.
-    pub(crate) fn warn(&self) {
-        self.warnings(&remedy::FLAGS).iter().for_each(|warning| say(warning));
+    /// Says what is probably wrong with the pair, or with what is matched of it for a `region`.
+    pub(crate) fn warn(&self, region: Option<&Region>) {
+        let window = region.map(|region| region.window_of(&self.pair));
+        let warnings = self.warnings_of(window.as_ref().unwrap_or(&self.pair), &remedy::FLAGS);
+        warnings.iter().for_each(|warning| say(warning));
     }
 
     /// What is probably wrong with the pair and its calibration, in these `words`.
     pub(crate) fn warnings(&self, words: &remedy::Words) -> Vec<String> {
+        self.warnings_of(&self.pair, words)
+    }
+
+    fn warnings_of(&self, pair: &Pair, words: &remedy::Words) -> Vec<String> {
         let mut said = Vec::new();
         if let (Some(by), Some(known)) = (&self.rectification, &self.calibration) {
             said.extend(doubts(by, &known.files));
         }
         // A range that was found does not show what the user knows.
-        let warnings = check::warnings(&self.pair, (!self.by_matches).then_some(self.range));
+        let warnings = check::warnings(pair, (!self.by_matches).then_some(self.range));
         said.extend(warnings.iter().map(|warning| match warning {
             // To rectify is no remedy any more.
             Warning::NotRectified { offset } if self.rectification.is_some() => format!(
@@ -268,6 +254,16 @@ impl Input {
             other => remedy::warning(other, words),
         }));
         said
+    }
+}
+
+/// The unit of depths, for people, by a calibration `file` or by flags.
+pub(crate) fn unit(unit: Unit, file: Option<&Path>) -> String {
+    match (unit, file) {
+        (Unit::Unknown, Some(file)) => format!("that of the baseline in {}", file.display()),
+        (Unit::Unknown, None) => "that of --baseline".into(),
+        (unit, Some(file)) => format!("{}, by {}", unit.name(), file.display()),
+        (unit, None) => unit.name().into(),
     }
 }
 

@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     input.say_range(Sign::default(), "");
     let folder = args.folder.as_deref().map(StagedFolder::new_or_empty).transpose()?;
     check_outputs(args, &input, folder.as_ref())?;
-    input.warn();
+    input.warn(None);
     let plan = Plan::new(input.pair.size().0, input.pair.size().1, input.range, &method)?;
     let mut matcher = Matcher::builder().execution(execution).build()?;
     let mut steps = folder.map(|folder| Steps::new(folder, plan));
@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         None => None,
     };
     let (matched, time) =
-        matching::run(&mut matcher, &input.pair, input.range.into(), &method, None, false, look)?;
+        matching::run(&mut matcher, &input.pair, input.range.into(), None, &method, None, false, look)?;
     let files = args.pair.files(&input, None);
     let record = MatchRecord::new(&files, &matched, time, Sign::default());
     files::deliver(args.json.as_deref(), &record, &times(&matched, time), |written| {

@@ -109,31 +109,32 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
     let read = || args.pair.read(args.sign, cameras.is_some(), Some(&args.numbers), rectifying.as_ref());
-    let mut input = stop::at_once(read)?;
+    let input = stop::at_once(read)?;
     let range = input.range;
     if !args.quiet {
         input.say_range(args.sign, "");
     }
     let mut rig = input.rig(cameras, &args.pair.left)?;
-    input.narrow(args.region.roi.as_ref(), |wider| check_range(args, wider).is_ok())?;
+    let part = args.region.roi.as_ref();
+    let region = part.map(|part| input.region(part)).transpose()?;
     let also = check_outputs(args, &input)?;
     if !args.quiet {
-        input.warn();
+        input.warn(region.as_ref());
     }
-    let plan = Plan::new(input.pair.size().0, input.pair.size().1, range, &method)?;
+    let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
+    let plan = Plan::new(width, height, range, &method)?;
     if args.dry_run {
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let mut matcher = Matcher::builder().execution(execution).build()?;
     let searched = input.searched(|wider| check_range(args, wider).is_ok());
-    let (mut matched, time) =
-        matching::run(&mut matcher, &input.pair, searched, &method, None, args.quiet, None)?;
+    let (matched, time) =
+        matching::run(&mut matcher, &input.pair, searched, part, &method, None, args.quiet, None)?;
     let range = matched.range();
     let mut pair = input.pair.clone();
-    if let Some(region) = input.region() {
-        matched.maps = region.maps_of(&matched.maps);
-        pair = region.part_of(&pair);
-        rig = rig.map(|rig| rig.of_part(region.part().x.start, region.part().y.start));
+    if let Some(part) = part {
+        pair = pair.crop(part);
+        rig = rig.map(|rig| rig.of_part(part.x.start, part.y.start));
     }
     if !args.quiet {
         input.say_wider(&matched, args.sign, "");

@@ -167,18 +167,17 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         input.say_range(sign, " in the first frame");
     }
     let mut rig = input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?;
-    // The folder is not there yet, and does not matter.
-    let fits = |wider| args.maps.check(Path::new(""), "000000", wider).is_ok();
-    input.narrow(args.region.roi.as_ref(), fits)?;
-    let region = input.region().cloned();
-    if let Some(part) = region.as_ref().map(Region::part) {
-        rig = rig.map(|rig| rig.of_part(part.x.start, part.y.start));
-    }
+    let part = args.region.roi.as_ref();
+    let region = part.map(|part| input.region(part)).transpose()?;
+    rig = match part {
+        Some(part) => rig.map(|rig| rig.of_part(part.x.start, part.y.start)),
+        None => rig,
+    };
     if !args.quiet {
-        input.warn();
+        input.warn(region.as_ref());
     }
     if args.dry_run {
-        let (width, height) = input.pair.size();
+        let (width, height) = region.as_ref().map_or(input.pair.size(), |region| region.window().size());
         let plan = Plan::new(width, height, input.range, &method)?;
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
@@ -189,18 +188,24 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let records = args.json.as_deref().map(Records::new).transpose()?;
     let mut sink = if film { writer.begin_film(rate, records)? } else { writer.begin_folder(records)? };
     let files = args.files(&input);
-    let rectified = args.rectify;
+    let (rectified, size) = (args.rectify, input.pair.size());
+    let region = part.map(|part| Region::new(part.clone(), size, range)).transpose()?;
     let pipeline = Pipeline { matcher, range, region, files, rectified, quiet: args.quiet };
     pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
 }
 
 /// The range for all frames: where sparse matches found it, a match of the first frame shows whether that is enough.
 fn range_of_all(matcher: &mut Matcher, first: &Input, args: &Args) -> Result<DisparityRange> {
+    // The folder is not there yet, and does not matter.
     let searched = first.searched(|wider| args.maps.check(Path::new(""), "000000", wider).is_ok());
     if !searched.may_widen {
         return Ok(first.range);
     }
-    let matched = searched.job(matcher, &first.pair).on_progress(|_| stop::go_on()).run()?;
+    let mut job = searched.job(matcher, &first.pair).on_progress(|_| stop::go_on());
+    if let Some(part) = &args.region.roi {
+        job = job.region(part.clone());
+    }
+    let matched = job.run()?;
     if !args.quiet {
         first.say_wider(&matched, Sign::default(), " of the first frame");
     }

@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_millis(50);
 pub(super) struct Pipeline {
     pub(super) matcher: Matcher,
     pub(super) range: DisparityRange,
-    /// The region that is wanted, where it is not all; the first frame is its window.
+    /// The region that is wanted, where it is not all.
     pub(super) region: Option<Region>,
     /// What the records say of the inputs.
     pub(super) files: Files,
@@ -62,13 +62,13 @@ impl Pipeline {
         sink: &mut Sink,
     ) -> Result<()> {
         let start = Instant::now();
-        let region = self.region.clone();
-        let size = region.as_ref().map_or(first.pair.size(), |region| region.part().size());
+        let region = self.region.as_ref();
+        let size = region.map_or(first.pair.size(), |region| region.part().size());
         let takes = Takes { pair: sink.takes_pair(), record: sink.takes_records() };
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         // It may wait for standard input for ever, so nobody waits for it.
-        thread::spawn(move || read(frames, by, region.as_ref(), &sender));
+        thread::spawn(move || read(frames, by, &sender));
         let (found, to_write) = sync_channel::<Found>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
@@ -112,7 +112,11 @@ impl Pipeline {
     ) -> Ran {
         let Self { matcher, range, region, files, rectified, .. } = self;
         let region = region.as_ref();
-        let part_of = |pair: &Pair| region.map_or_else(|| pair.clone(), |region| region.part_of(pair));
+        // What is shown of a pair, and what is matched of it.
+        let narrowed = |pair: Pair| match region {
+            Some(region) => (pair.crop(region.part()), region.window_of(&pair)),
+            None => (pair.clone(), pair),
+        };
         let range = *range;
         // The frames that are being matched.
         let (started, under_way) = channel();
@@ -127,9 +131,9 @@ impl Pipeline {
                 }
             };
             // The receiver lives as long as this.
-            let part = part_of(&frame.pair);
+            let (part, window) = narrowed(frame.pair);
             let _ = started.send((frame.name, part.georeferences(), takes.pair.then_some(part)));
-            Some((frame.pair, range))
+            Some((window, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
         let told = &mut ran;
@@ -213,18 +217,14 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
     }
 }
 
-/// Reads and rectifies frames, and narrows them to the window of the region, until one fails or nobody takes them.
-fn read(frames: Frames, by: Option<Rectification>, region: Option<&Region>, to: &SyncSender<Next>) {
+/// Reads and rectifies frames until one fails or nobody takes them.
+fn read(frames: Frames, by: Option<Rectification>, to: &SyncSender<Next>) {
     for frame in frames {
         let rectified = |frame: Frame| match &by {
             Some(by) => Ok(Frame { pair: by.apply(&frame.pair)?, ..frame }),
             None => Ok(frame),
         };
-        let narrowed = |frame: Frame| match region {
-            Some(region) => Frame { pair: region.window_of(&frame.pair), ..frame },
-            None => frame,
-        };
-        let frame = frame.and_then(rectified).map(narrowed).map_err(Failure::from);
+        let frame = frame.and_then(rectified).map_err(Failure::from);
         let failed = frame.is_err();
         if to.send(frame).is_err() || failed {
             return;
