@@ -19,7 +19,7 @@ use crate::words;
 
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
-    matcher: Mutex<mrfgs::Matcher>,
+    inner: Mutex<mrfgs::Matcher>,
     /// Its method, and the same with the map of the right view.
     methods: [Method; 2],
     stop: AtomicBool,
@@ -42,7 +42,7 @@ pub unsafe extern "C" fn mrfgs_matcher_new(options: *const Options, matcher: *mu
         with_right.set("right-map", "true")?;
         let matcher = mrfgs::Matcher::builder().execution(execution).build()?;
         let methods = [method, with_right];
-        Ok(Matcher { matcher: Mutex::new(matcher), methods, stop: AtomicBool::new(false) })
+        Ok(Matcher { inner: Mutex::new(matcher), methods, stop: AtomicBool::new(false) })
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("matcher", matcher, open) }
@@ -101,7 +101,7 @@ pub unsafe extern "C" fn mrfgs_match_masked(
         let maps = unsafe { Maps::given(maps) }?;
         maps.check(pair.size())?;
         let method = &matcher.methods[usize::from(!maps.right.is_null())];
-        let mut matching = matcher.matcher.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut matching = matcher.inner.lock().unwrap_or_else(PoisonError::into_inner);
         let job = match range {
             Some(range) => matching.job(&pair, range),
             None => matching.job(&pair, ..),

@@ -61,7 +61,7 @@ pub unsafe extern "C" fn mrfgs_rectification_new(
             })?,
             size => (size.0 as usize, size.1 as usize),
         };
-        if !(alpha <= 1.0) {
+        if alpha.is_nan() || alpha > 1.0 {
             return Err(Failure::argument(format!(
                 "alpha is {alpha}: give a number from 0 to 1, or -1 for the rectification of the calibration"
             )));

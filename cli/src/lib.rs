@@ -159,7 +159,7 @@ mod tests {
             ("match", 21),
             ("rectify", 7),
             ("sequence", 24),
-            ("batch", 13),
+            ("batch", 16),
             ("evaluate", 11),
             ("evaluate map", 7),
             ("evaluate submission", 9),
