@@ -4,7 +4,8 @@
 //! one row for each cause here, and [`Words`] has what a front end calls the few things that help.
 
 use crate::error::{
-    BudgetError, DeviceError, Error, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
+    BudgetError, DeviceError, Error, ExecutionError, MemoryError, OptionError, Purpose, RangeError,
+    ReadError,
 };
 use crate::front::check::Warning;
 
@@ -45,6 +46,8 @@ pub struct Words {
     pub truth_scale: Option<&'static str>,
     /// The value that stands for no data.
     pub no_data: Option<&'static str>,
+    /// What turns images upright.
+    pub orient: Option<&'static str>,
 }
 
 impl Words {
@@ -67,6 +70,7 @@ impl Words {
         max_pixels: None,
         truth_scale: None,
         no_data: None,
+        orient: None,
     };
 }
 
@@ -88,8 +92,9 @@ pub fn error(error: &Error, words: &Words) -> String {
 
 /// A warning with its remedy.
 #[must_use]
-pub fn warning(warning: &Warning, Words { min, max, mask, .. }: &Words) -> String {
+pub fn warning(warning: &Warning, Words { min, max, mask, orient, .. }: &Words) -> String {
     let remedy = match warning {
+        Warning::Oriented { .. } => and(": turn them upright by ", *orient),
         Warning::Saturated { .. } => format!(": expose both alike{}", and(", or ", *mask)),
         Warning::Swapped { .. } => {
             format!(": exchange the two images, or lower {min} below 0 if the cameras converge")

@@ -20,6 +20,7 @@ pub(crate) const FLAGS: Words = Words {
     max_pixels: Some("--max-pixels"),
     truth_scale: Some("--truth-scale"),
     no_data: Some("--no-data"),
+    orient: Some("--orient"),
     ..Words::PLAIN
 };
 
@@ -131,7 +132,8 @@ mod tests {
     }
 
     /// Every warning, and what is said of it.
-    const WARNINGS: [(Warning, &str); 11] = [
+    const WARNINGS: [(Warning, &str); 12] = [
+        (Warning::Oriented { which: 2 }, "both images ... turn them upright by --orient"),
         (Warning::Identical, "give the right view"),
         (Warning::Plain { view: "left" }, "the left view"),
         (Warning::Masked { view: "right" }, "the right view is masked"),

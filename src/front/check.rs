@@ -3,7 +3,7 @@
 
 use super::matches;
 use crate::error::Result;
-use crate::image::{Image, Pair};
+use crate::image::{Image, Orientation, Pair};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
 
@@ -91,6 +91,15 @@ pub fn range(pair: &Pair) -> Result<Option<DisparityRange>> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
+    /// Images are stored turned, by the tags of their files, and were not turned upright.
+    #[error(
+        "{} stored turned, by the orientation tag of EXIF or TIFF, and taken as stored",
+        ["the left image is", "the right image is", "both images are"][*which]
+    )]
+    Oriented {
+        /// The left image (0), the right one (1) or both (2).
+        which: usize,
+    },
     /// Both views hold the same pixels.
     #[error("the two images are the same, so they show no depth: give the right view as the second")]
     Identical,
@@ -184,6 +193,7 @@ pub enum Warning {
 /// Corners are searched in both directions along the row, up to half the width, and up to 8 rows away from
 /// it.
 ///
+/// - Oriented: the tag of a file says that its image is stored turned.
 /// - Masked: no pixel of a view counts.
 /// - Plain: nearly all grey of a view is within 4 levels of 8 bits. No other warning is given then.
 /// - Contrast, saturated: gain and offset between the views do no harm by themselves, because the matching
@@ -199,6 +209,24 @@ pub enum Warning {
 /// On a machine without memory for the search only the first three checks are made.
 #[must_use]
 pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
+    let mut out = Vec::from_iter(oriented(pair));
+    out.extend(of_pixels(pair, range));
+    out
+}
+
+/// Whether images are stored turned.
+fn oriented(pair: &Pair) -> Option<Warning> {
+    let which = match pair.orientations().map(Orientation::is_upright) {
+        [true, true] => return None,
+        [false, true] => 0,
+        [true, false] => 1,
+        [false, false] => 2,
+    };
+    Some(Warning::Oriented { which })
+}
+
+/// The other ones.
+fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let tones = [("left", Tones::of(pair.left())), ("right", Tones::of(pair.right()))];
     let masked = tones.iter().filter(|(_, tones)| tones.is_none());
     let masked: Vec<_> = masked.map(|(view, _)| Warning::Masked { view }).collect();

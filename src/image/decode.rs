@@ -8,6 +8,7 @@ use std::path::Path;
 use image::{ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, max_bytes_of, unsupported};
+use super::orientation::Orientation;
 use super::raster::{Raster, Sample, Samples};
 use super::{jpeg, pfm, tiff};
 use crate::error::{ReadError, Result};
@@ -144,13 +145,16 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(max_bytes_of(claimed));
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(coded_reason)?;
+    let mut decoder = reader.into_decoder().map_err(coded_reason)?;
     let (width, height) = decoder.dimensions();
     let plain = format == ImageFormat::Pnm;
     let per_byte = if plain { MAX_PLAIN_PIXELS_PER_BYTE } else { MAX_PIXELS_PER_BYTE };
     check_claim((width.into(), height.into()), max_pixels, per_byte, bytes.len())?;
     // The decoder holds rows and their filtered copies besides its pixels.
     let _claim = Claim::new(2 * decoder.total_bytes())?;
+    // A damaged one says nothing of the pixels.
+    let exif = decoder.exif_metadata().ok().flatten();
+    let orientation = exif.map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(&data));
     let (colour, size) = (decoder.color_type(), (width as usize, height as usize));
     let channels = usize::from(colour.channel_count());
     let samples = match usize::from(colour.bytes_per_pixel()) / channels {
@@ -158,7 +162,7 @@ fn decode_coded(bytes: &[u8], format: ImageFormat, max_pixels: u64) -> Result<Ra
         2 => filled::<u16>(decoder)?,
         _ => filled::<f32>(decoder)?,
     };
-    Ok(Raster::of(size, channels, samples))
+    Ok(Raster { orientation, ..Raster::of(size, channels, samples) })
 }
 
 /// All samples, which have this type.

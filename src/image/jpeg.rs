@@ -7,6 +7,7 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged};
+use super::orientation::Orientation;
 use super::raster::{Raster, Samples};
 use crate::error::ReadError;
 use crate::memory::{self, Claim};
@@ -39,7 +40,8 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     let _claim = Claim::new(count as u64 + BYTES_BESIDE * (size.0 * size.1) as u64)?;
     let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
-    Ok(Raster::of(size, channels, Samples::Byte(samples.into())))
+    let orientation = decoder.exif().map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(data));
+    Ok(Raster { orientation, ..Raster::of(size, channels, Samples::Byte(samples.into())) })
 }
 
 /// The error of the decoder, which prints some values in Rust's debug format.

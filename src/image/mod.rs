@@ -11,6 +11,7 @@ mod halved;
 mod jpeg;
 #[cfg(feature = "las")]
 mod las;
+mod orientation;
 pub mod pcd;
 pub mod pfm;
 pub mod picture;
@@ -22,6 +23,7 @@ mod tiff;
 pub mod write;
 
 pub use georeference::Georeference;
+pub use orientation::Orientation;
 
 use crate::error::{Error, Result};
 use std::fmt;
@@ -309,6 +311,7 @@ pub struct Pair {
     left: Arc<Image>,
     right: Arc<Image>,
     georeferences: [Option<Georeference>; 2],
+    orientations: [Orientation; 2],
     full: Option<Box<Pair>>,
 }
 
@@ -332,7 +335,13 @@ impl Pair {
     }
 
     fn without_georeference(left: Image, right: Image) -> Self {
-        Self { left: Arc::new(left), right: Arc::new(right), georeferences: [None, None], full: None }
+        Self {
+            left: Arc::new(left),
+            right: Arc::new(right),
+            georeferences: [None, None],
+            orientations: [Orientation::UPRIGHT; 2],
+            full: None,
+        }
     }
 
     /// The georeferences of the left and the right image, where they are from TIFF files that have one; maps have the pixels
@@ -340,6 +349,13 @@ impl Pair {
     #[must_use]
     pub fn georeferences(&self) -> [Option<Georeference>; 2] {
         self.georeferences.clone()
+    }
+
+    /// How the left and the right image are turned by the tags of their files: upright where [`read::Reader::orient`] has turned them.
+    /// Parts and mirror images of a pair count as upright.
+    #[must_use]
+    pub fn orientations(&self) -> [Orientation; 2] {
+        self.orientations
     }
 
     /// The reference view.

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::fmt::Display;
 
 use super::georeference::Georeference;
+use super::orientation::Orientation;
 use super::{Image, Pair, Pixel, Plane, Rect, grey};
 use crate::error::{Error, MemoryError, Purpose, Result};
 use crate::memory;
@@ -46,6 +47,8 @@ pub struct Raster<'a> {
     pub(super) no_data: Option<Vec<bool>>,
     /// Where its file says that it lies.
     pub(super) georeference: Option<Georeference>,
+    /// How its file says that it is turned.
+    pub(super) orientation: Orientation,
 }
 
 /// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
@@ -138,7 +141,8 @@ impl<'a> Raster<'a> {
 
     /// As [`Raster::new`], of samples that are known to fit.
     pub(super) fn of((width, height): (usize, usize), channels: usize, samples: Samples<'a>) -> Self {
-        Self { width, height, channels, samples, no_data: None, georeference: None }
+        let orientation = Orientation::UPRIGHT;
+        Self { width, height, channels, samples, no_data: None, georeference: None, orientation }
     }
 
     /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.
@@ -203,6 +207,32 @@ impl<'a> Raster<'a> {
         let samples = of_any!(&self.samples, v => Sample::samples(rows(v, of, part, n)?.into()));
         let no_data = self.no_data.as_ref().map(|marked| rows(marked, of, part, 1)).transpose()?;
         Ok(Raster { no_data, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
+    }
+
+    /// The image as it is seen, where its file says that it is stored turned; then without its georeference.
+    pub(super) fn upright(self) -> Result<Self, MemoryError> {
+        fn turned<S: Copy>(
+            values: &[S],
+            each: usize,
+            by: Orientation,
+            (width, height): (usize, usize),
+        ) -> Result<Vec<S>, MemoryError> {
+            let row = if by.is_sideways() { height } else { width };
+            let mut out = memory::reserved(values.len())?;
+            for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+                let (u, v) = by.stored((x, y), (width, height));
+                out.extend_from_slice(&values[(v * row + u) * each..][..each]);
+            }
+            Ok(out)
+        }
+        let (by, n) = (self.orientation, self.channels);
+        if by.is_upright() {
+            return Ok(self);
+        }
+        let size = if by.is_sideways() { (self.height, self.width) } else { self.size() };
+        let samples = of_any!(&self.samples, v => Sample::samples(turned(v, n, by, size)?.into()));
+        let no_data = self.no_data.as_ref().map(|marked| turned(marked, 1, by, size)).transpose()?;
+        Ok(Self { no_data, ..Self::of(size, n, samples) })
     }
 
     /// `f` applied to the grey or colour samples of each pixel.
@@ -305,9 +335,10 @@ pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Disp
     let scale = Scale::of(images, &masks);
     let [in_left, in_right] = masks;
     let georeferences = [&left, &right].map(|raster| raster.georeference.clone());
+    let orientations = [left.orientation, right.orientation];
     let l = scale.apply(&left, in_left);
     drop(left);
-    Ok(Pair { georeferences, ..Pair::new(l, scale.apply(&right, in_right))? })
+    Ok(Pair { georeferences, orientations, ..Pair::new(l, scale.apply(&right, in_right))? })
 }
 
 /// The conversion from samples to levels, the same for both images of a pair.

@@ -25,12 +25,15 @@ pub struct Reader {
     /// it: 0 to 255 for 8 bits, an index into the palette in TIFF. A pixel is masked where all of its samples
     /// have this value. `None`: the value that a TIFF file declares itself.
     pub no_data: Option<f64>,
+    /// Whether images and masks are turned upright that are stored turned, as the tag `Orientation` of EXIF or TIFF says. Those that
+    /// are turned have no georeference.
+    pub orient: bool,
 }
 
 impl Default for Reader {
-    /// [`MAX_PIXELS`], and the no-data value that a file declares itself.
+    /// [`MAX_PIXELS`], the no-data value that a file declares itself, and pixels as they are stored.
     fn default() -> Self {
-        Self { max_pixels: MAX_PIXELS, no_data: None }
+        Self { max_pixels: MAX_PIXELS, no_data: None, orient: false }
     }
 }
 
@@ -51,14 +54,14 @@ impl Reader {
     /// all 8-bit levels, 9 to 15 bits become words, and PNM counts up to its declared white. YCbCr and CMYK
     /// (JPEG, TIFF) become RGB, images whose white is 0 are inverted, and colours premultiplied by alpha are
     /// divided by it. Rows, planes and tiles are put in order. A TIFF file with several images is read from
-    /// the first one that is no reduced copy and no mask. Pixels are taken as they are stored: an orientation
-    /// tag is ignored, because a pair is rectified as it is stored. The tags of GeoTIFF come along
-    /// ([`Pair::georeferences`]), unless one of them is damaged.
+    /// the first one that is no reduced copy and no mask. Pixels are taken as they are stored, because a pair is
+    /// rectified as it is stored; an orientation tag counts with [`Reader::orient`] alone. The tags of GeoTIFF
+    /// come along ([`Pair::georeferences`]), unless one of them is damaged.
     ///
     /// A pixel is masked where its alpha is 0 (which includes a transparent palette entry), where one of its
     /// values is not finite, and where all of its samples stand for no data ([`Reader::no_data`]). Any other
     /// alpha is ignored. Negative values are ordinary values. `mask` is an image of the size of the left one;
-    /// where it is not black, the left image is masked as well. A masked pixel holds zeros.
+    /// where it is not black, the left image, after it was turned, is masked as well. A masked pixel holds zeros.
     ///
     /// # Errors
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
@@ -80,12 +83,20 @@ impl Reader {
         raster::joined([first, second], [left, right].map(Path::display))
     }
 
-    /// Reads one image, as it is stored: one view, or both beside each other. [`Pair::of_frames`] makes a pair of two.
+    /// Reads one image, as it is stored or upright: one view, or both beside each other. [`Pair::of_frames`] makes a pair of two.
     ///
     /// # Errors
     /// [`Error::Read`], as [`Reader::pair`].
     pub fn raster(self, path: &Path) -> Result<Raster<'static>> {
-        self.with_kind(path).map(|(_, raster)| raster)
+        self.oriented(self.with_kind(path)?.1, path)
+    }
+
+    /// Upright where the images are to be.
+    fn oriented<'a>(self, raster: Raster<'a>, path: &Path) -> Result<Raster<'a>> {
+        if !self.orient {
+            return Ok(raster);
+        }
+        raster.upright().map_err(|cause| Error::read(path, cause))
     }
 
     /// As [`Reader::raster`], of masks and levels, where no value stands for no data.
@@ -99,7 +110,9 @@ impl Reader {
     /// Those of [`Reader::pair`].
     pub fn pair_in_memory(self, left: (&Path, &[u8]), right: (&Path, &[u8])) -> Result<Pair> {
         let image = |(name, bytes): (&Path, &[u8])| {
-            decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))
+            let raster =
+                decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
+            self.oriented(raster, name)
         };
         raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display))
     }

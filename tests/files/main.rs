@@ -7,7 +7,8 @@ mod files;
 mod geotiffs;
 mod tiffs;
 
-use files::{Png, exif_orientation, jpeg};
+use files::{Png, exif_orientation, jpeg, tiff, tiff_data};
+use mrfgs::image::read::Reader;
 use mrfgs::image::{Image, Pair};
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -154,6 +155,49 @@ fn exif_orientation_turns_nothing() {
     assert_ne!(plain, noted);
     assert_eq!((left(&noted).width(), left(&noted)), (3, left(&plain)));
     assert_eq!(left(&jpeg(&[9], None, Some(&turned))), left(&jpeg(&[9], None, None)));
+}
+
+/// Where the reader turns images upright, it does so by the tags of all formats, with what they mask.
+#[test]
+fn a_reader_may_turn_images_upright() {
+    let upright = |bytes: &[u8]| {
+        let (_folder, path) = file(bytes);
+        Reader { orient: true, no_data: Some(3.0), ..Reader::default() }.pair(&path, &path, None).unwrap()
+    };
+    let greys = |pair: &Pair| {
+        let image = pair.left();
+        let pixels = image.pixels.data().iter().zip(image.masked.data());
+        pixels.map(|(pixel, masked)| (!masked).then_some(pixel[3] >> 8)).collect::<Vec<_>>()
+    };
+    // The third pixel holds no data; the first one is seen at the top, at the right, ...
+    for (tag, size, expected) in [
+        (1, (3, 1), [Some(1), Some(2), None]),
+        (2, (3, 1), [None, Some(2), Some(1)]),
+        (3, (3, 1), [None, Some(2), Some(1)]),
+        (6, (1, 3), [Some(1), Some(2), None]),
+        (8, (1, 3), [None, Some(2), Some(1)]),
+        (77, (3, 1), [Some(1), Some(2), None]),
+    ] {
+        let exif = exif_orientation(tag);
+        let png = Png { size: (3, 1), rows: &[0, 1, 2, 3], chunks: &[(*b"eXIf", &exif)], ..GREY }.bytes();
+        let tags =
+            [(256, 4, 1, 3), (257, 4, 1, 1), (258, 3, 1, 8), (262, 3, 1, 1), (274, 3, 1, u32::from(tag))];
+        let strip = [(273, 4, 1, tiff_data(8)), (277, 3, 1, 1), (279, 4, 1, 3)];
+        let tiff = tiff(&[&tags[..], &strip].concat(), &[1, 2, 3]);
+        for bytes in [png, tiff] {
+            let pair = upright(&bytes);
+            assert_eq!((pair.size(), greys(&pair)), (size, expected.to_vec()), "{tag}");
+            assert!(pair.orientations().iter().all(|orientation| orientation.is_upright()));
+        }
+    }
+    // The pixels of this one are all the same; the mark of its pair tells.
+    let (_folder, path) = file(&jpeg(&[9], None, Some(&exif_orientation(6))));
+    let stored = Pair::open(&path, &path).unwrap().orientations();
+    assert!(stored.iter().all(|orientation| !orientation.is_upright()));
+    let (_folder, path) = file(&jpeg(&[9], None, Some(b"Exif without a head")));
+    assert!(
+        Pair::open(&path, &path).unwrap().orientations().iter().all(|orientation| orientation.is_upright())
+    );
 }
 
 /// NaN and the infinities are masked. Of the other values the smallest becomes black and the largest white,

@@ -18,10 +18,14 @@ pub(crate) struct ReadingArgs {
         value_parser = clap::value_parser!(u64).range(1..)
     )]
     pub(crate) max_pixels: u64,
+    /// Turns images and masks upright that are stored turned, as the orientation tag of EXIF or TIFF says.
+    /// Otherwise pixels are taken as they are stored, and a line says so
+    #[arg(long)]
+    pub(crate) orient: bool,
 }
 
 impl ReadingArgs {
     pub(crate) fn reader(&self) -> Reader {
-        Reader { max_pixels: self.max_pixels, no_data: self.no_data }
+        Reader { max_pixels: self.max_pixels, no_data: self.no_data, orient: self.orient }
     }
 }

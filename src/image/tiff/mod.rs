@@ -1,7 +1,7 @@
 //! TIFF files: selects one image of a file, and converts its samples to levels; writes maps.
 //!
 //! Tags are those of TIFF 6.0 and its technical notes, and GDAL's tag for no data. A tag that changes the
-//! meaning of the samples is either supported or rejected. Orientation, resolution, colour profiles and
+//! meaning of the samples is either supported or rejected. Resolution, colour profiles and
 //! response curves are ignored, as everywhere in [`Reader::pair`](super::read::Reader::pair).
 
 mod chunks;
@@ -21,6 +21,7 @@ use self::chunks::Packing;
 use self::colours::Colours;
 use self::directory::Directory;
 use super::file::{MAX_PIXELS_PER_BYTE, check_claim, damaged, unsupported};
+use super::orientation::Orientation;
 use super::raster::{Raster, Sample, Samples, holding};
 use crate::error::ReadError;
 use crate::memory;
@@ -71,7 +72,14 @@ pub(super) fn decode(
     let no_data = no_data.map(|value| holding(&samples, layout.read, colours.stored(), value)).transpose()?;
     let (channels, samples) = colours.levels(samples)?;
     let georeference = geo::georeference(&directory);
-    Ok(Raster { no_data, georeference, ..Raster::of((layout.width, layout.height), channels, samples) })
+    // A damaged tag says nothing of the pixels.
+    let orientation = Orientation::of_tag(directory.first(Tag::Orientation, 1).unwrap_or(1));
+    Ok(Raster {
+        no_data,
+        georeference,
+        orientation,
+        ..Raster::of((layout.width, layout.height), channels, samples)
+    })
 }
 
 /// The no-data value that GDAL's tag declares.
