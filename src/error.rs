@@ -63,6 +63,9 @@ pub enum Error {
     /// A calibration lacks what depth needs, or makes no sense.
     #[error("the calibration {0}")]
     Calibration(String),
+    /// The pair cannot be rectified by its own matches.
+    #[error("the pair cannot be rectified by its matches: {0}")]
+    Rectification(#[from] RectificationError),
     /// Images, masks or maps that belong together do not fit each other.
     #[error("{0}")]
     Mismatch(String),
@@ -288,6 +291,28 @@ pub enum RangeError {
     /// No range was given, and the sparse matches are too few to find it.
     #[error("the views have too few matches to find the range of disparities")]
     NotFound,
+}
+
+/// Why a pair cannot be rectified by its own matches.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RectificationError {
+    /// Too few matches agree on how the cameras stood.
+    #[error("{agreeing} of {matches} agree on how the camera moved, and {least} are needed, and half of all")]
+    Few {
+        /// Matches that agree.
+        agreeing: usize,
+        /// All matches.
+        matches: usize,
+        /// Fewest that are needed.
+        least: usize,
+    },
+    /// One plane explains all matches, or a turn of the camera on the spot.
+    #[error("they show no depth, but one flat surface, or a camera that turned on the spot")]
+    Flat,
+    /// The camera moved forward or backward.
+    #[error("the camera moved towards what it shows, or away from it, and not to the side")]
+    Forward,
 }
 
 /// What is wrong with an [`Execution`](crate::options::Execution).

@@ -5,7 +5,7 @@
 
 use crate::error::{
     BudgetError, DeviceError, Error, ExecutionError, MemoryError, OptionError, Purpose, RangeError,
-    ReadError,
+    ReadError, RectificationError,
 };
 use crate::front::check::Warning;
 
@@ -46,6 +46,8 @@ pub struct Words {
     pub truth_scale: Option<&'static str>,
     /// The value that stands for no data.
     pub no_data: Option<&'static str>,
+    /// The calibration that rectifies a pair.
+    pub calibration: &'static str,
     /// What turns images upright.
     pub orient: Option<&'static str>,
 }
@@ -70,6 +72,7 @@ impl Words {
         max_pixels: None,
         truth_scale: None,
         no_data: None,
+        calibration: "a calibration",
         orient: None,
     };
 }
@@ -83,6 +86,7 @@ pub fn error(error: &Error, words: &Words) -> String {
         Error::Range(cause) => words.range(cause),
         Error::Execution(cause) => words.execution(cause),
         Error::Budget(cause) => words.budget(cause),
+        Error::Rectification(cause) => format!("{error}: {}", words.rectification(cause)),
         Error::Read { cause, .. } => format!("{error}{}", words.reading(cause)),
         Error::Device(cause) => format!("{error}{}", words.device(cause)),
         Error::Memory(cause) => format!("{error}{}", words.memory(cause)),
@@ -163,6 +167,19 @@ impl Words {
                 format!("{steps}{cause}; give {memory} {needed}{unit}")
             }
         }
+    }
+
+    fn rectification(&self, cause: &RectificationError) -> String {
+        let first = match cause {
+            RectificationError::Few { .. } => {
+                "check that both images show one scene from places near each other"
+            }
+            RectificationError::Flat => {
+                "step to the side between the photographs, and show things at different distances"
+            }
+            RectificationError::Forward => "step to the side between the photographs",
+        };
+        format!("{first}, or give {}", self.calibration)
     }
 
     fn reading(&self, cause: &ReadError) -> String {

@@ -150,7 +150,7 @@ pub enum Warning {
     /// Matches do not lie on the same row.
     #[error(
         "the pair is not rectified: matches lie {:.1} px above or below their row: rectify it first, by the calibration \
-         of the cameras",
+         of the cameras or by its own matches",
         f64::from(*offset) / f64::from(FRACTION)
     )]
     NotRectified {

@@ -7,6 +7,7 @@ mod filter;
 pub mod illumination;
 pub mod label_range;
 pub mod matches;
+mod unrectified;
 pub mod zones;
 
 use crate::error::{Error, Purpose, Result};

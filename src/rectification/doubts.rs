@@ -1,11 +1,11 @@
-//! What is probably wrong with a calibration.
+//! What is probably wrong with a rectification.
 
 use crate::calibration::cameras::Views;
 use crate::calibration::lens::Lens;
 
 use super::views::seen;
 
-/// A probable mistake in a calibration. It displays as one line with the cause and the remedy.
+/// A probable mistake in a calibration, or a weakness of matches that take its place. It displays as one line with the cause and the remedy.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Doubt {
@@ -39,6 +39,40 @@ pub enum Doubt {
         at: [i64; 2],
         /// Width and height of the views.
         size: (usize, usize),
+    },
+    /// Matches alone, many of which do not agree.
+    #[error(
+        "only {percent} % of the matches agree, so the rectification may be wrong: check it, or calibrate the cameras"
+    )]
+    FewAgree {
+        /// Matches that agree, in percent of all.
+        percent: u32,
+    },
+    /// Matches alone, whose rows stay apart.
+    #[error(
+        "rows are up to {pixels:.1} px apart: the lens may bend lines, or both images were not taken with one zoom: calibrate the \
+         cameras for better maps"
+    )]
+    RowsApart {
+        /// The 95th percentile, in pixels.
+        pixels: f64,
+    },
+    /// Matches alone, in a small part of the image.
+    #[error(
+        "the matches are in {percent} % of the image, and elsewhere rows may be apart: check that the images overlap"
+    )]
+    Coverage {
+        /// Parts of the image that have some, in percent of all.
+        percent: u32,
+    },
+    /// Matches alone, nearly all of which one plane explains.
+    #[error(
+        "all but {percent} % of the matches lie on one flat surface, which says little of how the camera moved: show things at \
+         different distances"
+    )]
+    NearlyFlat {
+        /// The others, in percent of all.
+        percent: u32,
     },
 }
 

@@ -1,4 +1,4 @@
-//! Rectified pairs from images as the cameras took them.
+//! Rectified pairs from images as the cameras took them: by a calibration, or by matches of the pair alone.
 //!
 //! The rectified views are those of Bouguet's method, as OpenCV's `stereoRectify` chooses them. The place in the image that each
 //! of their pixels shows is computed in double precision, with the same bits on every platform, and rounded to 1/256 px;
@@ -22,12 +22,18 @@
 //! ```
 
 mod doubts;
+mod from_matches;
+mod least_squares;
 mod options;
 mod sampling;
+mod trust;
+mod two_views;
 mod views;
 
 pub use doubts::Doubt;
 pub use options::Options;
+pub use trust::Trust;
+pub use two_views::Correspondence;
 
 use crate::calibration::cameras::{StereoCalibration, Views};
 use crate::calibration::lens::Lens;
@@ -49,6 +55,8 @@ pub struct Rectification {
     sizes: [(usize, usize); 2],
     unit: Unit,
     doubts: Vec<Doubt>,
+    /// Where it comes from matches alone, without a scale.
+    trust: Option<Trust>,
     /// Where the pixels of both rectified views come from, row by row, where they are [kept](Self::keep_places).
     places: Option<[Vec<Place>; 2]>,
 }
@@ -94,11 +102,21 @@ impl Rectification {
         if calibration.views.is_some() && options.alpha.is_none() {
             doubts.extend(doubts::of_views(&lenses, &views, size));
         }
+        Self::of_views(lenses, views, size, calibration.unit, doubts)
+    }
+
+    /// That by `views`, turned where need be.
+    fn of_views(
+        lenses: [Lens; 2],
+        views: Views,
+        size: (usize, usize),
+        unit: Unit,
+        doubts: Vec<Doubt>,
+    ) -> Result<Self> {
         let (views, rectified) = turned(views, views.size.unwrap_or(size));
         // Says where the right camera is on the left.
-        views.calibration(None, calibration.unit)?;
-        let unit = calibration.unit;
-        let found = Self { lenses, views, sizes: [size, rectified], unit, doubts, places: None };
+        views.calibration(None, unit)?;
+        let found = Self { lenses, views, sizes: [size, rectified], unit, doubts, trust: None, places: None };
         found.check_shown().map(|()| found)
     }
 
@@ -125,7 +143,7 @@ impl Rectification {
         Ok(())
     }
 
-    /// What is probably wrong with the calibration.
+    /// What is probably wrong with the calibration, or with the matches.
     #[must_use]
     pub fn doubts(&self) -> &[Doubt] {
         &self.doubts
@@ -222,8 +240,13 @@ impl Rectification {
     /// The calibration of the rectified pair.
     ///
     /// # Errors
-    /// None: where [`Views::calibration`] has one, [`Rectification::new`] had it before.
+    /// [`Error::Calibration`] where the pair was rectified by [matches alone](Self::of_matches), which show no scale.
     pub fn calibration(&self) -> Result<Calibration> {
+        if self.trust.is_some() {
+            return Err(Error::Calibration(
+                "is unknown, since the pair was rectified by its own matches, which show no scale".into(),
+            ));
+        }
         self.views.calibration(Some(self.size()), self.unit)
     }
 

@@ -1,0 +1,327 @@
+//! How the two views of one camera stood to each other, from matches alone.
+//!
+//! Both views are pinholes of one unknown focal length, with the principal point in the middle: Fusiello and Irsara, *Quasi-Euclidean
+//! Uncalibrated Rectification of Images* (2008). What they stand like is found by random samples (RANSAC, Fischler and Bolles 1981,
+//! with the truncated error of Torr and Zisserman's MSAC, 2000), and then by least squares of Sampson's distance over all matches, each
+//! weighted by Geman and McClure.
+//!
+//! The samples are the same in every run, sums are in a fixed order, and only + - * / and square roots and `libm` are used: the same
+//! bits on every machine, with any number of threads.
+
+use rayon::prelude::*;
+
+use super::least_squares::solved;
+use crate::calibration::cameras::Pose;
+use crate::calibration::lens::{Distortion, Lens};
+use crate::calibration::matrix::{
+    IDENTITY, Matrix, cross, dot, length, product, rotated, rotation, rotation_vector, scaled, transposed,
+};
+use crate::error::Result;
+
+/// A point of the scene in both images: x and y in the left one and in the right one, in pixels.
+pub type Correspondence = [[f64; 2]; 2];
+
+/// Number of random samples from each start.
+const SAMPLES: u64 = 400;
+/// Matches of a sample: one more than the geometry has unknowns, where the focal length is that of the start.
+const SAMPLE: usize = 6;
+/// Steps of least squares on a sample, and on all matches.
+const STEPS: [usize; 2] = [6, 30];
+/// The focal length that is assumed at the start, in longer sides of the image (open). Phones have .7 to .8, other cameras up to 1.5.
+const FOCAL_LENGTH: f64 = 1.0;
+/// What is unusual costs as much as if each match were so far off, in tolerances (open). Matches say little of the focal length, and of
+/// turns of both views about an axis across the way, where disparities are nearly the same or a lens bends lines; of all else they say
+/// so much that this does not count.
+const COST: f64 = 0.1;
+/// So unusual are a focal length of e times that assumed, a turn by so many radians, and a way that goes so far forward of 1 (open).
+const UNUSUAL: [f64; 3] = [1.0, 0.1, 0.2];
+
+/// Two views of one camera.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TwoViews {
+    /// From the frame of the left view to that of the right one.
+    rotation: Matrix,
+    /// Where the left view is in the frame of the right one: a unit vector.
+    direction: [f64; 3],
+    /// In pixels.
+    focal_length: f64,
+    size: (usize, usize),
+}
+
+/// The unknowns of [`TwoViews::moved`]: three of the rotation, two of the direction, the focal length.
+const UNKNOWNS: usize = 6;
+
+impl TwoViews {
+    /// Distance of a match from its epipolar line, in pixels, up to which it agrees: what matches in images of this size are exact to,
+    /// and what the lens of a phone distorts.
+    pub(super) fn tolerance((width, height): (usize, usize)) -> f64 {
+        const LEAST: f64 = 1.5;
+        const PARTS: f64 = 800.0;
+        (width.max(height) as f64 / PARTS).max(LEAST)
+    }
+
+    /// How the views of `size` stand by most of the `matches`; `None` of fewer than a sample.
+    pub(super) fn of(matches: &[Correspondence], size: (usize, usize)) -> Option<Self> {
+        if matches.len() < SAMPLE {
+            return None;
+        }
+        let tolerance = Self::tolerance(size);
+        // To the side, one above the other, and forward, which is no pair, but must not pass for one.
+        let starts = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+        let sampled = |i: u64| {
+            let few = sample(matches.len(), i % SAMPLES).map(|i| matches[i]);
+            let direction = starts[(i / SAMPLES) as usize];
+            Self { direction, ..Self::start(size) }.fitted(&few, STEPS[0], None)
+        };
+        let all: Vec<Self> = (0..starts.len() as u64 * SAMPLES).into_par_iter().map(sampled).collect();
+        let errors: Vec<f64> =
+            all.par_iter().map(|views| views.truncated_error(matches, tolerance)).collect();
+        let best = errors.iter().zip(&all).min_by(|a, b| a.0.total_cmp(b.0))?.1;
+        // Twice, because the matches that agree with a sample are not yet all.
+        let found = best.fitted(matches, STEPS[1], Some(tolerance));
+        Some(found.fitted(matches, STEPS[1], Some(tolerance / 2.0)))
+    }
+
+    /// What is assumed before any match is known: a step to the right, without a turn.
+    pub(super) fn start(size: (usize, usize)) -> Self {
+        Self { rotation: IDENTITY, direction: [-1.0, 0.0, 0.0], focal_length: Self::assumed(size), size }
+    }
+
+    fn assumed((width, height): (usize, usize)) -> f64 {
+        FOCAL_LENGTH * width.max(height) as f64
+    }
+
+    /// The ray of a pixel, in the frame of its view.
+    fn ray(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        let [cx, cy] = self.principal_point();
+        [(x - cx) / self.focal_length, (y - cy) / self.focal_length, 1.0]
+    }
+
+    /// The middle of both images, in pixels.
+    fn principal_point(&self) -> [f64; 2] {
+        [self.size.0, self.size.1].map(|side| (side as f64 - 1.0) / 2.0)
+    }
+
+    /// The lens of both views.
+    pub(super) fn lens(&self) -> Result<Lens> {
+        Lens::new([self.focal_length; 2], self.principal_point(), Distortion::NONE)
+    }
+
+    /// E: the rays p and q of a match have q E p = 0.
+    fn essential(&self) -> Matrix {
+        let [x, y, z] = self.direction;
+        product(&[[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]], &self.rotation)
+    }
+
+    /// How far apart the rows of a match are after rectification, about: Sampson's distance, of both points together, in pixels.
+    pub(super) fn distance(&self, of: &Correspondence) -> f64 {
+        self.distance_by(&self.essential(), of)
+    }
+
+    fn distance_by(&self, essential: &Matrix, [left, right]: &Correspondence) -> f64 {
+        let (p, q) = (self.ray(*left), self.ray(*right));
+        let (in_right, in_left) = (rotated(essential, p), rotated(&transposed(essential), q));
+        let squares = [in_right[0], in_right[1], in_left[0], in_left[1]].map(|v| v * v);
+        let norm = squares.iter().sum::<f64>() / 2.0;
+        if norm > 0.0 { self.focal_length * dot(q, in_right) / norm.sqrt() } else { 0.0 }
+    }
+
+    /// The sum of the squared distances of `matches`, each as if it were at most `tolerance`.
+    fn truncated_error(&self, matches: &[Correspondence], tolerance: f64) -> f64 {
+        let essential = self.essential();
+        let most = tolerance * tolerance;
+        matches
+            .iter()
+            .map(|of| {
+                let distance = self.distance_by(&essential, of);
+                // NaN counts as far.
+                let square = distance * distance;
+                if square < most { square } else { most }
+            })
+            .sum()
+    }
+
+    /// How unusual the views are: the focal length, the turn about each axis, and the way forward.
+    fn unusual(&self) -> [f64; 5] {
+        let [focal_length, turn, forward] = UNUSUAL;
+        let by = rotation_vector(&self.rotation);
+        let [_, _, z] = rotated(&rotation(scaled(by, -0.5)), self.direction);
+        let zoom = libm::log(self.focal_length / Self::assumed(self.size));
+        [zoom / focal_length, by[0] / turn, by[1] / turn, by[2] / turn, z / forward]
+    }
+
+    /// The views after a small change of each unknown.
+    fn moved(&self, by: [f64; UNKNOWNS]) -> Self {
+        let [x, y, z, a, b, zoom] = by;
+        // Two directions across that in which the left view is.
+        let smallest = (0..3).min_by(|&i, &j| self.direction[i].abs().total_cmp(&self.direction[j].abs()));
+        let across = cross(self.direction, IDENTITY[smallest.unwrap_or(0)]);
+        let across = scaled(across, 1.0 / length(across));
+        let other = cross(self.direction, across);
+        let direction: [f64; 3] = std::array::from_fn(|i| self.direction[i] + a * across[i] + b * other[i]);
+        Self {
+            rotation: product(&rotation([x, y, z]), &self.rotation),
+            direction: scaled(direction, 1.0 / length(direction)),
+            focal_length: self.focal_length * libm::exp(zoom),
+            size: self.size,
+        }
+    }
+
+    /// The views nearest to these that bring the rows of `matches` together, by the steps of Levenberg and Marquardt. With a `scale`, in
+    /// pixels, matches that are farther off count less and less, and the focal length changes too; without one it stays.
+    fn fitted(self, matches: &[Correspondence], steps: usize, scale: Option<f64>) -> Self {
+        const STEP: f64 = 1e-6;
+        // Of all that is unusual together.
+        let each = scale.map_or(0.0, |scale| COST * scale * COST * scale * matches.len() as f64);
+        let cost = |views: &Self| {
+            let essential = views.essential();
+            let of_matches: f64 = matches
+                .iter()
+                .map(|of| {
+                    let distance = views.distance_by(&essential, of);
+                    let square = distance * distance;
+                    scale.map_or(square, |scale| square / (1.0 + square / (scale * scale)))
+                })
+                .sum();
+            of_matches + each * views.unusual().iter().map(|v| v * v).sum::<f64>()
+        };
+        let (mut views, mut damping) = (self, 1e-3);
+        let mut least = cost(&views);
+        for _ in 0..steps {
+            let essential = views.essential();
+            let changed: [(Self, Matrix); UNKNOWNS] = std::array::from_fn(|i| {
+                let changed = views.moved(std::array::from_fn(|j| if i == j { STEP } else { 0.0 }));
+                (changed, changed.essential())
+            });
+            let (mut normal, mut right) = ([[0.0; UNKNOWNS]; UNKNOWNS], [0.0; UNKNOWNS]);
+            let mut add = |value: f64, changed: [f64; UNKNOWNS], weight: f64| {
+                let slopes = changed.map(|changed| (changed - value) / STEP);
+                for (i, slope) in slopes.iter().enumerate() {
+                    right[i] -= weight * slope * value;
+                    normal[i].iter_mut().zip(&slopes).for_each(|(sum, other)| *sum += weight * slope * other);
+                }
+            };
+            for of in matches {
+                let distance = views.distance_by(&essential, of);
+                let weight = scale.map_or(1.0, |scale| {
+                    let root = 1.0 / (1.0 + distance * distance / (scale * scale));
+                    root * root
+                });
+                let changed = changed.each_ref().map(|(views, essential)| views.distance_by(essential, of));
+                add(distance, changed, weight);
+            }
+            if scale.is_some() {
+                let unusual = changed.each_ref().map(|(views, _)| views.unusual());
+                for (i, value) in views.unusual().into_iter().enumerate() {
+                    add(value, unusual.map(|unusual| unusual[i]), each);
+                }
+            } else {
+                let zoom = UNKNOWNS - 1;
+                normal[zoom] = [0.0; UNKNOWNS];
+                normal.iter_mut().for_each(|row| row[zoom] = 0.0);
+                (normal[zoom][zoom], right[zoom]) = (1.0, 0.0);
+            }
+            let mut damped = normal;
+            (0..UNKNOWNS).for_each(|i| damped[i][i] += damping * (normal[i][i] + f64::MIN_POSITIVE));
+            let next = solved(damped, right).map(|by| views.moved(by));
+            match next.map(|next| (cost(&next), next)).filter(|(cost, _)| *cost < least) {
+                Some((cost, next)) => {
+                    (least, views) = (cost, next);
+                    damping *= 0.1;
+                }
+                None => damping *= 10.0,
+            }
+        }
+        views
+    }
+
+    /// How the right view stands to the left one, with a baseline of 1. Matches do not say on which side it is where the angle between
+    /// the views is not known well: it is to the right, as the user says. Where one view is above the other, most matches decide, which
+    /// must lie in front of both.
+    pub(super) fn pose(&self, matches: &[Correspondence]) -> Pose {
+        let half = rotation(scaled(rotation_vector(&self.rotation), -0.5));
+        let [x, y, _] = rotated(&half, self.direction);
+        let backwards = if x.abs() > y.abs() { x > 0.0 } else { self.votes_behind(matches) };
+        let sign = if backwards { -1.0 } else { 1.0 };
+        Pose { rotation: self.rotation, translation: scaled(self.direction, sign) }
+    }
+
+    /// Whether most matches are behind a view.
+    fn votes_behind(&self, matches: &[Correspondence]) -> bool {
+        let behind = matches.iter().filter(|[left, right]| {
+            // a p + t = b q, with p turned into the frame of the right view.
+            let (p, q) = (rotated(&self.rotation, self.ray(*left)), self.ray(*right));
+            let normal = cross(q, p);
+            dot(cross(q, self.direction), normal) > 0.0
+        });
+        2 * behind.count() > matches.len()
+    }
+
+    /// Whether the camera moved forward or backward: an image shows where the other one was taken from, or the way is more forward than to
+    /// a side.
+    pub(super) fn is_forward(&self) -> bool {
+        let half = rotation(scaled(rotation_vector(&self.rotation), -0.5));
+        let [x, y, z] = rotated(&half, self.direction).map(f64::abs);
+        let other = rotated(&transposed(&self.rotation), self.direction);
+        let [width, height] = [self.size.0, self.size.1].map(|side| side as f64 / self.focal_length / 2.0);
+        let shown = |[x, y, z]: [f64; 3]| x.abs() < width * z.abs() && y.abs() < height * z.abs();
+        z > x.max(y) || shown(self.direction) || shown(other)
+    }
+
+    /// The share of `matches` that no one plane explains, nor a mere turn of the camera: what is farther than the tolerance from where the
+    /// homography of most of them has it.
+    pub(super) fn share_off_one_plane(&self, matches: &[Correspondence]) -> f64 {
+        const ROUNDS: usize = 20;
+        let tolerance = Self::tolerance(self.size);
+        let rays: Vec<_> = matches.iter().map(|[left, right]| (self.ray(*left), self.ray(*right))).collect();
+        let mut plane = IDENTITY;
+        let apart = |plane: &Matrix, p: [f64; 3], q: [f64; 3]| {
+            let [x, y, z] = rotated(plane, p);
+            let (dx, dy) = (x / z - q[0], y / z - q[1]);
+            self.focal_length * (dx * dx + dy * dy).sqrt()
+        };
+        for round in 0..ROUNDS {
+            let (mut normal, mut right) = ([[0.0; 8]; 8], [0.0; 8]);
+            for &(p, q) in &rays {
+                let relative = apart(&plane, p, q) / tolerance;
+                let root = if round == 0 { 1.0 } else { 1.0 / (1.0 + relative * relative) };
+                let ([x, y, _], [u, v, _]) = (p, q);
+                for (row, goal) in [
+                    ([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u),
+                    ([0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y], v),
+                ] {
+                    for i in 0..8 {
+                        right[i] += root * root * row[i] * goal;
+                        (0..8).for_each(|j| normal[i][j] += root * root * row[i] * row[j]);
+                    }
+                }
+            }
+            let Some([a, b, c, d, e, f, g, h]) = solved(normal, right) else { return 0.0 };
+            plane = [[a, b, c], [d, e, f], [g, h, 1.0]];
+        }
+        let off = rays.iter().filter(|(p, q)| apart(&plane, *p, *q) > tolerance);
+        off.count() as f64 / matches.len().max(1) as f64
+    }
+}
+
+/// Some of `count` indices, all different.
+fn sample(count: usize, seed: u64) -> [usize; SAMPLE] {
+    // The generator SplitMix64.
+    let mut state = seed.wrapping_mul(0xd1b5_4a32_d192_ed03);
+    let mut next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (state ^ state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ mixed >> 31) % count as u64) as usize
+    };
+    let mut out = [usize::MAX; SAMPLE];
+    for i in 0..SAMPLE {
+        out[i] = loop {
+            let index = next();
+            if !out[..i].contains(&index) {
+                break index;
+            }
+        };
+    }
+    out
+}
