@@ -65,10 +65,11 @@ fn coarse(pair: &Pair) -> Result<Vec<Correspondence>> {
         let by = Rectification::turning_right(pair.size(), turn.to_radians())?;
         let found = search(pair, &by, None, CORNERS[0], rows)?;
         match Rectification::roughly(&found, pair.size()) {
-            Err(Error::Rectification(RectificationError::Few { .. })) if found.len() > most.len() => {
-                most = found
+            Err(Error::Rectification(RectificationError::Few { .. })) => {
+                if found.len() > most.len() {
+                    most = found;
+                }
             }
-            Err(Error::Rectification(RectificationError::Few { .. })) => {}
             _ => return Ok(found),
         }
     }

@@ -91,7 +91,7 @@ impl Rectification {
         let lens = found.lens()?;
         let views = views::choose(&[lens; 2], &found.pose(agreeing), size, options);
         views
-            .and_then(|views| Self::of_views([lens; 2], views, size, Unit::default(), Vec::new()))
+            .and_then(|views| Self::of_views(&[lens; 2], views, size, Unit::default(), Vec::new()))
             .map_err(|_| RectificationError::Forward.into())
     }
 

@@ -102,12 +102,12 @@ impl Rectification {
         if calibration.views.is_some() && options.alpha.is_none() {
             doubts.extend(doubts::of_views(&lenses, &views, size));
         }
-        Self::of_views(lenses, views, size, calibration.unit, doubts)
+        Self::of_views(&lenses, views, size, calibration.unit, doubts)
     }
 
     /// That by `views`, turned where need be.
     fn of_views(
-        lenses: [Lens; 2],
+        lenses: &[Lens; 2],
         views: Views,
         size: (usize, usize),
         unit: Unit,
@@ -116,7 +116,8 @@ impl Rectification {
         let (views, rectified) = turned(views, views.size.unwrap_or(size));
         // Says where the right camera is on the left.
         views.calibration(None, unit)?;
-        let found = Self { lenses, views, sizes: [size, rectified], unit, doubts, trust: None, places: None };
+        let (lenses, sizes) = (*lenses, [size, rectified]);
+        let found = Self { lenses, views, sizes, unit, doubts, trust: None, places: None };
         found.check_shown().map(|()| found)
     }
 

@@ -3,7 +3,7 @@
 //! Both views are pinholes of one unknown focal length, with the principal point in the middle: Fusiello and Irsara, *Quasi-Euclidean
 //! Uncalibrated Rectification of Images* (2008). What they stand like is found by random samples (RANSAC, Fischler and Bolles 1981,
 //! with the truncated error of Torr and Zisserman's MSAC, 2000), and then by least squares of Sampson's distance over all matches, each
-//! weighted by Geman and McClure.
+//! weighted as by Geman and `McClure`.
 //!
 //! The samples are the same in every run, sums are in a fixed order, and only + - * / and square roots and `libm` are used: the same
 //! bits on every machine, with any number of threads.
@@ -218,7 +218,7 @@ impl TwoViews {
             } else {
                 let zoom = UNKNOWNS - 1;
                 normal[zoom] = [0.0; UNKNOWNS];
-                normal.iter_mut().for_each(|row| row[zoom] = 0.0);
+                (0..UNKNOWNS).for_each(|i| normal[i][zoom] = 0.0);
                 (normal[zoom][zoom], right[zoom]) = (1.0, 0.0);
             }
             let mut damped = normal;
