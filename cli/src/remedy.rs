@@ -20,6 +20,7 @@ pub(crate) const FLAGS: Words = Words {
     max_pixels: Some("--max-pixels"),
     truth_scale: Some("--truth-scale"),
     no_data: Some("--no-data"),
+    calibration: "a calibration by --calib",
     orient: Some("--orient"),
     ..Words::PLAIN
 };
@@ -33,6 +34,7 @@ mod tests {
     use mrfgs::check::Warning;
     use mrfgs::error::{
         BudgetError, DeviceError, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
+        RectificationError,
     };
 
     use super::*;
@@ -116,6 +118,12 @@ mod tests {
             (read("is empty".into()), "cannot read a.png: is empty"),
             (Error::write("a.png", "disk full"), "cannot write a.png: disk full"),
             (Error::Calibration("does not say baseline".into()), "the calibration does not say baseline"),
+            (
+                RectificationError::Few { agreeing: 3, matches: 9, least: 30 }.into(),
+                "its matches: 3 of 9 agree ... one scene ... --calib",
+            ),
+            (RectificationError::Flat.into(), "no depth ... step to the side ... --calib"),
+            (RectificationError::Forward.into(), "away from it ... step to the side ... --calib"),
             (Error::Mismatch("the sizes differ".into()), "the sizes differ"),
             (DeviceError::NoDriver.into(), "install the driver ... --device cpu"),
             (DeviceError::WrongMaps { name: name() }.into(), "update its driver ... --device cpu"),

@@ -36,6 +36,11 @@ impl CameraArgs {
         let (focal, Baseline { length, unit }) = self.focal.zip(self.baseline)?;
         Some(Calibration::of_cameras(Camera::centred(focal, size), length, unit))
     }
+
+    /// The flag that gives them, where it is there.
+    pub(crate) fn flag(&self) -> Option<&'static str> {
+        self.focal.map(|_| "--focal")
+    }
 }
 
 /// The distance of two cameras.

@@ -1,6 +1,10 @@
 //! How images, masks and maps are read.
 
+use std::path::PathBuf;
+
 use mrfgs::image::read::{MAX_PIXELS, Reader};
+
+use crate::failure::{Failure, Result};
 
 /// How images, masks and maps are read.
 #[derive(clap::Args)]
@@ -25,6 +29,15 @@ pub(crate) struct ReadingArgs {
 }
 
 impl ReadingArgs {
+    /// The reader of images that are rectified: by a calibration of `files` as they are stored, and upright without one.
+    pub(crate) fn raw_reader(&self, files: &[PathBuf]) -> Result<Reader> {
+        if self.orient && !files.is_empty() {
+            let reason = "a calibration is of the pixels as they are stored; leave --orient or --calib out";
+            return Err(Failure::usage("--orient", reason));
+        }
+        Ok(Reader { orient: files.is_empty(), ..self.reader() })
+    }
+
     pub(crate) fn reader(&self) -> Reader {
         Reader { max_pixels: self.max_pixels, no_data: self.no_data, orient: self.orient }
     }

@@ -16,6 +16,8 @@ const EXAMPLES: &str = "\
 Examples:
   mrfgs rectify left.png right.png rectified --calib stereo.yml
   mrfgs match rectified/im0.png rectified/im1.png d.pfm --also depth
+  # Two photographs of one camera, moved to the side, without a calibration:
+  mrfgs rectify left.jpg right.jpg rectified
   # ROS has a file for each camera:
   mrfgs rectify l.png r.png rectified --calib left.yaml --calib right.yaml
   # All that the cameras have seen:
@@ -24,8 +26,12 @@ Examples:
 /// Rectify a pair of raw images
 ///
 /// Rectified images have no lens distortion, and matches are on the same row. DIR gets im0.png and im1.png (transparent
-/// where there is no source), mask0.png and mask1.png (white where there is none), and the calibration of the
+/// where there is no source), mask0.png and mask1.png (white where there is none), and with --calib the calibration of the
 /// rectified pair twice: calib.txt in Middlebury's form and cameras.yml in OpenCV's.
+///
+/// Without --calib the pair is rectified by matches of its own, as of two photographs of one camera that was moved to the side by
+/// hand. A line tells how far that can be trusted. There is no scale then, and no depth. Images are turned upright by their EXIF
+/// orientation; with --calib they are not, because a calibration is of the pixels as they are stored.
 ///
 /// CALIB is OpenCV's YAML, XML or JSON (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's
 /// camera chain (cam0 is the left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK or COLMAP, or
@@ -48,7 +54,8 @@ pub(crate) struct Args {
     folder: PathBuf,
 
     /// Calibration of the cameras; where it has several files, such as those of ROS, one after the other
-    #[arg(long, value_name = "CALIB", required = true)]
+    /// [default: matches of the pair]
+    #[arg(long, value_name = "CALIB")]
     calib: Vec<PathBuf>,
     #[command(flatten)]
     rectification: RectificationArgs,
@@ -68,11 +75,15 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<()> {
     stop::listen();
     let folder = StagedFolder::new_or_empty(&args.folder)?;
-    let calibration = calibration::read(&args.calib)?;
-    let raw = args.reading.reader().pair(&args.left, &args.right, args.mask.as_deref())?;
+    let reader = args.reading.raw_reader(&args.calib)?;
     let options = args.rectification.options();
-    let (rectification, pair) = input::rectify(&calibration, &args.calib, &raw, &options)?;
-    drop(raw);
+    let read = || reader.pair(&args.left, &args.right, args.mask.as_deref());
+    let (rectification, pair) = if args.calib.is_empty() {
+        input::rectify_alone([&args.left, &args.right], &read()?, &options)?
+    } else {
+        let calibration = calibration::read(&args.calib)?;
+        input::rectify(&calibration, &args.calib, &read()?, &options)?
+    };
     write_all(&folder.path(), &rectification, [pair.left(), pair.right()], args.maps)
         .map_err(|e| folder.named(e))?;
     folder.publish()?;
@@ -105,6 +116,9 @@ fn write_all(folder: &Path, by: &Rectification, images: [&Image; 2], maps: bool)
                 write::save(&at(&format!("map{i}{axis}.pfm")), &pfm::encode(map))?;
             }
         }
+    }
+    if by.trust().is_some() {
+        return Ok(());
     }
     let calibration = by.calibration()?;
     let texts = [

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use mrfgs::maps::{FRACTION, flag, has_disparity};
 use mrfgs::options::{DisparityRange, Method};
+use mrfgs::rectification::Trust;
 use mrfgs::{Matched, Timing};
 use serde::Serialize;
 
@@ -32,6 +33,9 @@ pub(crate) struct MatchRecord<'a> {
     /// The first column and row of the maps in the left view, where they are of a region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) region: Option<[usize; 2]>,
+    /// How far that can be trusted, where it was by matches alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) trust: Option<Trust>,
     width: usize,
     height: usize,
     sign: Sign,
@@ -74,6 +78,7 @@ impl<'a> MatchRecord<'a> {
             files,
             rectified: false,
             region: None,
+            trust: None,
             width,
             height,
             sign,

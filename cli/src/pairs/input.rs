@@ -78,7 +78,8 @@ impl Known {
 
 impl PairArgs {
     /// Reads the images and what the range takes, and the cameras where `cameras` asks for them, unless the user gives their
-    /// `numbers`. The user counts disparities by `sign`. With `rectify`, the images are as the cameras took them, and are rectified.
+    /// `numbers`. The user counts disparities by `sign`. With `rectify`, the images are as the cameras took them, and are rectified:
+    /// by the calibration, or without one by their own matches.
     pub(crate) fn read(
         &self,
         sign: Sign,
@@ -86,7 +87,15 @@ impl PairArgs {
         numbers: Option<&CameraArgs>,
         rectify: Option<&Options>,
     ) -> Result<Input> {
-        let pair = self.reading.reader().pair(&self.left, &self.right, self.mask.as_deref())?;
+        let reader = match rectify {
+            Some(_) => self.reading.raw_reader(&self.calib)?,
+            None => self.reading.reader(),
+        };
+        let pair = reader.pair(&self.left, &self.right, self.mask.as_deref())?;
+        if let Some(options) = rectify.filter(|_| self.calib.is_empty()) {
+            let (by, pair) = rectify_alone([&self.left, &self.right], &pair, options)?;
+            return Input::rectified_alone(pair, by, &self.search, sign);
+        }
         let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
         Input::new(pair, &self.search, sign, &self.calib, numbers, rectify, beside)
     }
@@ -151,6 +160,13 @@ impl Input {
         };
         let by_depth = search.takes_cameras().is_some();
         Ok(Self { pair, range, by_matches, by_depth, calibration, remedy, rectification })
+    }
+
+    /// `pair`, which `by` has rectified by its own matches, with the range to `search`, counted by `sign`.
+    fn rectified_alone(pair: Pair, by: Rectification, search: &Search, sign: Sign) -> Result<Self> {
+        let Found { range, by_matches } = search.range(&pair, None, sign)?;
+        let (rectification, remedy) = (Some(by), "give one with --calib");
+        Ok(Self { pair, range, by_matches, by_depth: false, calibration: None, remedy, rectification })
     }
 
     /// The files of the calibration, for a record.
@@ -227,6 +243,9 @@ impl Input {
 
     /// Says what is probably wrong with the pair, or with what is matched of it for a `region`.
     pub(crate) fn warn(&self, region: Option<&Region>) {
+        if let Some(trust) = self.rectification.as_ref().and_then(Rectification::trust) {
+            console::say(&trusted(trust));
+        }
         let window = region.map(|region| region.window_of(&self.pair));
         let warnings = self.warnings_of(window.as_ref().unwrap_or(&self.pair), &remedy::FLAGS);
         warnings.iter().for_each(|warning| say(warning));
@@ -239,18 +258,24 @@ impl Input {
 
     fn warnings_of(&self, pair: &Pair, words: &remedy::Words) -> Vec<String> {
         let mut said = Vec::new();
-        if let (Some(by), Some(known)) = (&self.rectification, &self.calibration) {
-            said.extend(doubts(by, &known.files));
+        let files = self.calibration.as_ref().map_or(&[][..], |known| &known.files);
+        if let Some(by) = &self.rectification {
+            said.extend(doubts(by, files));
         }
         // A range that was found does not show what the user knows.
         let warnings = check::warnings(pair, (!self.by_matches).then_some(self.range));
         said.extend(warnings.iter().map(|warning| match warning {
             // To rectify is no remedy any more.
-            Warning::NotRectified { offset } if self.rectification.is_some() => format!(
-                "after rectification matches lie {:.1} px above or below their row: the calibration is not of these \
-                 cameras as they are now, or not of images of this size",
-                f64::from(*offset) / f64::from(FRACTION)
-            ),
+            Warning::NotRectified { offset } if self.rectification.is_some() => {
+                let why = match self.calibration {
+                    Some(_) => {
+                        "the calibration is not of these cameras as they are now, or not of images of this size"
+                    }
+                    None => "the lens may bend lines, or the scene has moved: calibrate the cameras",
+                };
+                let rows = f64::from(*offset) / f64::from(FRACTION);
+                format!("after rectification matches lie {rows:.1} px above or below their row: {why}")
+            }
             other => remedy::warning(other, words),
         }));
         said
@@ -283,13 +308,23 @@ pub(crate) fn warn(warnings: impl IntoIterator<Item = Warning>) {
     warnings.into_iter().for_each(|warning| say(&remedy::warning(&warning, &remedy::FLAGS)));
 }
 
-/// Says on standard error what is probably wrong with the calibration of `files`.
+/// Says on standard error what is probably wrong with the calibration of `files`; without one, how far the matches that took its place
+/// can be trusted.
 pub(crate) fn doubt(by: &Rectification, files: &[PathBuf]) {
+    if let Some(trust) = by.trust() {
+        console::say(&trusted(trust));
+    }
     doubts(by, files).for_each(|doubt| say(&doubt));
 }
 
+/// How far a rectification by matches can be trusted, for people.
+fn trusted(trust: &Trust) -> String {
+    format!("rectified by its own matches, without a scale: {trust}")
+}
+
 fn doubts(by: &Rectification, files: &[PathBuf]) -> impl Iterator<Item = String> {
-    by.doubts().iter().map(move |doubt| format!("{}: {doubt}", shown(files)))
+    let of = if files.is_empty() { String::new() } else { format!("{}: ", shown(files)) };
+    by.doubts().iter().map(move |doubt| format!("{of}{doubt}"))
 }
 
 fn say(warning: &str) {
@@ -309,6 +344,23 @@ pub(crate) fn rectify(
     })?;
     let pair = rectification.apply(pair)?;
     Ok((rectification, pair))
+}
+
+/// Rectifies the `pair` of the files `names` by its own matches. Errors name these.
+pub(crate) fn rectify_alone(
+    names: [&Path; 2],
+    pair: &Pair,
+    options: &Options,
+) -> Result<(Rectification, Pair)> {
+    let by = Rectification::of_pair(pair, options).map_err(|e| match e {
+        Error::Rectification(_) => {
+            let [left, right] = names.map(Path::display);
+            Failure::Failed(format!("{left}, {right}: {}", remedy::error(&e, &remedy::FLAGS)))
+        }
+        e => e.into(),
+    })?;
+    let pair = by.apply(pair)?;
+    Ok((by, pair))
 }
 
 /// The cameras that `word` takes, by the `calibration` file of the pair, whose left image is `left` and has `size`.

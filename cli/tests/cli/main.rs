@@ -26,6 +26,7 @@ mod report;
 mod results;
 mod robust;
 mod sequences;
+mod unrectified;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;

@@ -29,6 +29,8 @@ Examples:
   mrfgs match l.tif r.tif d.tif --max-disparity 255 --roi 4000,2500,800,600
   # Depth without a calibration file:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
+  # Two photographs of one camera, without a calibration:
+  mrfgs match l.jpg r.jpg d.pfm --rectify
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Points as LAZ, in the frame of the left camera as it took the image:
@@ -67,9 +69,10 @@ pub(crate) struct Args {
     /// right-minus-left
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
-    /// LEFT and RIGHT are raw images: rectifies them by --calib first, as `mrfgs rectify` does. All outputs
-    /// are of the rectified left view
-    #[arg(long, requires = "calib")]
+    /// LEFT and RIGHT are raw images: rectifies them first, as `mrfgs rectify` does, by --calib, or without it by
+    /// their own matches; then there is no depth, and a calib.txt beside LEFT does not count. All outputs are of
+    /// the rectified left view
+    #[arg(long)]
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
@@ -90,8 +93,10 @@ pub(crate) struct Args {
     /// Writes what ran and what it found as JSON; `-` prints it
     ///
     /// The fields are `version`, `files` (`left`, `right`, `mask`, `calibration`, `output`), `rectified`,
-    /// `region` (its first column and row in LEFT, with --roi),
-    /// `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method` (every key), `ran_on`, `driver`
+    /// `trust` (where it was by matches alone: `matches`, `agreeing`, `median` and `percentile95` of the
+    /// distance of rows in pixels, `coverage` and `off_one_plane` from 0 to 1), `region` (its first column and
+    /// row in LEFT, with --roi), `width`, `height`, `sign`, `range` (`min`, `max`), `labels`, `method` (every
+    /// key), `ran_on`, `driver`
     /// (of the device), `note` (why another device was taken), `tiles`, `moved_up` (by how many pixels the
     /// right view was moved up), `smoothed` (how much the left and the right view were smoothed: standard
     /// deviations, in pixels), `iterations` and `seconds` (of the match). `density` is the share of pixels
@@ -108,6 +113,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let cameras = args.also.take_cameras();
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
+    if args.rectify && args.pair.calib.is_empty() {
+        let flag = cameras.map(Also::flag).or(args.numbers.flag().map(str::to_owned));
+        if let Some(flag) = flag {
+            let reason =
+                "matches alone show no scale, and so no depth; give a calibration of the cameras by --calib";
+            return Err(Failure::usage(flag, reason));
+        }
+    }
     let read = || args.pair.read(args.sign, cameras.is_some(), Some(&args.numbers), rectifying.as_ref());
     let input = stop::at_once(read)?;
     let range = input.range;
@@ -146,6 +159,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let unit = input.unit();
     let georeferences = pair.georeferences();
     let rectifying = input.rectifying();
+    let trust = input.rectification.as_ref().and_then(|by| by.trust().copied());
     drop(input);
     let pair = Some(pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
@@ -154,6 +168,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
     record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);
+    record.trust = trust;
     let said = write_outputs(args, &also, &outcome, &record)?;
     if let Some(unit) = unit.filter(|_| !args.quiet && !said.is_empty()) {
         console::say(&format!("{}; unit: {unit}", said.join("; ")));
