@@ -144,6 +144,18 @@ class Rectification:
         alpha: float | None = None,
         zero_disparity: bool = True,
     ) -> Rectification: ...
+    @staticmethod
+    def of_pair(
+        left: _Image,
+        right: _Image,
+        *,
+        mask: npt.ArrayLike | None = None,
+        no_data: float | None = None,
+        alpha: float | None = None,
+        zero_disparity: bool = True,
+    ) -> Rectification:
+        """The rectification of a pair by matches of its own, without a calibration: of two photographs of one camera that was moved to
+        the side by hand. `trust` says how far it can be trusted; `rig` raises ValueError, because there is no scale."""
     def apply(
         self,
         left: _Image,
@@ -173,7 +185,11 @@ class Rectification:
         """The rotations from the frame of each camera to that of its rectified view: R1 and R2 of OpenCV, of shape (3, 3)."""
     @property
     def rig(self) -> Rig:
-        """The cameras of the rectified pair: for depth and points."""
+        """The cameras of the rectified pair: for depth and points. Raises ValueError of a rectification by matches alone."""
+    @property
+    def trust(self) -> dict[str, float] | None:
+        """How far a rectification by matches alone can be trusted: `matches`, `agreeing`, `median` and `percentile95` of the distance of
+        rows (pixels), `coverage` and `off_one_plane` (0 to 1). None of one by a calibration."""
     def calib_txt(self) -> str:
         """The calibration of the rectified pair in Middlebury's form, in millimetres where the unit is known."""
     def cameras_yml(self) -> str:

@@ -4,10 +4,10 @@ use std::sync::OnceLock;
 
 use mrfgs::calibration::write;
 use mrfgs::image::calib::Calibration;
-use mrfgs::rectification::{Options, Rectification};
+use mrfgs::rectification::{Correspondence, Options, Rectification};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyTuple, PyType};
+use pyo3::types::{PyDict, PyTuple, PyType};
 
 use crate::arrays::{self, Image};
 use crate::calibration::PyCalibration;
@@ -30,18 +30,34 @@ pub(crate) struct PyRectification {
     by: Rectification,
     /// The same with its places, from the first pair on.
     kept: OnceLock<Rectification>,
-    /// What it was made of, for copies: the calibration, the size of the images, and the options.
-    made_of: (PyCalibration, (usize, usize), Options),
-    calibration: Calibration,
-    rig: Py<PyRig>,
+    /// What it was made of, for copies: calibration or matches, the size of the images, and the options.
+    made_of: (Source, (usize, usize), Options),
+    /// What is known of the rectified pair, unless it comes from matches alone.
+    known: Option<(Calibration, Py<PyRig>)>,
+}
+
+/// What a rectification follows from.
+#[derive(Clone, FromPyObject, IntoPyObject)]
+enum Source {
+    Calibration(PyCalibration),
+    Matches(Vec<Correspondence>),
 }
 
 impl PyRectification {
-    fn of(py: Python, known: PyCalibration, size: (usize, usize), options: Options) -> PyResult<Self> {
-        let by = Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
-        let calibration = by.calibration().map_err(|error| known.wrong(error))?;
-        let rig = Py::new(py, PyRig::of_rectified(&calibration, &known)?)?;
-        Ok(Self { by, kept: OnceLock::new(), made_of: (known, size, options), calibration, rig })
+    fn of(py: Python, source: Source, size: (usize, usize), options: Options) -> PyResult<Self> {
+        let (by, known) = match &source {
+            Source::Calibration(known) => {
+                let by = Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
+                let calibration = by.calibration().map_err(|error| known.wrong(error))?;
+                let rig = Py::new(py, PyRig::of_rectified(&calibration, known)?)?;
+                (by, Some((calibration, rig)))
+            }
+            Source::Matches(matches) => {
+                let by = py.detach(|| Rectification::of_matches(matches, size, &options)).map_err(exception)?;
+                (by, None)
+            }
+        };
+        Ok(Self { by, kept: OnceLock::new(), made_of: (source, size, options), known })
     }
 
     /// Many pairs may follow the first, so it finds out once where pixels come from.
@@ -52,6 +68,15 @@ impl PyRectification {
         let mut by = self.by.clone();
         by.keep_places()?;
         Ok(self.kept.get_or_init(|| by))
+    }
+
+    /// What takes a scale.
+    fn known(&self) -> PyResult<&(Calibration, Py<PyRig>)> {
+        self.known.as_ref().ok_or_else(|| {
+            PyValueError::new_err(
+                "the pair was rectified by its own matches, which show no scale; for depth, make a Rectification of a calibration",
+            )
+        })
     }
 }
 
@@ -66,9 +91,7 @@ impl PyRectification {
         alpha: Option<f64>,
         zero_disparity: bool,
     ) -> PyResult<Self> {
-        if let Some(alpha) = alpha.filter(|alpha| !(0.0..=1.0).contains(alpha)) {
-            return Err(PyValueError::new_err(format!("alpha: give a number from 0 to 1, not {alpha}")));
-        }
+        let options = options(alpha, zero_disparity)?;
         let known = PyCalibration::of(calibration)?;
         let size = match size {
             Some(size) => arrays::size(size)?,
@@ -79,9 +102,41 @@ impl PyRectification {
                 ))
             })?,
         };
-        let made = Self::of(py, known, size, Options { alpha, zero_disparity })?;
-        let names = &made.made_of.0.names;
-        exceptions::tell(py, made.by.doubts().iter().map(|doubt| format!("{names}: {doubt}")))?;
+        let made = Self::of(py, Source::Calibration(known), size, options)?;
+        if let Source::Calibration(PyCalibration { names, .. }) = &made.made_of.0 {
+            exceptions::tell(py, made.by.doubts().iter().map(|doubt| format!("{names}: {doubt}")))?;
+        }
+        Ok(made)
+    }
+
+    /// The rectification of a pair by matches of its own, without a calibration: of two photographs of one camera that was moved to the
+    /// side by hand, and turned by some degrees at most.
+    ///
+    /// left, right: arrays as `match` takes them, as they are seen: turn photographs upright by their EXIF orientation first.
+    /// mask: array of the shape (height, width) of left: where it is not 0 left is ignored.
+    /// no_data: a value that stands for no data in both images.
+    /// alpha, zero_disparity: as of Rectification.
+    ///
+    /// `trust` says how far it can be trusted. There is no scale, so `rig` raises ValueError. Raises ValueError where too few matches
+    /// agree, where they show no depth (one flat surface, or a camera that turned on the spot), and where the camera moved forward. What
+    /// makes it doubtful is told as a MatchWarning.
+    #[staticmethod]
+    #[pyo3(signature = (left, right, *, mask=None, no_data=None, alpha=None, zero_disparity=true))]
+    fn of_pair(
+        py: Python,
+        left: &Bound<PyAny>,
+        right: &Bound<PyAny>,
+        mask: Option<&Bound<PyAny>>,
+        no_data: Option<f64>,
+        alpha: Option<f64>,
+        zero_disparity: bool,
+    ) -> PyResult<Self> {
+        let options = options(alpha, zero_disparity)?;
+        let [left, right] = Image::both(left, right)?;
+        let pair = arrays::pair(&left, &right, mask, no_data)?;
+        let matches = py.detach(|| Rectification::matches_of(&pair)).map_err(exception)?;
+        let made = Self::of(py, Source::Matches(matches), pair.size(), options)?;
+        exceptions::tell(py, made.by.doubts().iter().map(ToString::to_string))?;
         Ok(made)
     }
 
@@ -139,21 +194,38 @@ impl PyRectification {
         arrays::matrices(py, self.by.rotations())
     }
 
-    /// The cameras of the rectified pair, as a Rig: for depth and points.
+    /// The cameras of the rectified pair, as a Rig: for depth and points. Raises ValueError of a rectification by matches alone.
     #[getter]
-    fn rig(&self, py: Python) -> Py<PyRig> {
-        self.rig.clone_ref(py)
+    fn rig(&self, py: Python) -> PyResult<Py<PyRig>> {
+        Ok(self.known()?.1.clone_ref(py))
+    }
+
+    /// How far a rectification by matches alone can be trusted; None of one by a calibration. A dictionary: `matches`, how many of them
+    /// are `agreeing`, the `median` and `percentile95` of how far apart the rows of these are (pixels), their `coverage` of the image, and
+    /// the share of them that is `off_one_plane` (0 to 1).
+    #[getter]
+    fn trust<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(trust) = self.by.trust() else { return Ok(None) };
+        let all = PyDict::new(py);
+        all.set_item("matches", trust.matches)?;
+        all.set_item("agreeing", trust.agreeing)?;
+        all.set_item("median", trust.median)?;
+        all.set_item("percentile95", trust.percentile95)?;
+        all.set_item("coverage", trust.coverage)?;
+        all.set_item("off_one_plane", trust.off_one_plane)?;
+        Ok(Some(all))
     }
 
     /// The calibration of the rectified pair in Middlebury's form, in millimetres where the unit is known: the text of calib.txt.
-    fn calib_txt(&self) -> String {
-        write::middlebury(&self.calibration).unwrap_or_default()
+    /// Raises ValueError of a rectification by matches alone.
+    fn calib_txt(&self) -> PyResult<String> {
+        Ok(write::middlebury(&self.known()?.0).unwrap_or_default())
     }
 
     /// The same for OpenCV, in the unit of the calibration: the text of a YAML file with K1, D1, R1, P1, K2, D2, R2, P2, R, T, Q, and the
-    /// rotations as fromRaw1 and fromRaw2.
-    fn cameras_yml(&self) -> String {
-        write::opencv(&self.calibration, self.by.rotations()).unwrap_or_default()
+    /// rotations as fromRaw1 and fromRaw2. Raises ValueError of a rectification by matches alone.
+    fn cameras_yml(&self) -> PyResult<String> {
+        Ok(write::opencv(&self.known()?.0, self.by.rotations()).unwrap_or_default())
     }
 
     fn __repr__(&self) -> String {
@@ -161,22 +233,29 @@ impl PyRectification {
         format!("<mrfgs.Rectification: {w} x {h} to {width} x {height}>")
     }
 
-    /// How `pickle` and `copy` make another one. It is found again: the same calibration gives the same bits everywhere.
+    /// How `pickle` and `copy` make another one. It is found again: the same calibration or matches give the same bits everywhere.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let (calibration, size, Options { alpha, zero_disparity }) = self.made_of.clone();
+        let (source, size, Options { alpha, zero_disparity }) = self.made_of.clone();
         let again = py.get_type::<Self>().getattr("_again")?;
-        Ok((again, (calibration, size, alpha, zero_disparity).into_pyobject(py)?))
+        Ok((again, (source, size, alpha, zero_disparity).into_pyobject(py)?))
     }
 
     /// As the constructor, without saying a second time what is probably wrong.
     #[classmethod]
     fn _again(
         of: &Bound<PyType>,
-        calibration: &PyCalibration,
+        source: Source,
         size: (usize, usize),
         alpha: Option<f64>,
         zero_disparity: bool,
     ) -> PyResult<Self> {
-        Self::of(of.py(), calibration.clone(), size, Options { alpha, zero_disparity })
+        Self::of(of.py(), source, size, Options { alpha, zero_disparity })
+    }
+}
+
+fn options(alpha: Option<f64>, zero_disparity: bool) -> PyResult<Options> {
+    match alpha.filter(|alpha| !(0.0..=1.0).contains(alpha)) {
+        Some(alpha) => Err(PyValueError::new_err(format!("alpha: give a number from 0 to 1, not {alpha}"))),
+        None => Ok(Options { alpha, zero_disparity }),
     }
 }

@@ -568,6 +568,44 @@ class Folder(unittest.TestCase):
         return path
 
 
+class RectificationByMatches(Folder):
+    def test_it_is_the_programs(self):
+        left, right = raw_pair()
+        program(self.folder, "rectify", RAW / "left.png", RAW / "right.png", "out", "--maps", "--quiet")
+        by = mrfgs.Rectification.of_pair(left, right)
+        self.assertEqual((by.size, by.raw_size), ((240, 180), (240, 180)))
+        for i, view in enumerate(by.apply(left, right)):
+            expected = read_png(self.folder / f"out/im{i}.png")[..., :3]
+            self.assertTrue(np.array_equal(np.where(view.mask, 0, view.data), np.where(view.mask, 0, expected)))
+            for axis, found in zip("xy", by.maps()[i]):
+                self.assertTrue(np.array_equal(found, read_pfm(self.folder / f"out/map{i}{axis}.pfm")))
+        trust = by.trust
+        self.assertEqual(list(trust), ["matches", "agreeing", "median", "percentile95", "coverage", "off_one_plane"])
+        self.assertTrue(30 <= trust["agreeing"] <= trust["matches"] and 0 < trust["median"] < trust["percentile95"] < 1.5)
+        # There is no scale.
+        for use in (lambda: by.rig, by.calib_txt, by.cameras_yml):
+            with self.assertRaisesRegex(ValueError, "no scale"):
+                use()
+        # Control: by a calibration there is one, and other views.
+        known = mrfgs.Rectification(CAMERAS)
+        self.assertIsNone(known.trust)
+        self.assertFalse(np.array_equal(known.maps()[0][0], by.maps()[0][0]))
+        shown = mrfgs.Rectification.of_pair(left, right, alpha=1)
+        self.assertLess(by.apply(left, right)[0].mask.mean(), shown.apply(left, right)[0].mask.mean())
+
+    def test_what_shows_no_geometry_is_refused(self):
+        left, right = raw_pair()
+        mask = np.ones(left.shape[:2], np.uint8)
+        for words, call in [
+            ("no depth", lambda: mrfgs.Rectification.of_pair(left, left)),
+            ("0 of 0 agree", lambda: mrfgs.Rectification.of_pair(left, right, mask=mask)),
+            ("alpha", lambda: mrfgs.Rectification.of_pair(left, right, alpha=2)),
+            ("240 x 180", lambda: mrfgs.Rectification.of_pair(left, right[1:])),
+        ]:
+            with self.assertRaisesRegex(ValueError, words):
+                call()
+
+
 class Rectification(Folder):
     def same(self, left, right, calibration, files, *arguments, **keywords):
         """That the program gives the same for the files LEFT RIGHT."""

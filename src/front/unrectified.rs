@@ -33,6 +33,14 @@ impl Rectification {
     /// # Errors
     /// Those of [`Rectification::of_matches`]; [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
     pub fn of_pair(pair: &Pair, options: &Options) -> Result<Self> {
+        Self::of_matches(&Self::matches_of(pair)?, pair.size(), options)
+    }
+
+    /// The matches of `pair` by which [`Rectification::of_pair`] rectifies it.
+    ///
+    /// # Errors
+    /// Those of [`Rectification::of_pair`] that concern matches.
+    pub fn matches_of(pair: &Pair) -> Result<Vec<Correspondence>> {
         matches::check_memory(pair)?;
         // Of pairs at 1, 1/2, 1/4 of the size and so on.
         let mut pairs = vec![pair.clone()];
@@ -49,7 +57,7 @@ impl Rectification {
                 found.iter_mut().flatten().flatten().for_each(|v| *v *= 2.0);
             }
         }
-        Self::of_matches(&found, pair.size(), options)
+        Ok(found)
     }
 }
 

@@ -9,7 +9,7 @@ use mrfgs::image::calib::{Calibration, Unit};
 use mrfgs::image::{Pair, Rect};
 use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
-use mrfgs::rectification::{Options, Rectification};
+use mrfgs::rectification::{Options, Rectification, Trust};
 use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
 
