@@ -240,7 +240,9 @@ class Rig:
 class Points:
     """A cloud of points."""
 
-    def __new__(cls, positions: npt.ArrayLike, colours: npt.ArrayLike, confidence: npt.ArrayLike) -> Points: ...
+    def __new__(
+        cls, positions: npt.ArrayLike, colours: npt.ArrayLike, confidence: npt.ArrayLike, unit: str = "unknown"
+    ) -> Points: ...
     @property
     def positions(self) -> npt.NDArray[np.float32]:
         """Where the points are, of shape (N, 3): x to the right, y down, z forward of the left camera, in the unit of the baseline."""
@@ -250,6 +252,9 @@ class Points:
     @property
     def confidence(self) -> npt.NDArray[np.uint8]:
         """Their confidence, of shape (N,), in 1/8 nat."""
+    @property
+    def unit(self) -> str:
+        """The unit of the positions: "mm", "cm", "m", or "unknown"."""
     def save(self, path: _Path) -> None:
         """Writes the points as .ply, .pcd, .las or .laz, as the program does; the confidence is `quality` or the intensity."""
     def __len__(self) -> int: ...

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mrfgs::depth::Rig;
-use mrfgs::image::calib::{Calibration, Camera};
+use mrfgs::image::calib::{Calibration, Camera, Unit};
 use mrfgs::image::cloud::{Cloud, Point};
 use mrfgs::image::{Pair, Plane, write};
 use mrfgs::maps::{FRACTION, Maps, flag};
@@ -223,7 +223,7 @@ impl PyRig {
         let maps =
             Maps { disparity, raw: Plane::filled(width, height, 0), confidence, validity, right: None };
         let cloud = py.detach(|| self.rig.cloud(&maps, pair.left()));
-        PyPoints::of(py, &cloud.points)
+        PyPoints::of(py, &cloud.points, cloud.unit)
     }
 
     /// The matrices [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the left and the right camera: two float64 arrays (3, 3), in pixels.
@@ -285,8 +285,9 @@ impl PyRig {
 /// positions: array (N, 3) of float32 or float64: x, y, z.
 /// colours: array (N, 3) of uint8: red, green, blue.
 /// confidence: array (N,) of uint8.
+/// unit: the unit of the positions, "mm", "cm", "m" or "unknown": files say it.
 ///
-/// Rig.points makes one; make another one of a part of it, as in Points(p.positions[near], p.colours[near], p.confidence[near]).
+/// Rig.points makes one; make another one of a part of it, as in Points(p.positions[near], p.colours[near], p.confidence[near], p.unit).
 #[pyclass(name = "Points", frozen, get_all, module = "mrfgs")]
 pub(crate) struct PyPoints {
     /// Where the points are: float32 of shape (N, 3), x to the right, y down, z forward of the left camera, in the unit of the
@@ -296,10 +297,12 @@ pub(crate) struct PyPoints {
     colours: Py<PyArray2<u8>>,
     /// Their confidence: uint8 of shape (N,), in 1/8 nat.
     confidence: Py<PyArray1<u8>>,
+    /// The unit of the positions: "mm", "cm", "m", or "unknown".
+    unit: String,
 }
 
 impl PyPoints {
-    fn of(py: Python, points: &[Point]) -> PyResult<Self> {
+    fn of(py: Python, points: &[Point], unit: Unit) -> PyResult<Self> {
         let count = points.len();
         let positions: Vec<f32> = points.iter().flat_map(|point| point.position).collect();
         let colours: Vec<u8> = points.iter().flat_map(|point| point.colour).collect();
@@ -308,6 +311,7 @@ impl PyPoints {
             positions: positions.into_pyarray(py).reshape([count, 3])?.unbind(),
             colours: colours.into_pyarray(py).reshape([count, 3])?.unbind(),
             confidence: confidence.into_pyarray(py).unbind(),
+            unit: unit.name().into(),
         })
     }
 }
@@ -315,11 +319,13 @@ impl PyPoints {
 #[pymethods]
 impl PyPoints {
     #[new]
+    #[pyo3(signature = (positions, colours, confidence, unit="unknown"))]
     fn new(
         py: Python,
         positions: &Bound<PyAny>,
         colours: &Bound<PyAny>,
         confidence: &Bound<PyAny>,
+        unit: &str,
     ) -> PyResult<Self> {
         const EXPECTED: &str = "shape (N, 3), float32 or float64";
         let doubles = arrays::table::<f64>("positions", positions, Some(3), EXPECTED);
@@ -342,7 +348,7 @@ impl PyPoints {
             colour: [0, 1, 2].map(|channel| colours[3 * i + channel]),
             confidence: confidence[i],
         });
-        Self::of(py, &points.collect::<Vec<_>>())
+        Self::of(py, &points.collect::<Vec<_>>(), calibration::unit(unit)?)
     }
 
     /// Writes the points as binary PLY or PCD, LAS 1.2 or LAZ, completely or not at all: the file that `mrfgs match` writes for
@@ -362,7 +368,8 @@ impl PyPoints {
         let (colours, _) = colours.as_chunks::<3>();
         let points = positions.iter().zip(colours).zip(confidence);
         let points = points.map(|((&position, &colour), confidence)| Point { position, colour, confidence });
-        let cloud = Cloud { points: points.collect(), ..Cloud::default() };
+        let unit = calibration::unit(&self.unit)?;
+        let cloud = Cloud { points: points.collect(), unit, ..Cloud::default() };
         py.detach(|| write::cloud(&path, &cloud)).map_err(exception)
     }
 
@@ -376,7 +383,7 @@ impl PyPoints {
 
     /// How `pickle` and `copy` make another one.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
-        let all = (self.positions.bind(py), self.colours.bind(py), self.confidence.bind(py));
+        let all = (self.positions.bind(py), self.colours.bind(py), self.confidence.bind(py), &self.unit);
         Ok((py.get_type::<Self>(), all.into_pyobject(py)?))
     }
 }

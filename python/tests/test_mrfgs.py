@@ -986,10 +986,12 @@ class Depth(Folder):
         self.assertTrue(np.array_equal(points.colours, left[y, x]))
         for other in (pickle.loads(pickle.dumps(points)), copy.deepcopy(points)):
             self.assertTrue(np.array_equal(other.positions, points.positions))
+            self.assertEqual(other.unit, rig.unit)
         # A part of a cloud is a cloud.
         near = points.positions[:, 2] < np.median(points.positions[:, 2])
         part = mrfgs.Points(points.positions[near].astype(np.float64), points.colours[near], points.confidence[near])
         part.save(self.folder / "part.ply")
+        self.assertIn(b"unit that of the baseline\n", (self.folder / "part.ply").read_bytes())
         data = (self.folder / "part.ply").read_bytes().split(b"end_header\n", 1)[1]
         self.assertEqual(data, cloud[near].tobytes())
         self.assertEqual(len(mrfgs.Points(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), np.zeros(0, np.uint8))), 0)
@@ -1060,6 +1062,7 @@ class Depth(Folder):
             (TypeError, "left: give an array of whole numbers", lambda: rig.points(found, left > 9)),
             (ValueError, "positions: give an array of shape (N, 3)", lambda: mrfgs.Points(positions[:, :2], colours, confidence)),
             (TypeError, "colours: give an array of shape (N, 3), uint8", lambda: mrfgs.Points(positions, colours / 255, confidence)),
+            (ValueError, "unit: give mm, cm, m or unknown", lambda: mrfgs.Points(positions, colours, confidence, "feet")),
             (ValueError, "4 positions, 3 colours and 4 values", lambda: mrfgs.Points(positions, colours[1:], confidence)),
             (OSError, "python.xyz: point clouds end in .ply, .pcd, .las or .laz", lambda: points.save(self.folder / "python.xyz")),
             (OSError, "python.laz", lambda: mrfgs.Points(positions + np.inf, colours, confidence).save(self.folder / "python.laz")),
