@@ -156,15 +156,16 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 21),
-            ("rectify", 7),
-            ("sequence", 24),
-            ("batch", 16),
-            ("evaluate", 11),
-            ("evaluate map", 7),
-            ("evaluate submission", 9),
-            ("bench", 10),
-            ("inspect", 12),
+            ("match", 22),
+            ("rectify", 8),
+            ("depth", 13),
+            ("sequence", 25),
+            ("batch", 17),
+            ("evaluate", 12),
+            ("evaluate map", 8),
+            ("evaluate submission", 10),
+            ("bench", 11),
+            ("inspect", 13),
             ("presets", 2),
         ];
         let program = Cli::command();

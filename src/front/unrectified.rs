@@ -31,7 +31,7 @@ impl Rectification {
     /// up to 1600 pixels.
     ///
     /// # Errors
-    /// Those of [`Rectification::of_matches`]; [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
+    /// Those of [`Rectification::of_matches`]; [`Error::Memory`] when the machine has not enough for the search.
     pub fn of_pair(pair: &Pair, options: &Options) -> Result<Self> {
         Self::of_matches(&Self::matches_of(pair)?, pair.size(), options)
     }
