@@ -26,7 +26,7 @@ pub(crate) fn writes(path: &Path) -> bool {
     WRITTEN.contains(&extension.as_str())
 }
 
-/// Whether a file begins like a film that ffmpeg reads: MP4 or QuickTime, Matroska or WebM, AVI.
+/// Whether a file begins like a film that ffmpeg reads: MP4, Matroska, AVI and their kin.
 pub(crate) fn reads(start: &[u8]) -> bool {
     let is_avi = start.starts_with(b"RIFF") && start.get(8..11).is_none_or(|kind| kind == b"AVI");
     is_avi || start.get(4..8) == Some(b"ftyp") || start.starts_with(b"\x1a\x45\xdf\xa3")

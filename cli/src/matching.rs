@@ -13,43 +13,54 @@ use crate::progress::Bar;
 use crate::remedy;
 use crate::text::plural;
 
-/// The disparities that a match searches.
+/// The disparities that a match searches, and where.
 #[derive(Clone, Copy)]
-pub(crate) struct Searched {
+pub(crate) struct Searched<'a> {
     range: DisparityRange,
     /// Whether it may become [wider](check::wider).
     pub(crate) may_widen: bool,
+    /// The region of the left view, where it is not all.
+    region: Option<&'a Rect>,
 }
 
-impl From<DisparityRange> for Searched {
+impl From<DisparityRange> for Searched<'_> {
     fn from(range: DisparityRange) -> Self {
-        Self { range, may_widen: false }
+        Self { range, may_widen: false, region: None }
     }
 }
 
-impl Searched {
+impl<'a> Searched<'a> {
     /// `range`, which may become wider where sparse matches found it and the wider one `fits` the outputs.
     pub(crate) fn new(
         range: DisparityRange,
         by_matches: bool,
         fits: impl Fn(DisparityRange) -> bool,
     ) -> Self {
-        Self { range, may_widen: by_matches && check::beyond(range).is_some_and(fits) }
+        Self { range, may_widen: by_matches && check::beyond(range).is_some_and(fits), region: None }
+    }
+
+    /// In this region alone, where there is one.
+    pub(crate) fn in_region(self, region: Option<&'a Rect>) -> Self {
+        Self { region, ..self }
     }
 
     /// A match of `pair` over it.
-    pub(crate) fn job<'a>(self, matcher: &'a mut Matcher, pair: &'a Pair) -> Job<'a> {
-        if self.may_widen { matcher.job(pair, Found(self.range)) } else { matcher.job(pair, self.range) }
+    pub(crate) fn job<'b>(self, matcher: &'b mut Matcher, pair: &'b Pair) -> Job<'b> {
+        let job =
+            if self.may_widen { matcher.job(pair, Found(self.range)) } else { matcher.job(pair, self.range) };
+        match self.region {
+            Some(region) => job.region(region.clone()),
+            None => job,
+        }
     }
 }
 
 /// Matches a pair with a progress bar, unless the user [stops](crate::stop) it, and says on standard error what ran where and how
-/// long. A `part` of the left view may be all that is wanted. `name` tells pairs apart where there are several.
+/// long. `name` tells pairs apart where there are several.
 pub(crate) fn run(
     matcher: &mut Matcher,
     pair: &Pair,
     searched: Searched,
-    part: Option<&Rect>,
     method: &Method,
     name: Option<&str>,
     quiet: bool,
@@ -58,9 +69,6 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut bar = Bar::new(name, quiet);
     let mut job = searched.job(matcher, pair).method(method).on_progress(|progress| bar.update(progress));
-    if let Some(part) = part {
-        job = job.region(part.clone());
-    }
     if let Some(inspector) = inspector {
         job = job.inspect(inspector);
     }

@@ -22,7 +22,7 @@ use crate::words;
 ///
 /// Rectification and Rig take it; they take paths, too. Raises FileNotFoundError for a file that is not there, and ValueError for
 /// one that makes no sense.
-#[pyclass(name = "Calibration", frozen, module = "mrfgs")]
+#[pyclass(name = "Calibration", frozen, module = "mrfgs", from_py_object)]
 #[derive(Clone)]
 pub(crate) struct PyCalibration {
     pub(crate) cameras: StereoCalibration,

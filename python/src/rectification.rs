@@ -47,13 +47,15 @@ impl PyRectification {
     fn of(py: Python, source: Source, size: (usize, usize), options: Options) -> PyResult<Self> {
         let (by, known) = match &source {
             Source::Calibration(known) => {
-                let by = Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
+                let by =
+                    Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
                 let calibration = by.calibration().map_err(|error| known.wrong(error))?;
                 let rig = Py::new(py, PyRig::of_rectified(&calibration, known)?)?;
                 (by, Some((calibration, rig)))
             }
             Source::Matches(matches) => {
-                let by = py.detach(|| Rectification::of_matches(matches, size, &options)).map_err(exception)?;
+                let by =
+                    py.detach(|| Rectification::of_matches(matches, size, &options)).map_err(exception)?;
                 (by, None)
             }
         };

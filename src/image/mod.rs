@@ -419,7 +419,7 @@ impl Pair {
         let georeferences = self.georeferences.each_ref().map(|georeference| {
             georeference.as_ref().map(|georeference| georeference.moved(part.x.start, part.y.start))
         });
-        Self { full, georeferences, ..self.map(|view| view.crop(part)) }
+        Self { georeferences, full, ..self.map(|view| view.crop(part)) }
     }
 
     /// (width, height) of both views.

@@ -125,14 +125,11 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
     if let Some(first) = args.calib.first() {
         return Ok((Some(first.clone()), input::of_rectified_images(&args.calib)?));
     }
-    match Calibration::beside(&args.map)? {
-        Some(calibration) => Ok((Some(args.map.with_file_name(CALIBRATION)), calibration)),
-        None => {
-            let reason =
-                format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());
-            Err(Failure::usage("--calib", reason))
-        }
+    if let Some(calibration) = Calibration::beside(&args.map)? {
+        return Ok((Some(args.map.with_file_name(CALIBRATION)), calibration));
     }
+    let reason = format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());
+    Err(Failure::usage("--calib", reason))
 }
 
 /// The left image. Points take its colours alone, so it is read as both views.

@@ -159,7 +159,7 @@ impl Input {
             None => "give one with --calib",
         };
         let by_depth = search.takes_cameras().is_some();
-        Ok(Self { pair, range, by_matches, by_depth, calibration, remedy, rectification })
+        Ok(Self { pair, range, by_matches, calibration, by_depth, remedy, rectification })
     }
 
     /// `pair`, which `by` has rectified by its own matches, with the range to `search`, counted by `sign`.
@@ -227,7 +227,7 @@ impl Input {
     }
 
     /// What is searched, where a range that `fits` can be written.
-    pub(crate) fn searched(&self, fits: impl Fn(DisparityRange) -> bool) -> Searched {
+    pub(crate) fn searched(&self, fits: impl Fn(DisparityRange) -> bool) -> Searched<'_> {
         Searched::new(self.range, self.by_matches, fits)
     }
 
@@ -248,7 +248,9 @@ impl Input {
         }
         let window = region.map(|region| region.window_of(&self.pair));
         let warnings = self.warnings_of(window.as_ref().unwrap_or(&self.pair), &remedy::FLAGS);
-        warnings.iter().for_each(|warning| say(warning));
+        for warning in &warnings {
+            say(warning);
+        }
     }
 
     /// What is probably wrong with the pair and its calibration, in these `words`.

@@ -26,7 +26,9 @@ fn films() -> Folder {
             ["im0.png", "im1.png"].map(|file| image::open(scene(name).join(file)).unwrap().to_luma8());
         stream.extend(b"FRAME\n");
         for y in 70..118 {
-            views.iter().for_each(|view| stream.extend((90..154).map(|x| view.get_pixel(x, y)[0])));
+            for view in &views {
+                stream.extend((90..154).map(|x| view.get_pixel(x, y)[0]));
+            }
         }
     }
     fs::write(folder.join("plain.y4m"), &stream).unwrap();

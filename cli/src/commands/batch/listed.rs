@@ -48,7 +48,7 @@ pub(super) struct Given<'a> {
 }
 
 /// A pair, read.
-pub(super) struct Input {
+pub(super) struct Read {
     pub(super) input: input::Input,
     /// The cameras, where an output takes them.
     pub(super) rig: Option<Rig>,
@@ -135,7 +135,7 @@ impl Listed {
     }
 
     /// Reads its images and what else its range takes, and the cameras where an output takes them.
-    pub(super) fn read(&self, base: &Path, reader: Reader, given: &Given) -> Result<Input> {
+    pub(super) fn read(&self, base: &Path, reader: Reader, given: &Given) -> Result<Read> {
         let at = |path: &String| base.join(path);
         let mut calib = given.calib.to_vec();
         let (pair, range, [left, right], mask) = match &self.source {
@@ -176,7 +176,7 @@ impl Listed {
             Source::Folder => Some(calibration_beside(&left)).filter(|path| at(path).exists()),
         };
         let files = Files { left, right, mask, calibration, output: None };
-        Ok(Input { input, rig, files })
+        Ok(Read { input, rig, files })
     }
 
     /// The paths of the views in the folder `dir`, as a list would have them.

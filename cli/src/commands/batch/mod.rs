@@ -21,7 +21,7 @@ use crate::outputs::{Claim, Format, MapArgs, MatchRecord, Outcome, also, files};
 use crate::progress::Counter;
 use crate::{console, remedy, stop};
 
-use listed::{Given, Input, List, Listed, shown};
+use listed::{Given, List, Listed, Read, shown};
 use request::{Request, State};
 use shard::{Shard, shard};
 
@@ -304,7 +304,7 @@ impl Batch<'_> {
         matcher: &mut Matcher,
     ) -> Result<Result<(Option<String>, Vec<String>)>> {
         let (request, record) = (self.request(listed), self.record(listed));
-        let (input, matched, time, warnings) = match self.compute(listed, matcher, claim) {
+        let (read, matched, time, warnings) = match self.compute(listed, matcher, claim) {
             Ok(computed) => computed,
             Err(failure @ (Failure::Stopped(_) | Failure::Error(Error::Device(_)))) => return Err(failure),
             Err(error) => {
@@ -313,7 +313,7 @@ impl Batch<'_> {
                 return Ok(Err(error));
             }
         };
-        let Input { input, rig, mut files } = input;
+        let Read { input, rig, mut files } = read;
         let (range, rectifying) = (matched.range(), input.rectifying());
         let pair = input.pair;
         let wanted = &self.args.maps;
@@ -335,7 +335,7 @@ impl Batch<'_> {
         listed: &Listed,
         matcher: &mut Matcher,
         claim: &Claim,
-    ) -> Result<(Input, Matched, Duration, Vec<String>)> {
+    ) -> Result<(Read, Matched, Duration, Vec<String>)> {
         let wanted = &self.args.maps;
         let read = listed.read(&self.base, self.reader, &self.given)?;
         let (input, pair) = (&read.input, &read.input.pair);

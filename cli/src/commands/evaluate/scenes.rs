@@ -93,7 +93,7 @@ impl RunArgs {
             let scene = folder.read(reading.reader(), *truth_scale)?;
             let (pair, name) = (&scene.pair, Some(scene.name.as_str()));
             let (matched, time) =
-                matching::run(&mut matcher, pair, scene.range.into(), None, &method, name, false, None)?;
+                matching::run(&mut matcher, pair, scene.range.into(), &method, name, false, None)?;
             see(&scene, &matched.maps, time)?;
             let (ground, maps, estimate) = (&scene.ground, &matched.maps, matched.maps.final_map());
             let figures = Figures {

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         None => None,
     };
     let (matched, time) =
-        matching::run(&mut matcher, &input.pair, input.range.into(), None, &method, None, false, look)?;
+        matching::run(&mut matcher, &input.pair, input.range.into(), &method, None, false, look)?;
     let files = args.pair.files(&input, None);
     let record = MatchRecord::new(&files, &matched, time, Sign::default());
     files::deliver(args.json.as_deref(), &record, &times(&matched, time), |written| {

@@ -140,9 +140,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
     let mut matcher = Matcher::builder().execution(execution).build()?;
-    let searched = input.searched(|wider| check_range(args, wider).is_ok());
+    let searched = input.searched(|wider| check_range(args, wider).is_ok()).in_region(part);
     let (matched, time) =
-        matching::run(&mut matcher, &input.pair, searched, part, &method, None, args.quiet, None)?;
+        matching::run(&mut matcher, &input.pair, searched, &method, None, args.quiet, None)?;
     let range = matched.range();
     let mut pair = input.pair.clone();
     if let Some(part) = part {

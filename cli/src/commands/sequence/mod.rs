@@ -201,11 +201,8 @@ fn range_of_all(matcher: &mut Matcher, first: &Input, args: &Args) -> Result<Dis
     if !searched.may_widen {
         return Ok(first.range);
     }
-    let mut job = searched.job(matcher, &first.pair).on_progress(|_| stop::go_on());
-    if let Some(part) = &args.region.roi {
-        job = job.region(part.clone());
-    }
-    let matched = job.run()?;
+    let searched = searched.in_region(args.region.roi.as_ref());
+    let matched = searched.job(matcher, &first.pair).on_progress(|_| stop::go_on()).run()?;
     if !args.quiet {
         first.say_wider(&matched, Sign::default(), " of the first frame");
     }
