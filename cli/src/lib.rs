@@ -156,16 +156,16 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 22),
+            ("match", 27),
             ("rectify", 8),
-            ("depth", 13),
-            ("sequence", 25),
-            ("batch", 17),
+            ("depth", 14),
+            ("sequence", 30),
+            ("batch", 19),
             ("evaluate", 12),
             ("evaluate map", 8),
             ("evaluate submission", 10),
             ("bench", 11),
-            ("inspect", 13),
+            ("inspect", 15),
             ("presets", 2),
         ];
         let program = Cli::command();

@@ -38,6 +38,7 @@ pub(crate) struct PyRectification {
 
 /// What a rectification follows from.
 #[derive(Clone, FromPyObject, IntoPyObject)]
+#[allow(clippy::large_enum_variant, reason = "there is one for each rectification")]
 enum Source {
     Calibration(PyCalibration),
     Matches(Vec<Correspondence>),

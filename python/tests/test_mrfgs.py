@@ -579,6 +579,10 @@ class RectificationByMatches(Folder):
             self.assertTrue(np.array_equal(np.where(view.mask, 0, view.data), np.where(view.mask, 0, expected)))
             for axis, found in zip("xy", by.maps()[i]):
                 self.assertTrue(np.array_equal(found, read_pfm(self.folder / f"out/map{i}{axis}.pfm")))
+        # A copy is made of the same matches.
+        again = pickle.loads(pickle.dumps(by))
+        self.assertTrue(np.array_equal(again.maps()[1][1], by.maps()[1][1]))
+        self.assertEqual(again.trust, by.trust)
         trust = by.trust
         self.assertEqual(list(trust), ["matches", "agreeing", "median", "percentile95", "coverage", "off_one_plane"])
         self.assertTrue(30 <= trust["agreeing"] <= trust["matches"] and 0 < trust["median"] < trust["percentile95"] < 1.5)
