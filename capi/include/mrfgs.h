@@ -163,6 +163,14 @@ typedef struct mrfgs_maps {
   size_t right_stride;
 } mrfgs_maps;
 
+// A part of the left image, in pixels: its first column and row, and its size.
+typedef struct mrfgs_region {
+  uint32_t x;
+  uint32_t y;
+  uint32_t width;
+  uint32_t height;
+} mrfgs_region;
+
 // Where a rectified view is written; it has the size of mrfgs_rectification_size(). Strides are in bytes, from a row to the next one.
 typedef struct mrfgs_view {
   // sizeof(mrfgs_view).
@@ -227,6 +235,16 @@ enum mrfgs_status mrfgs_match_masked(const struct mrfgs_matcher *matcher,
                                      const struct mrfgs_image *left_mask,
                                      const struct mrfgs_image *right_mask,
                                      const struct mrfgs_range *range,
+                                     const struct mrfgs_maps *maps);
+
+// The same of a region of the left image alone, in the time of that part; null takes all. The maps have the size of the region.
+enum mrfgs_status mrfgs_match_region(const struct mrfgs_matcher *matcher,
+                                     const struct mrfgs_image *left,
+                                     const struct mrfgs_image *right,
+                                     const struct mrfgs_image *left_mask,
+                                     const struct mrfgs_image *right_mask,
+                                     const struct mrfgs_range *range,
+                                     const struct mrfgs_region *region,
                                      const struct mrfgs_maps *maps);
 
 // What ran the last match of this thread that succeeded, for people; "" before the first. It stays until the next one.

@@ -5,13 +5,14 @@ use std::ptr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use mrfgs::image::Rect;
 use mrfgs::options::Method;
 
 use crate::argument;
 use crate::frame::{self, Image};
 use crate::maps::Maps;
 use crate::options::Options;
-use crate::range::Range;
+use crate::range::{Range, Region};
 use crate::status::{Status, call};
 use crate::text::Said;
 use crate::warnings;
@@ -90,6 +91,23 @@ pub unsafe extern "C" fn mrfgs_match_masked(
     range: *const Range,
     maps: *const Maps,
 ) -> Status {
+    // SAFETY: the caller promises what is needed.
+    unsafe { mrfgs_match_region(matcher, left, right, left_mask, right_mask, range, ptr::null(), maps) }
+}
+
+/// The same of a region of the left image alone, in the time of that part; null takes all. The maps have the size of the region.
+#[unsafe(no_mangle)]
+#[allow(clippy::too_many_arguments, reason = "C has no other way to leave some out")]
+pub unsafe extern "C" fn mrfgs_match_region(
+    matcher: *const Matcher,
+    left: *const Image,
+    right: *const Image,
+    left_mask: *const Image,
+    right_mask: *const Image,
+    range: *const Range,
+    region: *const Region,
+    maps: *const Maps,
+) -> Status {
     call(|| {
         // SAFETY: the caller promises that the pointer is null or good.
         let matcher = unsafe { argument::thing("matcher", matcher) }?;
@@ -98,13 +116,19 @@ pub unsafe extern "C" fn mrfgs_match_masked(
         // SAFETY: the caller promises that the pointer is null or good.
         let range = unsafe { Range::searched(range) }?;
         // SAFETY: the same.
+        let part = unsafe { Region::part(region) };
+        // SAFETY: the same.
         let maps = unsafe { Maps::given(maps) }?;
-        maps.check(pair.size())?;
+        maps.check(part.as_ref().map_or(pair.size(), Rect::size))?;
         let method = &matcher.methods[usize::from(!maps.right.is_null())];
         let mut matching = matcher.inner.lock().unwrap_or_else(PoisonError::into_inner);
         let job = match range {
             Some(range) => matching.job(&pair, range),
             None => matching.job(&pair, ..),
+        };
+        let job = match part {
+            Some(part) => job.region(part),
+            None => job,
         };
         let matched = job.method(method).cancel(&matcher.stop).run();
         // While the lock is held: the next match is not meant any more.

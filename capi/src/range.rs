@@ -1,5 +1,6 @@
-//! The disparities to search.
+//! The disparities to search, and where.
 
+use mrfgs::image::Rect;
 use mrfgs::options::DisparityRange;
 
 use crate::status::Failure;
@@ -20,5 +21,27 @@ impl Range {
         // SAFETY: the caller promises it.
         let range = unsafe { range.as_ref() };
         Ok(range.map(|range| DisparityRange::new(range.min, range.max)).transpose()?)
+    }
+}
+
+/// A part of the left image, in pixels: its first column and row, and its size.
+#[repr(C)]
+pub struct Region {
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Region {
+    /// Its columns and rows; `None` where it is null.
+    ///
+    /// # Safety
+    /// `region` is null or good.
+    pub(crate) unsafe fn part(region: *const Self) -> Option<Rect> {
+        // SAFETY: the caller promises it.
+        let region = unsafe { region.as_ref() };
+        let ends = |start: u32, length: u32| start as usize..(start as usize).saturating_add(length as usize);
+        region.map(|region| Rect { x: ends(region.x, region.width), y: ends(region.y, region.height) })
     }
 }

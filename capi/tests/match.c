@@ -110,6 +110,27 @@ static mrfgs_image converted(const struct pnm *pnm, mrfgs_format format, const u
     return image;
 }
 
+/* A region alone gives the program's map of it. */
+static void region(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *part) {
+    mrfgs_image left = spread(&frames[0], 0), right = spread(&frames[1], 3);
+    mrfgs_region at = {31, 20, 45, 30};
+    CHECK(part->width == at.width && part->height == at.height);
+    size_t bytes = part->width * part->height * sizeof(float);
+    float *found = malloc(bytes);
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = found, .disparity_stride = part->width * sizeof(float)};
+    CHECK(mrfgs_match_region(matcher, &left, &right, NULL, NULL, &range, &at, &maps) == MRFGS_STATUS_OK);
+    CHECK(memcmp(found, part->data, bytes) == 0);
+    /* Control: another region has another map. */
+    at.x += 1;
+    CHECK(mrfgs_match_region(matcher, &left, &right, NULL, NULL, &range, &at, &maps) == MRFGS_STATUS_OK);
+    CHECK(memcmp(found, part->data, bytes) != 0);
+    at.x = UINT32_MAX;
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_match_region(matcher, &left, &right, NULL, NULL, &range, &at, &maps), "region", "not inside");
+    free((void *)left.data);
+    free((void *)right.data);
+    free(found);
+}
+
 /* Every format of colours gives the map of the first one, and masks are what alpha is. */
 static void formats(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *map) {
     size_t pixels = map->width * map->height, stride = map->width * sizeof(float);
@@ -259,7 +280,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
 }
 
 int main(int argc, char **argv) {
-    if (argc != 8) return 2;
+    if (argc != 9) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
     presets();
     struct pnm frames[2] = {pnm_read(argv[1]), pnm_read(argv[2])};
@@ -273,6 +294,8 @@ int main(int argc, char **argv) {
     CHECK(mrfgs_matcher_new(options, &matcher) == MRFGS_STATUS_OK);
     mrfgs_range range = {0, atoi(argv[3])};
     compare(matcher, frames, range, maps);
+    struct pnm part = pnm_read(argv[8]);
+    region(matcher, frames, range, &part);
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
     warnings(matcher, frames, range);
     mistakes(options, matcher, frames);
