@@ -296,6 +296,7 @@ int main(int argc, char **argv) {
     compare(matcher, frames, range, maps);
     struct pnm part = pnm_read(argv[8]);
     region(matcher, frames, range, &part);
+    free(part.data);
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
     warnings(matcher, frames, range);
     mistakes(options, matcher, frames);

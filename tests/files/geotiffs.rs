@@ -22,14 +22,18 @@ const KEYS: [u16; 16] = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 1026, 34_737,
 const DOUBLES: [f64; 2] = [6_378_137.0, 298.257_223_563];
 const NAME: &str = "WGS 84 /|";
 
-/// All tags of GeoTIFF.
-const ALL: [(u16, Values); 6] = [
+/// Rational polynomials; the third and fourth number are the line and the sample that they count from.
+const POLYNOMIALS: [f64; 92] = [7.25; 92];
+
+/// All tags of GeoTIFF, and that of satellites.
+const ALL: [(u16, Values); 7] = [
     (33_550, Double(&SCALE)),
     (33_922, Double(&TIEPOINT)),
     (34_264, Double(&TRANSFORMATION)),
     (34_735, Short(&KEYS)),
     (34_736, Double(&DOUBLES)),
     (34_737, Text(NAME)),
+    (50_844, Double(&POLYNOMIALS)),
 ];
 
 /// A file of 2 x 1 grey pixels with these tags.
@@ -71,6 +75,7 @@ fn all_tags_go_along() {
         assert_eq!(map.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).unwrap(), KEYS);
         assert_eq!(doubles(map, Tag::GeoDoubleParamsTag), DOUBLES);
         assert_eq!(map.get_tag_ascii_string(Tag::GeoAsciiParamsTag).unwrap(), NAME);
+        assert_eq!(doubles(map, Tag::Unknown(50_844)), POLYNOMIALS);
         assert_eq!(map.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
     }
     let map = &mut map(2, georeference(&image(&ALL[..2], false)));
@@ -85,9 +90,19 @@ fn each_view_has_its_own() {
     assert_eq!(both.georeferences(), [georeference(&one), georeference(&other)]);
     assert_ne!(georeference(&one), georeference(&other));
     assert_eq!(pair(&bare, &one).georeferences(), [None, georeference(&one)]);
-    // Other pixels lie elsewhere.
+    // Other pixels lie elsewhere: those of a part begin at its first one.
     assert_eq!(both.mirrored().georeferences(), [None, None]);
-    assert_eq!(both.crop(&Rect { x: 1..2, y: 0..1 }).georeferences(), [None, None]);
+    let [one, other] = both.crop(&Rect { x: 1..2, y: 0..1 }).georeferences();
+    let mut tiepoint = TIEPOINT;
+    tiepoint[0] = -1.0;
+    assert_eq!(doubles(&mut map(1, one), Tag::ModelTiepointTag), tiepoint);
+    let other = &mut map(1, other);
+    let mut transformation = TRANSFORMATION;
+    (transformation[3], transformation[7]) = (4e5 + 0.5, 5e6 + 0.1);
+    assert_eq!(doubles(other, Tag::ModelTransformationTag), transformation);
+    let mut polynomials = POLYNOMIALS;
+    polynomials[3] -= 1.0;
+    assert_eq!(doubles(other, Tag::Unknown(50_844)), polynomials);
     assert_eq!(map(2, None).find_tag(Tag::ModelPixelScaleTag).unwrap(), None);
 }
 
