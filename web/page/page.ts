@@ -413,7 +413,8 @@ function readOut(pixel: Pixel | undefined): void {
     const cameras = points.known;
     const apart = cameras && measured ? disparity + cameras.doffs : 0;
     if (cameras && apart > 0) {
-        parts.push(`depth ${((cameras.baseline * cameras.focalLength) / apart).toPrecision(5)}`);
+        const unit = cameras.unit === 'unknown' ? '' : ` ${cameras.unit}`;
+        parts.push(`depth ${((cameras.baseline * cameras.focalLength) / apart).toPrecision(5)}${unit}`);
     }
     say('readout', parts.join(' · '));
 }

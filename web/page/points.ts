@@ -5,7 +5,9 @@ import { by, count, say, words } from './dom';
 import type { Cameras, Cloud } from './protocol';
 
 const FIELDS = { focalLength: 'focal-length', cx: 'cx', cy: 'cy', doffs: 'doffs', baseline: 'baseline' } as const;
-const field = (key: keyof Cameras) => by<HTMLInputElement>(FIELDS[key]);
+type Field = keyof typeof FIELDS;
+const ALL = Object.keys(FIELDS) as Field[];
+const field = (key: Field) => by<HTMLInputElement>(FIELDS[key]);
 
 /** Where the cameras come from. */
 type Source = 'calib.txt' | 'given' | 'guess';
@@ -19,6 +21,8 @@ const NOTES: Record<Source, string> = {
 export class PointsTab {
     private view: CloudView | undefined;
     private source: Source = 'guess';
+    /** That of the baseline. */
+    private unit = 'unknown';
     private size = { width: 0, height: 0 };
     /** Whether the points that are shown are of this result and these cameras. */
     private fresh = false;
@@ -31,9 +35,12 @@ export class PointsTab {
         private readonly points: (cameras: Cameras) => Promise<Cloud>,
         private readonly changed: () => void,
     ) {
-        for (const key of Object.keys(FIELDS) as (keyof Cameras)[]) {
+        for (const key of ALL) {
             field(key).addEventListener('change', () => {
                 this.source = 'given';
+                if (key === 'baseline') {
+                    this.unit = 'unknown';
+                }
                 this.renew();
             });
         }
@@ -43,10 +50,10 @@ export class PointsTab {
 
     /** The cameras of the form; undefined where a number is missing or makes no sense. */
     get cameras(): Cameras | undefined {
-        const of = (key: keyof Cameras) => field(key).valueAsNumber;
+        const of = (key: Field) => field(key).valueAsNumber;
         const cameras = { focalLength: of('focalLength'), cx: of('cx'), cy: of('cy'), doffs: of('doffs'), baseline: of('baseline') };
         const sound = Object.values(cameras).every(Number.isFinite) && cameras.focalLength > 0 && cameras.baseline > 0;
-        return sound ? cameras : undefined;
+        return sound ? { ...cameras, unit: this.unit } : undefined;
     }
 
     /** The cameras, where they are more than a guess. */
@@ -65,9 +72,11 @@ export class PointsTab {
         this.size = { width, height };
         if (read || this.source !== 'given' || !same) {
             this.source = read ? 'calib.txt' : 'guess';
-            const guess = { focalLength: width, cx: (width - 1) / 2, cy: (height - 1) / 2, doffs: 0, baseline: 1 };
-            for (const [key, value] of Object.entries(read ?? guess)) {
-                field(key as keyof Cameras).value = String(value);
+            const guess = { focalLength: width, cx: (width - 1) / 2, cy: (height - 1) / 2, doffs: 0, baseline: 1, unit: 'unknown' };
+            const cameras = read ?? guess;
+            this.unit = cameras.unit;
+            for (const key of ALL) {
+                field(key).value = String(cameras[key]);
             }
         }
         this.note();

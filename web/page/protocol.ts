@@ -74,13 +74,15 @@ export interface Comparison {
     took: number;
 }
 
-/** A rectified pair of pinhole cameras; lengths in pixels, the baseline in any unit. */
+/** A rectified pair of pinhole cameras; lengths in pixels, the baseline in its unit. */
 export interface Cameras {
     focalLength: number;
     cx: number;
     cy: number;
     doffs: number;
     baseline: number;
+    /** mm, cm, m, or unknown. */
+    unit: string;
 }
 
 export interface Cloud {

@@ -77,8 +77,8 @@ async function run(device: Device, preset: string, range: Range): Promise<{ foun
     return { found, took: performance.now() - begun };
 }
 
-const cameras = ({ focalLength, cx, cy, doffs, baseline }: Cameras) =>
-    new engine.Cameras(focalLength, cx, cy, doffs, baseline);
+const cameras = ({ focalLength, cx, cy, doffs, baseline, unit }: Cameras) =>
+    new engine.Cameras(focalLength, cx, cy, doffs, baseline, unit);
 
 const bytes = async (file: Blob) => new Uint8Array(await file.arrayBuffer());
 
@@ -157,9 +157,9 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
     },
     cameras(calibration) {
         const read = engine.Cameras.read(calibration);
-        const { focal_length, cx, cy, doffs, baseline } = read;
+        const { focal_length, cx, cy, doffs, baseline, unit } = read;
         read.free();
-        return { focalLength: focal_length, cx, cy, doffs, baseline };
+        return { focalLength: focal_length, cx, cy, doffs, baseline, unit };
     },
     points(of) {
         return using(cameras(of), (rig) => {

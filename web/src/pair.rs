@@ -105,14 +105,14 @@ pub struct Cameras {
 #[wasm_bindgen]
 impl Cameras {
     /// Cameras with this focal length and principal point of the left one, and this distance of the principal points along the
-    /// row, all in pixels; `baseline` gives the unit of the points.
+    /// row, all in pixels; the unit of `baseline`, mm, cm, m or unknown, is that of the points.
     ///
     /// # Errors
-    /// Where focal length or baseline are not above 0.
+    /// Where focal length or baseline are not above 0, and for another unit.
     #[wasm_bindgen(constructor)]
-    pub fn new(focal_length: f64, cx: f64, cy: f64, doffs: f64, baseline: f64) -> Thrown<Self> {
+    pub fn new(focal_length: f64, cx: f64, cy: f64, doffs: f64, baseline: f64, unit: &str) -> Thrown<Self> {
         let text = format!(
-            "cam0=[{focal_length} 0 {cx}; 0 {focal_length} {cy}; 0 0 1]\ndoffs={doffs}\nbaseline={baseline}"
+            "cam0=[{focal_length} 0 {cx}; 0 {focal_length} {cy}; 0 0 1]\ndoffs={doffs}\nbaseline={baseline}\nunit={unit}"
         );
         Self::read(&text)
     }
@@ -160,6 +160,12 @@ impl Cameras {
     #[wasm_bindgen(getter)]
     pub fn baseline(&self) -> f64 {
         self.baseline
+    }
+
+    /// The unit of that distance: mm, cm, m or unknown.
+    #[wasm_bindgen(getter)]
+    pub fn unit(&self) -> String {
+        self.rig.unit().name().into()
     }
 }
 

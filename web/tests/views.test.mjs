@@ -41,7 +41,7 @@ describe('views', () => {
             assert.match(said, new RegExp(`disparity ${map.at(x, y).toFixed(2)} px · confidence ${confidence[y * 320 + x]} `));
             assert.equal(/measured/.test(said), validity[y * 320 + x] === 0, said);
             // Z = baseline * f / d, by the calib.txt.
-            const depth = Number(said.match(/depth ([\d.]+)/)[1]);
+            const depth = Number(said.match(/depth ([\d.]+) m$/)[1]);
             assert.ok(Math.abs(depth / ((0.18604166666666666 * 240) / map.at(x, y)) - 1) < 1e-4, said);
         }
         await visit.tab.click('#zoom-fit');
