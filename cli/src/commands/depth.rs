@@ -18,6 +18,7 @@ use crate::pairs::input;
 const EXAMPLES: &str = "\
 Examples:
   mrfgs depth d.pfm --calib calib.txt
+  mrfgs depth scene/truth.pfm here.pfm --calib scene/calib.txt
   mrfgs depth d.pfm --calib stereo.yml --left im0.png --also points.laz
   mrfgs depth d.pfm --calib c --left l.png --also points --clip-depth 30
   mrfgs depth d.png --calib c --confidence d.confidence.png --min-confidence 48";
@@ -25,13 +26,15 @@ Examples:
 /// Write depth and points of a disparity map that is there already
 ///
 /// MAP is a disparity map in pixels, of this program or another one: .pfm, .tif, or .png with 16 bits as in KITTI. The files
-/// stand beside it, as `mrfgs match --also` would write them: d.pfm gets d.depth.pfm and d.points.ply. The cameras are
+/// stand beside it or beside OUTPUT, as `mrfgs match --also` would write them: d.pfm gets d.depth.pfm and d.points.ply. The cameras are
 /// those of a rectified pair. Disparities count in 1/256 px.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     /// Disparity map of the left view
     map: PathBuf,
+    /// Name after which the files are called, in the place of MAP
+    output: Option<PathBuf>,
     /// Calibration of the rectified pair, as `mrfgs match` takes it [default: a calib.txt beside MAP]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
@@ -57,6 +60,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let also = args.also.of_map()?;
+    let output = args.output.as_deref().unwrap_or(&args.map);
+    if args.also.limits.takes_confidence() && args.confidence.is_none() {
+        let reason = "takes the confidence of each pixel, which MAP does not hold; give it by --confidence";
+        return Err(Failure::usage("--min-confidence", reason));
+    }
     if args.also.show_left() && args.left.is_none() {
         return Err(Failure::usage(
             "--left",
@@ -65,7 +73,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let inputs = [Some(&args.map), args.left.as_ref(), args.confidence.as_ref()].into_iter().flatten();
     let inputs: Vec<_> = inputs.chain(&args.calib).map(|path| ("an input", path.as_path())).collect();
-    let outputs: Vec<_> = also.iter().map(|word| (word.flag(), word.beside(&args.map))).collect();
+    let outputs: Vec<_> = also.iter().map(|word| (word.flag(), word.beside(output))).collect();
     let named: Vec<_> = outputs.iter().map(|(flag, path)| (flag.as_str(), path.as_path())).collect();
     files::distinct(&inputs, &named)?;
     let reader = args.reading.reader();
@@ -91,7 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let maps = maps(&map, confidence);
     let range = range(&map);
     for word in &also {
-        word.check(&word.beside(&args.map), range)?;
+        word.check(&word.beside(output), range)?;
     }
     let outcome = Outcome {
         maps: &maps,
@@ -105,7 +113,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut written = Written::default();
     let mut said = Vec::new();
     for word in also {
-        let path = word.beside(&args.map);
+        let path = word.beside(output);
         said.extend(written.note(&path, args.also.write(word, &path, &outcome))?);
     }
     written.keep();

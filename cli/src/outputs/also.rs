@@ -152,6 +152,11 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
+    /// Whether the confidence counts.
+    pub(crate) fn takes_confidence(self) -> bool {
+        self.min_confidence.is_some()
+    }
+
     /// `map`, of the disparities of `maps`, without those of too little confidence.
     fn sure(self, mut map: Plane<f32>, maps: &Maps) -> Plane<f32> {
         if let Some(least) = self.min_confidence {

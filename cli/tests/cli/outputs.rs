@@ -74,6 +74,11 @@ fn depth_and_points_of_a_map_that_is_there() {
     for end in ["depth.pfm", "depth-mm.png", "points.ply", "points.las"] {
         assert!(bytes(&format!("d.{end}")) == bytes(&format!("again/d.{end}")), "{end}");
     }
+    run(&folder, &format!("depth again/d.pfm other.tif {more} --quiet")).succeeded();
+    assert!(
+        read_tiff(folder.join("other.depth.tif")).data().iter().filter(|depth| depth.is_finite()).count()
+            > 1000
+    );
     // The other sign is another map.
     run(&folder, &format!("depth again/d.pfm {more} --sign right-minus-left --quiet")).succeeded();
     assert!(read_pfm(folder.join("again/d.depth.pfm")).data().iter().all(|depth| depth.is_infinite()));
@@ -107,6 +112,8 @@ fn depth_and_points_of_a_map_that_is_there() {
         ("d.pfm", 2, "--calib & no calib.txt beside d.pfm"),
         ("d.pfm --calib @mixed/calib.txt --also points", 2, "--left & left image"),
         ("d.pfm --calib @mixed/calib.txt --also validity", 2, "--also validity & a match"),
+        ("d.pfm --calib @mixed/calib.txt --min-confidence 9", 2, "--min-confidence & --confidence"),
+        ("d.pfm nowhere/e.pfm --calib @mixed/calib.txt", 1, "nowhere"),
         ("d.pfm --calib @wall/calib.txt", 1, "calib.txt is for images of 240 x 180 & d.pfm is 320 x 240"),
         (
             "d.pfm --calib @mixed/calib.txt --left @wall/im0.png --also points",
