@@ -312,6 +312,21 @@ fn what_is_stopped_leaves_nothing_behind() {
     }
 }
 
+/// A pipe that nobody writes to keeps no match from being stopped by the first signal.
+#[cfg(unix)]
+#[test]
+fn a_wait_for_input_is_stopped_at_once() {
+    for signal in ["-INT", "-TERM"] {
+        let folder = Folder::new();
+        assert!(Command::new("mkfifo").arg(folder.join("left.png")).status().unwrap().success());
+        let child = started(&folder, "match left.png @mixed/im1.png out.pfm --device cpu");
+        std::thread::sleep(Duration::from_secs(1));
+        send(signal, &child);
+        assert_eq!(child.wait_with_output().unwrap().status.code(), Some(130));
+        assert_eq!(fs::read_dir(&*folder).unwrap().count(), 1, "nothing but the pipe");
+    }
+}
+
 #[test]
 fn files_in_the_way_are_replaced_and_devices_are_not() {
     let folder = workshop();
