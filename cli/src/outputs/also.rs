@@ -11,13 +11,13 @@ use mrfgs::depth::Rig;
 use mrfgs::image::cloud::Frame;
 use mrfgs::image::write::Writer;
 use mrfgs::image::{Georeference, Image, Plane, write};
-use mrfgs::maps::{FRACTION, Maps, flag};
+use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
-use serde::Serialize;
 
-use crate::args::{Sign, depth};
+use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::files::Written;
+use crate::outputs::limits::Limits;
 use crate::text::plural;
 
 /// An output beside the disparity map.
@@ -136,65 +136,6 @@ pub(crate) struct AlsoArgs {
     colours: Option<ColourMap>,
     #[command(flatten)]
     pub(crate) limits: Limits,
-}
-
-/// What is left out of the outputs.
-#[derive(clap::Args, Clone, Copy, Serialize)]
-pub(crate) struct Limits {
-    /// Pixels of less confidence (0 to 255), and filled ones, have no disparity: in OUTPUT, and in previews, depths and points
-    #[arg(long, value_name = "N")]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    min_confidence: Option<u8>,
-    /// Depths beyond this, in the unit of the baseline, are left out of depths and points
-    #[arg(long, value_name = "Z", allow_negative_numbers = true, value_parser = depth)]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    clip_depth: Option<f64>,
-}
-
-impl Limits {
-    /// Whether the confidence counts.
-    pub(crate) fn takes_confidence(self) -> bool {
-        self.min_confidence.is_some()
-    }
-
-    /// `map`, of the disparities of `maps`, without those of too little confidence.
-    fn sure(self, mut map: Plane<f32>, maps: &Maps) -> Plane<f32> {
-        if let Some(least) = self.min_confidence {
-            let pixels = maps.confidence.data().iter().zip(maps.validity.data());
-            for (d, (confidence, validity)) in map.data_mut().iter_mut().zip(pixels) {
-                if *confidence < least || validity & flag::FILLED != 0 {
-                    *d = f32::INFINITY;
-                }
-            }
-        }
-        map
-    }
-
-    /// The depth at disparity `d`, unless it is too far.
-    fn depth(self, rig: &Rig, d: f64) -> Option<f64> {
-        rig.depth(d).filter(|depth| self.clip_depth.is_none_or(|limit| *depth <= limit))
-    }
-
-    /// `map` without disparities that are too far away.
-    fn near(self, map: Plane<f32>, rig: &Rig) -> Plane<f32> {
-        if self.clip_depth.is_none() {
-            return map;
-        }
-        map.map(|d| self.depth(rig, f64::from(*d)).map_or(f32::INFINITY, |_| *d))
-    }
-
-    /// The maps in which what is not sure or too far has low confidence, and so gives no points.
-    fn trusted(self, maps: &Maps, rig: &Rig) -> Maps {
-        let mut maps = maps.clone();
-        let pixels = maps.disparity.data().iter().zip(maps.confidence.data());
-        for (validity, (d, confidence)) in maps.validity.data_mut().iter_mut().zip(pixels) {
-            let is_far = self.depth(rig, f64::from(*d) / f64::from(FRACTION)).is_none();
-            if is_far || self.min_confidence.is_some_and(|least| *confidence < least) {
-                *validity |= flag::LOW_CONFIDENCE;
-            }
-        }
-        maps
-    }
 }
 
 fn parser() -> impl TypedValueParser<Value = &'static Also> {

@@ -4,12 +4,14 @@ pub(crate) mod also;
 mod claim;
 pub(crate) mod files;
 mod film;
+mod limits;
 mod record;
 mod staged;
 
-pub(crate) use also::{Also, AlsoArgs, Format, Limits, MapArgs, Outcome, View};
+pub(crate) use also::{Also, AlsoArgs, Format, MapArgs, Outcome, View};
 pub(crate) use claim::Claim;
 pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;
+pub(crate) use limits::Limits;
 pub(crate) use record::{Files, MatchRecord, stage_and_level};
 pub(crate) use staged::StagedFolder;
