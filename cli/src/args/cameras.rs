@@ -68,7 +68,8 @@ fn focal_length(text: &str) -> Result<f64, String> {
     above_zero(text).ok_or_else(|| "give a number of pixels above 0".into())
 }
 
-fn above_zero(text: &str) -> Option<f64> {
+/// A number above 0.
+pub(super) fn above_zero(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite())
 }
 

@@ -12,6 +12,7 @@ use mrfgs::image::calib::Calibration;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use serde::Serialize;
 
+use crate::args::cameras::above_zero;
 use crate::args::sign::Sign;
 use crate::failure::{self, Failure, Result};
 
@@ -66,8 +67,7 @@ pub(crate) struct Search {
 
 /// A depth, as users give it.
 pub(crate) fn depth(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0);
-    number.ok_or_else(|| "give a number above 0, in the unit of the baseline".into())
+    above_zero(text).ok_or_else(|| "give a number above 0, in the unit of the baseline".into())
 }
 
 impl From<DisparityRange> for Search {

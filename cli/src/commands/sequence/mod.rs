@@ -169,10 +169,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut rig = input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?;
     let part = args.region.roi.as_ref();
     let region = part.map(|part| input.region(part)).transpose()?;
-    rig = match part {
-        Some(part) => rig.map(|rig| rig.of_part(part.x.start, part.y.start)),
-        None => rig,
-    };
+    if let Some(part) = part {
+        rig = rig.map(|rig| rig.of_part(part.x.start, part.y.start));
+    }
     if !args.quiet {
         input.warn(region.as_ref());
     }
