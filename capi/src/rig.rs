@@ -58,7 +58,7 @@ pub unsafe extern "C" fn mrfgs_rig_of_calibration(
     let make = || {
         // SAFETY: the caller promises that the pointer is null or good.
         let calibration = unsafe { argument::thing("calibration", calibration) }?;
-        let rectified = calibration.0.of_rectified_images()?.ok_or_else(|| {
+        let rectified = calibration.0.of_rectified_images(None)?.ok_or_else(|| {
             Failure::argument(
                 "the calibration is of images that are not rectified: use mrfgs_rig_of_rectification(), or give that of the \
                  rectified pair",

@@ -57,7 +57,7 @@ pub fn cameras(bytes: &[u8]) {
     let one = [(name, text)];
     for files in [&one[..], &[one[0].clone(), one[0].clone()]] {
         let Some(cameras) = told(calibration::of_texts(files)) else { continue };
-        told(cameras.of_rectified_images());
+        told(cameras.of_rectified_images(cameras.size));
         let size = cameras.size.unwrap_or((32, 24));
         for alpha in [None, Some(0.0), Some(1.0)] {
             let options = Options { alpha, ..Options::default() };

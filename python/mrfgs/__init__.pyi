@@ -199,7 +199,8 @@ class Rectification:
 class Rig:
     """The cameras of a rectified pair: from disparities to depths and points, in the unit of the baseline."""
 
-    def __new__(cls, calibration: _Cameras) -> Rig: ...
+    def __new__(cls, calibration: _Cameras, *, size: Sequence[int] | None = None) -> Rig:
+        """By the calibration of a rectified pair; size is that of the images, where the calibration is for several."""
     def of_part(self, x: int, y: int) -> Rig:
         """That of a part of the images, whose first pixel is (x, y), such as the roi of match."""
     @staticmethod

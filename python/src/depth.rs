@@ -90,9 +90,10 @@ impl PyRig {
 #[pymethods]
 impl PyRig {
     #[new]
-    fn new(calibration: &Bound<PyAny>) -> PyResult<Self> {
+    #[pyo3(signature = (calibration, *, size=None))]
+    fn new(calibration: &Bound<PyAny>, size: Option<(usize, usize)>) -> PyResult<Self> {
         let known = PyCalibration::of(calibration)?;
-        let rectified = known.cameras.of_rectified_images().map_err(|error| known.wrong(error))?;
+        let rectified = known.cameras.of_rectified_images(size).map_err(|error| known.wrong(error))?;
         let rectified = rectified.ok_or_else(|| {
             PyValueError::new_err(format!(
                 "{}: is of images that are not rectified; take the rig of a Rectification, or give the calibration of the \

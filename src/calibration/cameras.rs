@@ -1,7 +1,7 @@
 //! What a calibration says of a pair of cameras.
 
 use super::lens::Lens;
-use super::matrix::{Matrix, degrees, degrees_between, product, rotated, transposed};
+use super::matrix::{IDENTITY, Matrix, degrees, degrees_between, product, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 
@@ -49,6 +49,9 @@ pub struct Views {
 }
 
 impl Pose {
+    /// Of one camera to itself.
+    pub(super) const IN_PLACE: Self = Self { rotation: IDENTITY, translation: [0.0; 3] };
+
     /// The way back.
     pub(super) fn inverse(&self) -> Self {
         let rotation = transposed(&self.rotation);
@@ -64,6 +67,11 @@ impl Pose {
 }
 
 impl Views {
+    /// Of a pair that is rectified already: two like `camera`, `baseline` apart.
+    pub(super) fn of_rectified(camera: Camera, baseline: f64) -> Self {
+        Self { rotations: [IDENTITY; 2], cameras: [camera; 2], translation: [-baseline, 0.0], size: None }
+    }
+
     /// Whether columns, not rows, are epipolar lines: one camera is above the other.
     #[must_use]
     pub fn is_vertical(&self) -> bool {
@@ -129,20 +137,34 @@ impl StereoCalibration {
         self.others.iter_mut().for_each(|other| other.set_unit(unit));
     }
 
+    /// That of the same cameras with images of all these sizes; `None` without any.
+    pub(super) fn of_sizes(sizes: Vec<Self>) -> Option<Self> {
+        let mut sizes = sizes.into_iter();
+        let first = sizes.next()?;
+        Some(Self { others: sizes.collect(), ..first })
+    }
+
     /// What it says of images of this size, where it is for several; else itself.
     pub(crate) fn of_size(&self, size: (usize, usize)) -> &Self {
         std::iter::once(self).chain(&self.others).find(|one| one.size == Some(size)).unwrap_or(self)
     }
 
-    /// The calibration of images that are rectified already; `None` where it does not say how they were rectified.
+    /// The calibration of images that are rectified already and of this `size`, which counts where the file is for several; `None`
+    /// where it does not say how they were rectified.
     ///
     /// # Errors
-    /// Those of [`Views::calibration`].
-    pub fn of_rectified_images(&self) -> Result<Option<Calibration>> {
+    /// Those of [`Views::calibration`], and [`Error::Calibration`] where it is for several sizes and not for this one.
+    pub fn of_rectified_images(&self, size: Option<(usize, usize)>) -> Result<Option<Calibration>> {
         if let Some(benchmark) = &self.benchmark {
             return Ok(Some(benchmark.clone()));
         }
-        self.views.map(|views| views.calibration(views.size.or(self.size), self.unit)).transpose()
+        let one = size.map_or(self, |size| self.of_size(size));
+        if !self.others.is_empty() && (size.is_none() || one.size != size) {
+            let sizes = std::iter::once(self).chain(&self.others).filter_map(|one| one.size);
+            let sizes: Vec<String> = sizes.map(|(width, height)| format!("{width} x {height}")).collect();
+            return Err(Error::Calibration(format!("is for images of {}; say which", sizes.join(", "))));
+        }
+        one.views.map(|views| views.calibration(views.size.or(one.size), one.unit)).transpose()
     }
 
     /// With the pose that the rectification implies, where a file gives that alone.
@@ -168,6 +190,6 @@ mod tests {
         let mut all = StereoCalibration { others: vec![other], benchmark, ..Default::default() };
         all.set_unit(Unit::Centimetre);
         assert_eq!([all.unit, all.of_size((320, 240)).unit], [Unit::Centimetre; 2]);
-        assert_eq!(all.of_rectified_images().unwrap().unwrap().unit, Unit::Centimetre);
+        assert_eq!(all.of_rectified_images(Some((320, 240))).unwrap().unwrap().unit, Unit::Centimetre);
     }
 }

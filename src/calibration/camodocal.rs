@@ -1,9 +1,9 @@
-//! VINS-Fusion's configuration with the files of its two cameras, which have the form of camodocal.
+//! Camodocal's files of two cameras, with its own of how these stand to each other, or with VINS-Fusion's configuration.
 
-use super::cameras::StereoCalibration;
+use super::cameras::{Pose, StereoCalibration};
 use super::lens::{Distortion, Lens, RadialTangential};
 use super::models::Model;
-use super::node::Entries;
+use super::node::{Entries, Entry};
 use super::posed::{Posed, pair};
 use crate::error::{Error, Result};
 use crate::image::calib::Unit;
@@ -13,23 +13,48 @@ pub(super) fn is(entries: &Entries) -> bool {
     entries.find("modeltype").is_some() && entries.find("projectionparameters").is_some()
 }
 
-/// Whether these entries say how the cameras stand to the body.
+/// Whether these entries say how the cameras stand.
 pub(super) fn is_rig(entries: &Entries) -> bool {
-    entries.find("bodytcam0").is_some()
+    entries.find("bodytcam0").is_some() || is_own(entries)
+}
+
+/// Whether they say it in camodocal's own form.
+fn is_own(entries: &Entries) -> bool {
+    let group = entries.find("transform").and_then(|entry| entry.group().ok());
+    group.is_some_and(|group| group.find("qw").is_some())
 }
 
 /// The calibration of the cameras, left and right, in this rig.
 pub(super) fn read(rig: &Entries, cameras: [&Entries; 2]) -> Result<StereoCalibration> {
-    let camera = |i: usize| -> Result<Posed> {
-        let called = ["body_T_cam0", "body_T_cam1"][i];
-        let expected = "a matrix of 4 x 4 from the camera to the body";
-        let entry = rig.require(["bodytcam0", "bodytcam1"][i], called, expected)?;
-        let count =
-            |names: &str, called: &str| cameras[i].require(names, called, "a number of pixels")?.count();
+    let posed = |camera: &Entries, pose: Pose, entry| -> Result<Posed> {
+        let count = |names: &str, called: &str| camera.require(names, called, "a number of pixels")?.count();
         let size = Some((count("imagewidth", "image_width")?, count("imageheight", "image_height")?));
-        Ok(Posed { lens: lens(cameras[i])?, size, pose: entry.pose()?.inverse(), entry })
+        Ok(Posed { lens: lens(camera)?, size, pose, entry })
     };
-    pair(&camera(0)?, &camera(1)?, Unit::Metre)
+    let [left, right] = cameras;
+    if is_own(rig) {
+        let entry = || rig.require("transform", "transform", "a rotation and a translation");
+        let pose = transform(&entry()?)?;
+        // The unit is that of the board by which the cameras were calibrated.
+        return pair(&posed(left, Pose::IN_PLACE, entry()?)?, &posed(right, pose, entry()?)?, Unit::Unknown);
+    }
+    let in_body = |camera: &Entries, names: &str, called: &str| {
+        let entry = rig.require(names, called, "a matrix of 4 x 4 from the camera to the body")?;
+        posed(camera, entry.pose()?.inverse(), entry)
+    };
+    let left = in_body(left, "bodytcam0", "body_T_cam0")?;
+    let right = in_body(right, "bodytcam1", "body_T_cam1")?;
+    pair(&left, &right, Unit::Metre)
+}
+
+/// From the left camera to the right one.
+fn transform(entry: &Entry) -> Result<Pose> {
+    let entries = entry.group()?;
+    let number = |names: &str, called: &str| entries.number(names, called);
+    let [x, y, z] = [number("qx", "q_x")?, number("qy", "q_y")?, number("qz", "q_z")?];
+    let rotation = entry.quaternion([number("qw", "q_w")?, x, y, z])?;
+    let translation = [number("tx", "t_x")?, number("ty", "t_y")?, number("tz", "t_z")?];
+    Ok(Pose { rotation, translation })
 }
 
 fn lens(camera: &Entries) -> Result<Lens> {

@@ -113,7 +113,10 @@ fn camera(entry: &Entry) -> Result<(Lens, (usize, usize))> {
             Distortion::Equidistant([c(0), c(1), c(2), c(3)])
         }
         "FOV" => Distortion::FieldOfView(c(0)),
-        "THIN_PRISM_FISHEYE" => return Err(model.wrong("another lens model; undistort the images in COLMAP")),
+        "THIN_PRISM_FISHEYE" => Distortion::ThinPrismFisheye {
+            k: [c(0), c(1), c(4), c(5)],
+            then: RadialTangential::thin_prism([c(2), c(3)], [c(6), c(7)]),
+        },
         // OPENCV has no k3; RADIAL has no more than k1 and k2.
         _ => {
             let all = [c(0), c(1), c(2), c(3), c(4), c(5), c(6), c(7)];

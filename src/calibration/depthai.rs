@@ -22,16 +22,14 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let cameras = entries.require("cameradata", "cameraData", "a list of cameras")?;
     // Extrinsics lead along a chain of cameras, so one of both ways is there.
     let poses = match (chain(&cameras, left, right)?, chain(&cameras, right, left)?) {
-        (Some(pose), _) => [IN_PLACE, pose],
-        (None, Some(pose)) => [pose, IN_PLACE],
+        (Some(pose), _) => [Pose::IN_PLACE, pose],
+        (None, Some(pose)) => [pose, Pose::IN_PLACE],
         _ => return Err(stereo.error("has cameras between which no extrinsics lead; calibrate again")),
     };
     let left = posed(camera(&cameras, left)?, poses[0])?;
     let right = posed(camera(&cameras, right)?, poses[1])?;
     pair(&left, &right, Unit::Centimetre)
 }
-
-const IN_PLACE: Pose = Pose { rotation: super::matrix::IDENTITY, translation: [0.0; 3] };
 
 /// The camera of a socket: cameras are pairs of a socket and what is known.
 fn camera<'a>(cameras: &Entry<'a>, socket: i64) -> Result<Entry<'a>> {
@@ -48,7 +46,7 @@ fn camera<'a>(cameras: &Entry<'a>, socket: i64) -> Result<Entry<'a>> {
 
 /// From the camera at `from` to that at `to`, where extrinsics lead there.
 fn chain(cameras: &Entry, from: i64, to: i64) -> Result<Option<Pose>> {
-    let (mut socket, mut pose) = (from, IN_PLACE);
+    let (mut socket, mut pose) = (from, Pose::IN_PLACE);
     for _ in 0..cameras.items()?.len() {
         let extrinsics = camera(cameras, socket)?
             .group()?

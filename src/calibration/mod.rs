@@ -1,6 +1,6 @@
 //! Calibrations of pairs of cameras, as the programs that people have write them.
 //!
-//! [`read`] takes the files of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, VINS-Fusion, Basalt, ZED and OAK cameras, COLMAP, KITTI and
+//! [`read`] takes the files of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, VINS-Fusion, Basalt, ZED, OAK and RealSense cameras, COLMAP, KITTI and
 //! Middlebury, and tells them apart by their content. [`Rectification`](crate::rectification::Rectification) rectifies by them, and
 //! [`Rig`](crate::depth::Rig) takes depths from them.
 
@@ -20,6 +20,7 @@ mod node;
 mod opencv;
 mod orbslam;
 mod posed;
+mod realsense;
 mod ros;
 mod syntax;
 pub mod write;
@@ -47,11 +48,12 @@ const KNOWN: &str = "expected the entries of OpenCV (K1, D1, K2, D2, R, T), ROS 
 type Read = fn(&[Entries]) -> Option<Result<StereoCalibration>>;
 
 /// The forms in which calibrations are read, each with its name. `None` from those that it is not.
-const FORMS: [(&str, Read); 11] = [
+const FORMS: [(&str, Read); 12] = [
     ("Kalibr's", |files| alone(files, kalibr::is, kalibr::read)),
     ("KITTI's", |files| alone(files, kitti::is, kitti::read)),
     ("Basalt's", |files| alone(files, basalt::is, basalt::read)),
     ("DepthAI's", |files| alone(files, depthai::is, depthai::read)),
+    ("RealSense's", |files| alone(files, realsense::is, realsense::read)),
     ("ZED's", |files| alone(files, zed::is, zed::read)),
     ("ORB-SLAM's", |files| alone(files, orbslam::is, orbslam::read)),
     ("COLMAP's", |files| files.iter().any(colmap::is).then(|| colmap::read(&Entries::together(files)))),
@@ -60,7 +62,7 @@ const FORMS: [(&str, Read); 11] = [
         [one] if euroc::is(one) => Some(other_missing(one, "T_BS")),
         _ => None,
     }),
-    ("VINS-Fusion's", |files| {
+    ("camodocal's", |files| {
         let cameras: Vec<&Entries> = files.iter().filter(|file| camodocal::is(file)).collect();
         let rig = files.iter().find(|file| camodocal::is_rig(file));
         match (rig, &cameras[..]) {
@@ -69,8 +71,8 @@ const FORMS: [(&str, Read); 11] = [
             (_, found) => Some(Err(Error::read(
                 files[0].path(),
                 format!(
-                    "is one of three files, and there {} with body_T_cam0 and body_T_cam1 and {} of a camera; give the rig and \
-                     the files of both cameras, left and right",
+                    "is one of three files, and there {} of how the cameras stand (body_T_cam0 and body_T_cam1 of VINS-Fusion, or \
+                     camodocal's transform) and {} of a camera; give that and the files of both cameras, left and right",
                     if rig.is_some() { "is one" } else { "is none" },
                     found.len()
                 ),

@@ -147,6 +147,12 @@ impl<'a> Entries<'a> {
         self.find(names).map_or(Ok(0.0), |entry| entry.number())
     }
 
+    /// As [`Entries::number`], of one above 0.
+    pub(super) fn above_0(&self, names: &str, called: &str) -> Result<f64> {
+        let entry = self.require(names, called, "a number above 0")?;
+        entry.number().ok().filter(|v| *v > 0.0).ok_or_else(|| entry.wrong("a number above 0"))
+    }
+
     /// The file that errors of all entries together name.
     pub(super) fn path(&self) -> &'a Path {
         self.files[0].0

@@ -2,7 +2,6 @@
 
 use super::cameras::{StereoCalibration, Views};
 use super::lens::{Distortion, Lens, RadialTangential};
-use super::matrix::IDENTITY;
 use super::models::Model;
 use super::node::Entries;
 use super::opencv;
@@ -21,14 +20,14 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let mut calibration = StereoCalibration { size, unit: Unit::Metre, ..StereoCalibration::default() };
     if entries.find("camera1.fx").is_none() {
         let camera = camera(entries, "Camera")?;
-        let baseline = above_0(entries, "camera.bf", "Camera.bf")? / camera.focal_length[0];
-        calibration.views = Some(views(camera, baseline));
+        let baseline = entries.above_0("camera.bf", "Camera.bf")? / camera.focal_length[0];
+        calibration.views = Some(Views::of_rectified(camera, baseline));
         return Ok(calibration);
     }
     let entry = entries.require("camera.type", "Camera.type", "PinHole, KannalaBrandt8 or Rectified")?;
     if entry.word()?.eq_ignore_ascii_case("rectified") {
-        let baseline = above_0(entries, "stereo.b", "Stereo.b")?;
-        calibration.views = Some(views(camera(entries, "Camera1")?, baseline));
+        let baseline = entries.above_0("stereo.b", "Stereo.b")?;
+        calibration.views = Some(Views::of_rectified(camera(entries, "Camera1")?, baseline));
         return Ok(calibration);
     }
     let fisheye = match Model::of(&entry) {
@@ -44,15 +43,6 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     Ok(calibration)
 }
 
-fn views(camera: Camera, baseline: f64) -> Views {
-    Views { rotations: [IDENTITY; 2], cameras: [camera; 2], translation: [-baseline, 0.0], size: None }
-}
-
-fn above_0(entries: &Entries, names: &str, called: &str) -> Result<f64> {
-    let entry = entries.require(names, called, "a number above 0")?;
-    entry.number().ok().filter(|v| *v > 0.0).ok_or_else(|| entry.wrong("a number above 0"))
-}
-
 /// Focal length and principal point of the camera of this name.
 fn camera(entries: &Entries, name: &str) -> Result<Camera> {
     let names = |end: &str| (format!("{}.{end}", name.to_lowercase()), format!("{name}.{end}"));
@@ -62,7 +52,7 @@ fn camera(entries: &Entries, name: &str) -> Result<Camera> {
     };
     let focal_length = |end: &str| {
         let (names, called) = names(end);
-        above_0(entries, &names, &called)
+        entries.above_0(&names, &called)
     };
     Ok(Camera {
         focal_length: [focal_length("fx")?, focal_length("fy")?],

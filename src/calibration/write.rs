@@ -93,7 +93,7 @@ mod tests {
             };
             let read = |text: String| {
                 let read = of_texts(&[(Path::new("cameras"), text)]).unwrap();
-                read.of_rectified_images().unwrap().unwrap()
+                read.of_rectified_images(None).unwrap().unwrap()
             };
             assert_eq!(read(opencv(&calibration, &[IDENTITY; 2]).unwrap()), calibration);
             let again = read(middlebury(&calibration).unwrap());

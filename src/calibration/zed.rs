@@ -30,10 +30,9 @@ fn section(side: &str, size: &str) -> String {
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let there = SIZES.iter().filter(|(name, _)| entries.find(&section("left", name)).is_some());
-    let mut sizes =
-        there.map(|(name, size)| of_size(entries, name, *size)).collect::<Result<Vec<_>>>()?.into_iter();
-    let none = || Error::read(entries.path(), "has no size of images that is known");
-    Ok(StereoCalibration { others: sizes.clone().skip(1).collect(), ..sizes.next().ok_or_else(none)? })
+    let sizes = there.map(|(name, size)| of_size(entries, name, *size)).collect::<Result<Vec<_>>>()?;
+    StereoCalibration::of_sizes(sizes)
+        .ok_or_else(|| Error::read(entries.path(), "has no size of images that is known"))
 }
 
 /// The calibration for images of `size`, which sections call `name`.

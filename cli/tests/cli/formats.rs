@@ -132,12 +132,22 @@ impl Rig {
         vec![("vins.yaml", rig), ("cam0.yaml", camera(0)), ("cam1.yaml", camera(1))]
     }
 
+    /// In millimetres: the unit is that of the board by which the cameras were calibrated.
+    fn camodocal(&self) -> Files {
+        let names = ["fx", "fy", "cx", "cy"];
+        let mut files = self.vins("PINHOLE", "", names, ["k1", "k2", "p1", "p2"]);
+        let ([w, x, y, z], [tx, ty, tz]) = (quaternion(&self.r), self.t.map(|v| 1000.0 * v));
+        let transform = format!(
+            "   q_x: {x}\n   q_y: {y}\n   q_z: {z}\n   q_w: {w}\n   t_x: {tx}\n   t_y: {ty}\n   t_z: {tz}\n"
+        );
+        files[0] = ("extrinsics.yaml", format!("%YAML:1.0\n---\ntransform:\n{transform}"));
+        files
+    }
+
     fn basalt(&self, model: &str, own: &[(&str, f64)], coefficients: &[&str]) -> Files {
         let poses = self.to_body().map(|(turn, [x, y, z])| {
-            let vector = rotation_vector(&turn);
-            let angle = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let [a, b, c] = vector.map(|v| v / angle * (angle / 2.0).sin());
-            serde_json::json!({"px": x, "py": y, "pz": z, "qx": a, "qy": b, "qz": c, "qw": (angle / 2.0).cos()})
+            let [w, a, b, c] = quaternion(&turn);
+            serde_json::json!({"px": x, "py": y, "pz": z, "qx": a, "qy": b, "qz": c, "qw": w})
         });
         let lenses = [0, 1].map(|i| {
             let mut numbers = serde_json::Map::new();
@@ -213,22 +223,28 @@ impl Rig {
         for (i, (turn, place)) in self.to_body().into_iter().enumerate() {
             let ([fx, fy, cx, cy], [a, b, c, d]) = (self.k[i], self.d[i]);
             let (cx, cy, id) = (cx + 0.5, cy + 0.5, i + 3);
-            cameras += &format!("{id} {model} 240 180 {fx} {fy} {cx} {cy} {a} {b} {c} {d}\n");
+            let coefficients = match model {
+                "THIN_PRISM_FISHEYE" => format!("{a} {b} 0 0 {c} {d} 0 0"),
+                _ => format!("{a} {b} {c} {d}"),
+            };
+            cameras += &format!("{id} {model} 240 180 {fx} {fy} {cx} {cy} {coefficients}\n");
             // From the world to the camera.
             let turn = transposed(&turn);
             let [x, y, z] = rotated(&turn, place).map(|v| -1000.0 * v);
-            let vector = rotation_vector(&turn);
-            let angle = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let [qx, qy, qz] = vector.map(|v| v / angle * (angle / 2.0).sin());
+            let [qw, qx, qy, qz] = quaternion(&turn);
             let points = if i == 0 { "1.5 2.5 -1 7.0 8.0 3" } else { "" };
-            images += &format!(
-                "{} {} {qx} {qy} {qz} {x} {y} {z} {id} im{i}.png\n{points}\n",
-                i + 1,
-                (angle / 2.0).cos()
-            );
+            images += &format!("{} {qw} {qx} {qy} {qz} {x} {y} {z} {id} im{i}.png\n{points}\n", i + 1);
         }
         vec![("cameras.txt", cameras), ("images.txt", images)]
     }
+}
+
+/// w, x, y and z of a rotation.
+fn quaternion(turn: &Matrix) -> [f64; 4] {
+    let vector = rotation_vector(turn);
+    let angle = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let [x, y, z] = vector.map(|v| v / angle * (angle / 2.0).sin());
+    [(angle / 2.0).cos(), x, y, z]
 }
 
 /// A matrix of 4 x 4.
@@ -322,6 +338,7 @@ fn radial() -> Vec<(&'static str, Files)> {
         ("EuRoC", rig.euroc("radial-tangential")),
         ("ORB-SLAM3", rig.orb_slam("PinHole", ["k1", "k2", "p1", "p2"])),
         ("VINS-Fusion", rig.vins("PINHOLE", "", ["fx", "fy", "cx", "cy"], ["k1", "k2", "p1", "p2"])),
+        ("camodocal", rig.camodocal()),
         ("Basalt", rig.basalt("pinhole-radtan8", &[], &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"])),
         ("DepthAI", rig.depthai(0, true)),
         ("DepthAI from the right", rig.depthai(0, false)),
@@ -341,6 +358,7 @@ fn fisheyes() -> Vec<(&'static str, Files)> {
         ("Basalt", rig.basalt("kb4", &[], &["k1", "k2", "k3", "k4"])),
         ("DepthAI", rig.depthai(1, true)),
         ("COLMAP", rig.colmap("OPENCV_FISHEYE")),
+        ("COLMAP with a thin prism", rig.colmap("THIN_PRISM_FISHEYE")),
     ]
 }
 
@@ -376,10 +394,18 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
         "VINS-Fusion",
         "PINHOLE",
         "SCARAMUZZA",
-        "model_type: expected PINHOLE, MEI or KANNALA_BRANDT & VINS-Fusion's",
+        "model_type: expected PINHOLE, MEI or KANNALA_BRANDT & camodocal's",
     ),
     ("VINS-Fusion", "body_T_cam1", "body_T_cam2", "body_T_cam1 is missing"),
-    ("VINS-Fusion", "body_T_cam0", "body_T_cam9", "is one of three files & none with body_T_cam0"),
+    (
+        "VINS-Fusion",
+        "body_T_cam0",
+        "body_T_cam9",
+        "is one of three files & none of how the cameras stand & body_T_cam0",
+    ),
+    ("camodocal", "q_w", "q_v", "is one of three files & camodocal's transform"),
+    ("camodocal", "t_y", "t_w", "extrinsics.yaml & transform.t_y is missing"),
+    ("camodocal", "q_w: ", "q_w: 7", "transform: expected a rotation as a quaternion of length 1"),
     (
         "Basalt",
         "pinhole-radtan8",
@@ -547,6 +573,22 @@ fn settings_of_rectified_pairs_give_depths() {
         format!("%YAML:1.0\nCamera.type: \"Rectified\"\n{}{size}Stereo.b: 0.16\n", numbers("Camera1"));
     let two = format!("%YAML:1.0\n{}{size}Camera.bf: 34.48\n", numbers("Camera"));
     assert!(depths(&three) == first && depths(&two) == first);
+    // Its viewer writes numbers as words; 2 is a size that the camera has not.
+    let realsense = r#"{"baseline": "-160", "intrinsic_left.x.x": "0.5", "rectified.0.width": "640", "rectified.0.height": "480",
+        "rectified.0.fx": "430", "rectified.0.fy": "430", "rectified.0.ppx": "320", "rectified.0.ppy": "240",
+        "rectified.1.width": 240, "rectified.1.height": 180, "rectified.1.fx": 215.5, "rectified.1.fy": 215.5,
+        "rectified.1.ppx": 118.5, "rectified.1.ppy": 89.5, "rectified.2.width": 0}"#;
+    assert!(depths(realsense) == first);
+    for (from, to, words) in [
+        ("180", "181", "is for images of 640 x 480, 240 x 181; say which"),
+        ("-160", "0", "baseline: expected a number of millimetres other than 0 & RealSense's"),
+        ("\"rectified.1.fx\": 215.5", "\"rectified.1.fx\": 0", "rectified.1.fx: expected a number above 0"),
+        ("rectified.1.ppy", "rectified.1.pp", "rectified.1.ppy is missing"),
+    ] {
+        fs::write(folder.join("a-file"), realsense.replacen(from, to, 1)).unwrap();
+        run(&folder, "match @slanted/im0.png @slanted/im1.png bad.pfm --also depth-mm --calib a-file")
+            .failed(1, &format!("a-file & {words}"));
+    }
 }
 
 /// A focal length and a baseline are a calibration.

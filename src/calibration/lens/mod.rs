@@ -28,6 +28,13 @@ pub enum Distortion {
     /// Fisheye: the angle to the axis times a polynomial of its square, k1 to k4. OpenCV's `fisheye`, `equidistant`, the model
     /// of Kannala and Brandt.
     Equidistant([f64; 4]),
+    /// The same, then what a decentred lens and a thin prism add: COLMAP's `THIN_PRISM_FISHEYE`.
+    ThinPrismFisheye {
+        /// k1 to k4.
+        k: [f64; 4],
+        /// p1, p2 and the prism; its polynomials are 1.
+        then: RadialTangential,
+    },
     /// The unified model, `omni`, of Mei and Rives: a sphere seen from xi behind its centre, then radial and tangential distortion.
     Unified {
         /// How far behind the centre.
@@ -61,6 +68,7 @@ impl Distortion {
         match *self {
             Self::RadialTangential(model) => model.numbers(),
             Self::Equidistant(k) => k.to_vec(),
+            Self::ThinPrismFisheye { k, then } => [k.to_vec(), then.numbers()].concat(),
             Self::Unified { xi, then } => [vec![xi], then.numbers()].concat(),
             Self::DoubleSphere { xi, alpha } => vec![xi, alpha],
             Self::ExtendedUnified { alpha, beta } => vec![alpha, beta],
@@ -72,7 +80,9 @@ impl Distortion {
     fn radius(&self, tangent: f64) -> f64 {
         match *self {
             Self::RadialTangential(_) => tangent,
-            Self::Equidistant(k) => wide::equidistant(k, libm::atan(tangent))[0],
+            Self::Equidistant(k) | Self::ThinPrismFisheye { k, .. } => {
+                wide::equidistant(k, libm::atan(tangent))[0]
+            }
             Self::Unified { xi, .. } => wide::unified(xi, tangent),
             Self::DoubleSphere { xi, alpha } => wide::double_sphere(xi, alpha, tangent),
             Self::ExtendedUnified { alpha, beta } => wide::extended_unified(alpha, beta, tangent),
@@ -91,6 +101,10 @@ impl Distortion {
         let at = [x * factor, y * factor];
         match self {
             Self::Unified { then, .. } => then.distorted(at),
+            Self::ThinPrismFisheye { then, .. } => {
+                let added = then.added(flat_fisheye([x, y]), 0.0);
+                [at[0] + added[0], at[1] + added[1]]
+            }
             _ => at,
         }
     }
@@ -112,12 +126,19 @@ impl Distortion {
         };
         let grows = |(angle, tangent): &(f64, f64)| match self {
             Self::RadialTangential(model) => model.grows(tangent * tangent),
-            Self::Equidistant(k) => wide::equidistant(*k, *angle)[1] > 0.0,
+            Self::Equidistant(k) | Self::ThinPrismFisheye { k, .. } => wide::equidistant(*k, *angle)[1] > 0.0,
             Self::Unified { then, .. } => rises(*tangent).is_some_and(|radius| then.grows(radius * radius)),
             _ => rises(*tangent).is_some(),
         };
         tangents.take_while(grows).last().map_or(0.0, |(_, tangent)| tangent)
     }
+}
+
+/// Where a fisheye without coefficients shows a point of the plane z = 1: as far from the axis as its angle.
+fn flat_fisheye(at: [f64; 2]) -> [f64; 2] {
+    let tangent = (at[0] * at[0] + at[1] * at[1]).sqrt();
+    let factor = if tangent == 0.0 { 1.0 } else { libm::atan(tangent) / tangent };
+    at.map(|v| v * factor)
 }
 
 impl Lens {
@@ -172,6 +193,10 @@ impl Lens {
                 start.map(|v| v * libm::tan(angle) / radius)
             }
             Distortion::Unified { then, .. } => self.at_radius(then.nearly_undistorted(start, 20)),
+            Distortion::ThinPrismFisheye { then, .. } => (0..20).fold(self.at_radius(start), |found, _| {
+                let [dx, dy] = then.added(flat_fisheye(found), 0.0);
+                self.at_radius([start[0] - dx, start[1] - dy])
+            }),
             _ => self.at_radius(start),
         }
     }
@@ -211,6 +236,15 @@ mod tests {
 
     fn lens(distortion: Distortion) -> Lens {
         Lens::new([500.0, 510.0], [320.0, 240.0], distortion).unwrap()
+    }
+
+    fn thin_prism_fisheye() -> Distortion {
+        let mut then = [0.0; 12];
+        (then[2], then[3], then[8], then[10]) = (0.001, -0.002, 0.003, -0.001);
+        Distortion::ThinPrismFisheye {
+            k: [0.02, -0.01, 0.003, 0.001],
+            then: RadialTangential::new(&then).unwrap(),
+        }
     }
 
     #[test]
@@ -253,6 +287,7 @@ mod tests {
             Distortion::DoubleSphere { xi: -0.2, alpha: 0.6 },
             Distortion::ExtendedUnified { alpha: 0.6, beta: 1.1 },
             Distortion::FieldOfView(0.9),
+            thin_prism_fisheye(),
             radial(&[-0.05, 0.01, 0.001, -0.001, 0.0, 0.01, 0.0, 0.0, 0.001, 0.0, -0.002, 0.0, 0.02, -0.03]),
         ] {
             let lens = lens(distortion);
@@ -281,6 +316,19 @@ mod tests {
             assert!((found[0] - 320.0 - 500.0 * radius).abs() < 1e-9, "{distortion:?}: {found:?}");
             assert!((found[1] - 240.0).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_thin_prism_is_added_to_a_fisheye() {
+        let (tangent, seen) = (0.625_f64, lens(thin_prism_fisheye()).project([0.6, 0.8, 1.6]).unwrap());
+        // u and v of the definition: the angle in the direction (0.6, 0.8).
+        let angle = tangent.atan();
+        let (u, v, r2) = (0.6 * angle, 0.8 * angle, angle * angle);
+        let radial = 0.02 * r2 - 0.01 * r2.powi(2) + 0.003 * r2.powi(3) + 0.001 * r2.powi(4);
+        let x = u * (1.0 + radial) + 2.0 * 0.001 * u * v - 0.002 * (r2 + 2.0 * u * u) + 0.003 * r2;
+        let y = v * (1.0 + radial) - 2.0 * 0.002 * u * v + 0.001 * (r2 + 2.0 * v * v) - 0.001 * r2;
+        let expected = [500.0 * x + 320.0, 510.0 * y + 240.0];
+        assert!(seen.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{seen:?} {expected:?}");
     }
 
     #[test]

@@ -46,13 +46,18 @@ impl RadialTangential {
         Self { radial: [k1, k2, k3, k4, k5, k6], tangential: [p1, p2], ..Self::NONE }
     }
 
+    /// That of p1, p2 and a thin prism whose part grows with the square of the radius, across and down.
+    pub(crate) fn thin_prism(tangential: [f64; 2], [across, down]: [f64; 2]) -> Self {
+        Self { tangential, prism: [across, 0.0, down, 0.0], ..Self::NONE }
+    }
+
     pub(super) fn numbers(&self) -> Vec<f64> {
         let tilt = self.tilt.iter().flatten().flatten().flatten();
         [&self.radial[..], &self.tangential, &self.prism].concat().into_iter().chain(tilt.copied()).collect()
     }
 
     /// What is added to a point that is `factor` times (x, y): the tangential part and the prism.
-    fn added(&self, [x, y]: [f64; 2], factor: f64) -> [f64; 2] {
+    pub(super) fn added(&self, [x, y]: [f64; 2], factor: f64) -> [f64; 2] {
         let ([p1, p2], [s1, s2, s3, s4]) = (self.tangential, self.prism);
         let r2 = x * x + y * y;
         [
