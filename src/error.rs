@@ -289,8 +289,11 @@ pub enum RangeError {
         width: usize,
     },
     /// No range was given, and the sparse matches are too few to find it.
-    #[error("the views have too few matches to find the range of disparities")]
-    NotFound,
+    #[error("the views have too few matches to find the range of disparities{}", cause.as_ref().map(|cause| format!(": {cause}")).unwrap_or_default())]
+    NotFound {
+        /// The warning that says why, with what helps.
+        cause: Option<String>,
+    },
 }
 
 /// Why a pair cannot be rectified by its own matches.

@@ -137,7 +137,8 @@ impl Words {
             RangeError::TooFar { disparity, .. } if *disparity < 0 => (min, String::new()),
             RangeError::TooManyLabels { .. } => (max, ": narrow the range".into()),
             RangeError::OutsideImages { .. } => (max, ": give a range that fits the pair".into()),
-            RangeError::NotFound => {
+            RangeError::NotFound { cause: Some(_) } => return cause.to_string(),
+            RangeError::NotFound { cause: None } => {
                 return format!("{cause}: give {}", range.map_or(max.into(), |range| format!("the {range}")));
             }
             RangeError::TooFar { .. } => (max, String::new()),

@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::image::{Image, Pair, Plane, calib::Calibration, pfm, read};
+use mrfgs::error::{Error, RangeError};
+use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, pfm, read};
 use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::low_level::front::label_range::{self, LabelRanges, MIN_MATCHES};
 use mrfgs::low_level::front::matches::{self, Match};
@@ -264,7 +265,7 @@ fn there_is_nothing_to_match() {
         {
             assert_eq!(matches::find(&pair, None, range), [], "{:?}", pair.size());
         }
-        assert_eq!(check::range(&pair).unwrap(), None);
+        not_found(&pair);
         let told =
             |w: &Warning| matches!(w, Warning::Identical | Warning::Plain { .. } | Warning::Masked { .. });
         let said = check::warnings(&pair, None);
@@ -276,7 +277,13 @@ fn there_is_nothing_to_match() {
     // Views of different scenes cannot.
     let (left, right) = (Case::scene("slanted"), Case::scene("thin"));
     let strangers = Pair::new(left.pair.left().clone(), right.pair.right().clone()).unwrap();
-    assert_eq!(check::range(&strangers).unwrap(), None);
+    not_found(&strangers);
+}
+
+/// That matches find no range.
+fn not_found(pair: &Pair) {
+    let found = check::range(pair);
+    assert!(matches!(found, Err(Error::Range(RangeError::NotFound { .. }))), "{found:?}");
 }
 
 /// Matches at (0, 0), (1, 0) and so on.
@@ -366,7 +373,7 @@ fn the_range_holds_the_truth() {
     // The truth of real pairs has outliers: 36 pixels of Cones and one of Dolls lie far below all others.
     let scenes = SCENES.map(Case::scene).into_iter().map(|case| (case, 100.0, 3.0));
     for (case, share, most) in scenes.chain(real_pairs().into_iter().map(|case| (case, 99.95, 1.3))) {
-        let range = check::range(&case.pair).unwrap().unwrap();
+        let range = check::range(&case.pair).unwrap();
         let low = case.truths().fold(f32::MAX, f32::min).floor() as i32;
         let high = case.truths().fold(f32::MIN, f32::max).ceil() as i32;
         let inside = case.truths().filter(|t| range.min as f32 <= *t && *t <= range.max as f32).count();
@@ -423,7 +430,40 @@ fn views_that_are_turned_are_told() {
         assert_eq!(check::warnings(&pair, None), [Warning::Turned { how: "upside down" }], "{}", case.name);
         let pair = Pair::new(left.flipped(), right.flipped()).unwrap();
         assert_eq!(check::warnings(&pair, Some(case.range)), [], "{}", case.name);
+        // Turned by a quarter, either way, rows are columns.
+        for turned in [Image::flipped, Image::mirrored] {
+            let pair = Pair::new(turned(&left.transposed()), turned(&right.transposed())).unwrap();
+            assert_eq!(check::warnings(&pair, None), [Warning::Sideways], "{}", case.name);
+        }
+        let side = left.width().min(left.height());
+        let square = |image: &Image| image.crop(&Rect { x: 0..side, y: 0..side });
+        for turned in [Image::flipped, Image::mirrored] {
+            let pair = Pair::new(square(left), turned(&square(right).transposed())).unwrap();
+            let how = "turned by a quarter";
+            assert_eq!(check::warnings(&pair, None), [Warning::Turned { how }], "{}", case.name);
+        }
     }
+}
+
+/// Where matches find no range because of a mistake that has a name, the error has it.
+#[test]
+fn a_range_that_is_not_found_says_why() {
+    let mut refused = [0; 2];
+    for case in SCENES.map(Case::scene) {
+        let (left, right) = (case.pair.left(), case.pair.right());
+        let mirrored = Pair::new(left.clone(), right.mirrored());
+        let sideways = Pair::new(left.transposed(), right.transposed());
+        for (i, (pair, words)) in
+            [(mirrored, "is mirrored"), (sideways, "on the same column")].into_iter().enumerate()
+        {
+            // A few have enough false matches for a range.
+            if let Err(error) = check::range(&pair.unwrap()) {
+                assert!(error.to_string().contains(words), "{}: {error}", case.name);
+                refused[i] += 1;
+            }
+        }
+    }
+    assert!(refused.iter().all(|count| *count >= 3), "{refused:?}");
 }
 
 #[test]
@@ -459,6 +499,7 @@ fn warnings_are_one_line_with_the_cause() {
         (Warning::Identical, ["the same", "right view"]),
         (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
         (Warning::Turned { how: "upside down" }, ["upside down", "turn it back"]),
+        (Warning::Sideways, ["same column", "turn both"]),
         (Warning::Swapped { percent: 97 }, ["97 %", "seem to be swapped"]),
     ] {
         let line = warning.to_string();

@@ -254,4 +254,6 @@ fn rigs_that_give_no_pair_are_told() {
     refused(&forward, default, SIZE, "in front of the other");
     let apart = |cameras: &mut [Camera; 2], _: &mut f64| cameras[1].turn = raw::rotation([0.0, 1.2, 0.0]);
     refused(&apart, default, SIZE, "more than 90 degrees apart");
+    let over = |cameras: &mut [Camera; 2], _: &mut f64| cameras[1].turn = raw::rotation([0.0, 0.0, 3.1]);
+    refused(&over, default, SIZE, "upside down against the other");
 }

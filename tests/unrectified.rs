@@ -78,7 +78,7 @@ struct Found {
 
 /// The pair is matched; `truth` is where the right view has a pixel of the left one.
 fn measured(pair: &Pair, truth: impl Fn(usize, usize) -> Option<[f64; 2]>) -> Found {
-    let range = check::range(pair).unwrap().unwrap_or(DisparityRange::new(0, 60).unwrap());
+    let range = check::range(pair).unwrap_or(DisparityRange::new(0, 60).unwrap());
     let mut matcher = Matcher::builder().device("cpu").build().unwrap();
     let map = matcher.run(pair, range).unwrap().disparity();
     let (width, height) = pair.size();

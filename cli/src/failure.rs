@@ -35,7 +35,7 @@ impl Failure {
 
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Error(Error::Range(RangeError::NotFound)) => ExitCode::FAILURE,
+            Self::Error(Error::Range(RangeError::NotFound { .. })) => ExitCode::FAILURE,
             Self::Usage(_)
             | Self::Error(
                 Error::Option { .. }

@@ -95,7 +95,8 @@ mod tests {
                 RangeError::OutsideImages { min: 60, max: 70, width: 60 }.into(),
                 "--max-disparity ... give a range",
             ),
-            (RangeError::NotFound.into(), "too few matches ... give --max-disparity"),
+            (RangeError::NotFound { cause: None }.into(), "too few matches ... give --max-disparity"),
+            (RangeError::NotFound { cause: Some("it is plain".into()) }.into(), "disparities: it is plain"),
             (no_device.into(), "--device ... 0: llvmpipe ... `mrfgs devices`"),
             (
                 ExecutionError::ThreadCount { wanted: 0, most: 9 }.into(),

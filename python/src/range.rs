@@ -1,7 +1,6 @@
 //! The disparities to search.
 
 use mrfgs::check;
-use mrfgs::error::RangeError;
 use mrfgs::image::Pair;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -41,8 +40,6 @@ pub(crate) fn searched(
 
 /// The range that sparse matches find, from `min` on where that is given.
 fn found(pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
-    let Some(found) = check::range(pair).map_err(exception)? else {
-        return Err(exception(RangeError::NotFound.into()));
-    };
+    let found = check::range(pair).map_err(exception)?;
     DisparityRange::new(min.unwrap_or(found.min), found.max).map_err(exception)
 }

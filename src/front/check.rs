@@ -1,8 +1,8 @@
 //! Warnings about probable mistakes. Before a pair is matched they come from its pixels and from sparse
 //! matches, which also suggest the range to search; after a match they come from its maps.
 
-use super::matches;
-use crate::error::Result;
+use super::matches::{self, Match};
+use crate::error::{RangeError, Result};
 use crate::image::{Image, Orientation, Pair};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
@@ -13,6 +13,9 @@ const MIN_MATCHES: usize = 30;
 const STRAYS: usize = 400;
 /// The image is divided into this many parts along each side, to see how much of it has no match.
 const PARTS: usize = 8;
+/// Percentage of matches more than a pixel below 0 from which on the cameras count as converging (open). Of 52 pairs, two of satellites
+/// have more than half there and one of a robot has 2.5; the others, whose truth is above 0, have 1.0 at most, of which many are false.
+const BELOW_PERCENT: usize = 1;
 /// Approximate number of corners that [`warnings`] looks for: its statistics need no more.
 const SAMPLE: usize = 300;
 /// Number of rows above and below its own on which [`warnings`] looks for a corner.
@@ -51,7 +54,7 @@ const ENDING: usize = 8;
 /// Ranges with fewer labels consist of nothing but ends.
 const MIN_LABELS: usize = 3;
 
-/// The range of disparities in `pair`, with a margin; `None` where there are too few matches to tell.
+/// The range of disparities in `pair`, with a margin.
 ///
 /// The margin is lopsided. The farthest surface is mostly a background that faces the cameras and has
 /// matches, so one pixel plus 1/24 of the matches' span is enough. The nearest surfaces are often grounds
@@ -59,16 +62,20 @@ const MIN_LABELS: usize = 3;
 /// pixels plus 1/4 of the span. (Open; both are set by five real pairs. Too many labels cost time, too few
 /// cost the foreground.)
 ///
+/// Parallel cameras see nothing below 0. Only where more than one match in a hundred lies more than a pixel below, these are searched.
+///
 /// Where more than a quarter of the image has no match, that part may be a plain wall behind everything else.
 /// The range then extends down to 0, the horizon of parallel cameras.
 ///
 /// # Errors
+/// [`RangeError::NotFound`] where there are too few matches to tell, with the cause where [`warnings`] has one;
 /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
-pub fn range(pair: &Pair) -> Result<Option<DisparityRange>> {
+pub fn range(pair: &Pair) -> Result<DisparityRange> {
     matches::check_memory(pair)?;
     let found = matches::find(pair, None, None);
     if found.len() < MIN_MATCHES {
-        return Ok(None);
+        let cause = of_pixels(pair, None).first().map(Warning::to_string);
+        return Err(RangeError::NotFound { cause }.into());
     }
     let (width, height) = pair.size();
     let mut bare = [true; PARTS * PARTS];
@@ -83,7 +90,9 @@ pub fn range(pair: &Pair) -> Result<Option<DisparityRange>> {
     let span = near - far;
     let (min, max) = (far - FRACTION - span / 24, near + 3 * FRACTION + span / 4);
     let min = if 4 * bare > PARTS * PARTS { min.min(0) } else { min };
-    Ok(DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION)).ok())
+    let below = disparities.partition_point(|d| *d < -FRACTION);
+    let min = if 100 * below > BELOW_PERCENT * disparities.len() { min } else { min.max(0) };
+    DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION))
 }
 
 /// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
@@ -144,9 +153,15 @@ pub enum Warning {
          the same orientation"
     )]
     Turned {
-        /// How: "upside down", "mirrored" or "turned by half a turn".
+        /// How: "upside down", "mirrored", "turned by half a turn" or "turned by a quarter".
         how: &'static str,
     },
+    /// Matches lie on the same column.
+    #[error(
+        "matches lie on the same column, not on the same row, because both images are turned by 90 degrees, or one camera \
+         was above the other: turn both images by 90 degrees"
+    )]
+    Sideways,
     /// Matches do not lie on the same row.
     #[error(
         "the pair is not rectified: matches lie {:.1} px above or below their row: rectify it first, by the calibration \
@@ -200,6 +215,7 @@ pub enum Warning {
 ///   cost uses a census. Detail that falls between the levels or is clipped at either end is lost. Contrast
 ///   is the span of the middle 90 % of grey.
 /// - Turned: there are hardly any matches, and many once the right view is turned.
+/// - Sideways: the matches along rows are few or not rectified, and those along columns are neither.
 /// - Not rectified: the median of |dy| exceeds half a pixel. This needs half of the matches to be off, in
 ///   whichever direction (a rotation moves the two sides in opposite directions), so a few false matches do
 ///   not matter.
@@ -251,21 +267,39 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let (width, height) = pair.size();
     let search = |pair: &Pair| matches::search(pair, None, None, width * height / SAMPLE, ROWS);
     let found = search(pair);
-    if found.len() < MIN_MATCHES {
-        let turned = |view: Image| Some(search(&Pair::new(pair.left().clone(), view).ok()?).len());
-        let right = pair.right();
-        let ways: [(&str, &dyn Fn() -> Image); 3] = [
-            ("upside down", &|| right.flipped()),
-            ("mirrored", &|| right.mirrored()),
-            ("turned by half a turn", &|| right.flipped().mirrored()),
-        ];
-        let how = ways.into_iter().find(|(_, view)| turned(view()).is_some_and(|count| count >= MIN_MATCHES));
-        out.extend(how.map(|(how, _)| Warning::Turned { how }));
-        return out;
-    }
-    let offset = matches::median(found.iter().map(|m| m.dy.abs())).unsigned_abs();
-    if offset > MAX_OFFSET {
-        out.push(Warning::NotRectified { offset });
+    // `None` where there are too few matches to tell.
+    let offset = |found: &[Match]| {
+        let offset = || matches::median(found.iter().map(|m| m.dy.abs())).unsigned_abs();
+        (found.len() >= MIN_MATCHES).then(offset)
+    };
+    let sideways = || {
+        let pair = Pair::new(pair.left().transposed(), pair.right().transposed()).ok()?;
+        offset(&search(&pair)).filter(|offset| *offset <= MAX_OFFSET)
+    };
+    match offset(&found) {
+        Some(offset) if offset <= MAX_OFFSET => {}
+        _ if sideways().is_some() => {
+            out.push(Warning::Sideways);
+            return out;
+        }
+        Some(offset) => out.push(Warning::NotRectified { offset }),
+        None => {
+            let right = pair.right();
+            let ways: [(&str, &dyn Fn() -> Image); 5] = [
+                ("upside down", &|| right.flipped()),
+                ("mirrored", &|| right.mirrored()),
+                ("turned by half a turn", &|| right.flipped().mirrored()),
+                ("turned by a quarter", &|| right.transposed().mirrored()),
+                ("turned by a quarter", &|| right.transposed().flipped()),
+            ];
+            let matches = |view: Image| {
+                let turned = Pair::new(pair.left().clone(), view).ok()?;
+                offset(&search(&turned))
+            };
+            let how = ways.into_iter().find(|(_, view)| matches(view()).is_some());
+            out.extend(how.map(|(how, _)| Warning::Turned { how }));
+            return out;
+        }
     }
     let percent = 100 * found.iter().filter(|m| m.disparity < -FRACTION).count() / found.len();
     if percent >= SWAPPED_PERCENT && range.is_none_or(|r| r.min >= 0) {

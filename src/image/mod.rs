@@ -181,6 +181,12 @@ impl<T: Clone> Plane<T> {
         Self { width: self.width, height: self.height, data: rows.concat() }
     }
 
+    /// The plane with rows for columns.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self::from_fn(self.height, self.width, |x, y| self[(y, x)].clone())
+    }
+
     /// The values in `part`.
     #[must_use]
     pub fn crop(&self, part: &Rect) -> Self {
@@ -283,6 +289,12 @@ impl Image {
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self { pixels: self.pixels.flipped(), masked: self.masked.flipped() }
+    }
+
+    /// The image with rows for columns.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self { pixels: self.pixels.transposed(), masked: self.masked.transposed() }
     }
 
     /// The image inside `part`.

@@ -1,6 +1,6 @@
 //! Which disparities a match searches: a range, or the one that sparse matches find.
 
-use crate::error::{RangeError, Result};
+use crate::error::Result;
 use crate::front::check;
 use crate::image::Pair;
 use crate::options::DisparityRange;
@@ -49,6 +49,6 @@ impl Search for RangeFull {
     const FOUND: bool = true;
 
     fn range(self, pair: &Pair) -> Result<DisparityRange> {
-        check::range(pair)?.ok_or_else(|| RangeError::NotFound.into())
+        check::range(pair)
     }
 }

@@ -24,9 +24,11 @@ pub(super) fn choose(
     let error = |reason: &str| Err(Error::Calibration(reason.into()));
     let vector = rotation_vector(&pose.rotation);
     if length(vector) >= std::f64::consts::FRAC_PI_2 {
-        return error(
-            "has cameras that look in directions more than 90 degrees apart; no pair comes of them",
-        );
+        return error(if pose.rotation[2][2] > 0.0 {
+            "has one camera on its side or upside down against the other; turn its images, and calibrate with these"
+        } else {
+            "has cameras that look in directions more than 90 degrees apart; no pair comes of them"
+        });
     }
     let half = rotation(scaled(vector, -0.5));
     let t = rotated(&half, pose.translation);

@@ -4,6 +4,7 @@ use crate::Thrown;
 use crate::words::{thrown, warning};
 use mrfgs::check;
 use mrfgs::depth::Rig;
+use mrfgs::error::{Error, RangeError};
 use mrfgs::image::calib::{Calibration, Camera};
 use mrfgs::image::{Pair, Plane, read::Reader};
 use mrfgs::options::DisparityRange;
@@ -52,7 +53,11 @@ impl StereoPair {
     /// # Errors
     /// Where there is not enough memory.
     pub fn range(&self) -> Thrown<Option<Range>> {
-        Ok(check::range(&self.pair).map_err(thrown)?.map(|range| Range { range }))
+        match check::range(&self.pair) {
+            Ok(range) => Ok(Some(Range { range })),
+            Err(Error::Range(RangeError::NotFound { .. })) => Ok(None),
+            Err(error) => Err(thrown(error)),
+        }
     }
 
     /// What is probably wrong with the pair, and with the range where one was given.

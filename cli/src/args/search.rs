@@ -3,10 +3,8 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use mrfgs::Error;
 use mrfgs::check;
 use mrfgs::depth::Rig;
-use mrfgs::error::RangeError;
 use mrfgs::image::Pair;
 use mrfgs::image::calib::Calibration;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
@@ -152,7 +150,7 @@ impl Search {
         let range = if let Some(range) = given {
             range
         } else {
-            let found = check::range(pair)?.ok_or(Error::Range(RangeError::NotFound))?;
+            let found = check::range(pair)?;
             let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
             between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };

@@ -131,7 +131,7 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
         return Ok((None, calibration));
     }
     if let Some(first) = args.calib.first() {
-        return Ok((Some(first.clone()), input::of_rectified_images(&args.calib)?));
+        return Ok((Some(first.clone()), input::of_rectified_images(&args.calib, size)?));
     }
     if let Some(calibration) = Calibration::beside(&args.map)? {
         return Ok((Some(args.map.with_file_name(CALIBRATION)), calibration));

@@ -143,7 +143,7 @@ impl Input {
             let calibration = rectification.insert(by).calibration()?;
             Some(Known { files, calibration })
         } else if !calib.is_empty() {
-            Some(Known { files, calibration: of_rectified_images(calib)? })
+            Some(Known { files, calibration: of_rectified_images(calib, pair.size())? })
         } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
             Some(Known { files, calibration })
         } else if let Some(left) = beside {
@@ -294,12 +294,12 @@ pub(crate) fn unit(unit: Unit, file: Option<&Path>) -> String {
     }
 }
 
-/// What the calibration in `files` says of images that are rectified.
-pub(crate) fn of_rectified_images(files: &[PathBuf]) -> Result<Calibration> {
+/// What the calibration in `files` says of images that are rectified and of this `size`.
+pub(crate) fn of_rectified_images(files: &[PathBuf], size: (usize, usize)) -> Result<Calibration> {
     let named = |reason: &str| Error::read(shown(files), reason);
     let known = calibration::read(files)?;
     let calibration =
-        known.of_rectified_images().map_err(|e| failure::in_file(e, shown(files).as_ref(), ""))?;
+        known.of_rectified_images(Some(size)).map_err(|e| failure::in_file(e, shown(files).as_ref(), ""))?;
     Ok(calibration.ok_or_else(|| {
         named("is of images that are not rectified; add --rectify, or give the calibration of the rectified pair")
     })?)

@@ -110,8 +110,8 @@ const FAILURES: &[Failure] = &[
         "--json & the calibration file & another name",
     ),
     // The range.
-    ("match flat.png flat.png out.pfm", 1, "too few matches & --max-disparity"),
-    ("match flat.png flat.png out.pfm --max-disparity auto", 1, "--max-disparity & too few matches"),
+    ("match flat.png flat.png out.pfm", 1, "too few matches & all one colour"),
+    ("match flat.png flat.png out.pfm --max-disparity auto", 1, "too few matches & all one colour"),
     ("M out.pfm --memory 2", 2, "--memory <SIZE> & '2' & 2GiB & --help"),
     ("M out.pfm --memory 1.5GiB", 2, "--memory <SIZE> & '1.5GiB' & whole number"),
     ("M out.pfm --memory 0MiB", 2, "--memory <SIZE> & from 1MiB to 16TiB"),
