@@ -24,13 +24,13 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     for i in 0..MOST_SIZES {
         let name = |end: &str| format!("rectified.{i}.{end}");
         let Some(width) = entries.find(&name("width")) else { continue };
-        // One that the camera has not.
-        if width.number()? == 0.0 {
+        let number = |end: &str| entries.number(&name(end), &name(end));
+        // One that the camera has not has no width or no focal length.
+        if width.number()? == 0.0 || number("fx")? == 0.0 {
             continue;
         }
         let height = entries.require(&name("height"), &name("height"), "a number of pixels")?;
         let above_0 = |end: &str| entries.above_0(&name(end), &name(end));
-        let number = |end: &str| entries.number(&name(end), &name(end));
         let camera = Camera {
             focal_length: [above_0("fx")?, above_0("fy")?],
             principal_point: [number("ppx")?, number("ppy")?],
