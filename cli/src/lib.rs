@@ -27,7 +27,8 @@ use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use commands::{
-    batch, bench, completions, depth, devices, evaluate, inspect, man, r#match, presets, rectify, sequence,
+    batch, bench, completions, demo, depth, devices, evaluate, inspect, man, r#match, presets, rectify,
+    sequence,
 };
 use failure::Failure;
 pub use pairs::list;
@@ -40,6 +41,7 @@ left (x, y) with disparity d is seen at right (x - d, y).";
 
 const EXAMPLES: &str = "\
 Examples:
+  mrfgs demo                                  # a first map
   mrfgs match left.png right.png disparity.pfm --max-disparity 63
   mrfgs match im0.png im1.png disparity.png   # range: calib.txt beside im0.png
   mrfgs rectify left.png right.png rectified --calib stereo.yml
@@ -64,6 +66,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Demo(demo::Args),
     Match(r#match::Args),
     Rectify(rectify::Args),
     Depth(depth::Args),
@@ -102,6 +105,7 @@ fn run() -> Result<(), Failure> {
         Err(help) => return Ok(console::printed(help.print())?),
     };
     match cli.command {
+        Command::Demo(args) => demo::run(&args)?,
         Command::Match(args) => r#match::run(&args)?,
         Command::Rectify(args) => rectify::run(&args)?,
         Command::Depth(args) => depth::run(&args)?,
@@ -124,7 +128,10 @@ fn one_line(error: &clap::Error) -> String {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         let names: Vec<_> = program.get_subcommands().map(clap::Command::get_name).collect();
         let (last, others) = names.split_last().unwrap_or((&"", &[]));
-        return format!("give a subcommand: {} or {last}; `mrfgs --help` explains", others.join(", "));
+        return format!(
+            "give a subcommand: {} or {last}; `mrfgs --help` explains, `mrfgs demo` shows",
+            others.join(", ")
+        );
     }
     let text = error.render().to_string();
     let lines: Vec<&str> = text

@@ -5,6 +5,7 @@
 mod batch;
 mod bench;
 mod calibrations;
+mod demo;
 mod documents;
 mod evaluate;
 mod failures;
