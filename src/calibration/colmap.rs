@@ -115,7 +115,8 @@ fn camera(entry: &Entry) -> Result<(Lens, (usize, usize))> {
         "FOV" => Distortion::FieldOfView(c(0)),
         "THIN_PRISM_FISHEYE" => Distortion::ThinPrismFisheye {
             k: [c(0), c(1), c(4), c(5)],
-            then: RadialTangential::thin_prism([c(2), c(3)], [c(6), c(7)]),
+            tangential: [c(2), c(3)],
+            prism: [c(6), c(7)],
         },
         // OPENCV has no k3; RADIAL has no more than k1 and k2.
         _ => {

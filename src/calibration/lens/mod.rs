@@ -32,8 +32,10 @@ pub enum Distortion {
     ThinPrismFisheye {
         /// k1 to k4.
         k: [f64; 4],
-        /// p1, p2 and the prism; its polynomials are 1.
-        then: RadialTangential,
+        /// p1 and p2.
+        tangential: [f64; 2],
+        /// sx1 and sy1.
+        prism: [f64; 2],
     },
     /// The unified model, `omni`, of Mei and Rives: a sphere seen from xi behind its centre, then radial and tangential distortion.
     Unified {
@@ -68,7 +70,7 @@ impl Distortion {
         match *self {
             Self::RadialTangential(model) => model.numbers(),
             Self::Equidistant(k) => k.to_vec(),
-            Self::ThinPrismFisheye { k, then } => [k.to_vec(), then.numbers()].concat(),
+            Self::ThinPrismFisheye { k, tangential, prism } => [&k[..], &tangential, &prism].concat(),
             Self::Unified { xi, then } => [vec![xi], then.numbers()].concat(),
             Self::DoubleSphere { xi, alpha } => vec![xi, alpha],
             Self::ExtendedUnified { alpha, beta } => vec![alpha, beta],
@@ -101,9 +103,9 @@ impl Distortion {
         let at = [x * factor, y * factor];
         match self {
             Self::Unified { then, .. } => then.distorted(at),
-            Self::ThinPrismFisheye { then, .. } => {
-                let added = then.added(flat_fisheye([x, y]), 0.0);
-                [at[0] + added[0], at[1] + added[1]]
+            Self::ThinPrismFisheye { tangential, prism, .. } => {
+                let [dx, dy] = of_prism(*tangential, *prism, [x, y]);
+                [at[0] + dx, at[1] + dy]
             }
             _ => at,
         }
@@ -134,11 +136,12 @@ impl Distortion {
     }
 }
 
-/// Where a fisheye without coefficients shows a point of the plane z = 1: as far from the axis as its angle.
-fn flat_fisheye(at: [f64; 2]) -> [f64; 2] {
+/// What a decentred lens and a thin prism add to a fisheye, for a point of the plane z = 1.
+fn of_prism(tangential: [f64; 2], prism: [f64; 2], at: [f64; 2]) -> [f64; 2] {
     let tangent = (at[0] * at[0] + at[1] * at[1]).sqrt();
+    // Where a fisheye without coefficients shows it: as far from the axis as its angle.
     let factor = if tangent == 0.0 { 1.0 } else { libm::atan(tangent) / tangent };
-    at.map(|v| v * factor)
+    RadialTangential::thin_prism(tangential, prism).added(at.map(|v| v * factor), 0.0)
 }
 
 impl Lens {
@@ -193,10 +196,12 @@ impl Lens {
                 start.map(|v| v * libm::tan(angle) / radius)
             }
             Distortion::Unified { then, .. } => self.at_radius(then.nearly_undistorted(start, 20)),
-            Distortion::ThinPrismFisheye { then, .. } => (0..20).fold(self.at_radius(start), |found, _| {
-                let [dx, dy] = then.added(flat_fisheye(found), 0.0);
-                self.at_radius([start[0] - dx, start[1] - dy])
-            }),
+            Distortion::ThinPrismFisheye { tangential, prism, .. } => {
+                (0..20).fold(self.at_radius(start), |found, _| {
+                    let [dx, dy] = of_prism(tangential, prism, found);
+                    self.at_radius([start[0] - dx, start[1] - dy])
+                })
+            }
             _ => self.at_radius(start),
         }
     }
@@ -239,12 +244,8 @@ mod tests {
     }
 
     fn thin_prism_fisheye() -> Distortion {
-        let mut then = [0.0; 12];
-        (then[2], then[3], then[8], then[10]) = (0.001, -0.002, 0.003, -0.001);
-        Distortion::ThinPrismFisheye {
-            k: [0.02, -0.01, 0.003, 0.001],
-            then: RadialTangential::new(&then).unwrap(),
-        }
+        let (tangential, prism) = ([0.001, -0.002], [0.003, -0.001]);
+        Distortion::ThinPrismFisheye { k: [0.02, -0.01, 0.003, 0.001], tangential, prism }
     }
 
     #[test]

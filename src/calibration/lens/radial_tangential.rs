@@ -47,7 +47,7 @@ impl RadialTangential {
     }
 
     /// That of p1, p2 and a thin prism whose part grows with the square of the radius, across and down.
-    pub(crate) fn thin_prism(tangential: [f64; 2], [across, down]: [f64; 2]) -> Self {
+    pub(super) fn thin_prism(tangential: [f64; 2], [across, down]: [f64; 2]) -> Self {
         Self { tangential, prism: [across, 0.0, down, 0.0], ..Self::NONE }
     }
 
