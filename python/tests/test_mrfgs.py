@@ -509,8 +509,8 @@ import mrfgs
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 a = np.random.default_rng(1).integers(0, 256, (300, 400), dtype=np.uint8)
-print("ready", flush=True)
 try:
+    print("ready", flush=True)
     mrfgs.match(a, np.roll(a, -5, 1), 63, device=sys.argv[1], warn=False)
     print("matched", flush=True)
     time.sleep(60)
