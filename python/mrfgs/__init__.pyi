@@ -1,3 +1,6 @@
+# Tools that run this file need what comes first.
+from __future__ import annotations
+
 import os
 from typing import Any, Iterable, Iterator, Mapping, Sequence, TypedDict, final
 
@@ -10,9 +13,8 @@ __version__: str
 # (height, width) or (height, width, channels).
 _Image = npt.ArrayLike
 
-# The path of a calibration file, or those of two that belong together.
+# The path of a calibration file.
 _Path = str | os.PathLike[str]
-_Cameras = Calibration | _Path | Iterable[_Path]
 
 class MatchWarning(UserWarning):
     """What is probably wrong with a pair, or with the range of disparities that was searched, and what to do about it."""
@@ -131,6 +133,9 @@ class Calibration:
     @property
     def max_disparity(self) -> int | None:
         """The largest disparity of the pair, in pixels, from the line ndisp of a calib.txt; else None."""
+
+# A calibration, the path of its file, or those of two files that belong together.
+_Cameras = Calibration | _Path | Iterable[_Path]
 
 @final
 class Rectification:

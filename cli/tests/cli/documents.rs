@@ -3,14 +3,17 @@
 use std::fs;
 use std::path::Path;
 
-const DOCUMENTS: [&str; 8] = [
+const DOCUMENTS: [&str; 11] = [
     "README.md",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
+    "CODE_OF_CONDUCT.md",
     "CONTRIBUTING.md",
+    "SECURITY.md",
     "docs/guide.md",
     "docs/paper.md",
     "docs/results.md",
+    "python/README.md",
     "testdata/README.md",
 ];
 
