@@ -1010,6 +1010,18 @@ class Depth(Folder):
             self.assertTrue(np.array_equal(other.millimetres(disparity), rig.millimetres(disparity)))
             self.assertLess(np.abs(other.depth(disparity) / factor - rig.depth(disparity)).max(), 1e-5)
 
+    def test_a_calibration_for_several_sizes(self):
+        sizes = {"baseline": -50.0}
+        for i, (width, height) in enumerate([(640, 480), (320, 240)]):
+            for name, value in {"width": width, "height": height, "fx": 0.6 * width, "fy": 0.6 * width, "ppx": width / 2,
+                                "ppy": height / 2}.items():
+                sizes[f"rectified.{i}.{name}"] = value
+        calibration = mrfgs.Calibration.of_texts(json.dumps(sizes))
+        self.refused(ValueError, "is for images of 640 x 480, 320 x 240; say which", lambda: mrfgs.Rig(calibration))
+        for size, depth in [((640, 480), 384 * 50 / 8), ((320, 240), 192 * 50 / 8)]:
+            rig = mrfgs.Rig(calibration, size=size)
+            self.assertAlmostEqual(float(rig.depth(np.full(size[::-1], 8, np.float32))[0, 0]), depth, places=3)
+
     def test_a_rig_of_numbers(self):
         left, right = pair()
         found = mrfgs.match(left, right, 15, device="cpu")
