@@ -9,7 +9,9 @@ use crate::error::{MemoryError, Purpose, Result};
 fn available() -> Option<u64> {
     let mut system = sysinfo::System::new();
     system.refresh_memory_specifics(sysinfo::MemoryRefreshKind::nothing().with_ram());
-    Some(system.available_memory()).filter(|_| sysinfo::IS_SUPPORTED_SYSTEM)
+    // In a root without /proc there is nothing to read.
+    let known = sysinfo::IS_SUPPORTED_SYSTEM && system.total_memory() > 0;
+    known.then(|| system.available_memory())
 }
 
 /// A browser does not say.

@@ -323,8 +323,9 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and theirs.
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 16] = [
     "",
+    "demo",
     "match",
     "rectify",
     "depth",
