@@ -21,6 +21,7 @@ use crate::matched::PyMatched;
 ///
 /// calibration: that of the rectified pair, as a Calibration, the path of a file, or a list of the paths of two: calib.txt, OpenCV's
 ///     P1 and P2, ROS's projections. For raw images, Rectification.rig has it.
+/// size: (width, height) of the rectified images in pixels, where the calibration is for several; None takes its only one.
 ///
 /// A point at depth Z has the disparity d with d + doffs = baseline * f / Z. Depths and points have the unit of the baseline.
 /// Raises ValueError for a calibration that does not say the rectified cameras. Rig.of takes numbers in the place of a calibration.

@@ -466,7 +466,7 @@ class Match(unittest.TestCase):
             (ValueError, "threads", lambda: mrfgs.match(left, right, 15, device="cpu", threads=0)),
             (ValueError, "1 to 1024", lambda: mrfgs.match(left, right, 15, device="cpu", threads=1025)),
             (ValueError, "1 to 1024", lambda: mrfgs.Matcher(device="cpu", threads=4_000_000_000)),
-            (ValueError, "max_disparity", lambda: mrfgs.match(left * 0, right * 0)),
+            (ValueError, "all one colour", lambda: mrfgs.match(left * 0, right * 0)),
         ):
             with self.assertRaises(error) as raised:
                 call()
