@@ -289,11 +289,15 @@ pub enum RangeError {
         width: usize,
     },
     /// No range was given, and the sparse matches are too few to find it.
-    #[error("the views have too few matches to find the range of disparities{}", cause.as_ref().map(|cause| format!(": {cause}")).unwrap_or_default())]
+    #[error("the views have too few matches to find the range of disparities{}", after_colon(cause.as_deref()))]
     NotFound {
-        /// The warning that says why, with what helps.
+        /// Why, and what to mend, where the pair itself is at fault.
         cause: Option<String>,
     },
+}
+
+fn after_colon(cause: Option<&str>) -> String {
+    cause.map_or_else(String::new, |cause| format!(": {cause}"))
 }
 
 /// Why a pair cannot be rectified by its own matches.

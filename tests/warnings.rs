@@ -4,7 +4,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 
-use mrfgs::image::{Image, Pair, Plane, calib::Calibration, grey, read};
+use mrfgs::error::{Error, RangeError};
+use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, grey, read};
 use mrfgs::low_level::engine::Inspection;
 use mrfgs::low_level::front::check::{self, Warning};
 use mrfgs::maps::{FRACTION, Maps};
@@ -36,6 +37,10 @@ impl Case {
         }
     }
 
+    fn scene(name: &str) -> Self {
+        Self::load(&Path::new("testdata").join(name))
+    }
+
     /// The true disparity that `percent` of the pixels are below.
     fn truth(&self, percent: usize) -> f32 {
         self.truths[(self.truths.len() - 1) * percent / 100]
@@ -46,8 +51,13 @@ impl Case {
         matcher.run(&self.pair, range).unwrap().maps
     }
 
-    /// The warnings where the right view has `change` applied to each 8-bit level.
+    /// The warnings about [`Case::exposure`].
     fn exposed(&self, change: impl Fn(f64) -> f64) -> Vec<Warning> {
+        check::warnings(&self.exposure(change), Some(self.range))
+    }
+
+    /// The pair where the right view has `change` applied to each 8-bit level.
+    fn exposure(&self, change: impl Fn(f64) -> f64) -> Pair {
         let right = self.pair.right();
         let level = |v: u16| (change(f64::from(v >> 8)).round().clamp(0.0, 255.0) as u16) << 8;
         let pixels = right.pixels.map(|&[r, g, b, _]| {
@@ -55,13 +65,20 @@ impl Case {
             [r, g, b, grey(r, g, b)]
         });
         let right = Image { pixels, masked: right.masked.clone() };
-        check::warnings(&Pair::new(self.pair.left().clone(), right).unwrap(), Some(self.range))
+        Pair::new(self.pair.left().clone(), right).unwrap()
     }
 }
 
+/// The scenes whose views are moved, turned and exchanged.
+const SCENES: [&str; 6] = ["slanted", "thin", "wall", "repetitive", "exposure", "mixed"];
+
 /// All scenes, and all available real pairs.
 fn cases() -> Vec<Case> {
-    let scenes = ["slanted", "thin", "wall", "repetitive", "exposure", "light", "steep", "mixed"];
+    cases_of(&["slanted", "thin", "wall", "repetitive", "exposure", "light", "steep", "mixed"])
+}
+
+/// These scenes, and all available real pairs.
+fn cases_of(scenes: &[&str]) -> Vec<Case> {
     let mut folders: Vec<PathBuf> = scenes.iter().map(|scene| Path::new("testdata").join(scene)).collect();
     if let Some(folder) = std::env::var_os("MRFGS_MIDDLEBURY") {
         let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
@@ -70,6 +87,19 @@ fn cases() -> Vec<Case> {
         let _ = writeln!(std::io::stderr(), "SKIPPED on real pairs: MRFGS_MIDDLEBURY names no folder");
     }
     folders.iter().map(|folder| Case::load(folder)).collect()
+}
+
+/// `image` with the pixel at (x, y) taken from `from(x, y)`, clamped to the image.
+fn moved(image: &Image, from: impl Fn(i32, i32) -> (i32, i32)) -> Image {
+    let (width, height) = image.pixels.size();
+    let at = |x: usize, y: usize| {
+        let (x, y) = from(x as i32, y as i32);
+        (x.clamp(0, width as i32 - 1) as usize, y.clamp(0, height as i32 - 1) as usize)
+    };
+    Image {
+        pixels: Plane::from_fn(width, height, |x, y| image.pixels[at(x, y)]),
+        masked: Plane::from_fn(width, height, |x, y| image.masked[at(x, y)]),
+    }
 }
 
 #[test]
@@ -102,7 +132,7 @@ fn exposures_far_apart_are_told() {
 
 #[test]
 fn a_view_of_one_colour_is_told() {
-    let case = Case::load(Path::new("testdata/mixed"));
+    let case = Case::scene("mixed");
     let (width, height) = case.pair.size();
     let noise = |x: usize, y: usize| ((x * x * 31 + y * y * 17 + x * y * 13) % 3) as u8;
     let plain = Image::from_rgb8(&Plane::from_fn(width, height, |x, y| [90 + noise(x, y), 120, 30]));
@@ -132,7 +162,7 @@ fn a_view_of_one_colour_is_told() {
 /// Views that do not belong together have a full map all the same, so it must say what it is worth.
 #[test]
 fn views_that_hardly_match_are_told() {
-    let scene = |name: &str| Case::load(&Path::new("testdata").join(name)).pair;
+    let scene = |name: &str| Case::scene(name).pair;
     let (slanted, mixed, thin) = (scene("slanted"), scene("mixed"), scene("thin"));
     let inverted = |image: &Image| Image {
         pixels: image.pixels.map(|[r, g, b, _]| {
@@ -174,7 +204,7 @@ fn views_that_hardly_match_are_told() {
 /// A range that sparse matches found and that cuts off the scene becomes wider; one that a user gave stays.
 #[test]
 fn a_range_that_was_found_becomes_wider() {
-    let case = Case::load(Path::new("testdata/mixed"));
+    let case = Case::scene("mixed");
     for method in [Method::default(), Method::fast()] {
         let mut matcher = Matcher::builder().method(method).device("cpu").build().unwrap();
         let cut = DisparityRange::new(0, 25).unwrap();
@@ -222,7 +252,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
         assert!(cut.iter().any(|warnings| ends(warnings, false)), "{}: {cut:?}", case.name);
     }
     // Matched at half the size, disparities are kept in the range at the end.
-    let case = Case::load(Path::new("testdata/mixed"));
+    let case = Case::scene("mixed");
     let mut matcher = Matcher::builder().method(Method::fast()).device("cpu").build().unwrap();
     let mut told = |max: i32| {
         let range = DisparityRange::new(0, max).unwrap();
@@ -235,7 +265,7 @@ fn a_range_that_cuts_off_the_scene_is_told() {
     assert!(matches!(told(20)[..], [Warning::Clipped { end: 20, upper: true, percent: 20..35 }]));
     assert_eq!(told(case.range.max), []);
     // 0 is the horizon and not an end; ranges that consist only of ends get no warning.
-    let case = Case::load(Path::new("testdata/mixed"));
+    let case = Case::scene("mixed");
     let mut maps = case.maps(case.range);
     maps.raw = Plane::filled(case.pair.size().0, case.pair.size().1, 0);
     assert_eq!(check::warnings_of(&maps, case.range), []);
@@ -245,8 +275,125 @@ fn a_range_that_cuts_off_the_scene_is_told() {
 }
 
 #[test]
+fn pairs_that_are_not_rectified_are_told() {
+    for case in cases_of(&SCENES) {
+        assert_eq!(check::warnings(&case.pair, None), [], "{}", case.name);
+        for rows in [1, -1, 2, -5] {
+            let right = moved(case.pair.right(), |x, y| (x, y - rows));
+            let pair = Pair::new(case.pair.left().clone(), right).unwrap();
+            let warnings = check::warnings(&pair, Some(case.range));
+            let [Warning::NotRectified { offset }] = warnings[..] else {
+                panic!("{}, {rows} rows: {warnings:?}", case.name)
+            };
+            assert!(offset.abs_diff(rows.unsigned_abs() * 256) < 100, "{}, {rows} rows: {offset}", case.name);
+        }
+        // A slight rotation: there is no common offset, and the rows still do not match.
+        let width = case.pair.size().0 as i32;
+        let right = moved(case.pair.right(), |x, y| (x, y - (x - width / 2) * 12 / width));
+        let pair = Pair::new(case.pair.left().clone(), right).unwrap();
+        let warnings = check::warnings(&pair, None);
+        assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{}: {warnings:?}", case.name);
+    }
+}
+
+#[test]
+fn views_that_are_turned_are_told() {
+    for case in cases_of(&SCENES) {
+        let (left, right) = (case.pair.left(), case.pair.right());
+        for (how, turned) in [
+            ("upside down", right.flipped()),
+            ("mirrored", right.mirrored()),
+            ("turned by half a turn", right.flipped().mirrored()),
+        ] {
+            let pair = Pair::new(left.clone(), turned).unwrap();
+            for range in [None, Some(case.range)] {
+                assert_eq!(check::warnings(&pair, range), [Warning::Turned { how }], "{}", case.name);
+            }
+        }
+        // Either view; and both turned together are an ordinary pair.
+        let pair = Pair::new(left.flipped(), right.clone()).unwrap();
+        assert_eq!(check::warnings(&pair, None), [Warning::Turned { how: "upside down" }], "{}", case.name);
+        let pair = Pair::new(left.flipped(), right.flipped()).unwrap();
+        assert_eq!(check::warnings(&pair, Some(case.range)), [], "{}", case.name);
+        // Turned by a quarter, either way, rows are columns.
+        for turned in [Image::flipped, Image::mirrored] {
+            let pair = Pair::new(turned(&left.transposed()), turned(&right.transposed())).unwrap();
+            assert_eq!(check::warnings(&pair, None), [Warning::Sideways], "{}", case.name);
+        }
+        let side = left.width().min(left.height());
+        let square = |image: &Image| image.crop(&Rect { x: 0..side, y: 0..side });
+        for turned in [Image::flipped, Image::mirrored] {
+            let pair = Pair::new(square(left), turned(&square(right).transposed())).unwrap();
+            let how = "turned by a quarter";
+            assert_eq!(check::warnings(&pair, None), [Warning::Turned { how }], "{}", case.name);
+        }
+    }
+}
+
+/// Where matches find no range because of a mistake that has a name, the error has it.
+#[test]
+fn a_range_that_is_not_found_says_why() {
+    let mut refused = [0; 2];
+    for case in SCENES.map(Case::scene) {
+        let (left, right) = (case.pair.left(), case.pair.right());
+        let mirrored = Pair::new(left.clone(), right.mirrored());
+        let sideways = Pair::new(left.transposed(), right.transposed());
+        for (i, (pair, words)) in
+            [(mirrored, "is mirrored"), (sideways, "on the same column")].into_iter().enumerate()
+        {
+            // A few have enough false matches for a range.
+            if let Err(error) = check::range(&pair.unwrap()) {
+                assert!(error.to_string().contains(words), "{}: {error}", case.name);
+                refused[i] += 1;
+            }
+        }
+    }
+    assert!(refused.iter().all(|count| *count >= 3), "{refused:?}");
+    // A range helps where the views can be matched after all.
+    let (case, other) = (Case::scene("slanted"), Case::scene("thin"));
+    let strangers =
+        Case { pair: Pair::new(case.pair.left().clone(), other.pair.right().clone()).unwrap(), ..case };
+    let pair = strangers.exposure(|v| v * 0.15);
+    assert!(matches!(check::warnings(&pair, None)[..], [Warning::Contrast { .. }]));
+    let found = check::range(&pair);
+    assert!(matches!(found, Err(Error::Range(RangeError::NotFound { cause: None }))), "{found:?}");
+}
+
+#[test]
+fn swapped_views_are_told() {
+    for case in SCENES.map(Case::scene) {
+        let swapped = Pair::new(case.pair.right().clone(), case.pair.left().clone()).unwrap();
+        for range in [None, Some(case.range)] {
+            let warnings = check::warnings(&swapped, range);
+            assert!(matches!(warnings[..], [Warning::Swapped { .. }]), "{}: {warnings:?}", case.name);
+        }
+        // A user who asks for negative disparities is not warned.
+        let negative = DisparityRange::new(-31, 0).unwrap();
+        assert_eq!(check::warnings(&swapped, Some(negative)), [], "{}", case.name);
+    }
+}
+
+#[test]
+fn identical_images_are_told() {
+    let case = Case::scene("mixed");
+    let left = case.pair.left();
+    let mut other = left.clone();
+    other.pixels[(9, 9)] = [1, 2, 3, 4];
+    assert_eq!(check::warnings(&Pair::new(left.clone(), left.clone()).unwrap(), None), [Warning::Identical]);
+    assert_eq!(check::warnings(&Pair::new(left.clone(), other.clone()).unwrap(), None), []);
+    // A difference at a masked pixel does not count.
+    other.masked[(9, 9)] = true;
+    assert_eq!(check::warnings(&Pair::new(left.clone(), other).unwrap(), None), [Warning::Identical]);
+}
+
+#[test]
 fn warnings_are_one_line_with_the_cause() {
     for (warning, words) in [
+        (Warning::Identical, ["the same", "right view"]),
+        (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
+        (Warning::Turned { how: "upside down" }, ["upside down", "turn it back"]),
+        (Warning::Sideways, ["same column", "turn both"]),
+        (Warning::Swapped { percent: 97 }, ["97 %", "seem to be swapped"]),
         (Warning::Plain { view: "left" }, ["the left view is all one colour", "right image"]),
         (Warning::Contrast { percent: 12 }, ["12 % of the other's contrast", "expose both alike"]),
         (

@@ -314,8 +314,10 @@ enum mrfgs_status mrfgs_rig_new(double focal,
                                 double doffs,
                                 struct mrfgs_rig **rig);
 
-// The rig of a pair that is rectified already, by its calibration.
-enum mrfgs_status mrfgs_rig_of_calibration(const struct mrfgs_calibration *calibration, struct mrfgs_rig **rig);
+// The rig of a pair that is rectified already, by its calibration. One that is for images of several sizes is refused: give
+// mrfgs_rig_new() the numbers of yours.
+enum mrfgs_status mrfgs_rig_of_calibration(const struct mrfgs_calibration *calibration,
+                                           struct mrfgs_rig **rig);
 
 // The rig of what a rectification makes.
 enum mrfgs_status mrfgs_rig_of_rectification(const struct mrfgs_rectification *rectification, struct mrfgs_rig **rig);

@@ -49,7 +49,8 @@ pub unsafe extern "C" fn mrfgs_rig_new(focal: f64, baseline: f64, doffs: f64, ri
     unsafe { argument::make("rig", rig, make) }
 }
 
-/// The rig of a pair that is rectified already, by its calibration.
+/// The rig of a pair that is rectified already, by its calibration. One that is for images of several sizes is refused: give
+/// mrfgs_rig_new() the numbers of yours.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_of_calibration(
     calibration: *const Calibration,

@@ -159,14 +159,15 @@ impl StereoCalibration {
             return Ok(Some(benchmark.clone()));
         }
         let one = size.map_or(self, |size| self.of_size(size));
-        if !self.others.is_empty() && (size.is_none() || one.size != size) {
+        let Some(views) = one.views else { return Ok(None) };
+        if !self.others.is_empty() && one.size != size {
             let sizes = std::iter::once(self).chain(&self.others).filter_map(|one| one.size);
             let shown = |(width, height): (usize, usize)| format!("{width} x {height}");
             let sizes = sizes.map(shown).collect::<Vec<_>>().join(", ");
             let of = size.map_or("; say which".into(), |size| format!(", and these are {}", shown(size)));
             return Err(Error::Calibration(format!("is for images of {sizes}{of}")));
         }
-        one.views.map(|views| views.calibration(views.size.or(one.size), one.unit)).transpose()
+        views.calibration(views.size.or(one.size), one.unit).map(Some)
     }
 
     /// With the pose that the rectification implies, where a file gives that alone.

@@ -68,14 +68,14 @@ const MIN_LABELS: usize = 3;
 /// The range then extends down to 0, the horizon of parallel cameras.
 ///
 /// # Errors
-/// [`RangeError::NotFound`] where there are too few matches to tell, with the cause where [`warnings`] has one;
+/// [`RangeError::NotFound`] where there are too few matches to tell, with the warning where one says that the pair must be mended;
 /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
 pub fn range(pair: &Pair) -> Result<DisparityRange> {
     matches::check_memory(pair)?;
     let found = matches::find(pair, None, None);
     if found.len() < MIN_MATCHES {
-        let cause = of_pixels(pair, None).first().map(Warning::to_string);
-        return Err(RangeError::NotFound { cause }.into());
+        let cause = of_pixels(pair, None).into_iter().find(Warning::is_beyond_range);
+        return Err(RangeError::NotFound { cause: cause.map(|cause| cause.to_string()) }.into());
     }
     let (width, height) = pair.size();
     let mut bare = [true; PARTS * PARTS];
@@ -200,6 +200,13 @@ pub enum Warning {
         /// Pixels at that end, in percent of all measured ones.
         percent: usize,
     },
+}
+
+impl Warning {
+    /// Whether no range helps: the pair itself must be mended.
+    fn is_beyond_range(&self) -> bool {
+        !matches!(self, Self::Contrast { .. } | Self::Saturated { .. } | Self::Clipped { .. })
+    }
 }
 
 /// The probable mistakes in `pair`, the likeliest cause first. Empty where all seems well or there are too

@@ -78,7 +78,7 @@ pub fn find(pair: &Pair, zones: Option<(&Plane<u32>, usize)>, range: Option<Disp
 }
 
 /// Bytes per pixel that a search takes: the statistics of both views, and the eigenvalues of one; and two
-/// copies of the pixels and mask of one view, for trying its other orientations.
+/// copies of the pixels and mask of one view, or one of both, for trying other orientations.
 const BYTES: u64 = 2 * (2 + 4 + 8) + 8 + 2 * 9;
 
 /// Fails where the machine has not enough memory to search `pair`.

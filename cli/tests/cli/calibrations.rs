@@ -6,7 +6,7 @@ use mrfgs::rectification::{Options, Rectification};
 use super::*;
 
 /// That of `testdata/raw`, as OpenCV has it in YAML.
-fn opencv() -> String {
+pub(super) fn opencv() -> String {
     fs::read_to_string(scene("raw/cameras.yml")).unwrap()
 }
 
@@ -66,7 +66,7 @@ fn calib(files: &str) -> String {
     format!(" --calib {}", files.replace(' ', " --calib "))
 }
 
-fn rectify(folder: &Path, calibrations: &str) -> Run {
+pub(super) fn rectify(folder: &Path, calibrations: &str) -> Run {
     run(folder, &format!("rectify @raw/left.png @raw/right.png out{}", calib(calibrations)))
 }
 
@@ -329,50 +329,8 @@ pub(super) fn stored() -> String {
     text + &matrix("Q", 4, &q)
 }
 
-/// What is added to or changed in a calibration, and what must be said then. The change is a text and its replacement; of an
-/// entry that begins with it, `NAME * factor` scales all numbers, and `NAME turned degrees` turns a rotation about the y axis.
-const CONTRADICTIONS: &[(&str, &str, &str)] = &[
-    ("model", "fisheye: 0\ndistortion_model: equidistant", "distortion_model: contradicts fisheye"),
-    ("model", "fisheye: 1\ncamera_model: brown_conrady", "camera_model: contradicts fisheye"),
-    (
-        "model",
-        "distortion_model: plumb_bob\ncamera_model: fisheye",
-        "camera_model: contradicts distortion_model & keep the one that is right",
-    ),
-    ("model", "distortion_model: equidistant", "D1: expected the 4 coefficients of a fisheye & 5 numbers"),
-    ("model", "camera_model: fisheye", "D1: expected the 4 coefficients of a fisheye"),
-    ("model", "camera_model: KANNALA_BRANDT", "D1: expected the 4 coefficients of a fisheye"),
-    ("model", "distortion_model: scaramuzza", "distortion_model: expected a lens model & `scaramuzza`"),
-    ("model", "camera_model: cylinder", "camera_model: expected a lens model & `cylinder`"),
-    ("stored", "T * 1000", "P2: says a baseline of 0.1636 and T one of 163.6 & a factor of 1000 & one unit"),
-    ("stored", "T * 1.05", "P2: says a baseline of 0.1636 and T one of 0.1718 & a factor of 1.050"),
-    ("stored", "T * 0.1", "P2: says a baseline & a factor of 10.00"),
-    ("stored", "Q * 1000", "Q: says a baseline of 0.0001636 and T one of 0.1636 & 1000"),
-    ("stored", "Q * 0.5", "Q: says a baseline of 0.3272 and T one of 0.1636 & a factor of 2.000"),
-    ("stored", "T * -1", "R1 and R2, that contradicts T by 180.00 degrees & leave out R1, R2, P1 and P2"),
-    ("stored", "R turned 0.2", "that contradicts R by 0.20 degrees & leave out R1, R2, P1 and P2"),
-    ("stored", "R turned -3", "that contradicts R by 3.00 degrees"),
-    ("stored", "R1 turned 0.15", "that contradicts R by 0.15 degrees"),
-    ("stored", "R2 turned 1", "degrees & or calibrate again"),
-    (
-        "calib.txt",
-        "cam1=[216 0 118.5; 0 216 89.5; 0 0 1]",
-        "line 5: cam1: its focal length contradicts that of cam0 by 0.23 % & rectify again",
-    ),
-    (
-        "calib.txt",
-        "cam1=[215.5 0 118.5; 0 215.5 91; 0 0 1]",
-        "line 5: cam1: its row cy=91 contradicts cy=89.5 of cam0 by 1.50 px",
-    ),
-    (
-        "calib.txt",
-        "cam1=[215.5 0 120; 0 215.5 89.5; 0 0 1]",
-        "line 5: cam1: cx1 - cx0 = 1.500 contradicts doffs=0 by 1.50 px",
-    ),
-];
-
 /// `text` with the numbers of an entry changed.
-fn with_numbers(text: &str, name: &str, change: impl Fn(&[f64]) -> Vec<f64>) -> String {
+pub(super) fn with_numbers(text: &str, name: &str, change: impl Fn(&[f64]) -> Vec<f64>) -> String {
     let entry = text.find(&format!("\n{name}: ")).unwrap();
     let start = entry + text[entry..].find("data: [").unwrap() + 7;
     let end = start + text[start..].find(']').unwrap();
@@ -382,41 +340,12 @@ fn with_numbers(text: &str, name: &str, change: impl Fn(&[f64]) -> Vec<f64>) -> 
 }
 
 /// `text` with a rotation turned about the y axis.
-fn turned(text: &str, name: &str, degrees: f64) -> String {
+pub(super) fn turned(text: &str, name: &str, degrees: f64) -> String {
     let (sin, cos) = degrees.to_radians().sin_cos();
     with_numbers(text, name, |m| {
         let row = |a: f64, b: f64| (0..3).map(move |x| a * m[x] + b * m[6 + x]);
         row(cos, sin).chain(m[3..6].iter().copied()).chain(row(-sin, cos)).collect()
     })
-}
-
-#[test]
-fn calibrations_that_contradict_themselves_are_told() {
-    let folder = Folder::new();
-    for (kind, change, words) in CONTRADICTIONS {
-        let text = match *kind {
-            "model" => format!("{}\n{change}\n", opencv()),
-            "calib.txt" => {
-                let text = "cam0=[215.5 0 118.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\nwidth=240\n";
-                format!("{text}{change}\n")
-            }
-            _ => match change.split(' ').collect::<Vec<_>>()[..] {
-                [name, "*", factor] => {
-                    let factor: f64 = factor.parse().unwrap();
-                    with_numbers(&stored(), name, |numbers| numbers.iter().map(|v| v * factor).collect())
-                }
-                [name, _, degrees] => turned(&stored(), name, degrees.parse().unwrap()),
-                _ => unreachable!("{change}"),
-            },
-        };
-        fs::write(folder.join("a-file"), text).unwrap();
-        let told = rectify(&folder, "a-file");
-        told.failed(1, &format!("a-file & {words}"));
-        assert_eq!(listing(&folder).len(), 1, "{change}: nothing is left");
-    }
-    // Control: without a change, nothing contradicts.
-    fs::write(folder.join("a-file"), stored()).unwrap();
-    rectify(&folder, "a-file").succeeded().says("240 x 180, 98.7 % of the left");
 }
 
 /// A calibration that does not say the size of its images, and has the optical axis far from the middle of these.
@@ -598,4 +527,39 @@ fn files_that_are_no_calibration_are_told() {
         rectify(&folder, files).failed(1, &words);
         assert!(listing(&folder) == before, "{files}");
     }
+}
+
+/// A focal length and a baseline are a calibration.
+#[test]
+fn numbers_take_the_place_of_a_calibration() {
+    let folder = Folder::new();
+    let text = "cam0=[215.5 0 119.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\n";
+    fs::write(folder.join("a.txt"), text).unwrap();
+    let written = |name: &str, cameras: &str| {
+        let line = format!(
+            "match @slanted/im0.png @slanted/im1.png {name}.pfm --max-disparity 31 --also depth,depth-mm,points {cameras}"
+        );
+        run(&folder, &line).succeeded();
+        ["depth.pfm", "depth-mm.png", "points.ply"]
+            .map(|end| fs::read(folder.join(format!("{name}.{end}"))).unwrap())
+    };
+    let expected = written("file", "--calib a.txt");
+    assert!(written("mm", "--focal 215.5 --baseline 160mm") == expected);
+    let metres = written("m", "--focal 215.5 --baseline 0.16m");
+    assert!(metres[1] == expected[1] && metres[0] != expected[0]);
+    // Control.
+    assert!(written("other", "--focal 216 --baseline 160mm")[1] != expected[1]);
+
+    for (view, from) in [("left", "im0"), ("right", "im1")] {
+        fs::create_dir(folder.join(view)).unwrap();
+        fs::copy(scene("slanted").join(format!("{from}.png")), folder.join(view).join("0.png")).unwrap();
+    }
+    let line = "sequence left right maps --max-disparity 31 --focal 215.5 --baseline 16cm --also depth-mm";
+    run(&folder, line).succeeded();
+    assert!(fs::read(folder.join("maps/0.depth-mm.png")).unwrap() == expected[1]);
+
+    let line = "match left/0.png right/0.png d.pfm --max-disparity 31 --focal 215.5 --baseline 160 --also depth --json -";
+    let run = run(&folder, line).succeeded();
+    run.says("unit: that of --baseline");
+    assert!(run.json()["files"]["calibration"].is_null());
 }

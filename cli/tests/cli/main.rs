@@ -5,6 +5,7 @@
 mod batch;
 mod bench;
 mod calibrations;
+mod contradictions;
 mod demo;
 mod documents;
 mod evaluate;
@@ -14,6 +15,7 @@ mod files;
 #[cfg(unix)]
 mod films;
 mod formats;
+mod forms;
 mod geotiff;
 mod hostile;
 mod matching;
