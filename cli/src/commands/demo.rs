@@ -10,7 +10,7 @@ use crate::console;
 use crate::failure::Result;
 use crate::outputs::StagedFolder;
 
-/// A rendered pair, that of `testdata/mixed`.
+/// A rendered pair: copies of `testdata/mixed`, since the package must hold what is compiled into it.
 const PAIR: [(&str, &[u8]); 2] = [
     ("left.png", include_bytes!("../../demo/left.png")),
     ("right.png", include_bytes!("../../demo/right.png")),
