@@ -11,6 +11,7 @@
 
 mod arithmetic;
 mod memory;
+pub mod patches;
 pub mod planes;
 pub mod votes;
 

@@ -36,6 +36,21 @@ pub fn vote_weights() -> [Vec<u32>; 2] {
     VOTE_STEP.map(|step| (0..COLOUR_DIFFERENCES).map(|difference| weight(step, difference)).collect())
 }
 
+/// Share of its weight that what a patch knows keeps on the way to the next one, where both have one colour: about exp(-sqrt(2) / 37.5).
+const PATCH_FADE: f64 = 0.961;
+/// What a difference of one level takes off the logarithm of that share.
+const PATCH_EDGE: f64 = 0.0185;
+/// From this difference on, nothing is left.
+pub const PATCH_DIFFERENCES: usize = 336;
+
+/// Share of its weight, in 1/256, that what a patch knows keeps on the way to the next one, by the difference d between both:
+/// round(256 x 0.961 exp(-0.0185 d)), and 0 at the last.
+#[must_use]
+pub fn patch_weights() -> Vec<u32> {
+    let share = |difference: usize| 256.0 * PATCH_FADE * libm::exp(-PATCH_EDGE * difference as f64);
+    (0..=PATCH_DIFFERENCES).map(|difference| (share(difference) + 0.5).floor() as u32).collect()
+}
+
 /// Bilateral weights of the median's window, as 8-bit integers: max(0, [`MEDIAN_WEIGHT`] - colour - space).
 ///
 /// space = round(96 (1 - exp(-(dx^2 + dy^2) / 2 `sigma_space`^2))), with dx and dy in steps of the window.

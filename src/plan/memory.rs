@@ -1,5 +1,6 @@
 //! What a match takes of the memory, at most.
 
+use super::patches::{PATCH_OWN_WORDS, PATCH_SUM_WORDS, patches};
 use super::votes::Votes;
 use super::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
 use crate::options::{Fill, Illumination};
@@ -92,7 +93,11 @@ impl Plan {
         let padded = votes.labels.next_multiple_of(LABEL_BLOCK / 2);
         let sums = aligned(4 * votes.width * padded) * (votes.band + votes.summed());
         // The half-size image and the votes, and a device's table of weights.
-        (sums + 2 * aligned(4 * votes.width) * votes.height + (1 << 13)) as u64
+        let votes = sums + 2 * aligned(4 * votes.width) * votes.height + (1 << 13);
+        // The patches, and what reaches them.
+        let (width, height) = patches(self);
+        let of_patches = aligned(4 * PATCH_OWN_WORDS * width) + 2 * aligned(4 * PATCH_SUM_WORDS * width);
+        (votes + of_patches * height + (1 << 11)) as u64
     }
 
     /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to

@@ -83,6 +83,7 @@ fn nothing_valid() {
                     Stage::FillPlane,
                     Stage::Median,
                     Stage::Plane,
+                    Stage::FarPlane,
                     Stage::Confidence,
                 ] {
                     backend.run(stage).unwrap();

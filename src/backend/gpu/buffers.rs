@@ -6,6 +6,7 @@ use super::allocator::{Allocator, USAGE};
 use super::convergence::Convergence;
 use super::device::Device;
 use super::full_buffers::FullBuffers;
+use super::patch_buffers::PatchBuffers;
 use super::rows::{HALO, Pool, Rows};
 use super::uniform::{ALIGN_WORDS, LevelParams};
 use super::vote_buffers::VoteBuffers;
@@ -14,6 +15,7 @@ use crate::error::{MemoryError, Result};
 use crate::image::Plane;
 use crate::options::Fill;
 use crate::plan::{LevelPlan, Plan, RING_PART};
+use crate::stage::Stage;
 use crate::weights::MedianWeights;
 use std::array;
 
@@ -60,6 +62,8 @@ pub(super) struct Buffers {
     pub(super) source_rows: wgpu::Buffer,
     /// `None` where the method fills without votes.
     pub(super) votes: Option<VoteBuffers>,
+    /// `None` where the method does without planes from far away.
+    pub(super) patches: Option<PatchBuffers>,
     /// `None` where the pair is matched at its full size.
     pub(super) full: Option<FullBuffers>,
     written: Vec<wgpu::Buffer>,
@@ -295,6 +299,9 @@ impl Buffers {
             speckle_sizes: map("speckle sizes", 1)?,
             full: full.then(|| FullBuffers::new(a, &fine)).transpose()?,
             votes: has_votes.then(|| VoteBuffers::new(a, plan, &fine)).transpose()?,
+            patches: (Stage::FarPlane.descriptor().taken)(&plan.method)
+                .then(|| PatchBuffers::new(a, plan, &fine))
+                .transpose()?,
             median_weights: a.constant("median weights", &MedianWeights::of(&plan.method).words())?,
             // What distance subtracts is the same for all steps.
             fill_weights: a
