@@ -1,6 +1,7 @@
 // Runs the engine, so that the page stays responsive and a match can be ended at any time.
 
 import init, * as engine from 'engine';
+import { broken, buffers, own, words } from './answers';
 import type { Calls, Cameras, Device, Name, Picture, Range, Reply, Request } from './protocol';
 
 declare const self: DedicatedWorkerGlobalScope;
@@ -52,13 +53,6 @@ async function using<T extends { free(): void }, R>(value: T, use: (value: T) =>
 
 function picture(width: number, height: number, pixels: Uint8Array): Picture {
     return { width, height, pixels: new Uint8ClampedArray(own(pixels).buffer, pixels.byteOffset, pixels.length) };
-}
-
-/** The engine's arrays are copies of their own, never views of its memory. */
-function own(array: Float32Array): Float32Array<ArrayBuffer>;
-function own(array: Uint8Array): Uint8Array<ArrayBuffer>;
-function own(array: Float32Array | Uint8Array): Float32Array | Uint8Array {
-    return array;
 }
 
 async function run(device: Device, preset: string, range: Range): Promise<{ found: engine.Matched; took: number }> {
@@ -177,26 +171,6 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
 function post(reply: Reply): void {
     self.postMessage(reply, 'value' in reply ? buffers(reply.value) : []);
 }
-
-/** The memory of all arrays in a value: it moves to the page instead of being copied. */
-function buffers(value: unknown): ArrayBuffer[] {
-    if (ArrayBuffer.isView(value)) {
-        return [value.buffer as ArrayBuffer];
-    }
-    return value && typeof value === 'object' ? [...new Set(Object.values(value).flatMap(buffers))] : [];
-}
-
-/** A trap leaves the engine's memory as it was in mid-work: nothing can be trusted after it. */
-function broken(error: unknown): boolean {
-    return error instanceof WebAssembly.RuntimeError || error instanceof RangeError || error instanceof InternalError();
-}
-
-/** Firefox's own, which ends what takes too much stack; elsewhere a class that nothing is of. */
-function InternalError(): new () => object {
-    return (self as unknown as { InternalError?: new () => object }).InternalError ?? class {};
-}
-
-const words = (error: unknown) => (error instanceof Error ? error.message : String(error));
 
 async function answer<N extends Name>(id: number, call: N, args: Parameters<Calls[N]>): Promise<void> {
     try {

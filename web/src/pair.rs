@@ -6,8 +6,11 @@ use mrfgs::check;
 use mrfgs::depth::Rig;
 use mrfgs::error::{Error, RangeError};
 use mrfgs::image::calib::{Calibration, Camera};
-use mrfgs::image::{Pair, Plane, read::Reader};
+use mrfgs::image::raster::{Raster, Sample};
+use mrfgs::image::read::Reader;
+use mrfgs::image::{Pair, Plane};
 use mrfgs::options::DisparityRange;
+use std::borrow::Cow;
 use std::path::Path;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -27,6 +30,36 @@ impl StereoPair {
     pub fn new(left: &[u8], left_name: &str, right: &[u8], right_name: &str) -> Thrown<Self> {
         let files = ((Path::new(left_name), left), (Path::new(right_name), right));
         Ok(Self { pair: Reader::default().pair_in_memory(files.0, files.1).map_err(thrown)? })
+    }
+
+    /// The pair in memory: rows of grey, grey and alpha, RGB or RGBA without gaps, as many channels as the samples are for.
+    ///
+    /// # Errors
+    /// Where samples are missing, or the images differ in size.
+    pub fn of_samples8(
+        left: &[u8],
+        left_width: usize,
+        left_height: usize,
+        right: &[u8],
+        right_width: usize,
+        right_height: usize,
+    ) -> Thrown<Self> {
+        of_samples((left, (left_width, left_height)), (right, (right_width, right_height)))
+    }
+
+    /// The same with samples of 16 bits.
+    ///
+    /// # Errors
+    /// Where samples are missing, or the images differ in size.
+    pub fn of_samples16(
+        left: &[u16],
+        left_width: usize,
+        left_height: usize,
+        right: &[u16],
+        right_width: usize,
+        right_height: usize,
+    ) -> Thrown<Self> {
+        of_samples((left, (left_width, left_height)), (right, (right_width, right_height)))
     }
 
     /// Width in pixels.
@@ -65,6 +98,16 @@ impl StereoPair {
     pub fn warnings(&self, range: Option<Range>) -> Vec<String> {
         check::warnings(&self.pair, range.map(|r| r.range)).iter().map(warning).collect()
     }
+}
+
+fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usize))) -> Thrown<StereoPair> {
+    fn view<S: Sample>((samples, (width, height)): (&[S], (usize, usize))) -> mrfgs::Result<Raster<'_>> {
+        let pixels = width.saturating_mul(height);
+        let channels = samples.len().checked_div(pixels).unwrap_or(0);
+        Raster::new(width, height, channels, S::samples(Cow::Borrowed(samples)))
+    }
+    let pair = view(left).and_then(|left| Pair::of_frames(left, view(right)?));
+    Ok(StereoPair { pair: pair.map_err(thrown)? })
 }
 
 /// Disparities to search, in pixels, both ends included.

@@ -1,0 +1,208 @@
+// A matcher: what programs hold, and its worker's other end.
+
+import type { Bitmap, Calls, Match, Opened, Reason, Reply, Request, View } from './calls.js';
+
+export type { Bitmap, Match, Reason, View };
+
+export interface Options {
+    /** A preset: `default`, `accurate`, `fast`, `paper` or `fgs`. */
+    method?: 'default' | 'accurate' | 'fast' | 'paper' | 'fgs';
+    /** `auto` takes WebGPU where there is a device, and else the CPU. Node.js has the CPU alone. */
+    device?: 'auto' | 'cpu' | 'webgpu';
+}
+
+export interface MatchOptions {
+    /** The disparities to search, in pixels, both ends included. Without `maxDisparity` sparse matches give the range. */
+    minDisparity?: number;
+    maxDisparity?: number;
+    /** Ends the match, and with it the worker; the next match starts another. */
+    signal?: AbortSignal;
+    /** Hears how much of the match is done, 0 to 1. */
+    onProgress?: (done: number, stage: string) => void;
+}
+
+/** A worker, of a browser or of Node.js. */
+export interface Port {
+    post(request: Request, moved: ArrayBuffer[]): void;
+    /** Whether the process waits for it. */
+    busy(is: boolean): void;
+    end(): void;
+}
+
+export type Start = (hear: (reply: Reply) => void, fail: (reason: string) => void) => Port;
+
+const PRESETS = ['default', 'accurate', 'fast', 'paper', 'fgs'];
+const DEVICES = ['auto', 'cpu', 'webgpu'];
+
+export class Matcher {
+    /** The version of mrfgs. */
+    readonly version: string;
+    /** What the bits of a match's `reasons` say. */
+    readonly reasons: readonly Reason[];
+    /** What runs matches, for people. */
+    readonly device: string;
+    /** Why it is not the GPU, where `auto` found none. */
+    readonly note: string | undefined;
+    private queue: Promise<unknown> = Promise.resolve();
+
+    /** `createMatcher` makes them. */
+    constructor(
+        private readonly link: Link,
+        private readonly method: string,
+        { version, reasons, device, note }: Opened,
+    ) {
+        this.version = version;
+        this.reasons = reasons;
+        this.device = device;
+        this.note = note;
+    }
+
+    /** Matches a rectified pair. Calls wait for one another. */
+    match(left: View | Bitmap, right: View | Bitmap, options: MatchOptions = {}): Promise<Match> {
+        const next = this.queue.then(() => this.run(left, right, options));
+        this.queue = next.catch(() => {});
+        return next;
+    }
+
+    /** Ends the worker, and frees its memory. A match that runs fails. */
+    close(): void {
+        this.link.close();
+    }
+
+    private async run(left: View | Bitmap, right: View | Bitmap, options: MatchOptions): Promise<Match> {
+        const { minDisparity = 0, maxDisparity, signal, onProgress } = options;
+        for (const [name, value] of Object.entries({ minDisparity, maxDisparity })) {
+            if (value !== undefined && !Number.isSafeInteger(value)) {
+                throw new TypeError(`${name} is ${String(value)}: give a whole number of pixels`);
+            }
+        }
+        if (maxDisparity === undefined && options.minDisparity !== undefined) {
+            throw new TypeError('minDisparity is given without maxDisparity: give both, or none');
+        }
+        const range: [number, number] | undefined = maxDisparity === undefined ? undefined : [minDisparity, maxDisparity];
+        const views = [viewOf(left, 'left'), viewOf(right, 'right')] as const;
+        signal?.throwIfAborted();
+        const stop = () => this.link.fail(signal?.reason);
+        signal?.addEventListener('abort', stop);
+        this.link.onProgress = onProgress;
+        try {
+            return await this.link.call('match', ...views, this.method, range);
+        } finally {
+            this.link.onProgress = undefined;
+            signal?.removeEventListener('abort', stop);
+        }
+    }
+}
+
+/** Calls as promises, and a new worker in place of one that broke or was ended. */
+export class Link {
+    onProgress: MatchOptions['onProgress'];
+    private port: Port | undefined;
+    private waiting = new Map<number, { resolve(value: never): void; reject(reason: unknown): void }>();
+    private last = 0;
+    private closed = false;
+
+    constructor(
+        private readonly start: Start,
+        private readonly device: 'auto' | 'cpu' | 'webgpu',
+    ) {}
+
+    open(): Promise<Opened> {
+        const port: Port = this.start(
+            // What an ended worker still says counts no more.
+            (reply) => port === this.port && this.hear(reply),
+            (reason) => port === this.port && this.fail(new Error(`the worker of @mrfgs/wasm failed: ${reason}`)),
+        );
+        this.port = port;
+        return this.send('open', this.device);
+    }
+
+    async call<N extends keyof Calls>(name: N, ...args: Parameters<Calls[N]>): Promise<ReturnType<Calls[N]>> {
+        if (this.closed) {
+            throw new Error('the matcher is closed: create another');
+        }
+        if (this.port === undefined) {
+            await this.open();
+        }
+        return this.send(name, ...args);
+    }
+
+    /** Ends the worker and all that waits for it. */
+    fail(reason: unknown): void {
+        this.port?.end();
+        this.port = undefined;
+        const waiting = [...this.waiting.values()];
+        this.waiting.clear();
+        for (const { reject } of waiting) {
+            reject(reason);
+        }
+    }
+
+    close(): void {
+        this.closed = true;
+        this.fail(new Error('the matcher was closed'));
+    }
+
+    private send<N extends keyof Calls>(call: N, ...args: Parameters<Calls[N]>): Promise<ReturnType<Calls[N]>> {
+        const id = ++this.last;
+        return new Promise((resolve, reject) => {
+            this.waiting.set(id, { resolve, reject });
+            this.port?.busy(true);
+            this.port?.post({ id, call, args } as Request, []);
+        });
+    }
+
+    private hear(reply: Reply): void {
+        if ('broken' in reply) {
+            this.fail(new Error(`the engine of @mrfgs/wasm broke: ${reply.broken}`));
+        } else if ('stage' in reply) {
+            this.onProgress?.(reply.done, reply.stage);
+        } else {
+            const waiting = this.waiting.get(reply.id);
+            this.waiting.delete(reply.id);
+            this.port?.busy(this.waiting.size > 0);
+            if ('value' in reply) {
+                waiting?.resolve(reply.value as never);
+            } else {
+                waiting?.reject(new Error(reply.error));
+            }
+        }
+    }
+}
+
+/** A matcher whose worker `start` starts. */
+export async function opened(start: Start, { method = 'default', device = 'auto' }: Options): Promise<Matcher> {
+    for (const [name, value, known] of [['method', method, PRESETS], ['device', device, DEVICES]] as const) {
+        if (!known.includes(value)) {
+            throw new TypeError(`${name} is ${JSON.stringify(value)}: take ${known.join(', ')}`);
+        }
+    }
+    const link = new Link(start, device);
+    try {
+        return new Matcher(link, method, await link.open());
+    } catch (error) {
+        link.close();
+        throw error;
+    }
+}
+
+function viewOf(view: View | Bitmap, name: string): View {
+    if (typeof ImageBitmap !== 'undefined' && view instanceof ImageBitmap) {
+        const { width, height } = view;
+        const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+        if (context === null) {
+            throw new Error(`${name}: this browser gives no canvas to read an ImageBitmap: give its ImageData`);
+        }
+        context.drawImage(view, 0, 0);
+        return viewOf(context.getImageData(0, 0, width, height), name);
+    }
+    const { data, width, height } = (view ?? {}) as Partial<View>;
+    if (!(data instanceof Uint8Array || data instanceof Uint8ClampedArray || data instanceof Uint16Array)) {
+        throw new TypeError(`${name}: give ImageData, an ImageBitmap, or { data, width, height } with data of 8 or 16 bits`);
+    }
+    const channels = data.length / (Number(width) * Number(height));
+    if (![1, 2, 3, 4].includes(channels)) {
+        throw new TypeError(`${name}: ${data.length} samples are not 1 to 4 for each of ${String(width)} x ${String(height)} pixels`);
+    }
+    return { data, width: Number(width), height: Number(height) };
+}

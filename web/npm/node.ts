@@ -1,0 +1,24 @@
+// The package in Node.js: matches on the CPU.
+
+import { Worker } from 'node:worker_threads';
+import { type Matcher, type Options, opened } from './matcher.js';
+
+export type { Bitmap, Match, MatchOptions, Matcher, Options, Reason, View } from './matcher.js';
+
+/** Starts a thread with the engine. */
+export async function createMatcher(options: Options = {}): Promise<Matcher> {
+    if (options.device === 'webgpu') {
+        throw new TypeError("device is \"webgpu\", which Node.js has not: take 'cpu' or 'auto'");
+    }
+    return opened((hear, fail) => {
+        const worker = new Worker(new URL('./worker-node.js', import.meta.url), { name: 'mrfgs' });
+        worker.on('message', hear);
+        worker.on('error', (error) => fail(error instanceof Error ? error.message : String(error)));
+        return {
+            post: (request, moved) => worker.postMessage(request, moved),
+            // A process ends while nothing runs, also without `close`.
+            busy: (is) => (is ? worker.ref() : worker.unref()),
+            end: () => void worker.terminate(),
+        };
+    }, { ...options, device: options.device === 'auto' ? 'cpu' : (options.device ?? 'cpu') });
+}

@@ -1,0 +1,103 @@
+// Tries the package in Node.js, in the fresh project in which it lies. Needs MRFGS, the program, and MRFGS_ROOT, its repository.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, test } from 'node:test';
+import { createMatcher } from '@mrfgs/wasm';
+
+const root = process.env.MRFGS_ROOT;
+const { PNG } = createRequire(join(root, 'web/package.json'))('pngjs');
+const folder = mkdtempSync(join(tmpdir(), 'mrfgs-npm-'));
+after(() => rmSync(folder, { recursive: true }));
+const files = ['im0.png', 'im1.png'].map((name) => join(root, 'testdata/mixed', name));
+const [left, right] = files.map((file) => PNG.sync.read(readFileSync(file)));
+const range = { minDisparity: 0, maxDisparity: 47 };
+
+/** The disparities that the program finds, and its validity map, from the top row on. */
+function program(left, right, ...flags) {
+    const map = join(folder, 'map.pfm');
+    const also = ['--also', 'validity', '--device', 'cpu', '--quiet'];
+    execFileSync(process.env.MRFGS, ['match', left, right, map, '--max-disparity', '47', ...also, ...flags]);
+    const bytes = readFileSync(map);
+    const [, width, height] = /^Pf\n(\d+) (\d+)\n-1[^\n]*\n/.exec(bytes.toString('latin1')).map(Number);
+    const row = 4 * width;
+    const start = bytes.length - row * height;
+    const rows = Array.from({ length: height }, (_, y) => bytes.subarray(start + row * (height - 1 - y), start + row * (height - y)));
+    return { disparity: Buffer.concat(rows), validity: PNG.sync.read(readFileSync(join(folder, 'map.validity.png'))).data };
+}
+
+function same(found, expected) {
+    assert.equal(Buffer.compare(Buffer.from(found.disparity.buffer), expected.disparity), 0, 'the disparities differ');
+    assert.deepEqual(found.reasons, Uint8Array.from(found.reasons, (_, i) => expected.validity[4 * i]), 'the reasons differ');
+}
+
+for (const method of ['default', 'fast']) {
+    test(`${method} gives the map of the program`, async () => {
+        const matcher = await createMatcher({ method, device: 'auto' });
+        const heard = [];
+        const found = await matcher.match(left, right, { ...range, onProgress: (done) => heard.push(done) });
+        assert.deepEqual([found.width, found.height, found.confidence.length], [320, 240, 320 * 240]);
+        assert.ok(heard.length > 2 && heard.every((done) => done >= 0 && done <= 1), 'nothing is heard of the progress');
+        assert.equal(matcher.reasons.length, 9);
+        same(found, program(...files, '--method', method));
+        // The control of this check: other views give other maps.
+        const other = await matcher.match(right, left, range);
+        assert.throws(() => same(other, program(...files, '--method', method)));
+    });
+}
+
+test('views of 16 bits of grey give the map of the program', async () => {
+    const grey = [left, right].map(({ data, width, height }) => {
+        const samples = Uint16Array.from({ length: width * height }, (_, i) => 200 * data[4 * i] + data[4 * i + 1]);
+        return { data: samples, width, height };
+    });
+    const names = grey.map(({ data, width, height }, view) => {
+        const png = new PNG({ width, height, bitDepth: 16, colorType: 0, inputColorType: 0, inputHasAlpha: false });
+        png.data = Buffer.from(data.buffer);
+        writeFileSync(join(folder, `${view}.png`), PNG.sync.write(png, { bitDepth: 16, colorType: 0, inputColorType: 0, inputHasAlpha: false }));
+        return join(folder, `${view}.png`);
+    });
+    const matcher = await createMatcher({ method: 'fast' });
+    same(await matcher.match(...grey, range), program(...names, '--method', 'fast'));
+});
+
+test('without a range it is found, and matches wait for one another', async () => {
+    const matcher = await createMatcher({ method: 'fast', device: 'cpu' });
+    const [first, second] = await Promise.all([matcher.match(left, right), matcher.match(left, right, range)]);
+    assert.ok(first.maxDisparity > first.minDisparity);
+    assert.deepEqual([second.minDisparity, second.maxDisparity], [0, 47]);
+});
+
+test('an abort ends a match, and the next one runs', async () => {
+    const matcher = await createMatcher({ method: 'fast' });
+    const stopped = new AbortController();
+    const match = matcher.match(left, right, { ...range, signal: stopped.signal, onProgress: () => stopped.abort() });
+    await assert.rejects(match, { name: 'AbortError' });
+    await assert.rejects(matcher.match(left, right, { ...range, signal: AbortSignal.abort() }), { name: 'AbortError' });
+    assert.equal((await matcher.match(left, right, range)).width, 320);
+});
+
+test('bad input is told in one line', async () => {
+    const matcher = await createMatcher();
+    const cases = [
+        [[left, { ...right, width: 160, height: 480 }, range], /^.*320 x 240.*160 x 480.*$/],
+        [[left, { data: right.data, width: 7, height: 7 }, range], /^right: .* samples are not 1 to 4 for each of 7 x 7 pixels$/],
+        [[undefined, right, range], /^left: give ImageData.*$/],
+        [[left, { data: new Uint16Array(4 * 320 * 240), width: 320, height: 240 }, range], /^one view has 8 bits.*$/],
+        [[left, right, { minDisparity: 5, maxDisparity: 4 }], /^.*maxDisparity.*$/],
+        [[left, right, { minDisparity: 0, maxDisparity: 100_000 }], /^.*maxDisparity.*$/],
+        [[left, right, { maxDisparity: 4.5 }], /^maxDisparity is 4.5.*$/],
+        [[left, right, { minDisparity: 1 }], /^minDisparity is given without maxDisparity.*$/],
+    ];
+    for (const [args, message] of cases) {
+        await assert.rejects(matcher.match(...args), { message });
+    }
+    matcher.close();
+    await assert.rejects(matcher.match(left, right, range), { message: /closed/ });
+    await assert.rejects(createMatcher({ method: 'quick' }), { message: /^method is "quick": take default, / });
+    await assert.rejects(createMatcher({ device: 'gpu' }), { message: /^device is "gpu": take auto, cpu, webgpu$/ });
+    await assert.rejects(createMatcher({ device: 'webgpu' }), { message: /Node.js/ });
+});

@@ -1,0 +1,101 @@
+// Tries the package for npm as its users take it: installed in fresh projects, in Node.js and, built by Vite and without it, in Chromium.
+//
+//   node web/npm/tests/try.mjs TARBALL   MRFGS names the program to compare with
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { transformSync } from 'esbuild';
+import { installed, launch } from '../../tests/lib/browser.mjs';
+import { difference, native } from '../../tests/lib/native.mjs';
+import { ROOT, scene } from '../../tests/lib/paths.mjs';
+import { serve } from '../../tests/lib/server.mjs';
+
+const VITE = '8.3.8';
+const tarball = resolve(process.argv[2]);
+const folder = mkdtempSync(join(tmpdir(), 'mrfgs-npm-'));
+
+function project(name, ...packages) {
+    const at = join(folder, name);
+    mkdirSync(at);
+    writeFileSync(join(at, 'package.json'), JSON.stringify({ name, private: true, type: 'module' }));
+    execFileSync('npm', ['install', '--no-audit', '--no-fund', '--silent', tarball, ...packages], { cwd: at, stdio: 'inherit' });
+    return at;
+}
+
+function inNode() {
+    const at = project('node');
+    cpSync(join(ROOT, 'web/npm/tests/node.mjs'), join(at, 'node.test.mjs'));
+    const env = { ...process.env, MRFGS_ROOT: ROOT };
+    execFileSync(process.execPath, ['--test', '--test-reporter=spec', 'node.test.mjs'], { cwd: at, stdio: 'inherit', env });
+}
+
+/** In Chromium: built by Vite, by its development server, and without a bundler. Whether there is a Chromium. */
+async function byVite() {
+    const at = project('vite', `vite@${VITE}`);
+    cpSync(join(ROOT, 'web/npm/tests/vite'), at, { recursive: true });
+    cpSync(scene('mixed'), join(at, 'public/scene'), { recursive: true });
+    execFileSync(join(ROOT, 'web/node_modules/.bin/tsc'), ['--project', at], { stdio: 'inherit' });
+    execFileSync('npx', ['vite', 'build', '--base', './', '--logLevel', 'warn'], { cwd: at, stdio: 'inherit' });
+    if (!installed('chromium')) {
+        return false;
+    }
+    const { createServer } = await import(pathToFileURL(join(at, 'node_modules/vite/dist/node/index.js')).href);
+    const development = await createServer({ root: at, logLevel: 'warn', optimizeDeps: { exclude: ['@mrfgs/wasm'] }, server: { host: '127.0.0.1' } });
+    await development.listen();
+    // The page without types, and the package by its address.
+    const script = readFileSync(join(at, 'main.ts'), 'utf8');
+    const bare = join(at, 'bare');
+    mkdirSync(bare);
+    cpSync(join(at, 'public'), bare, { recursive: true });
+    cpSync(join(at, 'node_modules/@mrfgs/wasm'), join(bare, 'wasm'), { recursive: true });
+    writeFileSync(join(bare, 'main.js'), transformSync(script.replace("'@mrfgs/wasm'", "'./wasm/index.js'"), { loader: 'ts' }).code);
+    writeFileSync(join(bare, 'index.html'), '<!doctype html><script type="module" src="main.js"></script>');
+    const host = await serve({ '/built/': join(at, 'dist'), '/bare/': bare });
+    const browser = await launch('chromium');
+    try {
+        const { pfm } = native(join(scene('mixed'), 'im0.png'), join(scene('mixed'), 'im1.png'), ['--max-disparity', '47']);
+        const pages = [
+            [`${host.url}/built/`, 'cpu'],
+            [`${host.url}/built/`, 'webgpu'],
+            [development.resolvedUrls.local[0], 'cpu'],
+            [`${host.url}/bare/`, 'cpu'],
+        ];
+        for (const [page, device] of pages) {
+            const tab = await browser.newPage();
+            tab.on('pageerror', (error) => console.error(error.message));
+            await tab.goto(page);
+            await tab.waitForFunction(() => document.title === 'ready');
+            const found = await tab.evaluate((device) => window.match(device), device);
+            assert.equal(found.note, undefined);
+            assert.equal(difference(upsideDown(Buffer.from(found.disparity), 320), pfm.subarray(-4 * 320 * 240)), undefined, `another map by ${device} on ${page}`);
+            console.error(`in Chromium on ${found.device}, ${page}: the map of the program`);
+            await tab.close();
+        }
+    } finally {
+        await browser.close();
+        await host.stop();
+        await development.close();
+    }
+    return true;
+}
+
+/** PFM has the last row first. */
+function upsideDown(map, width) {
+    const rows = Array.from({ length: map.length / (4 * width) }, (_, y) => map.subarray(4 * width * y, 4 * width * (y + 1)));
+    return Buffer.concat(rows.reverse());
+}
+
+try {
+    inNode();
+    const chromium = await byVite();
+    const { version } = JSON.parse(readFileSync(join(folder, 'vite/node_modules/vite/package.json')));
+    console.log(`the program's map in Node.js ${process.versions.node}; built by Vite ${version}${chromium ? ', and the same map in Chromium' : ''}`);
+    if (!chromium) {
+        console.error('LEFT OUT: the package in Chromium, which is not installed');
+    }
+} finally {
+    rmSync(folder, { recursive: true, force: true });
+}
