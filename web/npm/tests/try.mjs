@@ -54,28 +54,33 @@ async function byVite() {
     writeFileSync(join(bare, 'main.js'), transformSync(script.replace("'@mrfgs/wasm'", "'./wasm/index.js'"), { loader: 'ts' }).code);
     writeFileSync(join(bare, 'index.html'), '<!doctype html><script type="module" src="main.js"></script>');
     const host = await serve({ '/built/': join(at, 'dist'), '/bare/': bare });
-    const browser = await launch('chromium');
+    const open = { true: await launch('chromium'), false: await launch('chromium', { gpu: false }) };
     try {
         const { pfm } = native(join(scene('mixed'), 'im0.png'), join(scene('mixed'), 'im1.png'), ['--max-disparity', '47']);
         const pages = [
-            [`${host.url}/built/`, 'cpu'],
-            [`${host.url}/built/`, 'webgpu'],
-            [development.resolvedUrls.local[0], 'cpu'],
-            [`${host.url}/bare/`, 'cpu'],
+            { page: `${host.url}/built/`, device: 'webgpu' },
+            { page: `${host.url}/built/`, device: 'cpu' },
+            { page: `${host.url}/built/`, device: 'auto', gpu: false, note: /WebGPU|GPU/ },
+            { page: development.resolvedUrls.local[0], device: 'cpu' },
+            { page: `${host.url}/bare/`, device: 'cpu' },
         ];
-        for (const [page, device] of pages) {
-            const tab = await browser.newPage();
+        for (const { page, device, gpu = true, note = /^$/ } of pages) {
+            const tab = await open[gpu].newPage();
             tab.on('pageerror', (error) => console.error(error.message));
             await tab.goto(page);
             await tab.waitForFunction(() => document.title === 'ready');
             const found = await tab.evaluate((device) => window.match(device), device);
-            assert.equal(found.note, undefined);
+            assert.match(found.note ?? '', note);
             assert.equal(difference(upsideDown(Buffer.from(found.disparity), 320), pfm.subarray(-4 * 320 * 240)), undefined, `another map by ${device} on ${page}`);
             console.error(`in Chromium on ${found.device}, ${page}: the map of the program`);
+            if (!gpu) {
+                await assert.rejects(tab.evaluate(() => window.match('webgpu')), /GPU/);
+            }
             await tab.close();
         }
     } finally {
-        await browser.close();
+        await open.true.close();
+        await open.false.close();
         await host.stop();
         await development.close();
     }

@@ -11,7 +11,7 @@ async function match(device: NonNullable<Options['device']>) {
     const found = await matcher.match(...views, { minDisparity: 0, maxDisparity: 47 });
     matcher.close();
     const bytes = (array: Float32Array | Uint8Array) => [...new Uint8Array(array.buffer)];
-    return { device: matcher.device, note: found.note, disparity: bytes(found.disparity), reasons: bytes(found.reasons) };
+    return { device: matcher.device, note: matcher.note, disparity: bytes(found.disparity), reasons: bytes(found.reasons) };
 }
 
 Object.assign(window, { match });
