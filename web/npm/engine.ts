@@ -57,7 +57,11 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
             };
         } finally {
             for (const value of held) {
-                value.free();
+                try {
+                    value.free();
+                } catch {
+                    // After a trap nothing can be freed; the trap is what is told.
+                }
             }
         }
     }

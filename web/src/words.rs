@@ -19,7 +19,7 @@ const PACKAGE: Words = Words {
     preset: "method",
     min: "minDisparity",
     max: "maxDisparity",
-    cpu: "take device: 'cpu'",
+    cpu: "use device: 'cpu', or the program mrfgs",
     mask: Some("give alpha 0 to what is no image"),
     range: None,
     ..PAGE
