@@ -14,6 +14,8 @@ import { ROOT, scene } from '../../tests/lib/paths.mjs';
 import { serve } from '../../tests/lib/server.mjs';
 
 const VITE = '8.3.8';
+// Standard output has the one line for the table of scripts/release.
+const TOLD = ['ignore', 2, 2];
 const tarball = resolve(process.argv[2]);
 const folder = mkdtempSync(join(tmpdir(), 'mrfgs-npm-'));
 
@@ -21,7 +23,7 @@ function project(name, ...packages) {
     const at = join(folder, name);
     mkdirSync(at);
     writeFileSync(join(at, 'package.json'), JSON.stringify({ name, private: true, type: 'module' }));
-    execFileSync('npm', ['install', '--no-audit', '--no-fund', '--silent', tarball, ...packages], { cwd: at, stdio: 'inherit' });
+    execFileSync('npm', ['install', '--no-audit', '--no-fund', '--silent', tarball, ...packages], { cwd: at, stdio: TOLD });
     return at;
 }
 
@@ -29,7 +31,7 @@ function inNode() {
     const at = project('node');
     cpSync(join(ROOT, 'web/npm/tests/node.mjs'), join(at, 'node.test.mjs'));
     const env = { ...process.env, MRFGS_ROOT: ROOT };
-    execFileSync(process.execPath, ['--test', '--test-reporter=spec', 'node.test.mjs'], { cwd: at, stdio: 'inherit', env });
+    execFileSync(process.execPath, ['--test', '--test-reporter=spec', 'node.test.mjs'], { cwd: at, stdio: TOLD, env });
 }
 
 /** In Chromium: built by Vite, by its development server, and without a bundler. Whether there is a Chromium. */
@@ -37,8 +39,8 @@ async function byVite() {
     const at = project('vite', `vite@${VITE}`);
     cpSync(join(ROOT, 'web/npm/tests/vite'), at, { recursive: true });
     cpSync(scene('mixed'), join(at, 'public/scene'), { recursive: true });
-    execFileSync(join(ROOT, 'web/node_modules/.bin/tsc'), ['--project', at], { stdio: 'inherit' });
-    execFileSync('npx', ['vite', 'build', '--base', './', '--logLevel', 'warn'], { cwd: at, stdio: 'inherit' });
+    execFileSync(join(ROOT, 'web/node_modules/.bin/tsc'), ['--project', at], { stdio: TOLD });
+    execFileSync('npx', ['vite', 'build', '--base', './', '--logLevel', 'warn'], { cwd: at, stdio: TOLD });
     if (!installed('chromium')) {
         return false;
     }
