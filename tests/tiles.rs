@@ -222,7 +222,7 @@ fn hardly_anything_differs_from_one_piece() {
                 3 => 0.03,
                 _ => 0.07,
             };
-            let memory = (streamed(&whole).bytes() >> 20) as u32 * quarters / 4;
+            let memory = (streamed(&whole).bytes() * quarters / 4).div_ceil(1 << 20) as u32;
             let tiles =
                 Tiles::with_overlap(&plan(pair.size(), range, &Method::default(), memory), overlap).unwrap();
             let differ = difference(&in_tiles(&mut cpu, &tiles, &pair).maps, &expected.maps);

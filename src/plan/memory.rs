@@ -81,7 +81,7 @@ impl Plan {
         // Beside them, what a device keeps of each row, and its tables.
         let maps =
             (100 + right + full) * width.next_multiple_of(ROW_ALIGN / 4) * height + 16 * height + (1 << 14);
-        maps as u64 + self.vote_bytes()
+        maps as u64 + self.vote_bytes() + self.patch_bytes()
     }
 
     /// Largest number of bytes taken by the votes on invalid pixels.
@@ -93,11 +93,18 @@ impl Plan {
         let padded = votes.labels.next_multiple_of(LABEL_BLOCK / 2);
         let sums = aligned(4 * votes.width * padded) * (votes.band + votes.summed());
         // The half-size image and the votes, and a device's table of weights.
-        let votes = sums + 2 * aligned(4 * votes.width) * votes.height + (1 << 13);
-        // The patches, and what reaches them.
+        (sums + 2 * aligned(4 * votes.width) * votes.height + (1 << 13)) as u64
+    }
+
+    /// Largest number of bytes taken by planes from far away.
+    fn patch_bytes(&self) -> u64 {
+        if self.method.refinement.fill != Fill::Votes {
+            return 0;
+        }
         let (width, height) = patches(self);
-        let of_patches = aligned(4 * PATCH_OWN_WORDS * width) + 2 * aligned(4 * PATCH_SUM_WORDS * width);
-        (votes + of_patches * height + (1 << 11)) as u64
+        // What patches have of their own, and what reaches them from both sides, and a device's table of weights.
+        let row = aligned(4 * PATCH_OWN_WORDS * width) + 2 * aligned(4 * PATCH_SUM_WORDS * width);
+        (row * height + (1 << 11)) as u64
     }
 
     /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to
@@ -143,7 +150,9 @@ impl Plan {
         let right = if self.method.refinement.right_map { 4 + 2 * 9 + 12 } else { 0 };
         // The maps at full size, and a copy.
         let full = if self.full.is_some() { 4 * 2 * 10 } else { 0 };
-        (20 + 12 + corrected + right + full) * self.levels[0].pixels() as u64 + self.vote_bytes()
+        // The host counts votes before it carries planes.
+        let filling = self.vote_bytes().max(self.patch_bytes());
+        (20 + 12 + corrected + right + full) * self.levels[0].pixels() as u64 + filling
     }
 
     /// Bytes taken by all volumes, graphs and maps together.
