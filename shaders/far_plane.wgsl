@@ -195,7 +195,7 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     let n = params.across;
     let all = max(s, 1);
     let e = error / all;
-    own[at] = i32((u32(s) + (1u << WEIGHT_BITS >> 1u)) >> WEIGHT_BITS);
+    own[at] = i32((u32(s) + ((1u << WEIGHT_BITS) >> 1u)) >> WEIGHT_BITS);
     own[at + n] = 512 * to.x / all;
     own[at + 2u * n] = 512 * to.y / all;
     own[at + 3u * n] = 4 * reference + 64 * error / all;
