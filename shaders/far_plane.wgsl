@@ -1,4 +1,4 @@
-// Planes through what is measured, carried from patch to patch of 4 x 4 pixels. Twice `gather`, `carry_rows`, `rise` and `sink`, at the end `take`.
+// Planes through measured pixels, carried from patch to patch of 4 x 4 pixels. Twice `gather`, `carry_rows`, `rise` and `sink`, then `take`.
 
 #import band image maps
 
@@ -8,9 +8,8 @@ struct Params {
     // Patches in a row, and rows of them.
     across: u32,
     down: u32,
-    // Words in a row of what patches have of their own, and of sums.
-    own_pitch: u32,
-    sum_pitch: u32,
+    // Words in a row of them.
+    pitch: u32,
     // First row of patches that is bound.
     first_bound: u32,
     // 1 where there are planes from the round before, else 0.
@@ -21,14 +20,17 @@ struct Params {
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> disparity: array<i32>;
-// By row: the moments of the patches, number by number, and then their colours, red | green << 8 | blue << 16.
-@group(0) @binding(4) var<storage, read_write> own: array<i32>;
-// The same without colours: what has reached a patch along its row, and then from above too.
-@group(0) @binding(5) var<storage, read_write> sums: array<i32>;
-// What reaches a patch from the right, and then from below; at last its plane.
-@group(0) @binding(6) var<storage, read_write> back: array<i32>;
+// By row of patches: their own moments, number by number, and their colours; what has reached them along their row, and then from above,
+// too; what reaches them from the right, and then from below, and at last their planes.
+@group(0) @binding(4) var<storage, read_write> patches: array<i32>;
 // Shares of weight that are left after a step, in 1/256, by the difference between two patches.
-@group(0) @binding(7) var<storage, read> shares: array<u32>;
+@group(0) @binding(5) var<storage, read> shares: array<u32>;
+
+// The first number of each of these.
+const OWN: u32 = 0u;
+const COLOUR: u32 = 10u;
+const SUM: u32 = 11u;
+const BACK: u32 = 21u;
 
 const NO_PLANE: i32 = 0;
 const PLANE: i32 = 1;
@@ -53,78 +55,50 @@ struct Plane {
     slopes: vec2<i32>,
 }
 
-fn own_at(x: u32, y: u32) -> u32 {
-    return (y - params.first_bound) * params.own_pitch + x;
+// Where number `number` of a patch is.
+fn place_of(number: u32, at: vec2<u32>) -> u32 {
+    return (at.y - params.first_bound) * params.pitch + number * params.across + at.x;
 }
 
-fn sum_at(x: u32, y: u32) -> u32 {
-    return (y - params.first_bound) * params.sum_pitch + x;
-}
-
-fn own_moments(x: u32, y: u32) -> Moments {
-    let at = own_at(x, y);
+// The moments of a patch from number `first` on.
+fn moments(first: u32, at: vec2<u32>) -> Moments {
+    let i = place_of(first, at);
     let n = params.across;
     return Moments(
-        u32(own[at]), vec2(own[at + n], own[at + 2u * n]), own[at + 3u * n],
-        vec3(own[at + 4u * n], own[at + 5u * n], own[at + 6u * n]),
-        vec2(own[at + 7u * n], own[at + 8u * n]), own[at + 9u * n],
+        u32(patches[i]), vec2(patches[i + n], patches[i + 2u * n]), patches[i + 3u * n],
+        vec3(patches[i + 4u * n], patches[i + 5u * n], patches[i + 6u * n]),
+        vec2(patches[i + 7u * n], patches[i + 8u * n]), patches[i + 9u * n],
     );
 }
 
-fn sum_moments(x: u32, y: u32) -> Moments {
-    let at = sum_at(x, y);
+fn set_moments(first: u32, at: vec2<u32>, m: Moments) {
+    let i = place_of(first, at);
     let n = params.across;
-    return Moments(
-        u32(sums[at]), vec2(sums[at + n], sums[at + 2u * n]), sums[at + 3u * n],
-        vec3(sums[at + 4u * n], sums[at + 5u * n], sums[at + 6u * n]),
-        vec2(sums[at + 7u * n], sums[at + 8u * n]), sums[at + 9u * n],
-    );
+    patches[i] = i32(m.weight);
+    patches[i + n] = m.mean.x;
+    patches[i + 2u * n] = m.mean.y;
+    patches[i + 3u * n] = m.disparity;
+    patches[i + 4u * n] = m.squares.x;
+    patches[i + 5u * n] = m.squares.y;
+    patches[i + 6u * n] = m.squares.z;
+    patches[i + 7u * n] = m.errors.x;
+    patches[i + 8u * n] = m.errors.y;
+    patches[i + 9u * n] = m.dd;
 }
 
-fn back_moments(x: u32, y: u32) -> Moments {
-    let at = sum_at(x, y);
+fn plane_of(at: vec2<u32>) -> Plane {
+    let i = place_of(BACK, at);
     let n = params.across;
-    return Moments(
-        u32(back[at]), vec2(back[at + n], back[at + 2u * n]), back[at + 3u * n],
-        vec3(back[at + 4u * n], back[at + 5u * n], back[at + 6u * n]),
-        vec2(back[at + 7u * n], back[at + 8u * n]), back[at + 9u * n],
-    );
+    return Plane(patches[i], patches[i + n], vec2(patches[i + 2u * n], patches[i + 3u * n]));
 }
 
-fn set_sum(x: u32, y: u32, m: Moments) {
-    let at = sum_at(x, y);
+fn set_plane(at: vec2<u32>, plane: Plane) {
+    let i = place_of(BACK, at);
     let n = params.across;
-    sums[at] = i32(m.weight);
-    sums[at + n] = m.mean.x;
-    sums[at + 2u * n] = m.mean.y;
-    sums[at + 3u * n] = m.disparity;
-    sums[at + 4u * n] = m.squares.x;
-    sums[at + 5u * n] = m.squares.y;
-    sums[at + 6u * n] = m.squares.z;
-    sums[at + 7u * n] = m.errors.x;
-    sums[at + 8u * n] = m.errors.y;
-    sums[at + 9u * n] = m.dd;
-}
-
-fn set_back(x: u32, y: u32, m: Moments) {
-    let at = sum_at(x, y);
-    let n = params.across;
-    back[at] = i32(m.weight);
-    back[at + n] = m.mean.x;
-    back[at + 2u * n] = m.mean.y;
-    back[at + 3u * n] = m.disparity;
-    back[at + 4u * n] = m.squares.x;
-    back[at + 5u * n] = m.squares.y;
-    back[at + 6u * n] = m.squares.z;
-    back[at + 7u * n] = m.errors.x;
-    back[at + 8u * n] = m.errors.y;
-    back[at + 9u * n] = m.dd;
-}
-
-fn plane_of(x: u32, y: u32) -> Plane {
-    let at = sum_at(x, y);
-    let n = params.across;
-    return Plane(back[at], back[at + n], vec2(back[at + 2u * n], back[at + 3u * n]));
+    patches[i] = plane.state;
+    patches[i + n] = plane.value;
+    patches[i + 2u * n] = plane.slopes.x;
+    patches[i + 3u * n] = plane.slopes.y;
 }
 
 // How far a pixel is from the middle of its patch, in half pixels.
@@ -145,13 +119,13 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     if id.x >= params.across || id.y >= params.band.rows {
         return;
     }
-    let patch_row = params.band.first_row + id.y;
+    let here = vec2(id.x, params.band.first_row + id.y);
     let top = PATCH * params.band.first_row;
-    let first = PATCH * vec2(id.x, patch_row);
+    let first = PATCH * here;
     let end = min(first + vec2(PATCH), vec2(params.level.width, params.level.height));
     var plane = Plane(NO_PLANE, 0, vec2(0));
     if params.again == 1u {
-        plane = plane_of(id.x, patch_row);
+        plane = plane_of(here);
     }
     var red_green_blue = vec3(0u);
     var count = 0u;
@@ -191,34 +165,28 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
             }
         }
     }
-    let at = own_at(id.x, patch_row);
-    let n = params.across;
     let all = max(s, 1);
     let e = error / all;
-    own[at] = i32((u32(s) + ((1u << WEIGHT_BITS) >> 1u)) >> WEIGHT_BITS);
-    own[at + n] = 512 * to.x / all;
-    own[at + 2u * n] = 512 * to.y / all;
-    own[at + 3u * n] = 4 * reference + 64 * error / all;
-    own[at + 4u * n] = (squares.x - to.x * to.x / all) / all;
-    own[at + 5u * n] = (squares.y - to.x * to.y / all) / all;
-    own[at + 6u * n] = (squares.z - to.y * to.y / all) / all;
-    own[at + 7u * n] = (errors.x - to.x * e) / (2 * all);
-    own[at + 8u * n] = (errors.y - to.y * e) / (2 * all);
-    own[at + 9u * n] = (spread - error * e) / all;
+    set_moments(OWN, here, Moments(
+        (u32(s) + ((1u << WEIGHT_BITS) >> 1u)) >> WEIGHT_BITS,
+        512 * to / all,
+        4 * reference + 64 * error / all,
+        (squares - vec3(to.x * to.x, to.x * to.y, to.y * to.y) / all) / all,
+        (errors - to * e) / (2 * all),
+        (spread - error * e) / all,
+    ));
     let mean = (2u * red_green_blue + vec3(count)) / vec3(max(2u * count, 1u));
-    own[at + 10u * n] = i32(mean.x | (mean.y << 8u) | (mean.z << 16u));
+    patches[place_of(COLOUR, here)] = i32(packed(mean));
 }
 
 // Share of the weight that is left after the step between two patches, in 1/256.
 fn share_between(a: vec2<u32>, b: vec2<u32>) -> u32 {
-    let one = own_at(a.x, a.y);
-    let other = own_at(b.x, b.y);
-    let n = params.across;
-    let colours = vec2(u32(own[one + 10u * n]), u32(own[other + 10u * n]));
-    let shifts = vec3(0u, 8u, 16u);
-    var apart = difference((vec3(colours.x) >> shifts) & vec3(255u), (vec3(colours.y) >> shifts) & vec3(255u));
-    if own[one] > 0 && own[other] > 0 {
-        apart += u32(max(abs(own[one + 3u * n] - own[other + 3u * n]) - STEP, 0)) >> STEP_BITS;
+    let colours = vec2(u32(patches[place_of(COLOUR, a)]), u32(patches[place_of(COLOUR, b)]));
+    var apart = difference(unpacked(colours.x), unpacked(colours.y));
+    let one = moments(OWN, a);
+    let other = moments(OWN, b);
+    if one.weight > 0u && other.weight > 0u {
+        apart += u32(max(abs(one.disparity - other.disparity) - STEP, 0)) >> STEP_BITS;
     }
     return shares[min(apart, LAST_SHARE)];
 }
@@ -283,15 +251,19 @@ fn carry_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     let y = params.band.first_row + row;
     var carry = NOTHING;
     for (var x = params.across - 1u; x > 0u; x--) {
-        set_back(x, y, carry);
-        carry = carried(both(own_moments(x, y), carry), vec2(-1, 0), share_between(vec2(x - 1u, y), vec2(x, y)));
+        let here = vec2(x, y);
+        set_moments(BACK, here, carry);
+        carry = carried(both(moments(OWN, here), carry), vec2(-1, 0), share_between(vec2(x - 1u, y), here));
     }
-    set_back(0u, y, carry);
-    var line = own_moments(0u, y);
-    set_sum(0u, y, both(line, carry));
-    for (var x = 1u; x < params.across; x++) {
-        line = both(own_moments(x, y), carried(line, vec2(1, 0), share_between(vec2(x - 1u, y), vec2(x, y))));
-        set_sum(x, y, both(line, back_moments(x, y)));
+    set_moments(BACK, vec2(0u, y), carry);
+    var line = NOTHING;
+    for (var x = 0u; x < params.across; x++) {
+        let here = vec2(x, y);
+        if x > 0u {
+            line = carried(line, vec2(1, 0), share_between(vec2(x - 1u, y), here));
+        }
+        line = both(moments(OWN, here), line);
+        set_moments(SUM, here, both(line, moments(BACK, here)));
     }
 }
 
@@ -302,20 +274,20 @@ fn rise(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if x >= params.across {
         return;
     }
-    let end = params.band.first_row + params.band.rows;
+    let first = params.band.first_row;
+    let end = first + params.band.rows;
     var carry = NOTHING;
     if end < params.down {
-        carry = carried(
-            both(sum_moments(x, end), back_moments(x, end)),
-            vec2(0, -1),
-            share_between(vec2(x, end - 1u), vec2(x, end)),
-        );
+        let below = vec2(x, end);
+        let sum = both(moments(SUM, below), moments(BACK, below));
+        carry = carried(sum, vec2(0, -1), share_between(vec2(x, end - 1u), below));
     }
-    for (var y = end - 1u; y > params.band.first_row; y--) {
-        set_back(x, y, carry);
-        carry = carried(both(sum_moments(x, y), carry), vec2(0, -1), share_between(vec2(x, y - 1u), vec2(x, y)));
+    for (var y = end - 1u; y > first; y--) {
+        let here = vec2(x, y);
+        set_moments(BACK, here, carry);
+        carry = carried(both(moments(SUM, here), carry), vec2(0, -1), share_between(vec2(x, y - 1u), here));
     }
-    set_back(x, params.band.first_row, carry);
+    set_moments(BACK, vec2(x, first), carry);
 }
 
 // What comes from above, by bands of rows from the first one on, and the planes. One invocation per column of patches.
@@ -328,21 +300,16 @@ fn sink(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let first = params.band.first_row;
     var line = NOTHING;
     if first > 0u {
-        line = sum_moments(x, first - 1u);
+        line = moments(SUM, vec2(x, first - 1u));
     }
     for (var y = first; y < first + params.band.rows; y++) {
+        let here = vec2(x, y);
         if y > 0u {
-            line = carried(line, vec2(0, 1), share_between(vec2(x, y - 1u), vec2(x, y)));
+            line = carried(line, vec2(0, 1), share_between(vec2(x, y - 1u), here));
         }
-        line = both(sum_moments(x, y), line);
-        let plane = fit(both(line, back_moments(x, y)));
-        set_sum(x, y, line);
-        let at = sum_at(x, y);
-        let n = params.across;
-        back[at] = plane.state;
-        back[at + n] = plane.value;
-        back[at + 2u * n] = plane.slopes.x;
-        back[at + 3u * n] = plane.slopes.y;
+        line = both(moments(SUM, here), line);
+        set_plane(here, fit(both(line, moments(BACK, here))));
+        set_moments(SUM, here, line);
     }
 }
 
@@ -389,7 +356,7 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     let at = id.y * params.level.pixel_pitch + id.x;
     let pixel = vec2(id.x, params.band.first_row + id.y);
-    let plane = plane_of(pixel.x / PATCH, pixel.y / PATCH);
+    let plane = plane_of(pixel / PATCH);
     if (flags[at] & FILLED) != 0u && plane.state == TRUSTED {
         let low = params.level.low;
         let range = FRACTION * vec2(low, low + i32(params.level.labels) - 1);

@@ -73,7 +73,7 @@ fn colour(at: u32) -> vec3<u32> {
 
 // Colour of a half-size pixel.
 fn half_colour(at: u32) -> vec3<u32> {
-    return (vec3(colours[at]) >> vec3(0u, 8u, 16u)) & vec3(255u);
+    return unpacked(colours[at]);
 }
 
 // weight / 65536 of sum.
@@ -133,7 +133,7 @@ fn halve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             }
         }
     }
-    colours[id.y * params.half_pitch + id.x] = mean.x | (mean.y << 8u) | (mean.z << 16u) | asked;
+    colours[id.y * params.half_pitch + id.x] = packed(mean) | asked;
 }
 
 // Own votes. One invocation per half-size pixel and label.

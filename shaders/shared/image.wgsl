@@ -9,3 +9,12 @@ fn difference(a: vec3<u32>, b: vec3<u32>) -> u32 {
     let d = max(a, b) - min(a, b);
     return d.x + d.y + d.z;
 }
+
+// A colour of 8 bits a channel in a word, red | green << 8 | blue << 16, and out of it.
+fn packed(colour: vec3<u32>) -> u32 {
+    return colour.x | (colour.y << 8u) | (colour.z << 16u);
+}
+
+fn unpacked(word: u32) -> vec3<u32> {
+    return (vec3(word) >> vec3(0u, 8u, 16u)) & vec3(255u);
+}

@@ -24,8 +24,8 @@ words! {
         /// Valid pixels vote for their own disparities, above all along rows. A vote loses weight with
         /// distance and at edges. Disparities that would hide what the right view sees get votes against
         /// them. Valid pixels of little confidence may be outvoted. Then planes are fitted through wide
-        /// surroundings of what is filled. At last, where what is measured lies in a plane, however far
-        /// away, that plane goes on; not without `plane`, nor where the pair is matched at half its size.
+        /// surroundings of what is filled. At last, planes of measured pixels, however far away, extend to
+        /// the filled pixels that they fit. This last step takes `plane`, and is left out at half the size.
         Votes = "votes",
     }
 }

@@ -1,6 +1,6 @@
 //! What a match takes of the memory, at most.
 
-use super::patches::{PATCH_OWN_WORDS, PATCH_SUM_WORDS, patches};
+use super::patches::{PATCH_WORDS, patches};
 use super::votes::Votes;
 use super::{GRAPH_WINDOW, LABEL_BLOCK, Plan, RING_PART, ROW_ALIGN};
 use crate::options::{Fill, Illumination};
@@ -102,9 +102,8 @@ impl Plan {
             return 0;
         }
         let (width, height) = patches(self);
-        // What patches have of their own, and what reaches them from both sides, and a device's table of weights.
-        let row = aligned(4 * PATCH_OWN_WORDS * width) + 2 * aligned(4 * PATCH_SUM_WORDS * width);
-        (row * height + (1 << 11)) as u64
+        // The patches, and a device's table of weights.
+        (aligned(4 * PATCH_WORDS * width) * height + (1 << 11)) as u64
     }
 
     /// Largest number of bytes that the host takes besides the pair before it hands it to a backend. Per pixel: 66 to

@@ -28,10 +28,8 @@ pub const PATCH_MOMENT: i32 = (1 << 20) - 1;
 pub const PATCH_RIDGE: i32 = 80;
 /// The steepest plane, in 1/8192: two pixels a pixel.
 pub const PATCH_STEEPEST: i32 = 1 << 14;
-/// Numbers that a device keeps of a patch: its moments and its colour, and those that reach it.
-pub const PATCH_OWN_WORDS: usize = 11;
-/// The same without a colour.
-pub const PATCH_SUM_WORDS: usize = 10;
+/// Numbers that a device keeps of a patch: its own moments and its colour, and twice the moments that reach it.
+pub const PATCH_WORDS: usize = 31;
 /// The least weight that a plane has.
 pub const PATCH_LEAST: u32 = 240;
 /// A plane is trusted where the mean square of what it leaves is below this, in 1/256 px^2: half a px^2.

@@ -1,5 +1,5 @@
-//! Lays planes through what is measured, however far away, and gives them to the filled pixels that they fit: a wall or a road goes on
-//! where nothing can be matched.
+//! Extends planes of measured pixels, however far away, to the filled pixels that they fit: a wall or a road goes on where nothing can be
+//! matched.
 //!
 //! Constants are those of [`patches`](crate::plan::patches). Patch (X, Y) stands for the pixels (4 X, 4 Y) to (4 X + 3, 4 Y + 3) that are
 //! inside. `>>` rounds down, / towards 0, and \[f\] is the sum of f over the pixels of a patch. What follows happens twice; the second

@@ -1,7 +1,8 @@
 //! Planes carried over from far away: see [`crate::backend::Stage::FarPlane`].
 
+use super::colours::{difference, mean_colours};
 use super::plane::limits;
-use crate::image::{Image, Pair, Plane};
+use crate::image::{Pair, Plane};
 use crate::maps::flag;
 use crate::plan::Plan;
 use crate::plan::patches::{
@@ -18,12 +19,12 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
         return;
     }
     let size = patches(plan);
-    let mut fits = Plane::filled(size.0, size.1, Fit::default());
-    let colours = by_patch(size, |x, y| colour(pair.left(), x, y));
-    let fades = patch_weights();
-    for round in 0..PATCH_ROUNDS {
-        let own = by_patch(size, |x, y| own(maps, (x, y), (round > 0).then_some(&fits[(x, y)])));
-        fits = fit(&own, &colours, &fades);
+    let mut fits = Plane::filled(size.0, size.1, None);
+    let colours = mean_colours(pair.left(), PATCH);
+    let shares = patch_weights();
+    for _ in 0..PATCH_ROUNDS {
+        let own = by_patch(size, |x, y| own(maps, (x, y), fits[(x, y)].as_ref()));
+        fits = fit(&own, &colours, &shares);
     }
     let (low, high) = limits(plan);
     let MapSet { disparity, validity, .. } = maps;
@@ -31,8 +32,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     disparity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         let pixels = row.iter_mut().zip(validity.row(y)).enumerate();
         for (x, (out, _)) in pixels.filter(|(_, (_, flags))| **flags & flag::FILLED != 0) {
-            let fit = &fits[(x / PATCH, y / PATCH)];
-            if fit.trusted {
+            if let Some(fit) = fits[(x / PATCH, y / PATCH)].filter(|fit| fit.trusted) {
                 *out = fit.at(x % PATCH, y % PATCH).clamp(low, high);
             }
         }
@@ -49,19 +49,6 @@ fn by_patch<T: Copy + Default + Send>(
         row.iter_mut().enumerate().for_each(|(x, out)| *out = of(x, y));
     });
     out
-}
-
-/// The mean colour of patch (x, y).
-fn colour(left: &Image, x: usize, y: usize) -> [u8; 3] {
-    let (mut sums, mut count) = ([0; 3], 0);
-    for y in PATCH * y..left.height().min(PATCH * (y + 1)) {
-        for x in (PATCH * x..left.width().min(PATCH * (x + 1))).filter(|&x| !left.masked[(x, y)]) {
-            let pixel = left.pixels[(x, y)];
-            sums.iter_mut().zip(pixel).for_each(|(sum, c)| *sum += u32::from(c >> 8));
-            count += 1;
-        }
-    }
-    sums.map(|sum| ((2 * sum + count) / (2 * count).max(1)) as u8)
 }
 
 /// The weighted moments of measured pixels.
@@ -92,7 +79,7 @@ fn own(maps: &MapSet, (x, y): (usize, usize), fit: Option<&Fit>) -> Moments {
             if validity[(u, v)] & flag::INVALID != 0 {
                 continue;
             }
-            if let Some(fit) = fit.filter(|fit| fit.is_there) {
+            if let Some(fit) = fit {
                 let near = (1 << PATCH_FAR_BITS) - (d - fit.at(u % PATCH, v % PATCH)).abs();
                 w = (w * near.max(0)) >> PATCH_FAR_BITS;
             }
@@ -128,13 +115,13 @@ fn from_middle(at: usize) -> i32 {
 }
 
 impl Moments {
-    /// These as seen from the next patch along an axis, where they weigh `fade` / 256 as much.
+    /// These as seen from the next patch along an axis, where they weigh `share` / 256 as much.
     #[inline(always)]
-    fn carried(mut self, axis: usize, forward: bool, fade: u32) -> Self {
+    fn carried(mut self, axis: usize, forward: bool, share: u32) -> Self {
         let step = 1024 * PATCH as i32;
         let mean = &mut self.mean[axis];
         *mean = (*mean + if forward { -step } else { step }).clamp(-PATCH_REACH, PATCH_REACH);
-        self.weight = (self.weight * fade) >> 8;
+        self.weight = (self.weight * share) >> 8;
         self
     }
 
@@ -173,10 +160,10 @@ impl Moments {
         }
     }
 
-    /// The plane through them.
-    fn fit(&self) -> Fit {
+    /// The plane through them, where they have enough weight.
+    fn fit(&self) -> Option<Fit> {
         if self.weight < PATCH_LEAST {
-            return Fit::default();
+            return None;
         }
         let (xx, yy) = (self.xx + PATCH_RIDGE, self.yy + PATCH_RIDGE);
         let (a, b) = if xx >= yy {
@@ -187,12 +174,11 @@ impl Moments {
         };
         let along = |slope: i32, mean: i32| (slope * (mean >> 6)) >> 7;
         let left = self.dd - product(a, self.xd) - product(b, self.yd);
-        Fit {
-            is_there: true,
+        Some(Fit {
             trusted: left < PATCH_RESIDUAL.max(self.dd >> PATCH_SHARE_BITS),
             value: self.disparity - along(a, self.mean[0]) - along(b, self.mean[1]),
             slopes: [a, b],
-        }
+        })
     }
 }
 
@@ -212,9 +198,9 @@ fn product(slope: i32, moment: i32) -> i32 {
 }
 
 /// A plane.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Fit {
-    is_there: bool,
+    /// Whether filled pixels take it.
     trusted: bool,
     /// In the middle of the patch, in 1/1024 px.
     value: i32,
@@ -231,49 +217,43 @@ impl Fit {
 }
 
 /// The planes through what the patches have of their own and what reaches them.
-fn fit(own: &Plane<Moments>, colours: &Plane<[u8; 3]>, fades: &[u32]) -> Plane<Fit> {
+fn fit(own: &Plane<Moments>, colours: &Plane<[u8; 3]>, shares: &[u32]) -> Plane<Option<Fit>> {
     let (width, height) = own.size();
-    let fade = |a: (usize, usize), b: (usize, usize)| {
-        let apart = colours[a].iter().zip(colours[b]).map(|(a, b)| usize::from(a.abs_diff(b))).sum::<usize>();
+    let share = |a: (usize, usize), b: (usize, usize)| {
         let (one, other) = (&own[a], &own[b]);
-        let edge = if one.weight > 0 && other.weight > 0 {
-            ((one.disparity - other.disparity).abs() - PATCH_STEP).max(0) >> PATCH_STEP_BITS
-        } else {
-            0
-        };
-        fades[(apart + edge as usize).min(fades.len() - 1)]
+        let mut apart = difference(colours[a], colours[b]);
+        if one.weight > 0 && other.weight > 0 {
+            let step = (one.disparity - other.disparity).abs() - PATCH_STEP;
+            apart += (step.max(0) >> PATCH_STEP_BITS) as usize;
+        }
+        shares[apart.min(shares.len() - 1)]
     };
     let mut rows = own.clone();
-    rows.data_mut().par_chunks_mut(width).enumerate().for_each_init(Vec::new, |steps, (y, row)| {
-        steps.clear();
-        steps.extend((1..width).map(|x| fade((x - 1, y), (x, y))));
-        carry(row, 0, steps);
+    rows.data_mut().par_chunks_mut(width).enumerate().for_each_init(Vec::new, |back, (y, row)| {
+        carry(row, 0, |x| share((x - 1, y), (x, y)), back);
     });
     // By columns.
-    let mut fits = Plane::filled(height, width, Fit::default());
+    let mut fits = Plane::filled(height, width, None);
     let columns = fits.data_mut().par_chunks_mut(height).enumerate();
-    columns.for_each_init(
-        || (Vec::new(), Vec::new()),
-        |(steps, column), (x, out)| {
-            steps.clear();
-            steps.extend((1..height).map(|y| fade((x, y - 1), (x, y))));
-            column.clear();
-            column.extend((0..height).map(|y| rows[(x, y)]));
-            carry(column, 1, steps);
-            out.iter_mut().zip(column).for_each(|(out, sum)| *out = sum.fit());
-        },
-    );
+    columns.for_each_init(Default::default, |(column, back): &mut (Vec<_>, _), (x, out)| {
+        column.clear();
+        column.extend((0..height).map(|y| rows[(x, y)]));
+        carry(column, 1, |y| share((x, y - 1), (x, y)), back);
+        out.iter_mut().zip(column).for_each(|(out, sum)| *out = sum.fit());
+    });
     by_patch((width, height), |x, y| fits[(y, x)])
 }
 
-/// Sums moments along a line, as they fade from place to place.
-fn carry(line: &mut [Moments], axis: usize, fades: &[u32]) {
-    let mut back = vec![Moments::default(); line.len()];
+/// Sums moments along a line; `share` tells what is left of their weight after the step to place i from the one before. `back` is working
+/// memory.
+fn carry(line: &mut [Moments], axis: usize, share: impl Fn(usize) -> u32, back: &mut Vec<Moments>) {
+    back.clear();
+    back.resize(line.len(), Moments::default());
     for i in (1..line.len()).rev() {
-        back[i - 1] = line[i].and(back[i]).carried(axis, false, fades[i - 1]);
+        back[i - 1] = line[i].and(back[i]).carried(axis, false, share(i));
     }
     for i in 1..line.len() {
-        line[i] = line[i].and(line[i - 1].carried(axis, true, fades[i - 1]));
+        line[i] = line[i].and(line[i - 1].carried(axis, true, share(i)));
     }
-    line.iter_mut().zip(back).for_each(|(sum, back)| *sum = sum.and(back));
+    line.iter_mut().zip(back).for_each(|(sum, back)| *sum = sum.and(*back));
 }

@@ -1,5 +1,6 @@
 //! The CPU path: every stage, parallel over rows, with inner loops over labels.
 
+mod colours;
 mod features;
 mod least_squares;
 #[cfg_attr(target_arch = "wasm32", path = "pages_in_browser.rs")]

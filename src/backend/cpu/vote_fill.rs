@@ -1,5 +1,6 @@
 //! Votes on what was filled: see [`crate::backend::Stage::VoteFill`].
 
+use super::colours::{channels, difference, mean_colours};
 use super::units::{block, each_lane};
 use crate::image::{Image, Pair, Plane};
 use crate::maps::{FRACTION, flag};
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
     let left = pair.left();
     if plan.method.refinement.fill == Fill::Votes {
-        let colours = halved(left);
+        let colours = mean_colours(left, 2);
         let elected = elect(maps, plan, &colours, Votes::of(plan));
         take(maps, left, &colours, &elected);
     }
@@ -32,43 +33,10 @@ fn may_be_outvoted(flags: u8, confidence: u8) -> bool {
     flags & flag::INVALID == 0 && !is_sure(flags, confidence)
 }
 
-/// Channels of a pixel in 8 bits.
-fn channels(pixel: [u16; 4]) -> [u8; 3] {
-    [0, 1, 2].map(|c| (pixel[c] >> 8) as u8)
-}
-
-/// The sum of the differences of the channels.
-fn difference(a: [u8; 3], b: [u8; 3]) -> usize {
-    a.into_iter().zip(b).map(|(a, b)| usize::from(a.abs_diff(b))).sum()
-}
-
 /// `weight` / 65536 of `sum`, rounded down.
 #[inline(always)]
 fn weighted(weight: u32, sum: u32) -> u32 {
     (sum >> 16) * weight + (((sum & 0xffff) * weight) >> 16)
-}
-
-/// The colour of every half-size pixel.
-fn halved(left: &Image) -> Plane<[u8; 3]> {
-    let (width, height) = left.pixels.size();
-    let mut halved = Plane::filled(width.div_ceil(2), height.div_ceil(2), [0; 3]);
-    let rows = halved.data_mut().par_chunks_mut(width.div_ceil(2)).enumerate();
-    rows.for_each(|(y, out)| {
-        for (x, out) in out.iter_mut().enumerate() {
-            let (mut sums, mut count) = ([0; 3], 0);
-            for y in 2 * y..height.min(2 * y + 2) {
-                for x in (2 * x..width.min(2 * x + 2)).filter(|&x| !left.masked[(x, y)]) {
-                    let pixel = channels(left.pixels[(x, y)]);
-                    sums.iter_mut().zip(pixel).for_each(|(sum, c)| *sum += u32::from(c));
-                    count += 1;
-                }
-            }
-            if count > 0 {
-                *out = sums.map(|sum| ((2 * sum + count) / (2 * count)) as u8);
-            }
-        }
-    });
-    halved
 }
 
 /// The half-size pixels that a filled pixel may take its vote from, and those whose vote may outvote a pixel.

@@ -10,21 +10,21 @@ use crate::plan::patches::{
     PATCH_WEIGHT_BITS, patches,
 };
 use crate::weights::PATCH_DIFFERENCES;
+use std::ops::Range;
 
 shader! {
     "far_plane"(plan, level) {
         across: u32,
         down: u32,
-        own_pitch: u32,
-        sum_pitch: u32,
+        pitch: u32,
         first_bound: u32,
         again: u32,
     }
-    gather: Gather { left, flags, disparity, own, back } => kernel(PATCH * PATCH + PATCH);
-    carry_rows: CarryRows { own, sums, back, shares } => kernel(2 * patches(plan).0);
-    rise: Rise { own, sums, back, shares } => kernel(patches(plan).1);
-    sink: Sink { own, sums, back, shares } => kernel(patches(plan).1);
-    take: Take { flags, disparity, back } => kernel(0);
+    gather: Gather { left, flags, disparity, patches } => kernel(PATCH * PATCH + PATCH);
+    carry_rows: CarryRows { patches, shares } => kernel(2 * patches(plan).0);
+    rise: Rise { patches, shares } => kernel(patches(plan).1);
+    sink: Sink { patches, shares } => kernel(patches(plan).1);
+    take: Take { flags, disparity, patches } => kernel(0);
 }
 
 fn kernel<B: Bindings>(loops: usize) -> Kernel<B> {
@@ -51,62 +51,46 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let (b, l, plan) = (r.buffers, r.params(), r.plan);
     let Some(p) = &b.patches else { return Ok(()) };
     let (across, down) = patches(plan);
-    let (across, down) = (across as u32, down as u32);
-    let own = Uniform { across, down, own_pitch: p.own_pitch, sum_pitch: p.sum_pitch, ..Uniform::default() };
-    let bands: Vec<_> =
-        (0..down).step_by(p.band as usize).map(|start| start..(start + p.band).min(down)).collect();
-    let patch = PATCH as u32;
-    let shares = || Binding::whole(&p.shares);
+    let (across, down, patch) = (across as u32, down as u32, PATCH as u32);
+    let own = Uniform { across, down, pitch: p.pitch, ..Uniform::default() };
+    let starts = (0..down).step_by(p.band as usize);
+    let bands: Vec<_> = starts.map(|start| start..(start + p.band).min(down)).collect();
     for round in 0..PATCH_ROUNDS {
         let own = Uniform { again: (round > 0).into(), ..own };
         for rows in &bands {
             let own = Uniform { first_bound: rows.start, ..own };
             let pixels = patch * rows.start..(patch * rows.end).min(l.height);
             let height = rows.end - rows.start;
+            let patches = || p.patches.bind(rows);
             let bindings = Gather {
                 left: b.left.bind(&pixels),
                 flags: b.flags.bind(&pixels),
                 disparity: b.disparity.bind(&pixels),
-                own: p.own.bind(rows),
-                back: p.back.bind(rows),
+                patches: patches(),
             };
             r.dispatch(&gather(plan, 0), &own, rows.clone(), (across, height), bindings)?;
-            let bindings = CarryRows {
-                own: p.own.bind(rows),
-                sums: p.sums.bind(rows),
-                back: p.back.bind(rows),
-                shares: shares(),
-            };
+            let bindings = CarryRows { patches: patches(), shares: Binding::whole(&p.shares) };
             r.dispatch(&carry_rows(plan, 0), &own, rows.clone(), (height, 1), bindings)?;
         }
+        // Along columns, a band also sees the row that it goes on from.
         for rows in bands.iter().rev() {
             let bound = with_halo(rows, 1, down);
             let own = Uniform { first_bound: bound.start, ..own };
-            let bindings = Rise {
-                own: p.own.bind(&bound),
-                sums: p.sums.bind(&bound),
-                back: p.back.bind(&bound),
-                shares: shares(),
-            };
+            let bindings = Rise { patches: p.patches.bind(&bound), shares: Binding::whole(&p.shares) };
             r.dispatch(&rise(plan, 0), &own, rows.clone(), (across, 1), bindings)?;
         }
         for rows in &bands {
             let bound = with_halo(rows, 1, down);
             let own = Uniform { first_bound: bound.start, ..own };
-            let bindings = Sink {
-                own: p.own.bind(&bound),
-                sums: p.sums.bind(&bound),
-                back: p.back.bind(&bound),
-                shares: shares(),
-            };
+            let bindings = Sink { patches: p.patches.bind(&bound), shares: Binding::whole(&p.shares) };
             r.dispatch(&sink(plan, 0), &own, rows.clone(), (across, 1), bindings)?;
         }
     }
-    let patches_of = |rows: &std::ops::Range<u32>| rows.start / patch..rows.end.div_ceil(patch);
-    let bind = |rows: &std::ops::Range<u32>| Take {
+    let patches_of = |rows: &Range<u32>| rows.start / patch..rows.end.div_ceil(patch);
+    let bind = |rows: &Range<u32>| Take {
         flags: b.flags.bind(rows),
         disparity: b.disparity.bind(rows),
-        back: p.back.bind(&patches_of(rows)),
+        patches: p.patches.bind(&patches_of(rows)),
     };
     for rows in r.map_bands(|rows| bind(rows).all())? {
         let own = Uniform { first_bound: patches_of(&rows).start, ..own };
