@@ -46,6 +46,8 @@ export interface Opened {
     version: string;
     device: string;
     note: string | undefined;
+    /** The names of all presets. */
+    presets: string[];
     reasons: Reason[];
 }
 

@@ -24,7 +24,8 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
         }
         matcher ??= await engine.Matcher.open('cpu');
         const reasons = (engine.reasons() as Reason[]).map(({ bit, name, about }) => ({ bit, name, about }));
-        return { version: engine.version(), device: matcher.device, note, reasons };
+        const presets = (engine.presets() as { name: string }[]).map(({ name }) => name);
+        return { version: engine.version(), device: matcher.device, note, presets, reasons };
     }
 
     async function match(left: View, right: View, method: string, given: [number, number] | undefined): Promise<ReturnType<Calls['match']>> {

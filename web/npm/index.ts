@@ -11,6 +11,6 @@ export function createMatcher(options: Options = {}): Promise<Matcher> {
         const worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module', name: 'mrfgs' });
         worker.addEventListener('message', ({ data }) => hear(data));
         worker.addEventListener('error', (event) => fail(event.message || 'it did not start'));
-        return { post: (request, moved) => worker.postMessage(request, moved), busy: () => {}, end: () => worker.terminate() };
+        return { post: (request) => worker.postMessage(request), busy: () => {}, end: () => worker.terminate() };
     }, options);
 }

@@ -23,7 +23,7 @@ export interface MatchOptions {
 
 /** A worker, of a browser or of Node.js. */
 export interface Port {
-    post(request: Request, moved: ArrayBuffer[]): void;
+    post(request: Request): void;
     /** Whether the process waits for it. */
     busy(is: boolean): void;
     end(): void;
@@ -31,7 +31,6 @@ export interface Port {
 
 export type Start = (hear: (reply: Reply) => void, fail: (reason: string) => void) => Port;
 
-const PRESETS = ['default', 'accurate', 'fast', 'paper', 'fgs'];
 const DEVICES = ['auto', 'cpu', 'webgpu'];
 
 export class Matcher {
@@ -148,7 +147,7 @@ export class Link {
         return new Promise((resolve, reject) => {
             this.waiting.set(id, { resolve, reject });
             this.port?.busy(true);
-            this.port?.post({ id, call, args } as Request, []);
+            this.port?.post({ id, call, args } as Request);
         });
     }
 
@@ -172,17 +171,21 @@ export class Link {
 
 /** A matcher whose worker `start` starts. */
 export async function opened(start: Start, { method = 'default', device = 'auto' }: Options): Promise<Matcher> {
-    for (const [name, value, known] of [['method', method, PRESETS], ['device', device, DEVICES]] as const) {
-        if (!known.includes(value)) {
-            throw new TypeError(`${name} is ${JSON.stringify(value)}: take ${known.join(', ')}`);
-        }
-    }
+    known('device', device, DEVICES);
     const link = new Link(start, device);
     try {
-        return new Matcher(link, method, await link.open());
+        const told = await link.open();
+        known('method', method, told.presets);
+        return new Matcher(link, method, told);
     } catch (error) {
         link.close();
         throw error;
+    }
+}
+
+function known(name: string, value: string, all: readonly string[]): void {
+    if (!all.includes(value)) {
+        throw new TypeError(`${name} is ${JSON.stringify(value)}: take ${all.join(', ')}`);
     }
 }
 

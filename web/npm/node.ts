@@ -15,7 +15,7 @@ export async function createMatcher(options: Options = {}): Promise<Matcher> {
         worker.on('message', hear);
         worker.on('error', (error) => fail(error instanceof Error ? error.message : String(error)));
         return {
-            post: (request, moved) => worker.postMessage(request, moved),
+            post: (request) => worker.postMessage(request),
             // A process ends while nothing runs, also without `close`.
             busy: (is) => (is ? worker.ref() : worker.unref()),
             end: () => void worker.terminate(),
