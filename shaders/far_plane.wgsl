@@ -308,8 +308,9 @@ fn sink(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             line = carried(line, vec2(0, 1), share_between(vec2(x, y - 1u), here));
         }
         line = both(moments(SUM, here), line);
-        set_plane(here, fit(both(line, moments(BACK, here))));
+        // First, so that fewer registers are held.
         set_moments(SUM, here, line);
+        set_plane(here, fit(both(line, moments(BACK, here))));
     }
 }
 
