@@ -8,6 +8,8 @@ struct Params {
     @align(16) band: Band,
     // Cost of disagreement.
     tau: u32,
+    // Cost of labels that differ by one.
+    step: u32,
 }
 
 // Codes of the neighbours, four per word.
@@ -27,6 +29,13 @@ fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
         q = max(q, vec4(least)) - vec4(least);
     }
     return select(q, vec4(MOST), b == vec4(MOST));
+}
+
+// The sums of a quad where labels that differ by one cost a step, given the sums below and above it, at the labels that the factor's
+// own pixel has. All sums are infinite at labels that the factor or the member does not have.
+fn with_steps(sums: vec4<u32>, below: u32, above: u32, has: vec4<bool>) -> vec4<u32> {
+    let near = min(vec4(below, sums.xyz), vec4(sums.yzw, above)) + vec4(params.step);
+    return min(sums, select(vec4(MOST), near, has));
 }
 
 @compute @workgroup_size(GROUP)
@@ -112,6 +121,16 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         high[slot] = low[slot] + params.tau;
     }
 
+    // With steps, a quad is sent once the next one is known. Until then: which of its labels the factor's own pixel has, and for each
+    // member its sums and the one below them.
+    var has = vec4<bool>();
+    var sums: array<vec4<u32>, SLOTS>;
+    var below: array<u32, SLOTS>;
+    if STEPS {
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            below[slot] = MOST;
+        }
+    }
     for (var quad = spanned.x; quad < spanned.y; quad++) {
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
@@ -122,8 +141,30 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                let sum = min(total - q[slot], vec4(high[slot]));
-                messages[own + (slot * quads + quad) * width] = pack(sum - vec4(low[slot]));
+                var sum = total - q[slot];
+                var to = own + (slot * quads + quad) * width;
+                if STEPS {
+                    let next = select(sum, vec4(MOST), q[slot] == vec4(MOST));
+                    sum = with_steps(sums[slot], below[slot], next.x, has);
+                    if quad > spanned.x {
+                        below[slot] = sums[slot].w;
+                    }
+                    sums[slot] = next;
+                    to -= width;
+                }
+                if !STEPS || quad > spanned.x {
+                    messages[to] = pack(min(sum, vec4(high[slot])) - vec4(low[slot]));
+                }
+            }
+        }
+        has = q[0] != vec4(MOST);
+    }
+    if STEPS {
+        for (var slot = 0u; slot < SLOTS; slot++) {
+            if bases[slot] != ABSENT {
+                let sum = with_steps(sums[slot], below[slot], MOST, has);
+                let to = own + (slot * quads + spanned.y - 1u) * width;
+                messages[to] = pack(min(sum, vec4(high[slot])) - vec4(low[slot]));
             }
         }
     }

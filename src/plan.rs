@@ -152,6 +152,8 @@ pub struct Plan {
     pub outside_cost: u8,
     /// Truncation of dependency messages.
     pub dependency: Truncation,
+    /// Cost of labels that differ by one in a dependency factor, in units; see [`Self::label_step`].
+    pub step: u16,
     /// Truncation of resolution messages.
     pub resolution: Truncation,
     /// Storage width of messages of both kinds, and of beliefs.
@@ -250,6 +252,7 @@ impl Plan {
             levels,
             neighbours,
             dependency,
+            step: units(method.messages.label_step),
             resolution,
             volume_width,
             phases,
@@ -331,6 +334,14 @@ impl Plan {
     #[must_use]
     pub fn floods(&self, level: usize) -> bool {
         self.phases.iter().any(|phase| phase.finest <= level && phase.iterations > 0)
+    }
+
+    /// Cost of labels that differ by one in a dependency factor of `level`, in units; `None` where it is that of any other
+    /// disagreement: at the finest level, whose labels are fine enough for one surface, and where the potential is not soft.
+    #[must_use]
+    pub fn label_step(&self, level: usize) -> Option<u16> {
+        let is_soft = self.method.messages.potential == Potential::Soft;
+        (level > 0 && is_soft && self.step < self.dependency.tau).then_some(self.step)
     }
 
     /// (width, height) of the finest level.

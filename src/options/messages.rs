@@ -40,6 +40,9 @@ options! {
         potential: Potential = Potential::Soft, takes one_of(Potential::WORDS), source "section 2.2: hard", of readings;
         /// Cost of disagreement in a dependency factor; hard potentials do not use it.
         dependency_truncation: f64 = 2.0, takes real(0.25..=255.75), unit "nats", source "not in the paper";
+        /// Cost of labels that differ by one in a dependency factor of a level coarser than the finest, where a slanted surface has
+        /// several labels within a factor; soft potentials alone use it, where it is below that of disagreement.
+        label_step: f64 = 0.75, takes real(0.25..=255.75), unit "nats", source "not in the paper";
         /// Which labels of two levels agree.
         agreement: Agreement = Agreement::Interpolating, takes one_of(Agreement::WORDS),
             source "section 2.2; open for odd labels", of readings;

@@ -27,11 +27,21 @@
 //!    absolute   low = 0, high = tau
 //!    ```
 //!
+//! Where [`Plan::label_step`] gives a cost for labels that differ by one, S(t, k) is replaced by
+//!
+//! ```text
+//! min(S(t, k), S(t, k - 1) + step, S(t, k + 1) + step)
+//! ```
+//!
+//! in m(t, k), where S is infinite at labels that not both p and p(t) have. (Surfaces that slant have several labels within a factor. At
+//! coarse levels labels are wide apart, and the members would vote each other down.)
+//!
 //! At labels that p(t) has and p has not, S is infinite and the message is tau. Messages at labels
 //! that p(t) does not have are not defined. A factor of one member, and a slot without one, keep
 //! the message they have: 0, from the start.
 //!
 //! [`Plan::dependency`]: crate::plan::Plan::dependency
+//! [`Plan::label_step`]: crate::plan::Plan::label_step
 
 use super::{Data, Descriptor, Volume, volumes};
 use crate::plan::GRAPH_WINDOW;

@@ -153,6 +153,7 @@ pub fn method(random: &mut Random, neighbours: usize) -> Method {
     m.graph.sigma_range = random.log_within(0.01, 3.0);
     m.messages.potential = random.pick(&[Potential::Soft, Potential::Exact, Potential::Hard]);
     m.messages.dependency_truncation = random.pick(&[0.25, 2.0, 10.0, 63.75, 64.0, 255.75]);
+    m.messages.label_step = random.pick(&[0.25, 0.75, 1.75, 9.0]);
     m.messages.agreement = random.pick(&[Agreement::Strict, Agreement::Interpolating]);
     m.messages.resolution_truncation = random.pick(&[0.25, 8.0, 63.75, 255.75]);
     m.schedule.order = random.pick(&[Order::Together, Order::CoarseFirst]);

@@ -4,7 +4,9 @@
 //! is exact. The messages to all members are stored for the labels of the factor's own pixel: at all others its
 //! belief is infinite, and the message is tau.
 
-use super::units::{Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate};
+use super::units::{
+    Least, Units, block, block_mut, bounds, cut_block, each_lane, keep_least, smallest, truncate,
+};
 use super::volumes::{Level, Volumes};
 use super::windows::{Seen, Window, Windows};
 use crate::graph::{LevelGraph, NO_MEMBER, offset};
@@ -23,7 +25,7 @@ pub(super) struct Scratch<U> {
     outside: Vec<U>,
     /// Sum of q over the members before.
     before: Vec<U>,
-    /// Sums of q over the other members.
+    /// Sums of q over the other members: of each of three members, with one value more at either end.
     sums: Vec<U>,
     /// Slots of the members.
     slots: Vec<usize>,
@@ -37,7 +39,7 @@ impl<U: Units> Scratch<U> {
             after: rows(slots),
             outside: rows(slots),
             before: rows(1),
-            sums: rows(3),
+            sums: vec![U::default(); 3 * (stride + 2)],
             slots: Vec::with_capacity(slots),
         }
     }
@@ -54,13 +56,15 @@ pub(super) struct Factors<'a> {
     pub(super) graph: &'a LevelGraph,
     pub(super) windows: &'a Windows,
     pub(super) cut: Truncation,
+    /// See [`Plan::label_step`](crate::plan::Plan::label_step).
+    pub(super) step: Option<u16>,
 }
 
 /// The messages of the factors of these rows.
 pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows: Range<usize>) {
     let (plan, l) = (&v.plan, &v.plan.levels[level]);
     let Level { graph, windows, belief, dependency: messages, .. } = &mut v.levels[level];
-    let factors = Factors { graph, windows, cut: plan.dependency };
+    let factors = Factors { graph, windows, cut: plan.dependency, step: plan.label_step(level) };
     let messages = windows.rows_mut(messages, graph.slots(), 1, rows.clone());
     messages.into_par_iter().zip(rows).for_each_init(
         || Scratch::new(l.stride, graph.slots()),
@@ -89,7 +93,7 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
     messages: &'a mut [U],
     scratch: &'a mut Scratch<U>,
 ) {
-    let Factors { graph, windows, cut } = *factors;
+    let Factors { graph, windows, cut, step } = *factors;
     let slots = graph.slots();
     let near = Near { windows, rows: windows.around(y), around };
     let offsets: [(isize, usize); GRAPH_WINDOW * GRAPH_WINDOW] = from_fn(|code| {
@@ -114,9 +118,9 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
                 ];
                 let factor = Three { members, stride: window.stride() };
                 if a.0.matches(window) && b.0.matches(window) {
-                    factor.send::<true>(cut, messages, &mut scratch.sums);
+                    factor.send::<true>(cut, step, messages, &mut scratch.sums);
                 } else {
-                    factor.send::<false>(cut, messages, &mut scratch.sums);
+                    factor.send::<false>(cut, step, messages, &mut scratch.sums);
                 }
             }
             ref codes => {
@@ -129,7 +133,7 @@ pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
                         let place = if slot == 0 { (x, REACH) } else { place(codes[slot - 1]) };
                         near.seen(near.window(place), window.first())
                     };
-                    any(cut, window.stride(), member, messages, scratch);
+                    any(cut, step, window.stride(), member, messages, scratch);
                 }
             }
         }
@@ -199,8 +203,18 @@ impl<U: Units> Three<'_, U> {
 
     /// Writes the messages of the factor.
     #[inline(always)]
-    fn send<const SAME: bool>(&self, cut: Truncation, messages: &mut [U], scratch: &mut [U]) {
+    fn send<const SAME: bool>(
+        &self,
+        cut: Truncation,
+        step: Option<u16>,
+        messages: &mut [U],
+        scratch: &mut [U],
+    ) {
         let stride = self.stride;
+        if let Some(step) = step {
+            self.send_near::<SAME>(cut, step, messages, scratch);
+            return;
+        }
         if stride == LABEL_BLOCK {
             let (sums, own) = self.sums::<SAME>(messages, 0);
             for slot in 0..3 {
@@ -224,6 +238,39 @@ impl<U: Units> Three<'_, U> {
             }
         }
     }
+
+    /// The same where labels that differ by one cost `step`.
+    #[inline(always)]
+    fn send_near<const SAME: bool>(&self, cut: Truncation, step: u16, messages: &mut [U], scratch: &mut [U]) {
+        let (stride, whole) = (self.stride, self.stride + 2);
+        let mut least = [[U::MOST; LABEL_BLOCK]; 3];
+        for at in (0..stride).step_by(LABEL_BLOCK) {
+            let (_, own) = self.sums::<SAME>(messages, at);
+            for slot in 0..3 {
+                keep_least(&mut least[slot], &own[slot]);
+                *block_mut(scratch, slot * whole + 1 + at) = own[slot];
+            }
+        }
+        for (slot, least) in least.into_iter().enumerate() {
+            let sums = &mut scratch[slot * whole..][..whole];
+            (sums[0], sums[whole - 1]) = (U::MOST, U::MOST);
+            truncate_near(sums, least, cut, step, &mut messages[slot * stride..][..stride]);
+        }
+    }
+}
+
+/// Truncates sums to a message where labels that differ by one cost `step`. `sums` has the largest value before and after the labels,
+/// and at those that no pixel has.
+#[inline(always)]
+fn truncate_near<U: Units>(sums: &[U], least: Least<U>, cut: Truncation, step: u16, out: &mut [U]) {
+    let (low, high) = bounds(least, cut);
+    let step = U::of(step.into());
+    for at in (0..out.len()).step_by(LABEL_BLOCK) {
+        let (below, here, above): (&Block<U>, &Block<U>, &Block<U>) =
+            (block(sums, at), block(sums, at + 1), block(sums, at + 2));
+        let near = each_lane(|i| here[i].min(below[i].min(above[i]).plus(step)));
+        *block_mut(out, at) = cut_block(&near, &low, &high);
+    }
 }
 
 #[inline(always)]
@@ -239,6 +286,7 @@ fn or<U: Units>(a: &Block<U>, b: &Block<U>) -> Block<U> {
 /// The messages of a factor of any number of members.
 fn any<'a, U: Units>(
     cut: Truncation,
+    step: Option<u16>,
     stride: usize,
     member: impl Fn(usize) -> Seen<'a, U>,
     messages: &mut [U],
@@ -270,17 +318,25 @@ fn any<'a, U: Units>(
         here.copy_from_slice(&next[..stride]);
         add(here, &q[at + stride..][..stride]);
     }
-    let sum = &mut sums[..stride];
+    let sums = &mut sums[..stride + 2];
+    (sums[0], sums[stride + 1]) = (U::MOST, U::MOST);
     before[..stride].fill(U::default());
     for (i, &slot) in slots.iter().enumerate() {
+        let sum = &mut sums[1..=stride];
         sum.copy_from_slice(&after[i * stride..][..stride]);
         add(sum, before);
         add(before, &q[i * stride..][..stride]);
         let mut least = [U::MOST; LABEL_BLOCK];
         for at in (0..stride).step_by(LABEL_BLOCK) {
-            keep_least(&mut least, &or(block(sum, at), block(outside, i * stride + at)));
+            let own = or(block(sum, at), block(outside, i * stride + at));
+            keep_least(&mut least, &own);
+            *block_mut(sum, at) = own;
         }
-        truncate(sum, least, cut, &mut messages[slot * stride..][..stride]);
+        let message = &mut messages[slot * stride..][..stride];
+        match step {
+            Some(step) => truncate_near(sums, least, cut, step, message),
+            None => truncate(&sums[1..=stride], least, cut, message),
+        }
     }
 }
 

@@ -68,7 +68,8 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>, level: usize) {
         let end_own = if i + 1 == count { height } else { rows.end - REACH };
         bands.push(Band { rows, rows_own: first_own..end_own, messages: here, own });
     }
-    let factors = Factors { graph: summands.graph, windows, cut: plan.dependency };
+    let (cut, step) = (plan.dependency, plan.label_step(level));
+    let factors = Factors { graph: summands.graph, windows, cut, step };
     bands.into_par_iter().enumerate().for_each(|(i, mut band)| {
         let above = if i == 0 { &[][..] } else { shared[i - 1] };
         let below = shared.get(i).copied().unwrap_or_default();

@@ -43,6 +43,10 @@ pub fn dependency(
             }
             let s: Vec<i64> = s.into_iter().map(|s: i64| s.min(most(plan).into())).collect();
             let both = |d: usize| own(d) && has[*pixel].contains(&d);
+            let s = match plan.label_step(level) {
+                Some(step) => with_steps(&s, both, step),
+                None => s,
+            };
             let mut message = cut(plan, &s, both, plan.dependency);
             for d in has[*pixel].clone().filter(|&d| !own(d)) {
                 message[d] = plan.dependency.tau.into();
@@ -52,6 +56,16 @@ pub fn dependency(
     }
     undefine(plan, level, graph, has, &mut out);
     out
+}
+
+/// The sums where labels that differ by one cost `step`, between labels that `count`.
+fn with_steps(s: &[i64], counts: impl Fn(usize) -> bool, step: u16) -> Vec<i64> {
+    let near = |d: usize| {
+        let next = [d.checked_sub(1), Some(d + 1)].into_iter().flatten();
+        let steps = next.filter(|&e| e < s.len() && counts(e)).map(|e| s[e] + i64::from(step));
+        steps.fold(s[d], i64::min)
+    };
+    (0..s.len()).map(near).collect()
 }
 
 /// Marks what is not defined in dependency messages: labels that a member does not have, and in slots that no messages
