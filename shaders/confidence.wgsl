@@ -1,11 +1,10 @@
-// Confidence: the margin between every pixel's optimum and its runner-up. One invocation per pixel.
+// The confidence of every pixel by itself: the margin between its optimum and its runner-up. One invocation per pixel.
 
 #import band maps
 
 struct Params {
     level: Level,
     @align(16) band: Band,
-    floor: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -20,14 +19,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let at = id.y * params.level.pixel_pitch + id.x;
-    var validity = flags[at] & VALIDITY;
+    let validity = flags[at] & VALIDITY;
     var confidence = 0u;
     if is_valid(validity) {
         let optimum = optima[at];
         confidence = min(2u * (optimum.y - (optimum.x >> 16u)), 255u);
-        if confidence < params.floor {
-            validity |= LOW_CONFIDENCE;
-        }
     }
     flags[at] = validity | (confidence << 8u);
 }

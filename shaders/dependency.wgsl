@@ -31,13 +31,6 @@ fn to_factor(member: u32, message: u32, least: u32) -> vec4<u32> {
     return select(q, vec4(MOST), b == vec4(MOST));
 }
 
-// The sums of a quad where labels that differ by one cost a step, given the sums below and above it, at the labels that the factor's
-// own pixel has. All sums are infinite at labels that the factor or the member does not have.
-fn with_steps(sums: vec4<u32>, below: u32, above: u32, has: vec4<bool>) -> vec4<u32> {
-    let near = min(vec4(below, sums.xyz), vec4(sums.yzw, above)) + vec4(params.step);
-    return min(sums, select(vec4(MOST), near, has));
-}
-
 @compute @workgroup_size(GROUP)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     enter(group);
@@ -108,7 +101,11 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                least[slot] = min(least[slot], select(total - q[slot], vec4(MOST), q[slot] == vec4(MOST)));
+                let sum = select(min(total - q[slot], vec4(MOST)), vec4(MOST), q[slot] == vec4(MOST));
+                least[slot] = min(least[slot], sum);
+                if STEPS {
+                    messages[own + (slot * quads + quad) * width] = pack(sum);
+                }
             }
         }
     }
@@ -121,16 +118,30 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         high[slot] = low[slot] + params.tau;
     }
 
-    // With steps, a quad is sent once the next one is known. Until then: which of its labels the factor's own pixel has, and for each
-    // member its sums and the one below them.
-    var has = vec4<bool>();
-    var sums: array<vec4<u32>, SLOTS>;
-    var below: array<u32, SLOTS>;
     if STEPS {
+        // The sums stand where the messages will. All are infinite at labels that the factor's own pixel or the member does not have.
         for (var slot = 0u; slot < SLOTS; slot++) {
-            below[slot] = MOST;
+            if bases[slot] != ABSENT {
+                var below = MOST;
+                var sums = unpack(messages[own + (slot * quads + spanned.x) * width]);
+                for (var quad = spanned.x; quad < spanned.y; quad++) {
+                    let to = own + (slot * quads + quad) * width;
+                    var next = vec4(MOST);
+                    if quad + 1u < spanned.y {
+                        next = unpack(messages[to + width]);
+                    }
+                    let near = min(vec4(below, sums.xyz), vec4(sums.yzw, next.x)) + vec4(params.step);
+                    let has = unpack(belief[bases[0] + quad * width]) != vec4(MOST);
+                    let sum = min(min(sums, select(vec4(MOST), near, has)), vec4(high[slot]));
+                    messages[to] = pack(sum - vec4(low[slot]));
+                    below = sums.w;
+                    sums = next;
+                }
+            }
         }
+        return;
     }
+
     for (var quad = spanned.x; quad < spanned.y; quad++) {
         var total = vec4<u32>();
         for (var slot = 0u; slot < SLOTS; slot++) {
@@ -141,30 +152,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                var sum = total - q[slot];
-                var to = own + (slot * quads + quad) * width;
-                if STEPS {
-                    let next = select(sum, vec4(MOST), q[slot] == vec4(MOST));
-                    sum = with_steps(sums[slot], below[slot], next.x, has);
-                    if quad > spanned.x {
-                        below[slot] = sums[slot].w;
-                    }
-                    sums[slot] = next;
-                    to -= width;
-                }
-                if !STEPS || quad > spanned.x {
-                    messages[to] = pack(min(sum, vec4(high[slot])) - vec4(low[slot]));
-                }
-            }
-        }
-        has = q[0] != vec4(MOST);
-    }
-    if STEPS {
-        for (var slot = 0u; slot < SLOTS; slot++) {
-            if bases[slot] != ABSENT {
-                let sum = with_steps(sums[slot], below[slot], MOST, has);
-                let to = own + (slot * quads + spanned.y - 1u) * width;
-                messages[to] = pack(min(sum, vec4(high[slot])) - vec4(low[slot]));
+                let sum = min(total - q[slot], vec4(high[slot]));
+                messages[own + (slot * quads + quad) * width] = pack(sum - vec4(low[slot]));
             }
         }
     }

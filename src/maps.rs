@@ -35,7 +35,11 @@ pub const REASONS: [(u8, &str, &str); 9] = [
     (flag::SPECKLE, "small region", "in a region too small to be trusted"),
     (flag::TIE, "tie", "two disparities match equally well"),
     (flag::OUTVOTED, "outvoted", "the pixels around it agree on another disparity, which it has taken"),
-    (flag::LOW_CONFIDENCE, "low confidence", "another disparity is nearly as good"),
+    (
+        flag::LOW_CONFIDENCE,
+        "low confidence",
+        "another disparity is nearly as good, or the pixels around it show others",
+    ),
     (flag::FILLED, "filled", "taken from pixels around it"),
     (flag::MASKED, "masked", "the image holds no data here"),
 ];

@@ -13,6 +13,7 @@ mod arithmetic;
 mod memory;
 pub mod patches;
 pub mod planes;
+pub mod support;
 pub mod votes;
 
 use crate::error::Result;

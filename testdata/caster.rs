@@ -185,6 +185,17 @@ const LAMP: Vec3 = [-0.45, -0.8, -0.65];
 /// How far the lamp reaches sideways, as a part of its distance: the softness of shadows.
 const LAMP_SIZE: f64 = 0.16;
 
+/// Where a ray meets a body.
+struct Met<'a> {
+    body: &'a Body,
+    depth: f64,
+    point: Vec3,
+    /// The point in the body's own coordinates.
+    local: Vec3,
+    /// Towards the side that the ray comes from.
+    normal: Vec3,
+}
+
 impl World {
     pub fn new(seed: u32) -> Self {
         Self { bodies: Vec::new(), sensors: [2 * seed, 2 * seed + 1].map(Sensor::new), seed }
@@ -202,15 +213,35 @@ impl World {
     }
 
     /// The colour that a camera's ray brings home, lit from the given part of the lamp (each -0.5 ..= 0.5). `pixel`
-    /// is the width of a pixel at depth 1. Surfaces are matt, so that a point has one colour whoever looks at it.
+    /// is the width of a pixel at depth 1. Where surfaces are matt, a point has one colour whoever looks at it.
     fn colour(&self, ray: &Ray, part: [f64; 2], pixel: f64) -> Vec3 {
-        let (depth, Some(i)) = self.nearest(ray) else { return [0.0; 3] };
+        let Some(met) = self.meet(ray) else { return [0.0; 3] };
+        let own = self.matt(&met, part, met.depth * pixel);
+        let gloss = met.body.paint.gloss;
+        if gloss == 0.0 {
+            return own;
+        }
+        let along = sub(ray.along, scale(met.normal, 2.0 * dot(met.normal, ray.along)));
+        let mirrored = Ray { from: add(met.point, scale(met.normal, 1e-6)), along };
+        let shown = self.meet(&mirrored).map(|far| self.matt(&far, part, (met.depth + far.depth) * pixel));
+        add(own, scale(shown.unwrap_or_default(), gloss))
+    }
+
+    /// What the ray meets first.
+    fn meet(&self, ray: &Ray) -> Option<Met<'_>> {
+        let (depth, Some(i)) = self.nearest(ray) else { return None };
         let body = &self.bodies[i];
         let point = ray.at(depth);
         let (local, mut normal) = body.surface(point);
         if dot(normal, ray.along) > 0.0 {
             normal = scale(normal, -1.0);
         }
+        Some(Met { body, depth, point, local, normal })
+    }
+
+    /// The light that leaves a point of a surface alike in all directions; no detail is much finer than `detail`.
+    fn matt(&self, met: &Met, part: [f64; 2], detail: f64) -> Vec3 {
+        let &Met { body, point, local, normal, .. } = met;
         let [a, b] = part.map(|p| LAMP_SIZE * p);
         let lamp = unit(add(LAMP, [a, -0.5 * (a + b), b]));
         let towards = Ray { from: add(point, scale(normal, 1e-6)), along: lamp };
@@ -218,7 +249,7 @@ impl World {
         let lit = facing > 0.0 && !self.bodies.iter().any(|body| body.meet(&towards).is_some());
         let ambient = 0.5 - 0.12 * normal[1];
         let light = ambient + if lit { 0.55 * facing } else { 0.0 };
-        scale(body.paint.colour(local, depth * pixel, body.seed), light)
+        scale(body.paint.colour(local, detail, body.seed), light)
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Recipe {
 }
 
 /// Every scene, as `testdata/` holds it.
-pub const ALL: [Recipe; 11] = [
+pub const ALL: [Recipe; 16] = [
     Recipe::small("slanted", slanted),
     Recipe::small("thin", thin),
     Recipe::small("wall", wall),
@@ -37,6 +37,11 @@ pub const ALL: [Recipe; 11] = [
     Recipe::small("rows", rows),
     Recipe::small("focus", focus),
     Recipe::small("grain", grain),
+    Recipe::small("poster", poster),
+    Recipe::small("screen", screen),
+    Recipe::small("border", border),
+    Recipe::small("corridor", corridor),
+    Recipe::small("behind", behind),
     Recipe { name: "mixed", width: 320, height: 240, labels: 48, world: mixed },
 ];
 
@@ -252,6 +257,124 @@ fn steep() -> World {
         0.09,
         paint(Blotches(0.12), [0x3f4a6b, 0xc2a067]).grain(0.14, 0.06),
     );
+    world
+}
+
+/// A white wall that runs past the viewer, and nothing on it but a poster at its far end.
+fn poster() -> World {
+    use Pattern::{Blotches, Checker, Plain};
+    let mut world = World::new(19);
+    let face = [0.45, 0.0, -1.0];
+    world.plane([0.0, 0.0, 2.4], face, paint(Plain, [0xe9e4da, 0]).grain(0.002, 0.3));
+    world.card([0.52, -0.24, 2.63], face, UP, [0.36, 0.44], paint(Blotches(0.16), [0x3f5d86, 0xd9b25e]));
+    let boards = paint(Plain, [0x8a6547, 0]).grain(0.2, 0.08).stretch([0.3, 1.0, 1.0]);
+    world.plane([0.0, 0.52, 1.1], [0.0, -1.0, -0.08], boards);
+    world.block(
+        [0.1, 0.36, 1.55],
+        [-0.4, 0.0, -1.0],
+        UP,
+        [0.16, 0.16, 0.12],
+        paint(Checker(0.1), [0x59734c, 0xcdbb83]),
+    );
+    world.ball([-0.42, 0.36, 1.3], 0.13, [0.3, -1.0, 0.2], paint(Blotches(0.1), [0xa8432f, 0xe6c9a0]));
+    world
+}
+
+/// A dark screen that mirrors a window behind the viewer, before a wall with something on it.
+fn screen() -> World {
+    use Pattern::{Blotches, Plain, Rings};
+    let mut world = World::new(20);
+    world.plane([0.0, 0.0, 2.7], [-0.15, 0.0, -1.0], paint(Blotches(0.3), [0x9c948a, 0x7b8791]));
+    let wood = paint(Plain, [0x9a6d42, 0]).grain(0.18, 0.1).stretch([0.2, 1.0, 1.0]);
+    world.plane([0.0, 0.5, 1.05], [0.0, -1.0, -0.16], wood);
+    // The window, and its bars.
+    let window = [-1.75, -1.1, -2.5];
+    world.card(window, [0.4, 0.2, 1.0], UP, [0.7, 0.6], paint(Plain, [0xffffff, 0]).grain(0.0, 1.0));
+    for half in [[0.05, 0.6], [0.7, 0.05]] {
+        let bar = paint(Plain, [0x2a2622, 0]).grain(0.0, 1.0);
+        world.card(add(window, [0.0, 0.0, 0.05]), [0.4, 0.2, 1.0], UP, half, bar);
+    }
+    // The screen in its frame.
+    let face = [-0.25, -0.08, -1.0];
+    world.card([0.14, -0.1, 1.86], face, UP, [0.5, 0.34], paint(Plain, [0x33312f, 0]).grain(0.1, 0.05));
+    world.card(
+        [0.137, -0.1, 1.845],
+        face,
+        UP,
+        [0.46, 0.3],
+        paint(Plain, [0x0d1013, 0]).grain(0.0, 1.0).gloss(0.9),
+    );
+    world.bar([-0.72, 0.5, 1.6], [-0.72, -0.25, 1.6], 0.09, paint(Rings(0.15), [0x40617a, 0xcfc3a2]));
+    world.ball([0.42, 0.31, 1.28], 0.1, [0.5, -1.0, 0.2], paint(Blotches(0.09), [0xb0503b, 0xe2cf9b]));
+    world
+}
+
+/// A floor and a slanted wall that run out at the left border, where the right view has no part of them.
+fn border() -> World {
+    use Pattern::{Blotches, Plain, Rings};
+    let mut world = World::new(21);
+    world.plane([0.0, 0.56, 1.25], [0.06, -1.0, -0.12], paint(Plain, [0x9b8f7a, 0]).grain(0.03, 0.12));
+    world.plane(
+        [0.4, 0.0, 3.2],
+        [0.8, 0.0, -1.0],
+        paint(Blotches(0.5), [0xb3a58c, 0x8d9a94]).grain(0.1, 0.12),
+    );
+    world.plane([0.4, 0.0, 3.2], [-0.5, 0.0, -1.0], paint(Blotches(0.4), [0x7f8ea3, 0xaaa29d]));
+    world.bar([0.55, 0.6, 1.5], [0.55, -0.1, 1.5], 0.1, paint(Rings(0.17), [0xa8503c, 0xd8c4a0]));
+    world.ball([0.05, 0.32, 1.9], 0.2, [0.4, -1.0, -0.3], paint(Blotches(0.18), [0x4f6f8c, 0xd6cfae]));
+    world
+}
+
+/// A corridor of plain walls and a plain ceiling, with two doors and a carpet.
+fn corridor() -> World {
+    use Pattern::{Blotches, Plain, Stripes};
+    let mut world = World::new(22);
+    let plaster = |colour| paint(Plain, [colour, 0]).grain(0.004, 0.2);
+    world.plane([0.0, 0.0, 4.6], VIEWER, paint(Blotches(0.3), [0x77808a, 0xa89f90]));
+    for (x, colour) in [(-0.8, 0xe3dccd), (0.8, 0xd9d4c8)] {
+        world.card([x, 0.0, 2.8], [-x, 0.0, 0.0], UP, [1.75, 0.6], plaster(colour));
+        let skirting = paint(Plain, [0x6b5a48, 0]).grain(0.15, 0.06);
+        world.card([0.99 * x, 0.52, 2.8], [-x, 0.0, 0.0], UP, [1.75, 0.04], skirting);
+    }
+    world.card([0.0, -0.56, 2.8], [0.0, 1.0, 0.0], VIEWER, [0.8, 1.75], plaster(0xf0ede6));
+    world.card([0.0, 0.56, 2.8], UP, VIEWER, [0.8, 1.75], paint(Blotches(0.14), [0x5f5a6b, 0x8c7a66]));
+    world.card(
+        [-0.79, 0.1, 2.3],
+        [1.0, 0.0, 0.0],
+        UP,
+        [0.3, 0.46],
+        paint(Stripes(0.2), [0x7a5536, 0x94714c]),
+    );
+    world.card(
+        [0.79, 0.1, 3.2],
+        [-1.0, 0.0, 0.0],
+        UP,
+        [0.3, 0.46],
+        paint(Stripes(0.2), [0x3f5a70, 0x5f7c8c]),
+    );
+    world.block(
+        [0.3, 0.42, 1.4],
+        [-0.3, 0.0, -1.0],
+        UP,
+        [0.13, 0.13, 0.1],
+        paint(Blotches(0.08), [0x7c6a4f, 0xcdbf9d]),
+    );
+    world
+}
+
+/// Pillars so near that each hides a wide part of what is behind it from the right view, where two surfaces meet.
+fn behind() -> World {
+    use Pattern::{Blotches, Rings};
+    let mut world = World::new(23);
+    world.plane([0.0, 0.0, 4.2], [0.1, 0.0, -1.0], paint(Blotches(0.5), [0x8f8a9c, 0xb0a58d]));
+    // Screens at half the depth: the first ends beside its pillar, the second goes on behind it.
+    let cloth = |a, b| paint(Blotches(0.18), [a, b]);
+    world.card([-0.78, 0.0, 2.1], [0.15, 0.0, -1.0], UP, [0.36, 0.62], cloth(0x557a6a, 0xcfc48e));
+    world.card([0.62, -0.1, 2.3], [-0.25, 0.0, -1.0], UP, [0.5, 0.5], cloth(0x8a4f46, 0xd3b79b));
+    world.plane([0.0, 0.56, 1.15], [0.0, -1.0, -0.1], paint(Blotches(0.2), [0x87715a, 0xa69680]));
+    let pillar = |a, b| paint(Rings(0.16), [a, b]).grain(0.14, 0.06);
+    world.bar([-0.06, 0.7, 1.2], [-0.06, -0.8, 1.2], 0.09, pillar(0x3f5f80, 0xd2d0c2));
+    world.bar([0.44, 0.7, 1.25], [0.44, -0.8, 1.25], 0.08, pillar(0x70455e, 0xd9c6a5));
     world
 }
 

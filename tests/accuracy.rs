@@ -45,7 +45,7 @@ fn rounded(matched: &Matched) -> Plane<f32> {
 
 #[test]
 fn rendered_scenes() {
-    // Average error in pixels, bad2.0 and bad0.5 in percent. The method is worst at the plain wall.
+    // Average error in pixels, bad2.0 and bad0.5 in percent. The method is worst at plain walls.
     let floors = [
         ("slanted", 0.15, 0.7, 6.0),
         ("thin", 0.58, 7.5, 15.5),
@@ -58,6 +58,11 @@ fn rendered_scenes() {
         ("rows", 0.35, 3.1, 18.0),
         ("focus", 0.72, 10.7, 26.8),
         ("grain", 0.90, 11.5, 49.5),
+        ("poster", 0.88, 17.5, 37.0),
+        ("screen", 1.10, 9.4, 16.3),
+        ("border", 0.13, 0.5, 3.7),
+        ("corridor", 1.70, 29.3, 48.5),
+        ("behind", 0.50, 4.4, 8.9),
     ];
     for (scene, avg, bad2, bad05) in floors {
         let folder = Path::new("testdata").join(scene);

@@ -151,7 +151,8 @@ typedef struct mrfgs_maps {
   // The disparity in pixels, +infinity where there is none. Left (x, y) with disparity d is seen at right (x - d, y).
   float *disparity;
   size_t disparity_stride;
-  // How far the best runner-up is behind, in 1/8 nat; 0 where nothing was measured.
+  // How far the best runner-up is behind, in 1/8 nat, as a mean over the pixels around; those with another disparity count 0. It
+  // is 0 where nothing was measured.
   uint8_t *confidence;
   size_t confidence_stride;
   // Why each pixel is what it is: the sum of mrfgs_flag.

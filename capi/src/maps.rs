@@ -52,7 +52,8 @@ pub struct Maps {
     /// The disparity in pixels, +infinity where there is none. Left (x, y) with disparity d is seen at right (x - d, y).
     pub disparity: *mut f32,
     pub disparity_stride: usize,
-    /// How far the best runner-up is behind, in 1/8 nat; 0 where nothing was measured.
+    /// How far the best runner-up is behind, in 1/8 nat, as a mean over the pixels around; those with another disparity count 0. It
+    /// is 0 where nothing was measured.
     pub confidence: *mut u8,
     pub confidence_stride: usize,
     /// Why each pixel is what it is: the sum of mrfgs_flag.

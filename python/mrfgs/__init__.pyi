@@ -45,7 +45,8 @@ class Matched:
         """Disparity before post-processing in pixels, +inf where the left image is masked."""
     @property
     def confidence(self) -> npt.NDArray[np.uint8]:
-        """How far the best runner-up is behind, in 1/8 nat; 0 where there is no measurement."""
+        """How far the best runner-up is behind, in 1/8 nat, as a mean over the pixels around; those with another disparity count 0. It
+        is 0 where there is no measurement."""
     @property
     def validity(self) -> npt.NDArray[np.uint8]:
         """Why each pixel is what it is: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low

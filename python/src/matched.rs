@@ -14,7 +14,8 @@ pub(crate) struct PyMatched {
     pub(crate) disparity: Py<PyArray2<f32>>,
     /// Disparity before post-processing in pixels, float32, +inf where the left image is masked.
     raw: Py<PyArray2<f32>>,
-    /// How far the best runner-up is behind, in 1/8 nat, uint8; 0 where there is no measurement.
+    /// How far the best runner-up is behind, in 1/8 nat, uint8, as a mean over the pixels around; those with another disparity count
+    /// 0. It is 0 where there is no measurement.
     pub(crate) confidence: Py<PyArray2<u8>>,
     /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
     /// confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured and trusted.

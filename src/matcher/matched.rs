@@ -90,7 +90,8 @@ impl Matched {
         self.maps.raw_map()
     }
 
-    /// How far the best runner-up is behind, in 1/8 nat, 0 to 255; 0 where nothing was measured.
+    /// How far the best runner-up is behind, in 1/8 nat, 0 to 255, as a mean over the pixels around; those with another disparity
+    /// count 0. It is 0 where nothing was measured.
     #[must_use]
     pub fn confidence(&self) -> &Plane<u8> {
         &self.maps.confidence

@@ -28,6 +28,8 @@ pub struct Paint {
     grain: f64,
     /// Size of the coarsest grain.
     cell: f64,
+    /// The part of the light that it mirrors, besides what it has of its own.
+    pub gloss: f64,
     /// Factors on the body's coordinates before the grain is looked up: below 1 draws it out.
     stretch: Vec3,
 }
@@ -35,7 +37,7 @@ pub struct Paint {
 /// A paint of two colours, given as 0xRRGGBB, with a medium grain.
 pub fn paint(pattern: Pattern, colours: [u32; 2]) -> Paint {
     let colours = colours.map(|c| [c >> 16, c >> 8, c].map(|byte| f64::from(byte & 255) / 255.0));
-    Paint { pattern, colours, grain: 0.16, cell: 0.12, stretch: [1.0; 3] }
+    Paint { pattern, colours, grain: 0.16, cell: 0.12, gloss: 0.0, stretch: [1.0; 3] }
 }
 
 impl Paint {
@@ -45,6 +47,10 @@ impl Paint {
 
     pub fn stretch(self, stretch: Vec3) -> Self {
         Self { stretch, ..self }
+    }
+
+    pub fn gloss(self, gloss: f64) -> Self {
+        Self { gloss, ..self }
     }
 
     /// The colour at a point of the body; no detail is much finer than `pixel`.

@@ -85,6 +85,7 @@ fn nothing_valid() {
                     Stage::Plane,
                     Stage::FarPlane,
                     Stage::Confidence,
+                    Stage::Support,
                 ] {
                     backend.run(stage).unwrap();
                 }
@@ -104,13 +105,13 @@ pub(crate) type Control = (Stage, bool, Twin, fn(&mut Plan));
 #[test]
 fn control_changes_are_found() {
     let region: Twin = |plan, _, maps| twin::speckle_filter::speckle_filter(plan, maps);
-    let confidence: Twin = |plan, _, maps| twin::confidence::confidence(plan, maps);
+    let support: Twin = |plan, _, maps| twin::support::support(plan, maps);
     let fill: Twin = |plan, _, maps| twin::fill::fill(plan, maps);
     control(&[
         (Stage::LeftRightCheck, false, twin::left_right_check::left_right_check, |p| p.range.min += 1),
         (Stage::SpeckleFilter, true, region, |p| p.method.refinement.speckle_size += 1),
         (Stage::Fill, false, fill, |p| p.method.refinement.nearer = Nearer::Smaller),
-        (Stage::Confidence, false, confidence, |p| p.method.refinement.confidence_floor += 4),
+        (Stage::Support, false, support, |p| p.method.refinement.confidence_floor += 4),
         (Stage::VoteFill, false, twin::vote_fill::vote_fill, |p| {
             p.method.refinement.nearer = Nearer::Smaller;
         }),

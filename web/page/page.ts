@@ -374,7 +374,7 @@ async function showView(): Promise<void> {
     if (shown === 'disparity' && facts) {
         legend.scale(facts.scales[colours()], String(mine.range.min), String(mine.range.max), 'px');
     } else if (shown === 'confidence' && facts) {
-        legend.scale(facts.scales.grey, '0', '255', 'in 1/8 nat: how far the runner-up is behind');
+        legend.scale(facts.scales.grey, '0', '255', 'in 1/8 nat: how far the runner-up is behind, on average over the pixels around');
     } else if (shown === 'validity' && facts) {
         legend.reasons(facts.reasons, mine.validity);
     } else {

@@ -105,7 +105,7 @@ static ALL: [Also; 16] = [
     row("points-original.laz", "", Kind::Points(Frame::Original)),
     row(
         "confidence",
-        "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat",
+        "The confidence: 8-bit .png, 0 to 255, how far the runner-up label is behind the best one, in 1/8 nat, as a mean over the pixels around",
         Kind::Bytes(|maps| &maps.confidence),
     ),
     row(

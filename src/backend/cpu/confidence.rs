@@ -1,4 +1,4 @@
-//! The confidence of each pixel: see [`crate::backend::Stage::Confidence`].
+//! The confidence of each pixel by itself: see [`crate::backend::Stage::Confidence`].
 
 use crate::image::Pair;
 use crate::maps::flag;
@@ -9,19 +9,11 @@ use rayon::prelude::*;
 /// Pixels that are worth a thread.
 const LEAST: usize = 1 << 14;
 
-pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
-    let floor = plan.method.refinement.confidence_floor;
+pub(super) fn run(maps: &mut MapSet, _: &Plan, _: &Pair) {
     let MapSet { optima, validity, confidence, .. } = maps;
-    let pixels = confidence.data_mut().par_iter_mut().zip(validity.data_mut()).zip(optima.data());
+    let pixels = confidence.data_mut().par_iter_mut().zip(validity.data()).zip(optima.data());
     pixels.with_min_len(LEAST).for_each(|((confidence, flags), optimum)| {
         let lead = (2 * u32::from(optimum.runner_up - optimum.best)).min(255);
-        if *flags & flag::INVALID != 0 {
-            *confidence = 0;
-        } else {
-            *confidence = lead as u8;
-            if lead < floor {
-                *flags |= flag::LOW_CONFIDENCE;
-            }
-        }
+        *confidence = if flags & flag::INVALID == 0 { lead as u8 } else { 0 };
     });
 }

@@ -18,7 +18,7 @@ shader! {
         // The finest level has the most labels.
         let (quads, slots) = (plan.levels[0].quads(), plan.slots());
         let floors = if absolute { slots * (quads + 1) } else { 0 };
-        Kernel::new(floors + 5 * slots + 2 * quads * (2 * slots + 1))
+        Kernel::new(floors + 3 * slots + 2 * quads * (2 * slots + 1))
             .of_width(plan.volume_width)
             .with("SLOTS", slots as u32)
             .with("ABSOLUTE", absolute)

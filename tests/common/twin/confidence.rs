@@ -1,7 +1,6 @@
 use super::Finest;
 use super::fill::invalid;
 use mrfgs::low_level::plan::Plan;
-use mrfgs::maps::flag;
 
 /// Confidence of each pixel: 16 for every 8 units of margin between the optimum and its runner-up.
 pub fn confidence(plan: &Plan, maps: &mut Finest) {
@@ -11,11 +10,6 @@ pub fn confidence(plan: &Plan, maps: &mut Finest) {
             let at = (x, y);
             let lead = ((maps.runner_up[at] - maps.best[at]) * 16 / 8).min(255);
             maps.confidence[at] = if invalid(maps.validity[at]) { 0 } else { lead };
-            if !invalid(maps.validity[at])
-                && i64::from(lead) < i64::from(plan.method.refinement.confidence_floor)
-            {
-                maps.validity[at] |= i32::from(flag::LOW_CONFIDENCE);
-            }
         }
     }
 }

@@ -131,8 +131,7 @@ pub(super) fn pictures(
     add("error", "Signed error", alt, legend, &colour::error(estimate, truth, ERROR_LIMIT))?;
     if let Some((_, maps)) = matched {
         let alt = "confidence of every pixel, bright is sure";
-        let legend =
-            "0 to 255, bright is sure: how far the runner-up label is behind the best one, in 1/8 nat.";
+        let legend = "0 to 255, bright is sure: how far the runner-up label is behind the best one, in 1/8 nat, on average around.";
         add("confidence", "Confidence", alt, legend.into(), &colour::grey(&maps.confidence))?;
         let (alt, picture) = ("why each pixel is what it is", colour::validity(&maps.validity));
         add("validity", "Validity", alt, validity_legend(), &picture)?;
