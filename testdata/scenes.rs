@@ -313,10 +313,10 @@ fn screen() -> World {
 fn border() -> World {
     use Pattern::{Blotches, Plain, Rings};
     let mut world = World::new(21);
-    world.plane([0.0, 0.56, 1.25], [0.06, -1.0, -0.12], paint(Plain, [0x9b8f7a, 0]).grain(0.03, 0.12));
+    world.plane([0.0, 0.56, 1.25], [0.03, -1.0, -0.12], paint(Plain, [0x9b8f7a, 0]).grain(0.03, 0.12));
     world.plane(
         [0.4, 0.0, 3.2],
-        [0.8, 0.0, -1.0],
+        [0.7, 0.0, -1.0],
         paint(Blotches(0.5), [0xb3a58c, 0x8d9a94]).grain(0.1, 0.12),
     );
     world.plane([0.4, 0.0, 3.2], [-0.5, 0.0, -1.0], paint(Blotches(0.4), [0x7f8ea3, 0xaaa29d]));

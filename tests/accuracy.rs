@@ -49,7 +49,7 @@ fn rendered_scenes() {
     let floors = [
         ("slanted", 0.15, 0.7, 6.0),
         ("thin", 0.58, 7.5, 15.5),
-        ("wall", 1.45, 24.0, 43.5),
+        ("wall", 1.30, 24.0, 45.5),
         ("repetitive", 0.22, 0.4, 6.3),
         ("exposure", 0.17, 0.6, 6.7),
         ("mixed", 0.28, 2.3, 9.8),

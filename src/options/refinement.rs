@@ -80,6 +80,6 @@ options! {
         /// Also make the disparity map of the right view, refined like that of the left one.
         right_map: bool = false, takes Takes::Switch, source "not in the paper";
         /// Pixels with less confidence than this get the validity flag for low confidence.
-        confidence_floor: u32 = 16, takes whole(0..=255), unit "1/8 nat", source "not in the paper";
+        confidence_floor: u32 = 24, takes whole(0..=255), unit "1/8 nat", source "not in the paper";
     }
 }
