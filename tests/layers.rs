@@ -185,6 +185,7 @@ fn imports_lead_down() {
         ("cli/src", 150, Some("The program")),
         ("capi/src", 10, None),
         ("python/src", 20, None),
+        ("ros/src", 15, None),
         ("web/src", 5, None),
     ] {
         let imports = Package::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).imports();

@@ -183,6 +183,18 @@ impl<'a> Raster<'a> {
         (self.width, self.height)
     }
 
+    /// How many samples a pixel has: 1 grey, 2 grey and alpha, 3 colour, 4 colour and alpha.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// The samples as stored, row by row.
+    #[must_use]
+    pub fn samples(&self) -> &Samples<'a> {
+        &self.samples
+    }
+
     /// What is inside `part`, without a georeference.
     ///
     /// # Errors

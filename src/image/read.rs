@@ -109,12 +109,18 @@ impl Reader {
     /// # Errors
     /// Those of [`Reader::pair`].
     pub fn pair_in_memory(self, left: (&Path, &[u8]), right: (&Path, &[u8])) -> Result<Pair> {
-        let image = |(name, bytes): (&Path, &[u8])| {
-            let raster =
-                decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
-            self.oriented(raster, name)
-        };
+        let image = |(name, bytes): (&Path, &[u8])| self.raster_in_memory(name, bytes);
         raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display))
+    }
+
+    /// As [`Reader::raster`], from a file that is in memory, with the name by which errors call it.
+    ///
+    /// # Errors
+    /// Those of [`Reader::raster`].
+    pub fn raster_in_memory(self, name: &Path, bytes: &[u8]) -> Result<Raster<'static>> {
+        let raster =
+            decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
+        self.oriented(raster, name)
     }
 
     fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {

@@ -1,0 +1,18 @@
+//! The messages of ROS that hold images, calibrations, disparities and points.
+//!
+//! They are decoded from the bytes of ROS 2 (CDR, of either byte order) and of ROS 1, and encoded as CDR.
+
+mod basics;
+mod bytes;
+mod definitions;
+mod types;
+
+pub use basics::{Encoding, Result, SECOND, Stamp};
+pub use definitions::definition;
+pub use types::{
+    CameraInfo, CompressedImage, DisparityImage, Encode, FLOAT32, Header, Image, PointCloud2, PointField,
+    RegionOfInterest, Type, UINT8,
+};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,302 @@
+//! Images of ROS as images of the library.
+
+use std::path::Path;
+
+use mrfgs::error::Reason;
+use mrfgs::image::raster::{Raster, Samples};
+use mrfgs::image::read::Reader;
+
+use crate::messages::{CompressedImage, Image, Result};
+
+/// What is read, as an error says it.
+const KNOWN: &str = "mono8, mono16, bgr8, rgb8, bgra8, rgba8, their kinds of 16 bits, 8UC1, 8UC3, 8UC4, 16UC1, 16UC3 and bayer_* are read";
+
+/// The colours of a pixel, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Colours {
+    Grey,
+    /// Red first, or blue first; the channels behind them are left out.
+    Rgb,
+    Bgr,
+    /// One colour each: those of two pixels of the first row, and of two of the second.
+    Mosaic([Colour; 4]),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Colour {
+    Red,
+    Green,
+    Blue,
+}
+
+/// How the samples of an image lie.
+struct Layout {
+    colours: Colours,
+    channels: usize,
+    /// Bytes of a sample: 1 or 2.
+    bytes: usize,
+}
+
+impl Layout {
+    fn of(encoding: &str) -> Option<Self> {
+        if let Some(mosaic) = encoding.strip_prefix("bayer_") {
+            let (letters, bits) = mosaic.split_at_checked(4)?;
+            let bytes = match bits {
+                "8" => 1,
+                "16" => 2,
+                _ => return None,
+            };
+            return Some(Self { colours: Colours::Mosaic(mosaic_of(letters)?), channels: 1, bytes });
+        }
+        let (colours, channels, bytes) = match encoding {
+            "mono8" | "8UC1" => (Colours::Grey, 1, 1),
+            "mono16" | "16UC1" => (Colours::Grey, 1, 2),
+            "bgr8" | "8UC3" => (Colours::Bgr, 3, 1),
+            "rgb8" => (Colours::Rgb, 3, 1),
+            "bgra8" | "8UC4" => (Colours::Bgr, 4, 1),
+            "rgba8" => (Colours::Rgb, 4, 1),
+            "bgr16" | "16UC3" => (Colours::Bgr, 3, 2),
+            "rgb16" => (Colours::Rgb, 3, 2),
+            "bgra16" | "16UC4" => (Colours::Bgr, 4, 2),
+            "rgba16" => (Colours::Rgb, 4, 2),
+            _ => return None,
+        };
+        Some(Self { colours, channels, bytes })
+    }
+}
+
+fn mosaic_of(letters: &str) -> Option<[Colour; 4]> {
+    use Colour::{Blue, Green, Red};
+    Some(match letters {
+        "rggb" => [Red, Green, Green, Blue],
+        "bggr" => [Blue, Green, Green, Red],
+        "gbrg" => [Green, Blue, Red, Green],
+        "grbg" => [Green, Red, Blue, Green],
+        _ => return None,
+    })
+}
+
+/// The image of a message, of at most `max_pixels` pixels. A mosaic of colours becomes colours, by the mean of the nearest samples.
+///
+/// # Errors
+/// Where its encoding is not read, or its numbers contradict each other or its data.
+pub fn image(message: &Image, max_pixels: u64) -> Result<Raster<'static>> {
+    let Image { encoding, data, .. } = message;
+    let [width, height, step] = [message.width, message.height, message.step].map(|v| v as usize);
+    let Some(layout) = Layout::of(encoding) else {
+        return Err(format!("its encoding is `{}`; {KNOWN}", shortened(encoding)).into());
+    };
+    if width == 0 || height == 0 {
+        return Err(format!("has {width} x {height} pixels").into());
+    }
+    if width as u64 * height as u64 > max_pixels {
+        return Err(format!("claims {width} x {height} pixels and at most {max_pixels} are read").into());
+    }
+    let row = width * layout.channels * layout.bytes;
+    if step < row {
+        return Err(
+            format!("a row of {width} pixels in {encoding} has {row} bytes, and its step is {step}").into()
+        );
+    }
+    if step as u64 * height as u64 > data.len() as u64 {
+        return Err(format!(
+            "{height} rows of {step} bytes are {}, and it has {} bytes of data",
+            step as u64 * height as u64,
+            data.len()
+        )
+        .into());
+    }
+    let rows = data.chunks_exact(step).take(height).map(|line| &line[..row]);
+    let size = (width, height);
+    if layout.bytes == 1 {
+        raster(&layout, size, rows.flatten().copied().collect(), |v| Samples::Byte(v.into()))
+    } else {
+        let word = if message.is_bigendian { u16::from_be_bytes } else { u16::from_le_bytes };
+        let words = rows.flat_map(|line| line.chunks_exact(2)).map(|v| word([v[0], v[1]]));
+        raster(&layout, size, words.collect(), |v| Samples::Word(v.into()))
+    }
+}
+
+/// The image of a message that holds a file, PNG or JPEG. `name` is what errors of the reader call it.
+///
+/// # Errors
+/// Where the file is damaged, too large or of another format.
+pub fn compressed(message: &CompressedImage, reader: Reader, name: &Path) -> mrfgs::Result<Raster<'static>> {
+    let CompressedImage { format, data, .. } = message;
+    if format.contains("compressedDepth") {
+        return Err(mrfgs::Error::read(
+            name,
+            "holds depths, not what a camera has seen; give the topic of an image",
+        ));
+    }
+    let raster = reader.raster_in_memory(name, data)?;
+    // As `image_transport` packs what it cannot name in OpenCV's colours: the mosaic, in grey.
+    let encoding = format.split(';').next().unwrap_or_default().trim();
+    match Layout::of(encoding) {
+        Some(layout @ Layout { colours: Colours::Mosaic(_), .. }) if raster.channels() == 1 => {
+            let size = raster.size();
+            let made = match raster.samples() {
+                Samples::Byte(v) => self::raster(&layout, size, v.to_vec(), |v| Samples::Byte(v.into())),
+                Samples::Word(v) => self::raster(&layout, size, v.to_vec(), |v| Samples::Word(v.into())),
+                _ => return Ok(raster),
+            };
+            made.map_err(|reason| mrfgs::Error::read(name, reason))
+        }
+        _ => Ok(raster),
+    }
+}
+
+/// The image of all `samples`.
+fn raster<S: Copy + Into<u32> + TryFrom<u32> + Default>(
+    layout: &Layout,
+    (width, height): (usize, usize),
+    samples: Vec<S>,
+    made: fn(Vec<S>) -> Samples<'static>,
+) -> Result<Raster<'static>> {
+    let pixels = || samples.chunks_exact(layout.channels);
+    let (channels, samples) = match layout.colours {
+        Colours::Grey => (1, samples),
+        Colours::Rgb if layout.channels == 3 => (3, samples),
+        Colours::Rgb => (3, pixels().flat_map(|p| [p[0], p[1], p[2]]).collect()),
+        Colours::Bgr => (3, pixels().flat_map(|p| [p[2], p[1], p[0]]).collect()),
+        Colours::Mosaic(mosaic) => (3, demosaiced(&samples, (width, height), mosaic)),
+    };
+    Raster::new(width, height, channels, made(samples)).map_err(|e| Reason::from(e.to_string()))
+}
+
+/// Red, green and blue of each pixel: its own sample, and the mean of those of another colour among the eight around it, rounded.
+fn demosaiced<S: Copy + Into<u32> + TryFrom<u32> + Default>(
+    samples: &[S],
+    (width, height): (usize, usize),
+    mosaic: [Colour; 4],
+) -> Vec<S> {
+    let mut out = Vec::with_capacity(3 * samples.len());
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let (mut sums, mut counts) = ([0; 3], [0; 3]);
+        for v in y.saturating_sub(1)..(y + 2).min(height) {
+            for u in x.saturating_sub(1)..(x + 2).min(width) {
+                let colour = mosaic[2 * (v % 2) + u % 2] as usize;
+                sums[colour] += samples[v * width + u].into();
+                counts[colour] += 1;
+            }
+        }
+        let own = mosaic[2 * (y % 2) + x % 2] as usize;
+        (sums[own], counts[own]) = (samples[y * width + x].into(), 1);
+        out.extend((0..3).map(|c| {
+            // An image of one row or column lacks a colour.
+            let mean = (sums[c] + counts[c] / 2).checked_div(counts[c]).unwrap_or(0);
+            S::try_from(mean).unwrap_or_default()
+        }));
+    }
+    out
+}
+
+/// The beginning of a text that may be of any length.
+fn shortened(text: &str) -> String {
+    text.chars().take(40).filter(|c| !c.is_control()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MANY: u64 = 1 << 20;
+
+    fn made(encoding: &str, (width, height): (u32, u32), step: u32, data: &[u8]) -> Result<Raster<'static>> {
+        let message =
+            Image { width, height, step, encoding: encoding.into(), data: data.into(), ..Image::default() };
+        image(&message, MANY)
+    }
+
+    fn bytes(raster: &Raster) -> Vec<u8> {
+        let Samples::Byte(bytes) = raster.samples() else { panic!("bytes") };
+        bytes.to_vec()
+    }
+
+    #[test]
+    fn colours_come_in_one_order() {
+        for (encoding, pixel, wanted) in [
+            ("mono8", &[7][..], &[7][..]),
+            ("8UC1", &[7], &[7]),
+            ("rgb8", &[1, 2, 3], &[1, 2, 3]),
+            ("bgr8", &[3, 2, 1], &[1, 2, 3]),
+            ("8UC3", &[3, 2, 1], &[1, 2, 3]),
+            ("rgba8", &[1, 2, 3, 0], &[1, 2, 3]),
+            ("bgra8", &[3, 2, 1, 0], &[1, 2, 3]),
+        ] {
+            // Two rows of two pixels, with padding that is no pixel.
+            let row = [pixel, pixel, &[99, 98]].concat();
+            let raster = made(encoding, (2, 2), row.len() as u32, &[&row[..], &row[..]].concat()).unwrap();
+            assert_eq!(bytes(&raster), [wanted; 4].concat(), "{encoding}");
+        }
+    }
+
+    #[test]
+    fn words_have_either_order() {
+        for (is_bigendian, wanted) in [(false, [0x0201, 0x0403]), (true, [0x0102, 0x0304])] {
+            let encoding = "mono16".into();
+            let data = [1, 2, 3, 4][..].into();
+            let message =
+                Image { width: 2, height: 1, step: 4, encoding, is_bigendian, data, ..Image::default() };
+            let raster = image(&message, MANY).unwrap();
+            let Samples::Word(words) = raster.samples() else { panic!("words") };
+            assert_eq!(**words, wanted);
+        }
+    }
+
+    #[test]
+    fn mosaics_become_colours() {
+        // Red 10, green 20 and blue 30 everywhere, in each of the four orders.
+        for (encoding, mosaic) in [
+            ("bayer_rggb8", [10, 20, 20, 30]),
+            ("bayer_bggr8", [30, 20, 20, 10]),
+            ("bayer_gbrg8", [20, 30, 10, 20]),
+            ("bayer_grbg8", [20, 10, 30, 20]),
+        ] {
+            let data: Vec<u8> = (0..5 * 4).map(|i| mosaic[2 * (i / 5 % 2) + i % 5 % 2]).collect();
+            let raster = made(encoding, (5, 4), 5, &data).unwrap();
+            assert_eq!(bytes(&raster), [10, 20, 30].repeat(20), "{encoding}");
+        }
+        // A ramp: means of two and of four neighbours, at the pixel (1, 1) of blue and (1, 0) of green.
+        let data: Vec<u8> = (0..16).map(|i| (10 * (i % 4) + i / 4) as u8).collect();
+        let raster = bytes(&made("bayer_rggb8", (4, 4), 4, &data).unwrap());
+        assert_eq!(raster[3 * 5..][..3], [11, 11, 11]);
+        assert_eq!(raster[3..][..3], [10, 10, 11]);
+        // Control: another order gives other colours.
+        assert_ne!(bytes(&made("bayer_bggr8", (4, 4), 4, &data).unwrap()), raster);
+    }
+
+    #[test]
+    fn contradictions_are_told() {
+        let data = [0; 64];
+        for (encoding, size, step, words) in [
+            ("yuv422", (4, 4), 8, "`yuv422`; mono8, mono16"),
+            ("bayer_rgbg8", (4, 4), 4, "`bayer_rgbg8`"),
+            ("32FC1", (4, 4), 16, "`32FC1`"),
+            ("mono8", (0, 4), 4, "0 x 4 pixels"),
+            ("bgr8", (4, 4), 8, "has 12 bytes, and its step is 8"),
+            ("mono8", (4, 17), 4, "17 rows of 4 bytes are 68, and it has 64 bytes"),
+            ("mono8", (u32::MAX, u32::MAX), u32::MAX, "at most 1048576 are read"),
+            ("mono8", (4, 4), u32::MAX, "4 rows of 4294967295 bytes are 17179869180"),
+        ] {
+            let said = made(encoding, size, step, &data).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
+    }
+
+    #[test]
+    fn files_in_messages_are_read() {
+        let mut file = std::io::Cursor::new(Vec::new());
+        let grey = ::image::GrayImage::from_fn(4, 4, |x, y| ::image::Luma([(10 * x + y) as u8]));
+        grey.write_to(&mut file, ::image::ImageFormat::Png).unwrap();
+        let read = |format: &str| {
+            let data = file.get_ref()[..].into();
+            let message = CompressedImage { format: format.into(), data, ..CompressedImage::default() };
+            compressed(&message, Reader::default(), Path::new("a.mcap"))
+        };
+        assert_eq!(bytes(&read("mono8; png compressed ").unwrap()), grey.clone().into_raw());
+        let colours = read("bayer_rggb8; png compressed ").unwrap();
+        assert_eq!(bytes(&colours), bytes(&made("bayer_rggb8", (4, 4), 4, grey.as_raw()).unwrap()));
+        assert!(read("16UC1; compressedDepth png").unwrap_err().to_string().contains("holds depths"));
+    }
+}

@@ -1,0 +1,239 @@
+//! Bags of ROS 1, from their start to their end. (The crate `rosbag` maps the whole file, takes lengths on trust, and panics where a bag
+//! was not closed.)
+
+use std::collections::HashMap;
+use std::mem;
+use std::path::Path;
+
+use mrfgs::Result;
+use mrfgs::error::Reason;
+
+use super::chunk::unpacked;
+use super::file::{File, MAX_RECORD};
+use super::message::{Message, topic};
+use crate::messages::Encoding;
+use crate::topics::Topic;
+
+/// How such a file begins.
+pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+
+/// The kinds of records that count here, in the field `op`.
+const MESSAGE: u8 = 2;
+const BAG: u8 = 3;
+const CHUNK: u8 = 5;
+const CONNECTION: u8 = 7;
+
+/// A file that is being read.
+pub(super) struct Bag {
+    file: File,
+    wanted: Vec<String>,
+    /// The topic of each connection: among all, and among those that are wanted.
+    connections: HashMap<u32, (usize, Option<usize>)>,
+    topics: Vec<Topic>,
+    /// The records of a chunk, how far they have been read, and where it begins in the file.
+    chunk: Vec<u8>,
+    chunk_at: usize,
+    chunk_start: u64,
+    /// Where the messages end and the index begins; 0 where the bag was not closed.
+    index: u64,
+    ended: bool,
+}
+
+impl Bag {
+    pub(super) fn open(path: &Path, wanted: Vec<String>) -> Result<Self> {
+        let mut file = File::open(path)?;
+        if file.left() < MAGIC.len() as u64 || file.take(MAGIC.len() as u64)? != MAGIC {
+            return Err(file.error("is no bag of ROS 1: it does not begin with #ROSBAG V2.0"));
+        }
+        let mut bag = Self {
+            file,
+            wanted,
+            connections: HashMap::new(),
+            topics: Vec::new(),
+            chunk: Vec::new(),
+            chunk_at: 0,
+            chunk_start: 0,
+            index: 0,
+            ended: false,
+        };
+        let head = bag.part()?;
+        let _padding = bag.part()?;
+        let fields = Fields::of(&head).map_err(|reason| bag.file.error(reason))?;
+        if fields.kind() != Some(BAG) {
+            return Err(bag.file.error("is a damaged bag: it does not begin with its header"));
+        }
+        bag.index = fields.get("index_pos").map_or(0, number);
+        Ok(bag)
+    }
+
+    /// The topics of a file.
+    pub(super) fn topics(path: &Path) -> Result<Vec<Topic>> {
+        let mut bag = Self::open(path, Vec::new())?;
+        if bag.index > bag.file.at() && bag.index < bag.file.len() && bag.connections_of_index().is_ok() {
+            return Ok(bag.topics);
+        }
+        let mut bag = Self::open(path, Vec::new())?;
+        // Damage is told when the messages are read: what lies before it counts.
+        match bag.by_ref().find_map(Result::err) {
+            Some(error) if bag.topics.is_empty() => Err(error),
+            _ => Ok(bag.topics),
+        }
+    }
+
+    fn connections_of_index(&mut self) -> Result<()> {
+        self.file.seek(self.index)?;
+        while self.file.left() > 0 {
+            let (head, body) = (self.part()?, self.part()?);
+            self.put(&head, &body).map_err(|reason| self.file.error(reason))?;
+        }
+        Ok(())
+    }
+
+    /// What stands behind its length.
+    fn part(&mut self) -> Result<Vec<u8>> {
+        let length = number(&self.file.take(4)?);
+        self.file.take(length)
+    }
+
+    /// Takes a record that is no chunk. Returns the message, if it is one of a topic that is wanted.
+    fn put(&mut self, head: &[u8], body: &[u8]) -> Result<Option<Message>, Reason> {
+        let fields = Fields::of(head)?;
+        let connection =
+            || fields.get("conn").map(|id| number(id) as u32).ok_or("has a record without its connection");
+        match fields.kind() {
+            Some(CONNECTION) => {
+                let id = connection()?;
+                let more = Fields::of(body)?;
+                let name =
+                    fields.get("topic").or(more.get("topic")).ok_or("has a connection without a topic")?;
+                let name = String::from_utf8_lossy(name).into_owned();
+                let kind = String::from_utf8_lossy(more.get("type").unwrap_or_default());
+                let wanted = self.wanted.iter().position(|one| *one == name);
+                let known = self.topics.iter().position(|topic| topic.name == name);
+                let topic = known.unwrap_or_else(|| {
+                    self.topics.push(topic(name, &kind, Some(Encoding::Ros1)));
+                    self.topics.len() - 1
+                });
+                self.connections.insert(id, (topic, wanted));
+                Ok(None)
+            }
+            Some(MESSAGE) => {
+                let id = connection()?;
+                let Some((_, wanted)) = self.connections.get(&id) else {
+                    return Err(
+                        format!("has a message of connection {id}, which it does not describe").into()
+                    );
+                };
+                let message = |topic| Message { topic, encoding: Encoding::Ros1, data: body.to_vec() };
+                Ok(wanted.map(message))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// The next message.
+    fn message(&mut self) -> Result<Option<Message>> {
+        loop {
+            while self.chunk_at < self.chunk.len() {
+                let chunk = mem::take(&mut self.chunk);
+                let put = record(&chunk, self.chunk_at).and_then(|(head, body, next)| {
+                    self.chunk_at = next;
+                    self.put(head, body)
+                });
+                self.chunk = chunk;
+                let start = self.chunk_start;
+                if let Some(message) =
+                    put.map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?
+                {
+                    return Ok(Some(message));
+                }
+            }
+            let start = self.file.at();
+            if self.index > 0 && start >= self.index {
+                return Ok(None);
+            }
+            if self.file.left() == 0 {
+                return Err(self.file.error(
+                    "is cut off: it has no index, as of a bag that was not closed; what is whole before it counts",
+                ));
+            }
+            let (head, body) = (self.part()?, self.part()?);
+            let kind = Fields::of(&head).map_err(|reason| self.file.error(reason))?.kind();
+            if kind == Some(CHUNK) {
+                let records = unpacked_chunk(&head, &body);
+                let records = records
+                    .map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?;
+                (self.chunk, self.chunk_at, self.chunk_start) = (records, 0, start);
+            } else if let Some(message) = self.put(&head, &body).map_err(|reason| self.file.error(reason))? {
+                return Ok(Some(message));
+            }
+        }
+    }
+}
+
+impl Iterator for Bag {
+    type Item = Result<Message>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let message = self.message();
+        self.ended = !matches!(message, Ok(Some(_)));
+        message.transpose()
+    }
+}
+
+/// The records of a chunk with this head and body.
+fn unpacked_chunk(head: &[u8], body: &[u8]) -> Result<Vec<u8>, Reason> {
+    let fields = Fields::of(head)?;
+    let method = String::from_utf8_lossy(fields.get("compression").unwrap_or_default());
+    let size = fields.get("size").map_or(MAX_RECORD + 1, number);
+    unpacked(body, &method, size)
+}
+
+/// The record at byte `at`: its head, its body, and where the next one begins.
+fn record(bytes: &[u8], at: usize) -> Result<(&[u8], &[u8], usize), Reason> {
+    let part = |at: usize| {
+        let length = number(bytes.get(at..at.checked_add(4)?)?) as usize;
+        let end = (at + 4).checked_add(length)?;
+        Some((bytes.get(at + 4..end)?, end))
+    };
+    let whole = part(at).and_then(|(head, end)| part(end).map(|(body, next)| (head, body, next)));
+    whole.ok_or_else(|| "ends in the middle of a record".into())
+}
+
+/// The fields of a head: `name=value`, each behind its length.
+struct Fields<'a>(Vec<(&'a [u8], &'a [u8])>);
+
+impl<'a> Fields<'a> {
+    fn of(bytes: &'a [u8]) -> Result<Self, Reason> {
+        let (mut fields, mut rest) = (Vec::new(), bytes);
+        while !rest.is_empty() {
+            let field = rest
+                .split_at_checked(4)
+                .and_then(|(length, rest)| rest.split_at_checked(number(length) as usize));
+            let (field, after) = field.ok_or("has a damaged record: a field of it has no end")?;
+            let equals = field
+                .iter()
+                .position(|byte| *byte == b'=')
+                .ok_or("has a damaged record: a field of it has no name")?;
+            fields.push((&field[..equals], &field[equals + 1..]));
+            rest = after;
+        }
+        Ok(Self(fields))
+    }
+
+    fn get(&self, name: &str) -> Option<&'a [u8]> {
+        self.0.iter().find(|(key, _)| *key == name.as_bytes()).map(|(_, value)| *value)
+    }
+
+    fn kind(&self) -> Option<u8> {
+        self.get("op")?.first().copied()
+    }
+}
+
+/// A number of up to eight bytes, lowest first.
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().take(8).rev().fold(0, |all, byte| all << 8 | u64::from(*byte))
+}

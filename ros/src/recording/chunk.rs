@@ -1,0 +1,42 @@
+//! The packed parts of recordings.
+
+use std::io::Read;
+
+use bzip2::read::BzDecoder;
+use lz4_flex::frame::FrameDecoder;
+use mrfgs::error::Reason;
+use ruzstd::decoding::StreamingDecoder;
+
+use super::file::MAX_RECORD;
+
+/// What is in `packed`, which claims to hold `size` bytes and is packed by the method of this name.
+///
+/// # Errors
+/// Where it is not so, in words that go after the name of the file.
+pub(super) fn unpacked(packed: &[u8], method: &str, size: u64) -> Result<Vec<u8>, Reason> {
+    if size > MAX_RECORD {
+        return Err(format!("claims {size} bytes, and at most {MAX_RECORD} are unpacked at once").into());
+    }
+    let mut bytes = Vec::new();
+    let read = match method {
+        "" | "none" => packed.take(size + 1).read_to_end(&mut bytes),
+        "lz4" => FrameDecoder::new(packed).take(size + 1).read_to_end(&mut bytes),
+        "bz2" => BzDecoder::new(packed).take(size + 1).read_to_end(&mut bytes),
+        "zstd" => match StreamingDecoder::new(packed) {
+            Ok(from) => from.take(size + 1).read_to_end(&mut bytes),
+            Err(error) => return Err(format!("is no zstd: {error}").into()),
+        },
+        other => {
+            let other: String = other.chars().filter(|c| !c.is_control()).take(20).collect();
+            return Err(format!("is packed by `{other}`; zstd, lz4, bz2 and none are read").into());
+        }
+    };
+    match read {
+        Ok(count) if count as u64 == size => Ok(bytes),
+        Ok(count) if (count as u64) < size => {
+            Err(format!("is damaged: it holds {count} bytes and claims {size}").into())
+        }
+        Ok(_) => Err(format!("is damaged: it holds more than the {size} bytes that it claims").into()),
+        Err(error) => Err(format!("is damaged: {}", error.to_string().replace('\n', " ")).into()),
+    }
+}

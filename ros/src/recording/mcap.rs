@@ -1,0 +1,265 @@
+//! MCAP files, from their start to their end.
+
+use std::collections::HashMap;
+use std::mem;
+use std::path::Path;
+
+use mcap::records::{Record, op};
+use mcap::{MAGIC, parse_record};
+use mrfgs::error::Reason;
+use mrfgs::{Error, Result};
+
+use super::chunk::unpacked;
+use super::file::{File, MAX_RECORD};
+use super::message::{Message, topic};
+use crate::messages::Encoding;
+use crate::topics::Topic;
+
+/// A record: its kind in one byte, its length in eight.
+const HEAD: u64 = 9;
+/// The last record: its head, two places and a checksum.
+const FOOTER: u64 = HEAD + 20;
+
+/// A file that is being read.
+pub(super) struct Mcap {
+    file: File,
+    wanted: Vec<String>,
+    schemas: HashMap<u16, String>,
+    channels: HashMap<u16, Channel>,
+    topics: Vec<Topic>,
+    /// The records of a chunk, how far they have been read, and where it begins in the file.
+    chunk: Vec<u8>,
+    chunk_at: usize,
+    chunk_start: u64,
+    ended: bool,
+}
+
+/// Where the messages of a channel belong.
+#[derive(Clone, Copy)]
+struct Channel {
+    /// Among all topics, and among those that are wanted.
+    topic: usize,
+    wanted: Option<usize>,
+    encoding: Option<Encoding>,
+}
+
+impl Mcap {
+    pub(super) fn open(path: &Path, wanted: Vec<String>) -> Result<Self> {
+        let mut file = File::open(path)?;
+        if file.left() < MAGIC.len() as u64 || file.take(MAGIC.len() as u64)? != MAGIC {
+            return Err(file.error("is no MCAP file: it does not begin as one"));
+        }
+        Ok(Self {
+            file,
+            wanted,
+            schemas: HashMap::new(),
+            channels: HashMap::new(),
+            topics: Vec::new(),
+            chunk: Vec::new(),
+            chunk_at: 0,
+            chunk_start: 0,
+            ended: false,
+        })
+    }
+
+    /// The topics of a file.
+    pub(super) fn topics(path: &Path) -> Result<Vec<Topic>> {
+        let mut file = Self::open(path, Vec::new())?;
+        if let Some(topics) = file.summary() {
+            return Ok(topics);
+        }
+        let mut file = Self::open(path, Vec::new())?;
+        // Damage is told when the messages are read: what lies before it counts.
+        let damage = file.by_ref().find_map(Result::err);
+        match damage {
+            Some(error) if file.topics.is_empty() => Err(error),
+            _ => Ok(file.topics),
+        }
+    }
+
+    /// The topics by the summary at the end, where there is a whole one.
+    fn summary(&mut self) -> Option<Vec<Topic>> {
+        let end = self.file.len().checked_sub(FOOTER + MAGIC.len() as u64)?;
+        self.file.seek(end).ok()?;
+        let tail = self.file.take(self.file.left()).ok()?;
+        if tail[0] != op::FOOTER || !tail.ends_with(MAGIC) {
+            return None;
+        }
+        let Ok(Record::Footer(footer)) = parse_record(op::FOOTER, &tail[HEAD as usize..FOOTER as usize])
+        else {
+            return None;
+        };
+        let size = end.checked_sub(footer.summary_start).filter(|size| *size < MAX_RECORD)?;
+        if footer.summary_start == 0 {
+            return None;
+        }
+        self.file.seek(footer.summary_start).ok()?;
+        let records = self.file.take(size).ok()?;
+        let (mut at, mut counts) = (0, None);
+        while at < records.len() {
+            let (kind, body, next) = record(&records, at).ok()?;
+            match kind {
+                op::SCHEMA | op::CHANNEL => _ = self.put(kind, body).ok()?,
+                op::STATISTICS => {
+                    let Ok(Record::Statistics(statistics)) = parse_record(kind, body) else { return None };
+                    counts = Some(statistics.channel_message_counts);
+                }
+                _ => {}
+            }
+            at = next;
+        }
+        let mut topics = mem::take(&mut self.topics);
+        for topic in &mut topics {
+            topic.count = counts.as_ref().map(|_| 0);
+        }
+        for (id, count) in counts.into_iter().flatten() {
+            if let Some(topic) = self.channels.get(&id).and_then(|channel| topics.get_mut(channel.topic)) {
+                topic.count = topic.count.map(|all| all + count);
+            }
+        }
+        (!topics.is_empty()).then_some(topics)
+    }
+
+    /// Takes a record that is no chunk. Returns the message, if it is one of a topic that is wanted.
+    fn put(&mut self, kind: u8, body: &[u8]) -> Result<Option<Message>, Reason> {
+        if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&kind) {
+            return Ok(None);
+        }
+        match parse_record(kind, body) {
+            Ok(Record::Schema { header, .. }) => {
+                self.schemas.insert(header.id, header.name);
+                Ok(None)
+            }
+            Ok(Record::Channel(channel)) => {
+                let encoding = match channel.message_encoding.as_str() {
+                    "cdr" => Some(Encoding::Cdr),
+                    "ros1" => Some(Encoding::Ros1),
+                    _ => None,
+                };
+                let kind = self.schemas.get(&channel.schema_id).map_or("", String::as_str);
+                let wanted = self.wanted.iter().position(|name| *name == channel.topic);
+                let known = self.topics.iter().position(|topic| topic.name == channel.topic);
+                let topic = known.unwrap_or_else(|| {
+                    let count = Some(0);
+                    self.topics.push(Topic { count, ..topic(channel.topic, kind, encoding) });
+                    self.topics.len() - 1
+                });
+                self.channels.insert(channel.id, Channel { topic, wanted, encoding });
+                Ok(None)
+            }
+            Ok(Record::Message { header, data }) => {
+                let Some(channel) = self.channels.get(&header.channel_id) else {
+                    return Err(format!(
+                        "has a message of channel {}, which it does not describe",
+                        header.channel_id
+                    )
+                    .into());
+                };
+                if let Some(count) = &mut self.topics[channel.topic].count {
+                    *count += 1;
+                }
+                let (Some(topic), Some(encoding)) = (channel.wanted, channel.encoding) else {
+                    return Ok(None);
+                };
+                Ok(Some(Message { topic, encoding, data: data.into_owned() }))
+            }
+            Ok(_) => Ok(None),
+            Err(error) => Err(format!("has a damaged record: {}", first_line(&error.to_string())).into()),
+        }
+    }
+
+    /// The next message.
+    fn message(&mut self) -> Result<Option<Message>> {
+        loop {
+            while self.chunk_at < self.chunk.len() {
+                let chunk = mem::take(&mut self.chunk);
+                let put = record(&chunk, self.chunk_at).and_then(|(kind, body, next)| {
+                    self.chunk_at = next;
+                    self.put(kind, body)
+                });
+                self.chunk = chunk;
+                let start = self.chunk_start;
+                if let Some(message) =
+                    put.map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?
+                {
+                    return Ok(Some(message));
+                }
+            }
+            let start = self.file.at();
+            if self.file.left() == 0 {
+                return Err(self.file.error(
+                    "is cut off: it has no end, as of a recording that was stopped by force; what is whole before it counts",
+                ));
+            }
+            let head = self.file.take(HEAD)?;
+            let (kind, length) = (head[0], number(&head[1..]));
+            match kind {
+                op::DATA_END | op::FOOTER => return Ok(None),
+                op::CHUNK => {
+                    let body = self.file.take(length)?;
+                    let records = unpacked_chunk(&body);
+                    let records = records
+                        .map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?;
+                    (self.chunk, self.chunk_at, self.chunk_start) = (records, 0, start);
+                }
+                op::SCHEMA | op::CHANNEL | op::MESSAGE => {
+                    let body = self.file.take(length)?;
+                    let put = self.put(kind, &body);
+                    if let Some(message) = put.map_err(|reason| self.file.error(reason))? {
+                        return Ok(Some(message));
+                    }
+                }
+                _ => self.file.skip(length)?,
+            }
+        }
+    }
+}
+
+impl Iterator for Mcap {
+    type Item = Result<Message>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let message: Result<Option<Message>, Error> = self.message();
+        self.ended = !matches!(message, Ok(Some(_)));
+        message.transpose()
+    }
+}
+
+/// The records of a chunk, whose body this is.
+fn unpacked_chunk(body: &[u8]) -> Result<Vec<u8>, Reason> {
+    let (header, data) = match parse_record(op::CHUNK, body) {
+        Ok(Record::Chunk { header, data }) => (header, data),
+        Ok(_) => return Err("is damaged".into()),
+        Err(error) => return Err(format!("is damaged: {}", first_line(&error.to_string())).into()),
+    };
+    let records = unpacked(&data, &header.compression, header.uncompressed_size)?;
+    // 0 is none.
+    if header.uncompressed_crc != 0 && crc32fast::hash(&records) != header.uncompressed_crc {
+        return Err("is damaged: its checksum does not agree".into());
+    }
+    Ok(records)
+}
+
+/// The record at byte `at`: its kind, its body, and where the next one begins.
+fn record(bytes: &[u8], at: usize) -> Result<(u8, &[u8], usize), Reason> {
+    let ends = || Reason::from("ends in the middle of a record");
+    let (head, rest) = bytes[at..].split_at_checked(HEAD as usize).ok_or_else(ends)?;
+    let length = usize::try_from(number(&head[1..])).map_err(|_| ends())?;
+    let body = rest.get(..length).ok_or_else(ends)?;
+    Ok((head[0], body, at + HEAD as usize + length))
+}
+
+fn number(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |all, byte| all << 8 | u64::from(*byte))
+}
+
+/// Those of the parser go on for many lines.
+fn first_line(text: &str) -> &str {
+    text.lines()
+        .map(str::trim)
+        .find(|line| line.chars().any(char::is_alphabetic))
+        .unwrap_or("it cannot be read")
+}
