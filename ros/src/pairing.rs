@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use crate::messages::Stamp;
 
 /// Most images of a camera that wait for their partners, or for older ones that come later.
-const WAITING: usize = 64;
+const WAITING: usize = 32;
 /// Most bytes of all that wait, unless a single image has more.
-const BYTES: usize = 256 << 20;
+const BYTES: usize = 128 << 20;
 
 /// How many images gave no pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

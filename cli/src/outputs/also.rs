@@ -18,6 +18,7 @@ use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::files::Written;
 use crate::outputs::limits::Limits;
+use crate::outputs::recording::Content;
 use crate::text::plural;
 
 /// An output beside the disparity map.
@@ -282,6 +283,41 @@ impl AlsoArgs {
             )),
             None => Ok(()),
         }
+    }
+
+    /// Refuses outputs that are no message of a recording.
+    pub(crate) fn check_recording(&self) -> Result<()> {
+        self.check(false)?;
+        let is_message = |also: &&Also| match also.kind {
+            Kind::Depth | Kind::Millimetres | Kind::Bytes(_) => true,
+            Kind::Points(frame) => frame == Frame::Matched && also.word == also.stem(),
+            Kind::Disparity(..) | Kind::Picture { .. } => false,
+        };
+        match self.wanted().find(|also| !is_message(also)) {
+            Some(also) => Err(Failure::usage(
+                also.flag(),
+                "is no message of a recording, which takes depth, depth-mm, points, confidence and validity; give the name of a folder \
+                 as OUTPUT",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// The wanted outputs for a recording.
+    pub(crate) fn contents(&self, outcome: &Outcome) -> Vec<Content> {
+        let &Outcome { maps, left, rig, .. } = outcome;
+        let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
+        let content = |also: &Also| match also.kind {
+            Kind::Bytes(map) => Some(Content::Bytes(also.word, map(maps).clone())),
+            Kind::Depth => rig.map(|rig| Content::Depth(rig.depths(&near(&rig)))),
+            Kind::Millimetres => rig.and_then(|rig| rig.millimetres(&near(&rig)).map(Content::Millimetres)),
+            Kind::Points(_) => {
+                let (rig, left) = rig.zip(left)?;
+                Some(Content::Points(rig.cloud(&self.limits.trusted(maps, &rig), left)))
+            }
+            Kind::Disparity(..) | Kind::Picture { .. } => None,
+        };
+        self.wanted().filter_map(content).collect()
     }
 
     /// Writes `also` to `path`. Returns what there is to say of it.

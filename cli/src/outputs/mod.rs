@@ -6,6 +6,7 @@ pub(crate) mod files;
 mod film;
 mod limits;
 mod record;
+mod recording;
 mod staged;
 
 pub(crate) use also::{Also, AlsoArgs, Format, MapArgs, Outcome, View};
@@ -14,4 +15,5 @@ pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;
 pub(crate) use limits::Limits;
 pub(crate) use record::{Files, MatchRecord, stage_and_level};
+pub(crate) use recording::{Cameras, RecordedMaps};
 pub(crate) use staged::StagedFolder;

@@ -42,6 +42,37 @@ pub(crate) struct PairArgs {
     pub(crate) reading: ReadingArgs,
 }
 
+/// A calibration: its files, or texts that stand in for them, each with a name.
+#[derive(Clone, Copy)]
+pub(crate) enum Calib<'a> {
+    Files(&'a [PathBuf]),
+    Texts(&'a [(PathBuf, String)]),
+}
+
+impl Calib<'_> {
+    fn is_empty(self) -> bool {
+        self.names().is_empty()
+    }
+
+    /// What messages call it.
+    fn names(self) -> Vec<PathBuf> {
+        match self {
+            Self::Files(files) => files.to_vec(),
+            Self::Texts(texts) => texts.iter().map(|(name, _)| name.clone()).collect(),
+        }
+    }
+
+    fn read(self) -> mrfgs::Result<StereoCalibration> {
+        match self {
+            Self::Files(files) => calibration::read(files),
+            Self::Texts(texts) => {
+                let texts: Vec<_> = texts.iter().map(|(name, text)| (name.as_path(), text.clone())).collect();
+                calibration::of_texts(&texts)
+            }
+        }
+    }
+}
+
 /// A pair, read.
 pub(crate) struct Input {
     pub(crate) pair: Pair,
@@ -97,7 +128,7 @@ impl PairArgs {
             return Input::rectified_alone(pair, by, &self.search, sign);
         }
         let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
-        Input::new(pair, &self.search, sign, &self.calib, numbers, rectify, beside)
+        Input::new(pair, &self.search, sign, Calib::Files(&self.calib), numbers, rectify, beside)
     }
 
     /// The paths for a record.
@@ -123,27 +154,28 @@ impl PairArgs {
 }
 
 impl Input {
-    /// `pair` with what the user says of it: the range to `search`, counted by `sign`, the files `calib` or the `numbers` of the
+    /// `pair` with what the user says of it: the range to `search`, counted by `sign`, the `calib` or the `numbers` of the
     /// cameras, and with `rectify` that it is as the cameras took it. Without both the calibration is that `beside` a left image,
     /// where it is given.
     pub(crate) fn new(
         mut pair: Pair,
         search: &Search,
         sign: Sign,
-        calib: &[PathBuf],
+        calib: Calib,
         numbers: Option<&CameraArgs>,
         rectify: Option<&Options>,
         beside: Option<&Path>,
     ) -> Result<Self> {
         let mut rectification = None;
-        let files = calib.to_vec();
+        let files = calib.names();
         let calibration = if let Some(options) = rectify {
             let by;
-            (by, pair) = self::rectify(&calibration::read(calib)?, calib, &pair, options)?;
+            (by, pair) = self::rectify(&calib.read()?, &files, &pair, options)?;
             let calibration = rectification.insert(by).calibration()?;
             Some(Known { files, calibration })
         } else if !calib.is_empty() {
-            Some(Known { files, calibration: of_rectified_images(calib, pair.size())? })
+            let calibration = of_rectified(&calib.read()?, &files, pair.size())?;
+            Some(Known { files, calibration })
         } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
             Some(Known { files, calibration })
         } else if let Some(left) = beside {
@@ -181,6 +213,11 @@ impl Input {
     pub(crate) fn region(&self, part: &Rect) -> Result<Region> {
         let region = Region::new(part.clone(), self.pair.size(), self.range);
         region.map_err(|e| Failure::usage("--roi", e))
+    }
+
+    /// The calibration of the rectified pair.
+    pub(crate) fn calibration(&self) -> Option<&Calibration> {
+        self.calibration.as_ref().map(|known| &known.calibration)
     }
 
     /// The unit of depths, for people, where there is a calibration.
@@ -296,8 +333,12 @@ pub(crate) fn unit(unit: Unit, file: Option<&Path>) -> String {
 
 /// What the calibration in `files` says of images that are rectified and of this `size`.
 pub(crate) fn of_rectified_images(files: &[PathBuf], size: (usize, usize)) -> Result<Calibration> {
+    of_rectified(&calibration::read(files)?, files, size)
+}
+
+/// What the calibration `known`, of these `files`, says of images that are rectified and of this `size`.
+fn of_rectified(known: &StereoCalibration, files: &[PathBuf], size: (usize, usize)) -> Result<Calibration> {
     let named = |reason: &str| Error::read(shown(files), reason);
-    let known = calibration::read(files)?;
     let calibration =
         known.of_rectified_images(Some(size)).map_err(|e| failure::in_file(e, shown(files).as_ref(), ""))?;
     Ok(calibration.ok_or_else(|| {

@@ -1,7 +1,8 @@
-//! Sequences of pairs: numbered images, and streams of frames.
+//! Sequences of pairs: numbered images, streams of frames, and recordings.
 
 mod files;
 mod pairing;
+mod recorded;
 mod stream;
 
 use std::collections::VecDeque;
@@ -13,8 +14,10 @@ use mrfgs::image::raster::Raster;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Plane, Rect};
 use mrfgs::{Error, Result};
+use mrfgs_ros::messages::Header;
 
 pub(crate) use pairing::Pairing;
+pub(crate) use recorded::Recorded;
 use stream::Stream;
 pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
 
@@ -87,17 +90,28 @@ impl Source {
 
 /// Both views at one time.
 pub(crate) struct Frame {
-    /// The stem of the file of the left view, or the number of the frame, from 000000 on.
+    /// The stem of the file of the left view, the time of a recorded one in seconds, or the number of the frame, from 000000 on.
     pub(crate) name: String,
+    /// Time and camera of a recorded left view.
+    pub(crate) header: Option<Header>,
     pub(crate) pair: Pair,
+}
+
+/// The sources of both views.
+#[allow(clippy::large_enum_variant, reason = "there is one of it")]
+enum Views {
+    /// One for each view; without the right one, frames hold both.
+    Sources {
+        left: Source,
+        right: Option<Source>,
+        layout: Layout,
+    },
+    Recorded(Recorded),
 }
 
 /// The frames of a sequence, in order.
 pub(crate) struct Frames {
-    left: Source,
-    /// `None` where the frames of `left` hold both views.
-    right: Option<Source>,
-    layout: Layout,
+    views: Views,
     /// How many came so far.
     count: usize,
     /// Where the left view of every frame is ignored.
@@ -108,8 +122,15 @@ pub(crate) struct Frames {
     names: [String; 2],
 }
 
-/// Both views of one time, and the name of the left one.
-type Rasters = (Option<String>, [Raster<'static>; 2]);
+/// What is known of the left view.
+#[derive(Default)]
+struct About {
+    name: Option<String>,
+    header: Option<Header>,
+}
+
+/// Both views of one time.
+type Rasters = (About, [Raster<'static>; 2]);
 
 impl Frames {
     /// The frames of two sources, or of one with both views in each frame.
@@ -135,12 +156,28 @@ impl Frames {
             let pairs = pairing::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
             [*l, *r] = pairs.map(Into::into);
         }
-        Ok(Self { left, right, layout, count: 0, mask: None, size: None, names })
+        Ok(Self { views: Views::Sources { left, right, layout }, count: 0, mask: None, size: None, names })
+    }
+
+    /// The frames of a recording.
+    pub(crate) fn of_recording(recorded: Recorded) -> Self {
+        let name = recorded.path().display().to_string();
+        let views = Views::Recorded(recorded);
+        Self { views, count: 0, mask: None, size: None, names: [name.clone(), name] }
+    }
+
+    /// The sources where frames come from files and streams, left and right.
+    fn sources(&self) -> impl Iterator<Item = &Source> {
+        let (left, right) = match &self.views {
+            Views::Sources { left, right, .. } => (Some(left), right.as_ref()),
+            Views::Recorded(_) => (None, None),
+        };
+        left.into_iter().chain(right)
     }
 
     /// How many there are, where that is known.
     pub(crate) fn len(&self) -> Option<usize> {
-        match &self.left {
+        match self.sources().next()? {
             Source::Files { left, .. } => Some(left.len() + self.count),
             Source::Stream(_) => None,
         }
@@ -148,7 +185,7 @@ impl Frames {
 
     /// How many frames a second the left source has, where it says so.
     pub(crate) fn rate(&self) -> Option<FrameRate> {
-        match &self.left {
+        match self.sources().next()? {
             Source::Files { .. } => None,
             Source::Stream(stream) => stream.rate(),
         }
@@ -156,17 +193,17 @@ impl Frames {
 
     /// Whether they are images of two cameras.
     pub(crate) fn are_images_of_two(&self) -> bool {
-        self.right.is_some() && !self.have_stream()
+        self.sources().count() == 2 && !self.have_stream()
     }
 
     /// Whether a stream is among the sources.
     pub(crate) fn have_stream(&self) -> bool {
-        std::iter::once(&self.left).chain(&self.right).any(|source| matches!(source, Source::Stream(_)))
+        self.sources().any(|source| matches!(source, Source::Stream(_)))
     }
 
     /// The first image of the left camera, where frames are images.
     pub(crate) fn first_image(&self) -> Option<&Path> {
-        match &self.left {
+        match self.sources().next()? {
             Source::Files { left, .. } => left.front().map(PathBuf::as_path),
             Source::Stream(_) => None,
         }
@@ -174,7 +211,7 @@ impl Frames {
 
     /// The films that ffmpeg decodes.
     pub(crate) fn films(&self) -> impl Iterator<Item = &Path> {
-        std::iter::once(&self.left).chain(&self.right).filter_map(|source| match source {
+        self.sources().filter_map(|source| match source {
             Source::Files { .. } => None,
             Source::Stream(stream) => stream.film(),
         })
@@ -188,18 +225,31 @@ impl Frames {
 
     /// The files that are read, none of which an output may overwrite.
     pub(crate) fn files(&self) -> Vec<&Path> {
-        std::iter::once(&self.left).chain(&self.right).flat_map(Source::files).collect()
+        match &self.views {
+            Views::Sources { .. } => self.sources().flat_map(Source::files).collect(),
+            Views::Recorded(recorded) => recorded.files().collect(),
+        }
     }
 
     fn rasters(&mut self) -> Option<Result<Rasters>> {
-        let Some(right) = &mut self.right else {
-            return Some(self.left.next()?.and_then(|(name, frame)| {
-                let split = self.layout.split(&frame);
-                let views = split.map_err(|e| named(e, name.as_ref().unwrap_or(&self.names[0])))?;
-                Ok((name, views))
-            }));
+        let of = |name| About { name, header: None };
+        let (left, right) = match &mut self.views {
+            Views::Recorded(recorded) => {
+                return Some(recorded.next()?.map(|(header, views)| {
+                    let name = Some(header.stamp.to_string());
+                    (About { name, header: Some(header) }, views)
+                }));
+            }
+            Views::Sources { left, right: None, layout } => {
+                return Some(left.next()?.and_then(|(name, frame)| {
+                    let split = layout.split(&frame);
+                    let views = split.map_err(|e| named(e, name.as_ref().unwrap_or(&self.names[0])))?;
+                    Ok((of(name), views))
+                }));
+            }
+            Views::Sources { left, right: Some(right), .. } => (left, right),
         };
-        let (l, r) = rayon::join(|| self.left.next(), || right.next());
+        let (l, r) = rayon::join(|| left.next(), || right.next());
         let ended = |which: usize| {
             let (one, other) = (&self.names[which], &self.names[1 - which]);
             Error::Mismatch(format!("{one} ends here and {other} goes on"))
@@ -209,11 +259,11 @@ impl Frames {
             (Some(Err(e)), _) | (_, Some(Err(e))) => Some(Err(e)),
             (None, Some(_)) => Some(Err(ended(0))),
             (Some(_), None) => Some(Err(ended(1))),
-            (Some(Ok((name, l))), Some(Ok((_, r)))) => Some(Ok((name, [l, r]))),
+            (Some(Ok((name, l))), Some(Ok((_, r)))) => Some(Ok((of(name), [l, r]))),
         }
     }
 
-    fn frame(&mut self, (name, [left, right]): Rasters) -> Result<Frame> {
+    fn frame(&mut self, (About { name, header }, [left, right]): Rasters) -> Result<Frame> {
         let name = name.unwrap_or_else(|| format!("{:06}", self.count));
         let left = match &self.mask {
             Some(mask) => left.masked_by(mask.clone()).map_err(|e| named(e, &name))?,
@@ -226,7 +276,7 @@ impl Frames {
             return Err(Error::Mismatch(format!("frame {name} {reason}: all frames have one size")));
         }
         self.count += 1;
-        Ok(Frame { name, pair })
+        Ok(Frame { name, header, pair })
     }
 }
 

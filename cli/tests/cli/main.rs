@@ -22,6 +22,7 @@ mod matching;
 mod outputs;
 mod plugin;
 mod points;
+mod recordings;
 #[path = "../../../testdata/render-cloud.rs"]
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;

@@ -22,7 +22,9 @@ pub use write::Writer;
 
 /// The names that the files of recordings end with.
 const EXTENSIONS: [&str; 3] = ["mcap", "bag", "db3"];
-/// Beside the files of a recording in a folder.
+/// What the files of a recording in a folder end with.
+const PARTS: [&str; 4] = [".mcap", ".mcap.zstd", ".db3", ".db3.zstd"];
+/// Beside these.
 const METADATA: &str = "metadata.yaml";
 
 /// A recording: a file, or a folder with the files of one.
@@ -44,7 +46,11 @@ impl Recording {
     #[must_use]
     pub fn is(path: &Path) -> bool {
         if path.is_dir() {
-            return path.join(METADATA).is_file();
+            // Folders of images may have such a file, too.
+            let entries = fs::read_dir(path).into_iter().flatten().flatten();
+            let is_part = |name: &str| PARTS.iter().any(|end| name.to_ascii_lowercase().ends_with(end));
+            let has_parts = entries.into_iter().any(|entry| entry.file_name().to_str().is_some_and(is_part));
+            return has_parts && path.join(METADATA).is_file();
         }
         extension(path).is_some() || path.is_file() && format(path).is_ok_and(|format| format.is_some())
     }

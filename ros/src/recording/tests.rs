@@ -264,6 +264,7 @@ fn folders_have_their_files_in_order() {
     let folder = TempDir::new().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("metadata.yaml"), "").unwrap();
+    assert!(!Recording::is(folder.path()), "it may have images");
     let said = |words: &str| {
         let said = Recording::open(folder.path()).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");

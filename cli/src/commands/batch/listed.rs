@@ -166,8 +166,15 @@ impl Listed {
         }
         let left_image = at(&left);
         let beside = Some(&*left_image).filter(|_| given.cameras.is_some() || search.takes_calibration());
-        let input =
-            input::Input::new(pair, &search, Sign::default(), &calib, None, given.rectify.as_ref(), beside)?;
+        let input = input::Input::new(
+            pair,
+            &search,
+            Sign::default(),
+            input::Calib::Files(&calib),
+            None,
+            given.rectify.as_ref(),
+            beside,
+        )?;
         let rig = input.rig(given.cameras, &left_image)?;
         let calibration = match &self.source {
             Source::Row(row) if self.has_calibration() => Some(row.calibration.join(", ")),

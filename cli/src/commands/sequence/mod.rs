@@ -12,13 +12,14 @@ use mrfgs::region::Region;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
-    CameraArgs, ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, RegionArgs, Search, Sign,
+    CameraArgs, ExecutionArgs, MethodArgs, ReadingArgs, RecordingArgs, RectificationArgs, RegionArgs, Search,
+    Sign,
 };
 use crate::failure::{Failure, Result};
-use crate::outputs::{Files, MapArgs, files, is_printed};
+use crate::outputs::{Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
-use crate::pairs::input::Input;
-use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, raw_frames};
+use crate::pairs::input::{Calib, Input};
+use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
 use pipeline::Pipeline;
@@ -33,6 +34,9 @@ Examples:
   mrfgs sequence pairs depth.y4m --layout top-bottom --colours viridis
   # What ffmpeg -pix_fmt yuv444p -f yuv4mpegpipe sends, matched and played:
   mrfgs sequence - - --method fast --max-disparity 63 | ffplay -
+  # A recording of ROS, with the calibration in it:
+  mrfgs sequence drive.mcap maps --also depth-mm
+  mrfgs sequence drive.mcap found.mcap --also depth,points
   # Raw images and a calibration, to depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
@@ -44,10 +48,15 @@ Examples:
 /// that have the same number are a pair (--pairing). Without RIGHT each frame holds both views, as --layout says. All frames have
 /// one size.
 ///
+/// LEFT alone may also be a recording of ROS: an MCAP file, the folder of a bag of ROS 2 in MCAP, or a .bag of ROS 1. Its images are
+/// paired by the times in their headers, and frames are called by these. Images on topics such as `image_rect` are rectified, others are
+/// rectified by the `camera_info` beside them.
+///
 /// OUTPUT is a folder, or a film: NAME.y4m, - for such a film on standard output, and where ffmpeg is installed NAME.mp4, .mkv,
 /// .mov, .webm or .avi. A folder gets a map of each frame, named after
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
-/// with --also side-by-side, LEFT stands beside it.
+/// with --also side-by-side, LEFT stands beside it. NAME.mcap is a recording of ROS 2: disparities on /disparity, and with --also
+/// depth, depth-mm, points, confidence or validity these, with the times of the left images.
 ///
 /// Without --max-disparity the range is that of the calibration, or that of the first frame. While frames are matched, the next ones are
 /// read and rectified, and the last one is written. The CPU path matches as many at once as it has threads, as
@@ -60,7 +69,7 @@ pub(crate) struct Args {
     left: PathBuf,
     /// Frames of the right camera
     right: Option<PathBuf>,
-    /// Folder for the maps, or film to write: NAME.y4m, NAME.mp4 or -
+    /// Folder for the maps, film to write: NAME.y4m, NAME.mp4 or -, or recording to write: NAME.mcap
     #[arg(required = true)]
     output: PathBuf,
 
@@ -75,11 +84,13 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SIZE,FORMAT", value_parser = raw_frames)]
     raw_frames: Option<RawFrames>,
     #[command(flatten)]
+    recording: RecordingArgs,
+    #[command(flatten)]
     search: Search,
     #[command(flatten)]
     region: RegionArgs,
     /// Calibration: the range (ndisp of a calib.txt), and the cameras for depth and points; as `mrfgs match` takes it
-    /// [default: a calib.txt beside the left images]
+    /// [default: a calib.txt beside the left images, or what a recording says]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
     #[command(flatten)]
@@ -136,37 +147,68 @@ fn is_film(output: &Path) -> bool {
     is_printed(output) || is_y4m || ffmpeg::writes(output) && !output.is_dir()
 }
 
+/// Whether an output is a recording.
+fn is_recording(output: &Path) -> bool {
+    let is_mcap = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+    is_mcap && !output.is_dir()
+}
+
 pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();
-    let film = is_film(&args.output);
+    let (film, recording) = (is_film(&args.output), is_recording(&args.output));
+    check_flags(args)?;
     if film {
         args.maps.also.check_film()?;
-    } else {
-        args.maps.also.check(args.rectify)?;
+    } else if recording {
+        args.maps.also.check_recording()?;
+    }
+    stop::listen();
+    let recorded = open_recording(args)?;
+    let texts = recorded.as_ref().map(|recorded| calibration_of(recorded, args)).transpose()?.flatten();
+    // What a recording has not rectified is rectified by what it says of its cameras.
+    let rectify = args.rectify || texts.is_some() && recorded.as_ref().is_some_and(|one| !one.is_rectified());
+    if !film && !recording {
+        args.maps.also.check(rectify)?;
     }
     let method = args.maps.also.made_by(args.method.method()?)?;
-    let rectifying = args.rectification.options_if(args.rectify)?;
-    check_flags(args)?;
-    stop::listen();
-    let mut frames = open(args)?;
+    let rectifying = args.rectification.options_if(rectify)?;
+    let left_out = recorded.as_ref().map(Recorded::left_out);
+    let mut frames = match recorded {
+        Some(recorded) => masked(Frames::of_recording(recorded), args)?,
+        None => open(args)?,
+    };
     let first_image = frames.first_image().map(Path::to_owned);
     check_outputs(args, &frames, first_image.as_deref())?;
     let rate = frames.rate();
     // The first frame decides on the range and, for all that follow, on the size.
     let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
-    let Frame { name, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
+    let Frame { name, header, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
-    let beside = first_image.as_deref().filter(|_| cameras.is_some() || args.search.takes_calibration());
+    let beside =
+        first_image.as_deref().filter(|_| cameras.is_some() || recording || args.search.takes_calibration());
     let numbers = Some(&args.numbers);
-    let mut input = Input::new(pair, &args.search, sign, &args.calib, numbers, rectifying.as_ref(), beside)?;
+    let calib = texts.as_deref().map_or(Calib::Files(&args.calib), Calib::Texts);
+    let mut input = Input::new(pair, &args.search, sign, calib, numbers, rectifying.as_ref(), beside)?;
     if let Some(by) = &mut input.rectification {
         by.keep_places()?;
     }
     if !args.quiet {
         input.say_range(sign, " in the first frame");
     }
-    let mut rig = input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?;
+    // A recording also holds the cameras themselves, for which nothing needs to be asked.
+    let mut rig = if recording && cameras.is_none() {
+        None
+    } else {
+        input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?
+    };
+    if let (Some(word), Some(rig)) = (cameras.filter(|_| recording), &rig)
+        && rig.unit().millimetres().is_none()
+    {
+        let reason = "is in metres in a recording, and nothing says the unit of the baseline; add an entry `unit` to the calibration: mm, \
+                      cm or m, or give it with --baseline";
+        return Err(Failure::usage(word.flag(), reason));
+    }
     let part = args.region.roi.as_ref();
     let region = part.map(|part| input.region(part)).transpose()?;
     if let Some(part) = part {
@@ -183,14 +225,94 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
     let range = range_of_all(&mut matcher, &input, args)?;
     let rectifying = input.rectifying();
-    let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying };
+    let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying, rate };
     let records = args.json.as_deref().map(Records::new).transpose()?;
-    let mut sink = if film { writer.begin_film(rate, records)? } else { writer.begin_folder(records)? };
+    let mut sink = if film {
+        writer.begin_film(records)?
+    } else if recording {
+        let origin = part.map_or((0, 0), |part| (part.x.start, part.y.start));
+        let cameras = input.calibration().and_then(|calibration| Cameras::of(calibration, origin));
+        writer.begin_recording(cameras, records)?
+    } else {
+        writer.begin_folder(records)?
+    };
     let files = args.files(&input);
-    let (rectified, size) = (args.rectify, input.pair.size());
+    let (rectified, size) = (rectify, input.pair.size());
     let region = part.map(|part| Region::new(part.clone(), size, range)).transpose()?;
     let pipeline = Pipeline { matcher, range, region, files, rectified, quiet: args.quiet };
-    pipeline.run(Frame { name, pair: input.pair }, frames, input.rectification, &mut sink)
+    let first = Frame { name, header, pair: input.pair };
+    let ended = pipeline.run(first, frames, input.rectification, &mut sink);
+    if let Some(said) = left_out.and_then(|left_out| left_out.said()).filter(|_| !args.quiet) {
+        console::say(&said);
+    }
+    ended
+}
+
+/// The recording that LEFT is, if it is one.
+fn open_recording(args: &Args) -> Result<Option<Recorded>> {
+    let (left, reader) = (args.left.clone(), args.reading.reader());
+    let Args { recording, .. } = args;
+    let is_one = !is_printed(&left) && Recorded::is(&left);
+    if !is_one {
+        let flags =
+            [("--topics", recording.topics.is_some()), ("--tolerance", recording.tolerance.is_some())];
+        return match flags.into_iter().find(|(_, given)| *given) {
+            Some((flag, _)) => {
+                Err(Failure::usage(flag, "is for a recording, and LEFT is none; leave it out"))
+            }
+            None => Ok(None),
+        };
+    }
+    let reason = "a recording holds both views, on two topics; leave it out";
+    for (flag, given) in [
+        ("RIGHT", args.right.is_some()),
+        ("--layout", args.layout.is_some()),
+        ("--pairing", args.pairing.is_some()),
+        ("--raw-frames", args.raw_frames.is_some()),
+    ] {
+        if given {
+            return Err(Failure::usage(flag, reason));
+        }
+    }
+    let recording = recording.clone();
+    let opened = pipeline::patiently(move || Recorded::open(&left, &recording, reader))??;
+    Ok(Some(opened))
+}
+
+/// The calibration that a recording has, where the user gives none.
+fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBuf, String)>>> {
+    if !args.calib.is_empty() || args.numbers.flag().is_some() {
+        return Ok(None);
+    }
+    let found = recorded.calibration()?;
+    let (topic, beside) = recorded.left_topic();
+    if found.is_some() {
+        // Rectified images need no cameras for their disparities, whatever is wrong with these.
+        let takes_cameras = args.maps.also.take_cameras().is_some() || args.search.takes_cameras().is_some();
+        let counts = !recorded.is_rectified() || takes_cameras || is_recording(&args.output);
+        return Ok(found.filter(|_| counts));
+    }
+    let path = recorded.path().display();
+    if let Some(word) = args.maps.also.take_cameras() {
+        let reason = format!(
+            "takes the cameras, and {path} has no calibration of both on topics such as {beside}; give one with --calib, or --focal and \
+             --baseline"
+        );
+        return Err(Failure::usage(word.flag(), reason));
+    }
+    if recorded.is_raw() {
+        let reason = format!(
+            "{topic} is not rectified, and there is no calibration of both cameras on topics such as {beside}; give --rectify and both \
+             files with --calib, or if it is rectified, --calib or --focal and --baseline"
+        );
+        return Err(Error::read(recorded.path(), reason).into());
+    }
+    if !recorded.is_rectified() && !args.quiet {
+        console::say(&format!(
+            "{topic} counts as rectified, since there is no calibration of both cameras on topics such as {beside}"
+        ));
+    }
+    Ok(None)
 }
 
 /// The range for all frames: where sparse matches found it, a match of the first frame shows whether that is enough.
@@ -218,6 +340,10 @@ fn check_flags(args: &Args) -> Result<()> {
         let reason = "is that of maps in a folder, and OUTPUT is a film; leave it out, or give the name of a folder as OUTPUT";
         return Err(Failure::usage("--format", reason));
     }
+    if args.maps.format.is_some() && is_recording(&args.output) {
+        let reason = "is that of maps in a folder, and OUTPUT is a recording; leave it out, or give the name of a folder as OUTPUT";
+        return Err(Failure::usage("--format", reason));
+    }
     let extension = args.output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if OTHER_FILMS.contains(&extension.as_str()) && !args.output.is_dir() {
         let reason = format!(
@@ -242,9 +368,7 @@ fn open(args: &Args) -> Result<Frames> {
     let (raw, reader) = (args.raw_frames, args.reading.reader());
     let open = move || Frames::open(&left, right.as_deref(), pairing, layout, raw, reader);
     let mut frames = pipeline::patiently(open)??;
-    if let Some(mask) = &args.mask {
-        frames = frames.masked_by(args.reading.reader().mask(mask)?);
-    }
+    frames = masked(frames, args)?;
     if !args.quiet {
         frames.films().for_each(|film| console::say(&format!("ffmpeg decodes {}", film.display())));
     }
@@ -263,6 +387,14 @@ fn open(args: &Args) -> Result<Frames> {
     Ok(frames)
 }
 
+/// The frames, with the mask that the user gives.
+fn masked(frames: Frames, args: &Args) -> Result<Frames> {
+    match &args.mask {
+        Some(mask) => Ok(frames.masked_by(args.reading.reader().mask(mask)?)),
+        None => Ok(frames),
+    }
+}
+
 /// Refuses outputs that are an input, a terminal, or a file where it must be a folder.
 fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Result<()> {
     let output = args.output.as_path();
@@ -279,6 +411,9 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
             return Err(Failure::usage("--json", "`-` is the film already; give the name of a file"));
         }
         return Ok(console::check_takes_data()?);
+    }
+    if is_recording(output) {
+        return files::distinct(&named, &[("OUTPUT", output)]);
     }
     if is_film(output) {
         if ffmpeg::writes(output) {

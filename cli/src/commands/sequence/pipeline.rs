@@ -132,13 +132,16 @@ impl Pipeline {
             };
             // The receiver lives as long as this.
             let (part, window) = narrowed(frame.pair);
-            let _ = started.send((frame.name, part.georeferences(), takes.pair.then_some(part)));
+            let about = (frame.name, frame.header);
+            let _ = started.send((about, part.georeferences(), takes.pair.then_some(part)));
             Some((window, range))
         });
         let mut ran = Ran { on: None, note: None, ended: Ok(()) };
         let told = &mut ran;
         let ended = matcher.run_all_until(pairs, stop::flag(), move |mut matched| {
-            let Ok((name, georeferences, pair)) = under_way.try_recv() else { return ControlFlow::Break(()) };
+            let Ok(((name, header), georeferences, pair)) = under_way.try_recv() else {
+                return ControlFlow::Break(());
+            };
             let note = matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS));
             told.note = note.or(told.note.take());
             if let Some(region) = region {
@@ -151,7 +154,7 @@ impl Pipeline {
                 line(&name, &record)
             });
             told.on = Some(matched.ran_on);
-            match found.send(Found { name, georeferences, maps: matched.maps, pair, record }) {
+            match found.send(Found { name, header, georeferences, maps: matched.maps, pair, record }) {
                 Ok(()) => ControlFlow::Continue(()),
                 // It tells why.
                 Err(_) => ControlFlow::Break(()),

@@ -10,12 +10,16 @@ use mrfgs::depth::Rig;
 use mrfgs::image::{Georeference, Pair, write, write::Growing};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
+use mrfgs_ros::messages::{Header, SECOND, Stamp};
 
 use crate::args::Sign;
 use crate::console;
 use crate::failure::Result;
-use crate::outputs::{Film, MapArgs, Outcome, files, is_printed};
+use crate::outputs::{Cameras, Film, MapArgs, Outcome, RecordedMaps, files, is_printed};
 use crate::sequences::FrameRate;
+
+/// Frames a second where nothing says it.
+const RATE: FrameRate = (25, 1);
 
 /// What is written of every frame.
 pub(super) struct Writer<'a> {
@@ -25,11 +29,15 @@ pub(super) struct Writer<'a> {
     pub(super) rig: Option<Rig>,
     /// The rotation from the frame of the left camera to the rectified one, where frames are rectified.
     pub(super) rectifying: Option<Matrix>,
+    /// How many frames there are a second, where that is known.
+    pub(super) rate: Option<FrameRate>,
 }
 
 /// A frame that has been matched.
 pub(super) struct Found {
     pub(super) name: String,
+    /// Time and camera, where it was recorded.
+    pub(super) header: Option<Header>,
     pub(super) maps: Maps,
     /// Those of both views.
     pub(super) georeferences: [Option<Georeference>; 2],
@@ -72,24 +80,51 @@ impl Records {
     }
 }
 
-/// The folder or the film, with what is in it so far.
+/// Where the maps go.
+#[allow(clippy::large_enum_variant, reason = "there is one of it")]
+enum To {
+    Folder,
+    Film(Film),
+    Recording(RecordedMaps),
+}
+
+/// The output, with what is in it so far.
 pub(super) struct Sink<'a> {
     writer: Writer<'a>,
-    film: Option<Film>,
+    to: To,
+    /// How many frames it has.
+    count: usize,
     records: Option<Records>,
 }
 
 impl<'a> Writer<'a> {
-    /// Begins a film of `rate` frames a second.
+    fn begin(self, to: To, records: Option<Records>) -> Sink<'a> {
+        Sink { writer: self, to, count: 0, records }
+    }
+
+    /// Begins a film.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub(super) fn begin_film(self, rate: Option<FrameRate>, records: Option<Records>) -> Result<Sink<'a>> {
+    pub(super) fn begin_film(self, records: Option<Records>) -> Result<Sink<'a>> {
         if !is_printed(self.output) {
             write::check_path(self.output)?;
         }
-        let film = Some(Film::new(self.output, rate));
-        Ok(Sink { writer: self, film, records })
+        let film = To::Film(Film::new(self.output, self.rate));
+        Ok(self.begin(film, records))
+    }
+
+    /// Begins a recording of maps that these `cameras` have, where they are known.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub(super) fn begin_recording(
+        self,
+        cameras: Option<Cameras>,
+        records: Option<Records>,
+    ) -> Result<Sink<'a>> {
+        let recording = To::Recording(RecordedMaps::new(self.output, self.range, cameras)?);
+        Ok(self.begin(recording, records))
     }
 
     /// Begins a folder, which may be there.
@@ -103,7 +138,7 @@ impl<'a> Writer<'a> {
             let _ = fs::remove_dir(self.output);
         }
         checked?;
-        Ok(Sink { writer: self, film: None, records })
+        Ok(self.begin(To::Folder, records))
     }
 }
 
@@ -120,24 +155,74 @@ impl Sink<'_> {
 
     /// Writes a frame.
     pub(super) fn add(&mut self, found: &Found) -> Result<()> {
-        let Writer { output, wanted, range, rig, rectifying } = self.writer;
+        let Writer { output, wanted, range, rig, rectifying, rate } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
         let georeferences = found.georeferences.clone();
         let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, rectifying, georeferences };
-        match &mut self.film {
-            Some(film) => film.add(&wanted.also.film_picture(&outcome))?,
-            None => wanted.write(output, &found.name, &outcome)?,
+        match &mut self.to {
+            To::Folder => wanted.write(output, &found.name, &outcome)?,
+            To::Film(film) => film.add(&wanted.also.film_picture(&outcome))?,
+            To::Recording(recording) => {
+                let header = found.header.clone().unwrap_or_else(|| header(&found.name, self.count, rate));
+                let map = outcome.final_map(wanted.also.limits);
+                recording.add(&header, &map, wanted.also.contents(&outcome))?;
+            }
         }
+        self.count += 1;
         match (&mut self.records, &found.record) {
             (Some(records), Some(record)) => records.add(record),
             _ => Ok(()),
         }
     }
 
-    /// Ends film and records.
+    /// Ends film or recording, and records.
     pub(super) fn finish(&mut self) -> Result<()> {
-        let film = self.film.take().map_or(Ok(()), Film::finish);
+        let ended = match std::mem::replace(&mut self.to, To::Folder) {
+            To::Folder => Ok(()),
+            To::Film(film) => film.finish(),
+            To::Recording(recording) => recording.finish(),
+        };
         self.records.take().map_or(Ok(()), Records::finish)?;
-        Ok(film?)
+        Ok(ended?)
+    }
+}
+
+/// What a frame that was not recorded has in the place of its header: the time in its name, or that of its number.
+fn header(name: &str, count: usize, rate: Option<FrameRate>) -> Header {
+    let (frames, seconds) = rate.unwrap_or(RATE);
+    let of_number = || Stamp((count as i128 * i128::from(SECOND) * seconds as i128 / frames as i128) as i64);
+    Header { stamp: time_in(name).unwrap_or_else(of_number), frame_id: "left".into() }
+}
+
+/// The time that a name is: seconds with decimals, or nanoseconds.
+fn time_in(name: &str) -> Option<Stamp> {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    match name.split_once('.') {
+        Some((seconds, decimals)) if is_number(seconds) && is_number(decimals) && decimals.len() <= 9 => {
+            let nanoseconds = format!("{decimals:0<9}").parse::<i64>().ok()?;
+            Some(Stamp(seconds.parse::<i64>().ok()?.checked_mul(SECOND)?.checked_add(nanoseconds)?))
+        }
+        None if is_number(name) && name.len() == 19 => name.parse().ok().map(Stamp),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_without_a_header_have_a_time() {
+        for (name, count, time) in [
+            ("1699999999.123456789", 7, 1_699_999_999_123_456_789),
+            ("1305031102.175304", 7, 1_305_031_102_175_304_000),
+            ("1403636579763555584", 7, 1_403_636_579_763_555_584),
+            ("000007", 7, 280_000_000),
+            ("frame.7", 1, 40_000_000),
+            ("99999999999999999999.5", 0, 0),
+        ] {
+            assert_eq!(header(name, count, None).stamp, Stamp(time), "{name}");
+        }
+        assert_eq!(header("a", 3, Some((30_000, 1001))).stamp, Stamp(100_100_000));
     }
 }

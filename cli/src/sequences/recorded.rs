@@ -1,0 +1,265 @@
+//! Pairs out of a recording of ROS.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use mrfgs::image::raster::Raster;
+use mrfgs::image::read::Reader;
+use mrfgs::{Error, Result};
+use mrfgs_ros::messages::{CameraInfo, CompressedImage, Header, Image, Stamp};
+use mrfgs_ros::pairing::{Pairing, Tally};
+use mrfgs_ros::pixels;
+use mrfgs_ros::recording::{Message, Recording};
+use mrfgs_ros::topics::{self, Topic};
+
+use crate::args::{RecordingArgs, Topics};
+use crate::text::plural;
+
+/// The pairs of a recording.
+pub(crate) struct Recorded {
+    images: Images,
+    files: Vec<PathBuf>,
+    /// The calibration of both cameras with the names of its topics, where it is there.
+    cameras: Option<[(String, CameraInfo); 2]>,
+    messages: Box<dyn Iterator<Item = Result<Message>> + Send>,
+    pairing: Pairing<Message>,
+    /// Why the messages ended.
+    error: Option<Error>,
+    ended: bool,
+    /// How many pairs came so far, and the time of the first image of each camera.
+    count: usize,
+    first: [Option<Stamp>; 2],
+    /// Whether an image of time 0 came of each camera.
+    has_zero: [bool; 2],
+    left_out: LeftOut,
+}
+
+/// Where messages are from, and how they become images.
+struct Images {
+    path: PathBuf,
+    topics: [Topic; 2],
+    reader: Reader,
+}
+
+/// What gave no pair, while and after the pairs are read.
+#[derive(Clone, Default)]
+pub(crate) struct LeftOut(Arc<Mutex<Tally>>);
+
+/// Both views of one time, and the header of the left one.
+pub(super) type Views = (Header, [Raster<'static>; 2]);
+
+impl Recorded {
+    /// Whether `path` is a recording, by its name or its first bytes.
+    pub(crate) fn is(path: &Path) -> bool {
+        Recording::is(path)
+    }
+
+    /// Opens the recording `path`.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or has no two topics of images that are a pair.
+    pub(crate) fn open(path: &Path, args: &RecordingArgs, reader: Reader) -> Result<Self> {
+        let recording = Recording::open(path)?;
+        let all = recording.topics();
+        let chosen = match &args.topics {
+            Some(Topics([left, right])) => {
+                topics::named(all, left).and_then(|l| Ok([l, topics::named(all, right)?]))
+            }
+            None => topics::pair(all, "--topics"),
+        };
+        let chosen = chosen.map_err(|reason| Error::read(path, reason))?.map(Topic::clone);
+        let names = chosen.each_ref().map(|topic| topic.name.as_str());
+        Ok(Self {
+            files: recording.files().map(Path::to_owned).collect(),
+            cameras: cameras(&recording, &chosen)?,
+            messages: Box::new(recording.messages(&names)),
+            pairing: Pairing::new(args.tolerance.unwrap_or(0)),
+            error: None,
+            ended: false,
+            count: 0,
+            first: [None; 2],
+            has_zero: [false; 2],
+            left_out: LeftOut::default(),
+            images: Images { path: path.to_owned(), topics: chosen, reader },
+        })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.images.path
+    }
+
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(PathBuf::as_path)
+    }
+
+    /// What gave no pair so far.
+    pub(crate) fn left_out(&self) -> LeftOut {
+        self.left_out.clone()
+    }
+
+    /// Whether the images are rectified, by the names of their topics.
+    pub(crate) fn is_rectified(&self) -> bool {
+        self.images.topics.iter().all(Topic::is_rectified)
+    }
+
+    /// Whether the topics say that the images are not rectified.
+    pub(crate) fn is_raw(&self) -> bool {
+        self.images.topics.iter().any(Topic::is_raw)
+    }
+
+    /// The topic of the left images, and where its calibration would be.
+    pub(crate) fn left_topic(&self) -> (&str, String) {
+        let beside = self.images.topics[0].camera_infos().pop().unwrap_or_default();
+        (&self.images.topics[0].name, beside)
+    }
+
+    /// The calibration that the recording has of both cameras: a text for each, with its name.
+    ///
+    /// # Errors
+    /// Where the cameras are exchanged.
+    pub(crate) fn calibration(&self) -> Result<Option<Vec<(PathBuf, String)>>> {
+        let Some(cameras) = &self.cameras else { return Ok(None) };
+        let [left, right] = cameras.each_ref().map(|(_, camera)| camera.p[3]);
+        if left != 0.0 && right == 0.0 {
+            let [left, right] = self.images.topics.each_ref().map(|topic| topic.name.as_str());
+            let reason =
+                format!("by its calibration {left} is the right camera; give --topics {right},{left}");
+            return Err(Error::read(&self.images.path, reason));
+        }
+        let texts = cameras.iter().map(|(topic, camera)| {
+            let name = format!("{}:{topic}", self.images.path.display());
+            let camera = if self.is_rectified() { &camera.of_rectified() } else { camera };
+            (PathBuf::from(name), camera.text())
+        });
+        Ok(Some(texts.collect()))
+    }
+
+    /// The next pair; `None` after the last one.
+    pub(super) fn next(&mut self) -> Option<Result<Views>> {
+        loop {
+            let pair = self.pairing.next(self.ended);
+            *self.left_out.0.lock().unwrap_or_else(PoisonError::into_inner) = self.pairing.tally();
+            if let Some([(_, left), (_, right)]) = pair {
+                self.count += 1;
+                let images = &self.images;
+                let (l, r) = rayon::join(|| images.view(&left), || images.view(&right));
+                let header = header(&left).map_err(|reason| images.at(&left, reason));
+                return Some(header.and_then(|header| Ok((header, [l?, r?]))));
+            }
+            if self.ended {
+                let error = self.error.take();
+                return error.or_else(|| (self.count == 0).then(|| self.without_pairs())).map(Err);
+            }
+            match self.messages.next().map(|message| message.and_then(|message| self.add(message))) {
+                Some(Ok(())) => {}
+                Some(Err(error)) => (self.ended, self.error) = (true, Some(error)),
+                None => self.ended = true,
+            }
+        }
+    }
+
+    fn add(&mut self, message: Message) -> Result<()> {
+        let (side, bytes) = (message.topic, message.data.len());
+        let Header { stamp, .. } = header(&message).map_err(|reason| self.images.at(&message, reason))?;
+        self.first[side].get_or_insert(stamp);
+        if stamp.0 == 0 && std::mem::replace(&mut self.has_zero[side], true) {
+            return Err(self
+                .images
+                .at(&message, "has no time in its headers, and images are paired by these"));
+        }
+        self.pairing.add(side, stamp, message, bytes);
+        Ok(())
+    }
+
+    /// Why there is no pair at all.
+    fn without_pairs(&self) -> Error {
+        let [l, r] = self.images.topics.each_ref().map(|topic| topic.name.as_str());
+        let reason = match self.first {
+            [Some(left), Some(right)] => format!(
+                "no image of {l} has the time of one of {r}: the first ones are of {left} and {right}; give --tolerance SECONDS if the \
+                 cameras are not triggered together"
+            ),
+            [None, _] => format!("has no image on {l}"),
+            [_, None] => format!("has no image on {r}"),
+        };
+        Error::read(&self.images.path, reason)
+    }
+}
+
+impl Images {
+    /// An error of a message.
+    fn at(&self, message: &Message, reason: impl Into<mrfgs::error::Reason>) -> Error {
+        Error::read(self.name_of(message), reason.into())
+    }
+
+    /// What errors call a message: file, topic and time.
+    fn name_of(&self, message: &Message) -> PathBuf {
+        let time = header(message).map(|header| format!(" at {}", header.stamp)).unwrap_or_default();
+        format!("{}:{}{time}", self.path.display(), self.topics[message.topic].name).into()
+    }
+
+    fn view(&self, message: &Message) -> Result<Raster<'static>> {
+        let name = self.name_of(message);
+        let error = |reason| Error::read(&name, reason);
+        if self.topics[message.topic].is_compressed() {
+            let image = CompressedImage::decode(&message.data, message.encoding).map_err(error)?;
+            return pixels::compressed(&image, self.reader, &name);
+        }
+        let image = Image::decode(&message.data, message.encoding).map_err(error)?;
+        let raster = pixels::image(&image, self.reader.max_pixels).map_err(error)?;
+        match self.reader.no_data {
+            Some(value) => raster.without(value),
+            None => Ok(raster),
+        }
+    }
+}
+
+impl LeftOut {
+    /// In words, where there is something to say.
+    pub(crate) fn said(&self) -> Option<String> {
+        let Tally { alone: [left, right], repeated, late } =
+            *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut said = Vec::new();
+        if left + right > 0 {
+            said.push(format!("{left} left and {right} right image{} had no partner", plural(right)));
+        }
+        if repeated > 0 {
+            said.push(format!("{repeated} image{} had the time of another one", plural(repeated)));
+        }
+        if late > 0 {
+            said.push(format!(
+                "{late} image{} came too late in the recording to be put in order",
+                plural(late)
+            ));
+        }
+        (!said.is_empty()).then(|| said.join(", "))
+    }
+}
+
+fn header(message: &Message) -> mrfgs_ros::messages::Result<Header> {
+    Header::of(&message.data, message.encoding)
+}
+
+/// The first calibration of each camera; `None` where one is missing, or says that there is none.
+fn cameras(recording: &Recording, chosen: &[Topic; 2]) -> Result<Option<[(String, CameraInfo); 2]>> {
+    let infos = chosen.each_ref().map(|topic| topics::camera_info(recording.topics(), topic));
+    let [Some(left), Some(right)] = infos else { return Ok(None) };
+    let mut found: [Option<CameraInfo>; 2] = [None, None];
+    // Damage in the recording is told with the image that it hits.
+    for message in recording.messages(&[&left.name, &right.name]).map_while(Result::ok) {
+        let name = format!("{}:{}", recording.path().display(), [left, right][message.topic].name);
+        let camera = CameraInfo::decode(&message.data, message.encoding);
+        found[message.topic].get_or_insert(camera.map_err(|reason| Error::read(name, reason))?);
+        if found.iter().all(Option::is_some) {
+            break;
+        }
+    }
+    let [l, r] = found;
+    let found = l.zip(r).map(|(l, r)| [(left.name.clone(), l), (right.name.clone(), r)]);
+    // Of what is rectified already the projection counts alone.
+    let is_rectified = chosen.iter().all(Topic::is_rectified);
+    let is_known = |(_, camera): &(String, CameraInfo)| {
+        if is_rectified { camera.p[0] != 0.0 } else { camera.is_calibrated() }
+    };
+    Ok(found.filter(|all| all.iter().all(is_known)))
+}

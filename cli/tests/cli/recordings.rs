@@ -1,0 +1,425 @@
+//! `mrfgs sequence` of recordings: the maps are those of `match`, and what is written holds them. The messages are laid out and taken
+//! apart here by hand.
+
+use std::io::Read;
+
+use mcap::records::MessageHeader;
+
+use super::*;
+
+const SIZE: (u32, u32) = (64, 48);
+const SCENES: [&str; 3] = ["slanted", "thin", "repetitive"];
+const RANGE: &str = "--max-disparity 23 --device cpu";
+const START: u64 = 1_700_000_000_000_000_000;
+/// Nanoseconds between two frames.
+const STEP: u64 = 50_000_000;
+
+fn frame(scene_name: &str, view: usize) -> image::RgbImage {
+    let image = image::open(scene(scene_name).join(format!("im{view}.png"))).unwrap();
+    image.crop_imm(90, 70, SIZE.0, SIZE.1).to_rgb8()
+}
+
+/// A message as ROS 2 lays it out; each number stands at a multiple of its size.
+struct Bytes(Vec<u8>);
+
+impl Bytes {
+    fn with_header(stamp: u64, frame_id: &str) -> Self {
+        Self(vec![0, 1, 0, 0]).header(stamp, frame_id)
+    }
+
+    /// A message within a message has its own header.
+    fn with_header_again(self, stamp: u64) -> Self {
+        self.header(stamp, "camera")
+    }
+
+    fn header(self, stamp: u64, frame_id: &str) -> Self {
+        self.u32((stamp / 1_000_000_000) as u32).u32((stamp % 1_000_000_000) as u32).text(frame_id)
+    }
+
+    fn filled(mut self, to: usize) -> Self {
+        while !(self.0.len() - 4).is_multiple_of(to) {
+            self.0.push(0);
+        }
+        self
+    }
+
+    fn u32(self, v: u32) -> Self {
+        let mut filled = self.filled(4);
+        filled.0.extend(v.to_le_bytes());
+        filled
+    }
+
+    fn bytes(mut self, bytes: &[u8]) -> Self {
+        self.0.extend(bytes);
+        self
+    }
+
+    fn text(self, text: &str) -> Self {
+        self.u32(text.len() as u32 + 1).bytes(text.as_bytes()).bytes(&[0])
+    }
+
+    fn doubles(self, values: &[f64]) -> Self {
+        let filled = self.filled(8);
+        values.iter().fold(filled, |all, v| all.bytes(&v.to_le_bytes()))
+    }
+}
+
+fn image_message(stamp: u64, image: &image::RgbImage) -> Vec<u8> {
+    let (width, height) = image.dimensions();
+    let message = Bytes::with_header(stamp, "camera").u32(height).u32(width).text("rgb8").bytes(&[0]);
+    message.u32(3 * width).u32(image.as_raw().len() as u32).bytes(image.as_raw()).0
+}
+
+/// Two cameras alike, 0.2 m apart: lens, rotation and projection are those of `camera_file`.
+fn camera_info(view: usize, (width, height): (u32, u32)) -> Vec<u8> {
+    let (k, d, r, p) = camera(view, (width, height));
+    let message = Bytes::with_header(0, "camera").u32(height).u32(width).text("plumb_bob").u32(5);
+    let message = message.doubles(&d).doubles(&k).doubles(&r).doubles(&p);
+    message.u32(0).u32(0).u32(0).u32(0).u32(0).u32(0).bytes(&[0]).0
+}
+
+type Camera = ([f64; 9], [f64; 5], [f64; 9], [f64; 12]);
+
+fn camera(view: usize, (width, height): (u32, u32)) -> Camera {
+    let (cx, cy) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
+    let k = [60.0, 0.0, cx, 0.0, 60.0, cy, 0.0, 0.0, 1.0];
+    let p = [60.0, 0.0, cx, [0.0, -12.0][view], 0.0, 60.0, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+    (k, [-0.1, 0.02, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], p)
+}
+
+/// As `camera_calibration` saves it.
+fn camera_file(view: usize) -> String {
+    let (k, d, r, p) = camera(view, SIZE);
+    let matrix = |name: &str, (rows, cols): (usize, usize), data: &[f64]| {
+        format!("{name}:\n  rows: {rows}\n  cols: {cols}\n  data: {data:?}\n")
+    };
+    let matrices = [
+        matrix("camera_matrix", (3, 3), &k),
+        matrix("distortion_coefficients", (1, 5), &d),
+        matrix("rectification_matrix", (3, 3), &r),
+        matrix("projection_matrix", (3, 4), &p),
+    ];
+    format!("image_width: 64\nimage_height: 48\ndistortion_model: plumb_bob\n{}", matrices.concat())
+}
+
+/// A message: topic, type and bytes.
+type Message = (String, &'static str, Vec<u8>);
+
+const IMAGE: &str = "sensor_msgs/msg/Image";
+const CAMERA: &str = "sensor_msgs/msg/CameraInfo";
+
+/// Images of all scenes on `/left/TOPIC` and `/right/TOPIC`, the right ones `apart` nanoseconds later.
+fn images(topic: &str, apart: u64) -> Vec<Message> {
+    let mut messages = Vec::new();
+    for (n, scene) in SCENES.iter().enumerate() {
+        for (view, side) in ["left", "right"].into_iter().enumerate() {
+            let stamp = START + STEP * n as u64 + apart * view as u64;
+            messages.push((format!("/{side}/{topic}"), IMAGE, image_message(stamp, &frame(scene, view))));
+        }
+    }
+    messages
+}
+
+fn cameras(size: (u32, u32)) -> Vec<Message> {
+    let info = |(view, side)| (format!("/{side}/camera_info"), CAMERA, camera_info(view, size));
+    ["left", "right"].into_iter().enumerate().map(info).collect()
+}
+
+/// Writes them by the crate of MCAP, in chunks of one or two images.
+fn record(path: &Path, messages: &[Message]) {
+    let options = mcap::WriteOptions::new().profile("ros2").chunk_size(Some(12_000)).compression(None);
+    let mut writer = options.create(std::io::BufWriter::new(fs::File::create(path).unwrap())).unwrap();
+    for (time, (topic, kind, bytes)) in messages.iter().enumerate() {
+        let schema = writer.add_schema(kind, "ros2msg", b"").unwrap();
+        let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+        let time = START + time as u64;
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        writer.write_to_known_channel(&header, bytes).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+const NAMES: [&str; 3] = ["1700000000.000000000", "1700000000.050000000", "1700000000.100000000"];
+
+/// What `match` writes for each scene: the files that end so.
+fn wanted(folder: &Path, ends: &[&str], flags: &str) -> Vec<Vec<Vec<u8>>> {
+    let outside = Folder::new();
+    for view in [0, 1] {
+        fs::write(outside.join(format!("{view}.yaml")), camera_file(view)).unwrap();
+    }
+    let maps: Vec<Vec<Vec<u8>>> = SCENES
+        .iter()
+        .map(|scene| {
+            for view in [0, 1] {
+                frame(scene, view).save(outside.join(format!("{view}.png"))).unwrap();
+            }
+            run(&outside, &format!("match 0.png 1.png w.pfm --quiet {RANGE} {flags}")).succeeded();
+            ends.iter().map(|end| fs::read(outside.join(format!("w.{end}"))).unwrap()).collect()
+        })
+        .collect();
+    assert!(maps[0] != maps[1] && maps[1] != maps[2], "control: all frames differ");
+    assert!(!folder.join("w.pfm").exists());
+    maps
+}
+
+fn found(folder: &Path, ends: &[&str]) -> Vec<Vec<Vec<u8>>> {
+    let file = |name: &str, end: &str| fs::read(folder.join(format!("{name}.{end}"))).unwrap();
+    NAMES.iter().map(|name| ends.iter().map(|end| file(name, end)).collect()).collect()
+}
+
+#[test]
+fn recordings_give_the_maps_of_match() {
+    let folder = Folder::new();
+    let wanted = wanted(&folder, &["pfm"], "");
+    let path = folder.join("drive.mcap");
+    let run_it =
+        |flags: &str, output: &str| run(&folder, &format!("sequence drive.mcap {output} {RANGE} {flags}"));
+    record(&path, &images("image_rect", 0));
+    run_it("", "maps").succeeded().says("3 frames of 64 x 48, 24 labels");
+    assert_eq!(found(&folder.join("maps"), &["pfm"]), wanted);
+    assert_eq!(listing(&folder.join("maps")).len(), 3);
+    // In any order, under other names, and not triggered together.
+    let mut messages = images("image_rect", 0);
+    messages.sort_by_key(|(topic, ..)| std::cmp::Reverse(topic.clone()));
+    messages.rotate_left(1);
+    record(&path, &messages);
+    run_it("--quiet", "sorted").succeeded();
+    assert_eq!(found(&folder.join("sorted"), &["pfm"]), wanted);
+    record(&path, &images("image_rect", 2_000_000));
+    run_it("--quiet", "never").failed(1, "no image of /left/image_rect & --tolerance");
+    run_it("--quiet --tolerance 0.0019", "never").failed(1, "--tolerance");
+    run_it("--quiet --tolerance 0.002", "near").succeeded();
+    assert_eq!(found(&folder.join("near"), &["pfm"]), wanted);
+    // Control: exchanged topics are another pair.
+    run_it("--quiet --tolerance 0.002 --topics right/image_rect,left/image_rect", "swapped").succeeded();
+    let swapped = fs::read_dir(folder.join("swapped")).unwrap().next().unwrap().unwrap().path();
+    assert!(wanted.iter().flatten().all(|map| *map != fs::read(&swapped).unwrap()));
+    // What has no partner is left out, and counted.
+    let mut messages = images("image_rect", 0);
+    messages.remove(3);
+    messages.push(messages[0].clone());
+    record(&path, &messages);
+    run_it("", "gaps")
+        .succeeded()
+        .says("1 left and 0 right images had no partner, 1 image had the time of another one");
+    assert_eq!(listing(&folder.join("gaps")).len(), 2);
+    // The folder of a recording in two files.
+    fs::create_dir(folder.join("bag")).unwrap();
+    fs::write(folder.join("bag/metadata.yaml"), "rosbag2_bagfile_information:\n").unwrap();
+    let messages = images("image_rect", 0);
+    for (file, part) in [("bag_9.mcap", &messages[..3]), ("bag_10.mcap", &messages[3..])] {
+        record(&folder.join("bag").join(file), part);
+    }
+    run(&folder, &format!("sequence bag of-bag {RANGE} --quiet")).succeeded();
+    assert_eq!(found(&folder.join("of-bag"), &["pfm"]), wanted);
+}
+
+/// The calibration in a recording does what ROS's own files do.
+#[test]
+fn calibrations_in_recordings_are_those_of_files() {
+    let folder = Folder::new();
+    let path = folder.join("drive.mcap");
+    let ends = ["pfm", "depth.pfm", "points.ply"];
+    let of_files = wanted(&folder, &ends, "--rectify --calib 0.yaml --calib 1.yaml --also depth,points");
+    // They come after the first images.
+    record(&path, &[images("image_raw", 0), cameras(SIZE)].concat());
+    run(&folder, &format!("sequence drive.mcap maps {RANGE} --quiet --also depth,points --json maps.jsonl"))
+        .succeeded();
+    assert_eq!(found(&folder.join("maps"), &ends), of_files);
+    let text = fs::read_to_string(folder.join("maps.jsonl")).unwrap();
+    assert!(
+        text.contains("\"calibration\":\"drive.mcap:/left/camera_info, drive.mcap:/right/camera_info\""),
+        "{text}"
+    );
+    assert!(
+        text.contains("\"rectified\":true") && text.contains("\"frame\":\"1700000000.050000000\""),
+        "{text}"
+    );
+    // Rectified images take the cameras, but are not rectified.
+    record(&path, &[cameras(SIZE), images("image_rect", 0)].concat());
+    run(&folder, &format!("sequence drive.mcap rect {RANGE} --quiet --also depth")).succeeded();
+    let of_rect = wanted(&folder, &["pfm", "depth.pfm"], "--calib 0.yaml --calib 1.yaml --also depth");
+    assert_eq!(found(&folder.join("rect"), &["pfm", "depth.pfm"]), of_rect);
+    assert_ne!(of_rect[0][0], of_files[0][0], "control: unrectified images are another pair");
+    // The user's own calibration counts more.
+    let calib = "cam0=[60 0 32; 0 60 24; 0 0 1]\ndoffs=0\nbaseline=400\nunit=mm\n";
+    fs::write(folder.join("calib.txt"), calib).unwrap();
+    let line = format!("sequence drive.mcap own {RANGE} --quiet --also depth --calib calib.txt");
+    run(&folder, &line).succeeded();
+    let depth = |folder_name: &str| {
+        read_pfm(folder.join(folder_name).join(format!("{}.depth.pfm", NAMES[0]))).data().to_vec()
+    };
+    for (ours, theirs) in depth("own").iter().zip(depth("rect")) {
+        assert!(theirs.is_infinite() && ours.is_infinite() || (ours / theirs / 2000.0 - 1.0).abs() < 1e-6);
+    }
+}
+
+/// The messages of a topic: times and bytes.
+fn messages(path: &Path, topic: &str) -> Vec<(u64, Vec<u8>)> {
+    let bytes = fs::read(path).unwrap();
+    // Chunks are packed by LZ4, for which the crate of MCAP would take C.
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let channel = summary.channels.values().find(|channel| channel.topic == topic).unwrap();
+    let mut found = Vec::new();
+    for record in mcap::read::LinearReader::new(&bytes).unwrap() {
+        let mcap::records::Record::Chunk { header, data } = record.unwrap() else { continue };
+        let mut records = Vec::new();
+        lz4_flex::frame::FrameDecoder::new(&data[..]).read_to_end(&mut records).unwrap();
+        assert_eq!(records.len() as u64, header.uncompressed_size);
+        for record in mcap::read::LinearReader::sans_magic(&records) {
+            if let mcap::records::Record::Message { header, data } = record.unwrap()
+                && header.channel_id == channel.id
+            {
+                found.push((header.log_time, data.into_owned()));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn what_is_written_holds_what_match_finds() {
+    let folder = Folder::new();
+    record(&folder.join("drive.mcap"), &[cameras(SIZE), images("image_rect", 0)].concat());
+    let also = "--also depth,depth-mm,confidence";
+    run(&folder, &format!("sequence drive.mcap found.mcap {RANGE} --quiet {also}")).succeeded();
+    let ends = ["pfm", "depth.pfm", "depth-mm.png", "confidence.png"];
+    let wanted = wanted(&folder, &ends, &format!("--calib 0.yaml --calib 1.yaml {also}"));
+    let header = |stamp: u64| Bytes::with_header(stamp, "camera");
+    let image = |start: Bytes, encoding: &str, bytes: usize, data: &[u8]| {
+        let start = start.u32(SIZE.1).u32(SIZE.0).text(encoding).bytes(&[0]);
+        start.u32(SIZE.0 * bytes as u32).u32(data.len() as u32).bytes(data)
+    };
+    let all = |topic: &str| messages(&folder.join("found.mcap"), topic);
+    let floats = |bytes: &[u8], none: f32| -> Vec<u8> {
+        fs::write(folder.join("map.pfm"), bytes).unwrap();
+        let map = read_pfm(folder.join("map.pfm"));
+        map.data().iter().flat_map(|v| if v.is_finite() { *v } else { none }.to_le_bytes()).collect()
+    };
+    for (n, files) in wanted.iter().enumerate() {
+        let stamp = START + STEP * n as u64;
+        let disparity = image(header(stamp).with_header_again(stamp), "32FC1", 4, &floats(&files[0], -1.0));
+        let end = [60.0_f32, 0.2].into_iter().fold(disparity.filled(4), |all, v| all.bytes(&v.to_le_bytes()));
+        let end = end.u32(0).u32(0).u32(SIZE.1).u32(SIZE.0).bytes(&[0]).filled(4);
+        let end = [0.0_f32, 23.0, 1.0 / 256.0].into_iter().fold(end, |all, v| all.bytes(&v.to_le_bytes()));
+        assert!(all("/disparity")[n] == (stamp, end.0), "frame {n}");
+        let depth = image(header(stamp), "32FC1", 4, &floats(&files[1], f32::NAN));
+        assert!(all("/depth/image_rect")[n] == (stamp, depth.0), "frame {n}");
+        let png = |bytes: &[u8]| image::load_from_memory(bytes).unwrap();
+        let words: Vec<u8> = png(&files[2]).to_luma16().iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert!(
+            all("/depth/image_rect_raw")[n] == (stamp, image(header(stamp), "16UC1", 2, &words).0),
+            "frame {n}"
+        );
+        let bytes = png(&files[3]).to_luma8().into_raw();
+        assert!(all("/confidence")[n] == (stamp, image(header(stamp), "mono8", 1, &bytes).0), "frame {n}");
+    }
+    let disparity = all("/disparity");
+    assert!(disparity.len() == 3 && disparity[0].1[4..] != disparity[1].1[4..], "control: all frames differ");
+    // Of a folder of images, whose names are their times.
+    for (view, side) in ["left", "right"].into_iter().enumerate() {
+        fs::create_dir(folder.join(side)).unwrap();
+        for (scene, name) in SCENES.iter().zip(NAMES) {
+            frame(scene, view).save(folder.join(side).join(format!("{name}.png"))).unwrap();
+        }
+    }
+    run(&folder, &format!("sequence left right of-files.mcap {RANGE} --quiet")).succeeded();
+    let times: Vec<_> =
+        messages(&folder.join("of-files.mcap"), "/disparity").into_iter().map(|(time, _)| time).collect();
+    assert_eq!(times, [START, START + STEP, START + 2 * STEP]);
+}
+
+/// What is wrong with a recording is told in one line, and whole frames stay.
+#[test]
+fn recordings_that_are_wrong_are_told_in_one_line() {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
+    let good = images("image_rect", 0);
+    record(&at("good.mcap"), &good);
+    let whole = fs::read(at("good.mcap")).unwrap();
+    let with_last = |bytes: Vec<u8>| {
+        let mut messages = good.clone();
+        messages[4].2 = bytes;
+        messages
+    };
+    let last = &good[4].2;
+    let changed = |at: usize, to: &[u8]| {
+        let mut bytes = last.clone();
+        bytes[at..at + to.len()].copy_from_slice(to);
+        with_last(bytes)
+    };
+    record(
+        &at("encoding.mcap"),
+        &changed(last.windows(4).position(|word| word == b"rgb8").unwrap(), b"abc9"),
+    );
+    // Height and width stand behind the name of the camera.
+    record(&at("huge.mcap"), &changed(24, &[0xff; 8]));
+    record(&at("short.mcap"), &changed(24, &100_u32.to_le_bytes()));
+    record(&at("cut-message.mcap"), &with_last(last[..100].to_vec()));
+    record(
+        &at("half.mcap"),
+        &good.iter().filter(|one| one.0.starts_with("/left")).cloned().collect::<Vec<_>>(),
+    );
+    record(&at("raw.mcap"), &images("image_raw", 0));
+    record(&at("size.mcap"), &[cameras((128, 96)), images("image_raw", 0)].concat());
+    record(&at("both.mcap"), &[images("image_raw", 0), images("image_rect", 0)].concat());
+    record(&at("text.mcap"), &[("/left".into(), "std_msgs/msg/String", vec![0, 1, 0, 0])]);
+    for (name, bytes) in [
+        ("empty.mcap", &b""[..]),
+        ("words.mcap", b"a picture is worth a thousand words"),
+        ("words.bag", b"a picture is worth a thousand words"),
+        ("a.db3", b"SQLite format 3\0"),
+        ("cut.mcap", &whole[..whole.len() / 2]),
+    ] {
+        fs::write(at(name), bytes).unwrap();
+    }
+    let mut flipped = whole.clone();
+    let pixel = whole.windows(4).rposition(|word| word == b"rgb8").unwrap() + 500;
+    flipped[pixel] ^= 1;
+    fs::write(at("flipped.mcap"), flipped).unwrap();
+    let before = listing(&folder);
+    for (line, code, done, words) in [
+        ("none.mcap OUT", 1, 0, "none.mcap & no such file"),
+        ("empty.mcap OUT", 1, 0, "empty.mcap: is empty"),
+        ("words.mcap OUT", 1, 0, "words.mcap: is no MCAP file"),
+        ("words.bag OUT", 1, 0, "words.bag: is no bag of ROS 1"),
+        ("a.db3 OUT", 1, 0, "a.db3 & ros2 bag convert"),
+        ("cut.mcap OUT", 1, 1, "cut.mcap: is cut off"),
+        ("flipped.mcap OUT", 1, 2, "flipped.mcap: the chunk at byte & checksum"),
+        ("encoding.mcap OUT", 1, 2, "encoding.mcap:/left/image_rect at 1700000000.100000000 & `abc9`"),
+        ("huge.mcap OUT", 1, 2, "4294967295 x 4294967295 pixels"),
+        ("short.mcap OUT", 1, 2, "100 rows of 192 bytes"),
+        ("cut-message.mcap OUT", 1, 2, "/left/image_rect & ends early"),
+        ("half.mcap OUT", 1, 0, "/left/image_rect alone"),
+        ("raw.mcap OUT", 1, 0, "/left/image_raw is not rectified & /left/camera_info & --rectify"),
+        ("size.mcap OUT", 1, 0, "size.mcap:/left/camera_info & 128 x 96 & 64 x 48"),
+        ("both.mcap OUT", 1, 0, "several pairs & --topics & /left/image_raw,/right/image_raw"),
+        ("text.mcap OUT", 1, 0, "no images & /left (std_msgs/msg/String)"),
+        ("good.mcap OUT --topics /a,/b", 1, 0, "has no topic /a & /left/image_rect, /right/image_rect"),
+        ("good.mcap OUT --topics /a", 2, 0, "--topics & left"),
+        ("good.mcap OUT --tolerance -1", 2, 0, "--tolerance & from 0"),
+        ("good.mcap OUT --max-pixels 100", 1, 0, "64 x 48 pixels and at most 100"),
+        ("good.mcap good.mcap OUT", 2, 0, "RIGHT & holds both views"),
+        ("good.mcap OUT --pairing order", 2, 0, "--pairing & two topics"),
+        ("good.mcap OUT --also depth", 2, 0, "--also depth & /left/camera_info"),
+        ("good.mcap found.mcap --also preview", 2, 0, "--also preview & no message"),
+        ("good.mcap found.mcap --format tif", 2, 0, "--format & recording"),
+        ("good.mcap good.mcap", 2, 0, "OUTPUT & already"),
+    ] {
+        for output in ["maps", "new.mcap"] {
+            run(&folder, &format!("sequence {} {RANGE} --quiet", line.replace("OUT", output)))
+                .failed(code, words);
+            if output == "maps" && done > 0 {
+                assert_eq!(listing(&at("maps")).len(), done, "{line}");
+                fs::remove_dir_all(at("maps")).unwrap();
+            } else if done > 0 {
+                assert_eq!(messages(&at(output), "/disparity").len(), done, "{line}");
+                fs::remove_file(at(output)).unwrap();
+            }
+            assert_eq!(listing(&folder), before, "{line}");
+        }
+    }
+    fs::create_dir(at("left")).unwrap();
+    frame("thin", 0).save(at("left/1.png")).unwrap();
+    run(&folder, "sequence left left maps --tolerance 1").failed(2, "--tolerance & LEFT is none");
+}
