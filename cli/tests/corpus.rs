@@ -12,12 +12,13 @@ use std::path::{Path, PathBuf};
 type Target = fn(&[u8]);
 
 /// Every target with its name, which is that of its folder.
-const TARGETS: [(&str, Target); 6] = [
+const TARGETS: [(&str, Target); 7] = [
     ("pfm", targets::pfm),
     ("calib", targets::calib),
     ("cameras", targets::cameras),
     ("image", targets::image),
     ("list", targets::list),
+    ("recording", targets::recording),
     ("config", targets::config),
 ];
 

@@ -11,6 +11,9 @@ use mrfgs::options::{DisparityRange, Method, PRESETS};
 use mrfgs::rectification::{Options, Rectification};
 use mrfgs::{Error, Result};
 use mrfgs_cli::list::{self, Largest};
+use mrfgs_ros::messages::{CameraInfo, CompressedImage, Image};
+use mrfgs_ros::pixels;
+use mrfgs_ros::recording::{Message, Recording};
 use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
@@ -48,6 +51,41 @@ pub fn calib(bytes: &[u8]) {
             camera.focal_length.iter().all(|f| f.is_finite() && *f > 0.0)
                 && camera.principal_point.iter().all(|c| c.is_finite())
         }));
+    });
+}
+
+/// A recording: all its topics and messages, and what they hold if they are images or cameras.
+pub fn recording(bytes: &[u8]) {
+    with_file(bytes, |path| {
+        if !Recording::is(path) {
+            return;
+        }
+        let Some(recording) = told(Recording::open(path)) else { return };
+        let names: Vec<&str> = recording.topics().iter().map(|topic| topic.name.as_str()).collect();
+        let mut failed = false;
+        for message in recording.messages(&names) {
+            assert!(!failed, "nothing follows an error");
+            let Some(Message { topic, encoding, data }) = told(message) else {
+                failed = true;
+                continue;
+            };
+            assert!(topic < names.len());
+            let named = |reason| Error::read(path, reason);
+            if let Some(image) = told(Image::decode(&data, encoding).map_err(named)) {
+                told(pixels::image(&image, MAX_PIXELS).map_err(named));
+            }
+            if let Some(image) = told(CompressedImage::decode(&data, encoding).map_err(named)) {
+                told(pixels::compressed(
+                    &image,
+                    Reader { max_pixels: MAX_PIXELS, ..Reader::default() },
+                    path,
+                ));
+            }
+            if let Some(camera) = told(CameraInfo::decode(&data, encoding).map_err(named)) {
+                let texts = [(path, camera.text()), (path, camera.of_rectified().text())];
+                told(calibration::of_texts(&texts));
+            }
+        }
     });
 }
 
