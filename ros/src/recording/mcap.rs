@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::mem;
 use std::path::Path;
 
+use mcap::MAGIC;
 use mcap::records::{Record, op};
-use mcap::{MAGIC, parse_record};
 use mrfgs::error::Reason;
 use mrfgs::{Error, Result};
 
@@ -85,8 +85,7 @@ impl Mcap {
         if tail[0] != op::FOOTER || !tail.ends_with(MAGIC) {
             return None;
         }
-        let Ok(Record::Footer(footer)) = parse_record(op::FOOTER, &tail[HEAD as usize..FOOTER as usize])
-        else {
+        let Ok(Record::Footer(footer)) = parsed(op::FOOTER, &tail[HEAD as usize..FOOTER as usize]) else {
             return None;
         };
         let size = end.checked_sub(footer.summary_start).filter(|size| *size < MAX_RECORD)?;
@@ -101,7 +100,7 @@ impl Mcap {
             match kind {
                 op::SCHEMA | op::CHANNEL => _ = self.put(kind, body).ok()?,
                 op::STATISTICS => {
-                    let Ok(Record::Statistics(statistics)) = parse_record(kind, body) else { return None };
+                    let Ok(Record::Statistics(statistics)) = parsed(kind, body) else { return None };
                     counts = Some(statistics.channel_message_counts);
                 }
                 _ => {}
@@ -125,7 +124,7 @@ impl Mcap {
         if ![op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&kind) {
             return Ok(None);
         }
-        match parse_record(kind, body) {
+        match parsed(kind, body) {
             Ok(Record::Schema { header, .. }) => {
                 self.schemas.insert(header.id, header.name);
                 Ok(None)
@@ -164,7 +163,7 @@ impl Mcap {
                 Ok(Some(Message { topic, encoding, data: data.into_owned() }))
             }
             Ok(_) => Ok(None),
-            Err(error) => Err(format!("has a damaged record: {}", first_line(&error.to_string())).into()),
+            Err(reason) => Err(format!("has a damaged record: {reason}").into()),
         }
     }
 
@@ -230,10 +229,10 @@ impl Iterator for Mcap {
 
 /// The records of a chunk, whose body this is.
 fn unpacked_chunk(body: &[u8]) -> Result<Vec<u8>, Reason> {
-    let (header, data) = match parse_record(op::CHUNK, body) {
+    let (header, data) = match parsed(op::CHUNK, body) {
         Ok(Record::Chunk { header, data }) => (header, data),
         Ok(_) => return Err("is damaged".into()),
-        Err(error) => return Err(format!("is damaged: {}", first_line(&error.to_string())).into()),
+        Err(reason) => return Err(format!("is damaged: {reason}").into()),
     };
     let records = unpacked(&data, &header.compression, header.uncompressed_size)?;
     // 0 is none.
@@ -241,6 +240,44 @@ fn unpacked_chunk(body: &[u8]) -> Result<Vec<u8>, Reason> {
         return Err("is damaged: its checksum does not agree".into());
     }
     Ok(records)
+}
+
+/// A record of this kind. The parser makes room for as long a text as the record claims, so that is checked before.
+fn parsed(kind: u8, body: &[u8]) -> Result<Record<'_>, Reason> {
+    if texts_fit(kind, body).is_none() {
+        return Err("a text in it has no end".into());
+    }
+    mcap::parse_record(kind, body).map_err(|error| Reason::from(first_line(&error.to_string())))
+}
+
+/// Something where all texts of a record end within it.
+fn texts_fit(kind: u8, body: &[u8]) -> Option<()> {
+    let text = |rest: &mut &[u8]| {
+        let (length, after) = rest.split_at_checked(4)?;
+        *rest = after.get(number(length) as usize..)?;
+        Some(())
+    };
+    // What stands before the first one, and how many there are.
+    let (start, count) = match kind {
+        op::SCHEMA => (2, 2),
+        op::CHANNEL => (4, 2),
+        op::CHUNK => (28, 1),
+        _ => return Some(()),
+    };
+    let mut rest = body.get(start..)?;
+    for _ in 0..count {
+        text(&mut rest)?;
+    }
+    if kind == op::CHANNEL {
+        // Pairs of texts behind the bytes that they take.
+        let (length, after) = rest.split_at_checked(4)?;
+        let mut pairs = after.get(..number(length) as usize)?;
+        while !pairs.is_empty() {
+            text(&mut pairs)?;
+            text(&mut pairs)?;
+        }
+    }
+    Some(())
 }
 
 /// The record at byte `at`: its kind, its body, and where the next one begins.

@@ -97,6 +97,15 @@ fn what_lies_before_damage_is_read() {
         let (messages, _) = read(&path);
         assert_eq!(messages, all[..messages.len()], "{at}");
     }
+    // Texts that claim 4 GiB, of a channel, of its metadata, and of a chunk.
+    for (kind, start) in
+        [(4, &[1, 0, 0, 0][..]), (4, &[&[1, 0, 0, 0][..], &[0; 8], &[4, 0, 0, 0]].concat()), (6, &[0; 28])]
+    {
+        let body = [start, &[0xff; 4]].concat();
+        fs::write(&path, [MAGIC, &[kind], &(body.len() as u64).to_le_bytes(), &body].concat()).unwrap();
+        let said = read(&path).1.unwrap();
+        assert!(said.contains("a text in it has no end"), "{said}");
+    }
     // A record of 8 EiB, and a chunk that claims 1 TiB.
     for (kind, body) in [(3, &[][..]), (6, &[&[0; 16][..], &(1_u64 << 40).to_le_bytes(), &[0; 16]].concat())]
     {
