@@ -44,7 +44,7 @@ fn match_writes_every_output_in_every_format() {
         }
     }
     assert!(measured > 20_000 && filled > 500, "{measured} measured, {filled} filled");
-    assert!(confidence.data().iter().any(|&c| c > 100));
+    assert!(confidence.data().iter().any(|&c| c > 80));
     assert!(map != raw, "post-processing does something");
 
     // The same map in the other formats; the number of threads changes nothing.
