@@ -166,7 +166,7 @@ mod tests {
             ("match", 27),
             ("rectify", 8),
             ("depth", 14),
-            ("sequence", 30),
+            ("sequence", 32),
             ("batch", 19),
             ("evaluate", 12),
             ("evaluate map", 8),
