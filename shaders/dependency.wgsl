@@ -101,10 +101,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         for (var slot = 0u; slot < SLOTS; slot++) {
             if bases[slot] != ABSENT {
-                let sum = select(min(total - q[slot], vec4(MOST)), vec4(MOST), q[slot] == vec4(MOST));
+                let sum = select(total - q[slot], vec4(MOST), q[slot] == vec4(MOST));
                 least[slot] = min(least[slot], sum);
                 if STEPS {
-                    messages[own + (slot * quads + quad) * width] = pack(sum);
+                    messages[own + (slot * quads + quad) * width] = pack(min(sum, vec4(MOST)));
                 }
             }
         }

@@ -16,9 +16,9 @@ struct Params {
 // From the middle to the farthest place.
 const REACH: u32 = STEP * (PLACES / 2u);
 
-// A row or column, `place` steps after the first place around the one at `middle`; the nearest inside where there are only `count`.
-fn inside(middle: u32, place: u32, count: u32) -> u32 {
-    return min(max(middle + STEP * place, REACH) - REACH, count - 1u);
+// The row or column of a place around `middle`, by its index, or the nearest of the `count` that there are.
+fn inside(middle: u32, index: u32, count: u32) -> u32 {
+    return min(max(middle + STEP * index, REACH) - REACH, count - 1u);
 }
 
 @compute @workgroup_size(GROUP)

@@ -153,8 +153,6 @@ pub struct Plan {
     pub outside_cost: u8,
     /// Truncation of dependency messages.
     pub dependency: Truncation,
-    /// Cost of labels that differ by one in a dependency factor, in units; see [`Self::label_step`].
-    pub step: u16,
     /// Truncation of resolution messages.
     pub resolution: Truncation,
     /// Storage width of messages of both kinds, and of beliefs.
@@ -253,7 +251,6 @@ impl Plan {
             levels,
             neighbours,
             dependency,
-            step: units(method.messages.label_step),
             resolution,
             volume_width,
             phases,
@@ -341,8 +338,9 @@ impl Plan {
     /// disagreement: at the finest level, whose labels are fine enough for one surface, and where the potential is not soft.
     #[must_use]
     pub fn label_step(&self, level: usize) -> Option<u16> {
-        let is_soft = self.method.messages.potential == Potential::Soft;
-        (level > 0 && is_soft && self.step < self.dependency.tau).then_some(self.step)
+        let messages = &self.method.messages;
+        let step = units(messages.label_step);
+        (level > 0 && messages.potential == Potential::Soft && step < self.dependency.tau).then_some(step)
     }
 
     /// (width, height) of the finest level.

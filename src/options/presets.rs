@@ -102,7 +102,7 @@ impl Method {
                 final_iterations: 0,
                 ..ScheduleOptions::default()
             },
-            // Steps would take 5 % of the time and bring nothing on roads and desks.
+            // At half the size, steps help in rooms and harm on desks.
             messages: MessageOptions { temperature: 0.35, label_step: 2.0, ..MessageOptions::default() },
             // Labels lead by less after fewer iterations.
             refinement: RefinementOptions {

@@ -97,7 +97,7 @@ fn control_a_changed_parameter_is_found() {
         ("evidence down", "Evidence(1)", |p| p.levels[1].evidence.down += 1),
         ("evidence multiplier", "Evidence(2)", |p| p.levels[2].evidence.multiplier -= 1000),
         ("dependency tau", "Dependency(0)", |p| p.dependency.tau += 1),
-        ("label step", "Dependency(1)", |p| p.step -= 1),
+        ("label step", "Dependency(1)", |p| p.method.messages.label_step = 0.5),
         ("dependency rule", "Dependency(0)", |p| p.dependency.rule = TruncationRule::Absolute),
         ("resolution tau", "Up(2)", |p| p.resolution.tau += 1),
         ("resolution rule", "Down(0)", |p| p.resolution.rule = TruncationRule::Absolute),

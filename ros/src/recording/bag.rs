@@ -8,7 +8,7 @@ use std::path::Path;
 use mrfgs::Result;
 use mrfgs::error::Reason;
 
-use super::chunk::unpacked;
+use super::chunk::{Chunk, unpacked};
 use super::file::{File, MAX_RECORD};
 use super::message::{Message, topic};
 use crate::messages::Encoding;
@@ -30,10 +30,7 @@ pub(super) struct Bag {
     /// The topic of each connection: among all, and among those that are wanted.
     connections: HashMap<u32, (usize, Option<usize>)>,
     topics: Vec<Topic>,
-    /// The records of a chunk, how far they have been read, and where it begins in the file.
-    chunk: Vec<u8>,
-    chunk_at: usize,
-    chunk_start: u64,
+    chunk: Chunk,
     /// Where the messages end and the index begins; 0 where the bag was not closed.
     index: u64,
     ended: bool,
@@ -50,9 +47,7 @@ impl Bag {
             wanted,
             connections: HashMap::new(),
             topics: Vec::new(),
-            chunk: Vec::new(),
-            chunk_at: 0,
-            chunk_start: 0,
+            chunk: Chunk::default(),
             index: 0,
             ended: false,
         };
@@ -134,19 +129,14 @@ impl Bag {
     /// The next message.
     fn message(&mut self) -> Result<Option<Message>> {
         loop {
-            while self.chunk_at < self.chunk.len() {
-                let chunk = mem::take(&mut self.chunk);
-                let put = record(&chunk, self.chunk_at).and_then(|(head, body, next)| {
-                    self.chunk_at = next;
-                    self.put(head, body)
-                });
-                self.chunk = chunk;
-                let start = self.chunk_start;
-                if let Some(message) =
-                    put.map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?
-                {
-                    return Ok(Some(message));
-                }
+            let mut chunk = mem::take(&mut self.chunk);
+            let found = chunk.message(|records, at| {
+                let (head, body, next) = record(records, at)?;
+                Ok((self.put(head, body)?, next))
+            });
+            self.chunk = chunk;
+            if let Some(message) = found.map_err(|reason| self.file.error(reason))? {
+                return Ok(Some(message));
             }
             let start = self.file.at();
             if self.index > 0 && start >= self.index {
@@ -163,7 +153,7 @@ impl Bag {
                 let records = unpacked_chunk(&head, &body);
                 let records = records
                     .map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?;
-                (self.chunk, self.chunk_at, self.chunk_start) = (records, 0, start);
+                self.chunk = Chunk::new(records, start);
             } else if let Some(message) = self.put(&head, &body).map_err(|reason| self.file.error(reason))? {
                 return Ok(Some(message));
             }

@@ -8,6 +8,43 @@ use mrfgs::error::Reason;
 use ruzstd::decoding::StreamingDecoder;
 
 use super::file::MAX_RECORD;
+use super::message::Message;
+
+/// The records of a chunk, which are taken one by one.
+#[derive(Default)]
+pub(super) struct Chunk {
+    records: Vec<u8>,
+    /// How far they have been taken.
+    at: usize,
+    /// Where the chunk begins in the file.
+    start: u64,
+}
+
+impl Chunk {
+    pub(super) fn new(records: Vec<u8>, start: u64) -> Self {
+        Self { records, at: 0, start }
+    }
+
+    /// The next message. `take` takes the record at a byte of the chunk, and says where the next one begins.
+    ///
+    /// # Errors
+    /// Those of `take`, in words that go after the name of the file.
+    pub(super) fn message(
+        &mut self,
+        mut take: impl FnMut(&[u8], usize) -> Result<(Option<Message>, usize), Reason>,
+    ) -> Result<Option<Message>, Reason> {
+        while self.at < self.records.len() {
+            let taken = take(&self.records, self.at);
+            let (message, next) =
+                taken.map_err(|reason| Reason::from(format!("the chunk at byte {} {reason}", self.start)))?;
+            self.at = next;
+            if message.is_some() {
+                return Ok(message);
+            }
+        }
+        Ok(None)
+    }
+}
 
 /// What is in `packed`, which claims to hold `size` bytes and is packed by the method of this name.
 ///

@@ -9,7 +9,7 @@ use mcap::records::{Record, op};
 use mrfgs::error::Reason;
 use mrfgs::{Error, Result};
 
-use super::chunk::unpacked;
+use super::chunk::{Chunk, unpacked};
 use super::file::{File, MAX_RECORD};
 use super::message::{Message, topic};
 use crate::messages::Encoding;
@@ -27,10 +27,7 @@ pub(super) struct Mcap {
     schemas: HashMap<u16, String>,
     channels: HashMap<u16, Channel>,
     topics: Vec<Topic>,
-    /// The records of a chunk, how far they have been read, and where it begins in the file.
-    chunk: Vec<u8>,
-    chunk_at: usize,
-    chunk_start: u64,
+    chunk: Chunk,
     ended: bool,
 }
 
@@ -55,9 +52,7 @@ impl Mcap {
             schemas: HashMap::new(),
             channels: HashMap::new(),
             topics: Vec::new(),
-            chunk: Vec::new(),
-            chunk_at: 0,
-            chunk_start: 0,
+            chunk: Chunk::default(),
             ended: false,
         })
     }
@@ -170,19 +165,14 @@ impl Mcap {
     /// The next message.
     fn message(&mut self) -> Result<Option<Message>> {
         loop {
-            while self.chunk_at < self.chunk.len() {
-                let chunk = mem::take(&mut self.chunk);
-                let put = record(&chunk, self.chunk_at).and_then(|(kind, body, next)| {
-                    self.chunk_at = next;
-                    self.put(kind, body)
-                });
-                self.chunk = chunk;
-                let start = self.chunk_start;
-                if let Some(message) =
-                    put.map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?
-                {
-                    return Ok(Some(message));
-                }
+            let mut chunk = mem::take(&mut self.chunk);
+            let found = chunk.message(|records, at| {
+                let (kind, body, next) = record(records, at)?;
+                Ok((self.put(kind, body)?, next))
+            });
+            self.chunk = chunk;
+            if let Some(message) = found.map_err(|reason| self.file.error(reason))? {
+                return Ok(Some(message));
             }
             let start = self.file.at();
             if self.file.left() == 0 {
@@ -199,7 +189,7 @@ impl Mcap {
                     let records = unpacked_chunk(&body);
                     let records = records
                         .map_err(|reason| self.file.error(format!("the chunk at byte {start} {reason}")))?;
-                    (self.chunk, self.chunk_at, self.chunk_start) = (records, 0, start);
+                    self.chunk = Chunk::new(records, start);
                 }
                 op::SCHEMA | op::CHANNEL | op::MESSAGE => {
                     let body = self.file.take(length)?;

@@ -6,6 +6,7 @@ use crate::plan::Plan;
 use crate::plan::support::{SUPPORT_NEAR, SUPPORT_PLACES, SUPPORT_REACH, SUPPORT_STEP};
 use crate::stage::MapSet;
 use rayon::prelude::*;
+use std::iter::repeat_n;
 
 /// Rows that are worth a thread.
 const LEAST_ROWS: usize = 16;
@@ -19,16 +20,15 @@ struct Row {
 
 impl Row {
     fn fill(&mut self, disparity: &Plane<i32>, confidence: &Plane<u8>, y: usize) {
-        fn wide<T: Copy>(out: &mut Vec<i32>, row: &[T], value: impl Fn(T) -> i32) {
-            let inside = |i: usize| i.saturating_sub(SUPPORT_REACH).min(row.len() - 1);
+        fn wide<T: Copy + Into<i32>>(out: &mut Vec<i32>, row: &[T]) {
+            let beyond = |end: T| repeat_n(end, SUPPORT_REACH);
             out.clear();
-            out.extend((0..SUPPORT_REACH).map(|i| value(row[inside(i)])));
-            out.extend(row.iter().map(|&v| value(v)));
-            let end = SUPPORT_REACH + row.len();
-            out.extend((end..end + SUPPORT_REACH).map(|i| value(row[inside(i)])));
+            out.extend(beyond(row[0]).map(T::into));
+            out.extend(row.iter().map(|&v| v.into()));
+            out.extend(beyond(row[row.len() - 1]).map(T::into));
         }
-        wide(&mut self.disparities, disparity.row(y), |d| d);
-        wide(&mut self.confidences, confidence.row(y), i32::from);
+        wide(&mut self.disparities, disparity.row(y));
+        wide(&mut self.confidences, confidence.row(y));
     }
 }
 
