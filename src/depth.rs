@@ -93,6 +93,28 @@ impl Rig {
         disparities.map(|&d| self.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32))
     }
 
+    /// The error to expect of the depth at disparity `d`, whose own error is `sigma` (both in pixels), in the unit of the baseline: to
+    /// first order the depth Z moves by Z sigma / (d + doffs). `None` where [`Rig::depth`] is `None`.
+    #[must_use]
+    pub fn depth_sigma(&self, d: f64, sigma: f64) -> Option<f64> {
+        self.depth(d).map(|depth| depth * sigma / (d + self.doffs))
+    }
+
+    /// The errors to expect of the depths of a map, from its disparities and [theirs](crate::sigma); +infinity where there is no depth, or
+    /// no finite error.
+    ///
+    /// # Panics
+    /// When the maps differ in size.
+    #[must_use]
+    pub fn depth_sigmas(&self, disparities: &Plane<f32>, sigmas: &Plane<f32>) -> Plane<f32> {
+        assert_eq!(disparities.size(), sigmas.size(), "both are of one view");
+        let (width, height) = disparities.size();
+        Plane::from_fn(width, height, |x, y| {
+            let (d, sigma) = (f64::from(disparities[(x, y)]), f64::from(sigmas[(x, y)]));
+            self.depth_sigma(d, sigma).map_or(f32::INFINITY, |sigma| sigma as f32)
+        })
+    }
+
     /// The unit of the baseline.
     #[must_use]
     pub fn unit(&self) -> Unit {
@@ -165,6 +187,19 @@ mod tests {
         }
         let map = Plane::new(3, 1, vec![60.0, -20.0, f32::INFINITY]);
         assert_eq!(rig.depths(&map).data(), [2000.0, f32::INFINITY, f32::INFINITY]);
+    }
+
+    #[test]
+    fn errors_of_depths_follow_from_those_of_disparities() {
+        let rig = Rig::new(&calibration()).unwrap();
+        let row = |values: &[f32]| Plane::new(values.len(), 1, values.to_vec());
+        let (none, map) = (f32::INFINITY, row(&[60.0, 12.0, 60.0, -20.0, f32::INFINITY]));
+        let sigmas = rig.depth_sigmas(&map, &row(&[0.2, 0.4, none, 0.2, 0.2]));
+        // 2000 * 0.2 / 80, and 5000 * 0.4 / 32.
+        assert_eq!(sigmas.data(), [5.0, 62.5, none, none, none]);
+        // A small step of the disparity moves the depth by as much.
+        let moved = rig.depth(60.0 - 0.001).unwrap() - rig.depth(60.0).unwrap();
+        assert!((moved / 0.001 - 25.0).abs() < 1e-3, "{moved}");
     }
 
     #[test]

@@ -111,6 +111,7 @@ pub mod region;
 #[doc(hidden)]
 pub mod remedy;
 mod roofline;
+pub mod sigma;
 mod stage;
 mod text;
 mod watch;

@@ -29,12 +29,16 @@ fn pair(folder: &Path) -> (Pair, DisparityRange) {
     (Pair::open(&left, &right).unwrap(), range)
 }
 
-fn report(folder: &Path, map: &Plane<f32>) -> Report {
+fn truth(folder: &Path) -> Plane<f32> {
     let pfm::Pfm::Grey(truth) = pfm::read(&folder.join("disp0GT.pfm")).unwrap() else {
         panic!("colour truth")
     };
+    truth
+}
+
+fn report(folder: &Path, map: &Plane<f32>) -> Report {
     let mask = read::grey8(&folder.join("mask0nocc.png")).unwrap();
-    GroundTruth::new(truth, Some(mask)).unwrap().evaluate(map).unwrap()
+    GroundTruth::new(truth(folder), Some(mask)).unwrap().evaluate(map).unwrap()
 }
 
 /// A map, and the same map in whole pixels.
@@ -73,6 +77,42 @@ fn rendered_scenes() {
         assert!(all.avg.unwrap() <= avg && all.bad[2] <= bad2 && all.bad[0] <= bad05, "{scene}: {all:?}");
         let whole = report(&folder, &rounded(&matched)).all;
         assert!(all.bad[0] < whole.bad[0], "{scene}: {} against {}", all.bad[0], whole.bad[0]);
+    }
+}
+
+/// Two thirds of the pixels are off by less than sigma, or more of them: these scenes are cleaner than what it was fitted to. It knows
+/// which are off by more.
+#[test]
+fn sigma_is_the_size_of_the_errors() {
+    for method in [Method::default(), Method::fast()] {
+        // Of each measured pixel: sigma, and by how much it is off.
+        let mut pixels = Vec::new();
+        for scene in ["slanted", "thin", "mixed", "steep", "rows", "focus", "screen", "border", "behind"] {
+            let folder = Path::new("testdata").join(scene);
+            let matched = matched(&folder, &method);
+            let truth = truth(&folder);
+            let off =
+                matched.disparity().into_data().into_iter().zip(truth.data()).map(|(d, t)| (d - t).abs());
+            let measured = matched.sigma().into_data().into_iter().zip(off);
+            pixels.extend(measured.filter(|(sigma, off)| sigma.is_finite() && off.is_finite()));
+        }
+        pixels.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let within = |pixels: &[(f32, f32)], times: f32| {
+            100.0 * pixels.iter().filter(|(sigma, off)| *off < times * sigma).count() as f64
+                / pixels.len() as f64
+        };
+        let (sure, unsure) = pixels.split_at(pixels.len() / 2);
+        for part in [sure, unsure] {
+            let found = [1.0, 2.0, 3.0].map(|times| within(part, times));
+            println!("within 1, 2 and 3 sigma: {found:.1?} %");
+            assert!((70.0..96.0).contains(&found[0]) && found[1] > 88.0 && found[2] > 91.0, "{found:?}");
+        }
+        // Control: with the sigma of the surer half the other one would be far off.
+        let sigma = sure[sure.len() / 2].0;
+        let blind: Vec<_> = unsure.iter().map(|(_, off)| (sigma, *off)).collect();
+        let (known, blind) = (within(unsure, 1.0), within(&blind, 1.0));
+        println!("{known:.1} %, by the sigma of the others {blind:.1} %");
+        assert!(blind < known - 12.0, "{blind} and {known}");
     }
 }
 

@@ -162,6 +162,10 @@ typedef struct mrfgs_maps {
   // A match that writes it takes longer.
   float *right;
   size_t right_stride;
+  // The error to expect of every measured disparity in pixels, from its confidence: about two thirds are nearer to the truth.
+  // +infinity where nothing was measured.
+  float *sigma;
+  size_t sigma_stride;
 } mrfgs_maps;
 
 // A part of the left image, in pixels: its first column and row, and its size.
@@ -335,6 +339,18 @@ enum mrfgs_status mrfgs_depth(const struct mrfgs_rig *rig,
                               size_t disparity_stride,
                               float *depth,
                               size_t depth_stride);
+
+// The error to expect of every depth, in the unit of the baseline, of maps of disparities and of their errors (mrfgs_maps.sigma), both
+// in pixels: +infinity where there is none. Strides are in bytes. The maps may be one.
+enum mrfgs_status mrfgs_depth_sigma(const struct mrfgs_rig *rig,
+                                    uint32_t width,
+                                    uint32_t height,
+                                    const float *disparity,
+                                    size_t disparity_stride,
+                                    const float *sigma,
+                                    size_t sigma_stride,
+                                    float *depth_sigma,
+                                    size_t depth_sigma_stride);
 
 // Frees a rig; it may be null.
 void mrfgs_rig_free(struct mrfgs_rig *rig);

@@ -63,10 +63,14 @@ pub struct Maps {
     /// A match that writes it takes longer.
     pub right: *mut f32,
     pub right_stride: usize,
+    /// The error to expect of every measured disparity in pixels, from its confidence: about two thirds are nearer to the truth.
+    /// +infinity where nothing was measured.
+    pub sigma: *mut f32,
+    pub sigma_stride: usize,
 }
 
 /// The sizes that the structure has had, each with more fields than the one before.
-const SIZES: [usize; 2] = [offset_of!(Maps, right), size_of::<Maps>()];
+const SIZES: [usize; 3] = [offset_of!(Maps, right), offset_of!(Maps, sigma), size_of::<Maps>()];
 
 impl Maps {
     /// What a caller gives, whose header may be older and know fewer fields.
@@ -95,6 +99,8 @@ impl Maps {
             validity_stride: 0,
             right: ptr::null_mut(),
             right_stride: 0,
+            sigma: ptr::null_mut(),
+            sigma_stride: 0,
         };
         // SAFETY: the caller promises that so many bytes are there; the structure has no fewer, and its fields may hold any bytes.
         unsafe { maps.cast::<u8>().copy_to_nonoverlapping((&raw mut own).cast::<u8>(), size) };
@@ -108,6 +114,7 @@ impl Maps {
             ("confidence", self.confidence.is_null(), self.confidence_stride, 1),
             ("validity", self.validity.is_null(), self.validity_stride, 1),
             ("right", self.right.is_null(), self.right_stride, size_of::<f32>()),
+            ("sigma", self.sigma.is_null(), self.sigma_stride, size_of::<f32>()),
         ] {
             if !is_null {
                 extent(stride, size, pixel)
@@ -133,6 +140,10 @@ impl Maps {
         if !self.validity.is_null() {
             // SAFETY: the caller promises it.
             unsafe { put(matched.validity(), self.validity, self.validity_stride) };
+        }
+        if !self.sigma.is_null() {
+            // SAFETY: the caller promises it.
+            unsafe { put(&matched.sigma(), self.sigma, self.sigma_stride) };
         }
         if let Some(right) = matched.maps.right_map().filter(|_| !self.right.is_null()) {
             // SAFETY: the caller promises it.

@@ -114,37 +114,86 @@ pub unsafe extern "C" fn mrfgs_depth(
     call(|| {
         // SAFETY: the caller promises that the pointer is null or good.
         let rig = unsafe { argument::thing("rig", rig) }?;
-        let size = (width as usize, height as usize);
-        if let Some((w, h)) = rig.size.filter(|known| *known != size) {
-            return Err(Failure::argument(format!(
-                "the map is {width} x {height} and the calibration of images of {w} x {h}: depth takes the calibration of this size"
-            )));
+        let given = [("disparity", disparity, disparity_stride)];
+        // SAFETY: the caller promises that the maps are as large as the arguments say.
+        unsafe {
+            put_each(rig, (width, height), given, ("depth", depth, depth_stride), |[d]| {
+                rig.rig.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32)
+            })
         }
-        for (name, is_null, stride) in
-            [("disparity", disparity.is_null(), disparity_stride), ("depth", depth.is_null(), depth_stride)]
-        {
-            if is_null {
-                return Err(Failure::argument(format!("the map of {name} is null")));
-            }
-            extent(stride, size, size_of::<f32>())
-                .map_err(|wrong| Failure::argument(format!("the map of {name} {wrong}")))?;
-        }
-        for y in 0..size.1 {
-            for x in 0..size.0 {
-                let offset = |stride: usize| y * stride + x * size_of::<f32>();
-                // SAFETY: the caller promises that the map is as large as the arguments say.
-                let from = unsafe { disparity.byte_add(offset(disparity_stride)) };
-                // SAFETY: the same.
-                let d = unsafe { from.read_unaligned() };
-                let found = rig.rig.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32);
-                // SAFETY: the same.
-                let to = unsafe { depth.byte_add(offset(depth_stride)) };
-                // SAFETY: the same.
-                unsafe { to.write_unaligned(found) };
-            }
-        }
-        Ok(())
     })
+}
+
+/// The error to expect of every depth, in the unit of the baseline, of maps of disparities and of their errors (mrfgs_maps.sigma), both
+/// in pixels: +infinity where there is none. Strides are in bytes. The maps may be one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mrfgs_depth_sigma(
+    rig: *const Rig,
+    width: u32,
+    height: u32,
+    disparity: *const f32,
+    disparity_stride: usize,
+    sigma: *const f32,
+    sigma_stride: usize,
+    depth_sigma: *mut f32,
+    depth_sigma_stride: usize,
+) -> Status {
+    call(|| {
+        // SAFETY: the caller promises that the pointer is null or good.
+        let rig = unsafe { argument::thing("rig", rig) }?;
+        let given = [("disparity", disparity, disparity_stride), ("sigma", sigma, sigma_stride)];
+        // SAFETY: the caller promises that the maps are as large as the arguments say.
+        unsafe {
+            put_each(
+                rig,
+                (width, height),
+                given,
+                ("depth_sigma", depth_sigma, depth_sigma_stride),
+                |[d, sigma]| {
+                    rig.rig
+                        .depth_sigma(f64::from(d), f64::from(sigma))
+                        .map_or(f32::INFINITY, |sigma| sigma as f32)
+                },
+            )
+        }
+    })
+}
+
+/// Writes `value` of each pixel of the given maps to `to`. Each map has its name and its stride.
+///
+/// # Safety
+/// A map is null, or as large as its stride and the size say.
+unsafe fn put_each<const N: usize>(
+    rig: &Rig,
+    (width, height): (u32, u32),
+    given: [(&str, *const f32, usize); N],
+    (name, to, stride): (&str, *mut f32, usize),
+    value: impl Fn([f32; N]) -> f32,
+) -> Result<(), Failure> {
+    let size = (width as usize, height as usize);
+    if let Some((w, h)) = rig.size.filter(|known| *known != size) {
+        return Err(Failure::argument(format!(
+            "the map is {width} x {height} and the calibration of images of {w} x {h}: depth takes the calibration of this size"
+        )));
+    }
+    for (name, map, stride) in given.into_iter().chain([(name, to.cast_const(), stride)]) {
+        if map.is_null() {
+            return Err(Failure::argument(format!("the map of {name} is null")));
+        }
+        extent(stride, size, size_of::<f32>())
+            .map_err(|wrong| Failure::argument(format!("the map of {name} {wrong}")))?;
+    }
+    for y in 0..size.1 {
+        for x in 0..size.0 {
+            let offset = |stride: usize| y * stride + x * size_of::<f32>();
+            // SAFETY: the pixel is in the map, as the caller promises.
+            let values =
+                given.map(|(_, map, stride)| unsafe { map.byte_add(offset(stride)).read_unaligned() });
+            // SAFETY: the same.
+            unsafe { to.byte_add(offset(stride)).write_unaligned(value(values)) };
+        }
+    }
+    Ok(())
 }
 
 /// Frees a rig; it may be null.

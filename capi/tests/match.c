@@ -7,8 +7,9 @@
 
 #include <mrfgs.h>
 
-/* The first header had no map of the right view. */
+/* The first header had no map of the right view, the second no errors. */
 #define FIRST_SIZE offsetof(mrfgs_maps, right)
+#define SECOND_SIZE offsetof(mrfgs_maps, sigma)
 
 #define CHECK(condition) check((condition) != 0, #condition, __LINE__)
 
@@ -52,29 +53,32 @@ static int same(const uint8_t *map, size_t stride, const struct pnm *expected) {
     return 1;
 }
 
-static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm maps[4]) {
+static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm maps[5]) {
     for (size_t more = 0; more < 8; more += 7) {
         mrfgs_image left = spread(&frames[0], more), right = spread(&frames[1], 2 * more);
-        uint8_t *found[4];
-        size_t strides[4];
-        for (int i = 0; i < 4; i++) {
+        uint8_t *found[5];
+        size_t strides[5];
+        for (int i = 0; i < 5; i++) {
             strides[i] = maps[i].width * maps[i].bytes + more;
             found[i] = malloc(strides[i] * maps[i].height);
             memset(found[i], 0x5a, strides[i] * maps[i].height);
         }
         mrfgs_maps all = {sizeof all, (float *)found[0], strides[0], found[1], strides[1], found[2], strides[2],
-                          (float *)found[3], strides[3]};
+                          (float *)found[3], strides[3], (float *)found[4], strides[4]};
         CHECK(mrfgs_match(matcher, &left, &right, &range, &all) == MRFGS_STATUS_OK);
-        for (int i = 0; i < 4; i++) CHECK(same(found[i], strides[i], &maps[i]));
+        for (int i = 0; i < 5; i++) CHECK(same(found[i], strides[i], &maps[i]));
         CHECK(memcmp(maps[0].data, maps[3].data, maps[0].width * maps[0].height * sizeof(float)) != 0);
-        /* A caller with the first header, whose memory ends where its structure does. */
-        mrfgs_maps *first = malloc(FIRST_SIZE);
-        memcpy(first, &all, FIRST_SIZE);
-        first->size = FIRST_SIZE;
-        for (int i = 0; i < 4; i++) memset(found[i], 0x5a, strides[i] * maps[i].height);
-        CHECK(mrfgs_match(matcher, &left, &right, &range, first) == MRFGS_STATUS_OK);
-        for (int i = 0; i < 4; i++) CHECK(same(found[i], strides[i], &maps[i]) == (i < 3));
-        free(first);
+        /* Callers with earlier headers, whose memory ends where their structure does. */
+        const size_t sizes[2] = {FIRST_SIZE, SECOND_SIZE};
+        for (int n = 0; n < 2; n++) {
+            mrfgs_maps *earlier = malloc(sizes[n]);
+            memcpy(earlier, &all, sizes[n]);
+            earlier->size = sizes[n];
+            for (int i = 0; i < 5; i++) memset(found[i], 0x5a, strides[i] * maps[i].height);
+            CHECK(mrfgs_match(matcher, &left, &right, &range, earlier) == MRFGS_STATUS_OK);
+            for (int i = 0; i < 5; i++) CHECK(same(found[i], strides[i], &maps[i]) == (i < 3 + n));
+            free(earlier);
+        }
         /* Control: the comparison sees one bit. */
         found[0][strides[0]] ^= 1;
         CHECK(!same(found[0], strides[0], &maps[0]));
@@ -83,7 +87,7 @@ static void compare(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_ra
         mrfgs_maps one = {.size = sizeof one, .validity = found[2], .validity_stride = strides[2]};
         CHECK(mrfgs_match(matcher, &left, &right, &range, &one) == MRFGS_STATUS_OK);
         CHECK(same(found[2], strides[2], &maps[2]));
-        for (int i = 0; i < 4; i++) free(found[i]);
+        for (int i = 0; i < 5; i++) free(found[i]);
         free((void *)left.data);
         free((void *)right.data);
     }
@@ -266,7 +270,7 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     small = maps, small.right = disparity, small.right_stride = 3;
     refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.right", "stride");
     small = maps, small.size = FIRST_SIZE + 1;
-    refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 57", "sizeof(mrfgs_maps) is 72");
+    refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 57", "sizeof(mrfgs_maps) is 88");
     small = maps, small.size = 8;
     refused(wrong, mrfgs_match(matcher, &image, &image, &range, &small), "maps.size is 8", "header");
     /* The next match is stopped, and the one after it is not. */
@@ -280,11 +284,12 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
 }
 
 int main(int argc, char **argv) {
-    if (argc != 9) return 2;
+    if (argc != 10) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
     presets();
     struct pnm frames[2] = {pnm_read(argv[1]), pnm_read(argv[2])};
-    struct pnm maps[4] = {pnm_read(argv[4]), pnm_read(argv[5]), pnm_read(argv[6]), pnm_read(argv[7])};
+    struct pnm maps[5];
+    for (int i = 0; i < 5; i++) maps[i] = pnm_read(argv[4 + i]);
     mrfgs_options *options = mrfgs_options_new();
     mrfgs_matcher *matcher;
     CHECK(mrfgs_options_preset(options, "fast") == MRFGS_STATUS_OK);
@@ -294,7 +299,7 @@ int main(int argc, char **argv) {
     CHECK(mrfgs_matcher_new(options, &matcher) == MRFGS_STATUS_OK);
     mrfgs_range range = {0, atoi(argv[3])};
     compare(matcher, frames, range, maps);
-    struct pnm part = pnm_read(argv[8]);
+    struct pnm part = pnm_read(argv[9]);
     region(matcher, frames, range, &part);
     free(part.data);
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
@@ -303,7 +308,7 @@ int main(int argc, char **argv) {
     mrfgs_options_free(options);
     mrfgs_matcher_free(matcher);
     for (int i = 0; i < 2; i++) free(frames[i].data);
-    for (int i = 0; i < 4; i++) free(maps[i].data);
+    for (int i = 0; i < 5; i++) free(maps[i].data);
     printf("match.c: mrfgs %s, %zu x %zu, %zu channels of %zu bytes: all maps are equal\n", mrfgs_version(), frames[0].width,
            frames[0].height, frames[0].channels, frames[0].bytes);
     return 0;

@@ -112,7 +112,7 @@ static void views_are_the_programs(const mrfgs_rectification *by, const struct p
 
 /* The map of both views, and depths. */
 static void maps_are_the_programs(const mrfgs_rectification *by, const char *calibration_path, const struct pnm raw[2],
-                                  mrfgs_range range, const struct pnm expected[3]) {
+                                  mrfgs_range range, const struct pnm expected[4]) {
     mrfgs_image images[2] = {image_of(&raw[0], MRFGS_FORMAT_RGB8), image_of(&raw[1], MRFGS_FORMAT_RGB8)};
     struct views views = rectified(by, images, 3, MRFGS_FORMAT_RGB8);
     uint32_t width = (uint32_t)expected[0].width, height = (uint32_t)expected[0].height;
@@ -125,12 +125,14 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     mrfgs_matcher *matcher;
     CHECK(mrfgs_options_preset(options, "fast") == MRFGS_STATUS_OK && mrfgs_options_device(options, "cpu") == MRFGS_STATUS_OK);
     CHECK(mrfgs_matcher_new(options, &matcher) == MRFGS_STATUS_OK);
-    float *map = malloc(bytes), *of_right = malloc(bytes), *depth = malloc(bytes), *other = malloc(bytes);
-    mrfgs_maps maps = {.size = sizeof maps, .disparity = map, .disparity_stride = stride, .right = of_right, .right_stride = stride};
+    float *map = malloc(bytes), *of_right = malloc(bytes), *depth = malloc(bytes), *other = malloc(bytes),
+          *sigma = malloc(bytes);
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = map, .disparity_stride = stride, .right = of_right, .right_stride = stride,
+                       .sigma = sigma, .sigma_stride = stride};
     CHECK(mrfgs_match_masked(matcher, &left, &right, &masks[0], &masks[1], &range, &maps) == MRFGS_STATUS_OK);
     CHECK(memcmp(map, expected[0].data, bytes) == 0 && memcmp(of_right, expected[1].data, bytes) == 0);
     /* Control: without masks, the borders match something. */
-    maps.disparity = other;
+    maps.disparity = other, maps.sigma = NULL;
     CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK && memcmp(other, map, bytes) != 0);
 
     mrfgs_rig *rig;
@@ -140,6 +142,13 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     /* Control: of another map, other depths. In place. */
     memcpy(other, of_right, bytes);
     CHECK(mrfgs_depth(rig, width, height, other, stride, other, stride) == MRFGS_STATUS_OK && memcmp(other, depth, bytes) != 0);
+    /* The errors of depths, and a control: where disparities are twice as far off, depths are. */
+    CHECK(mrfgs_depth_sigma(rig, width, height, map, stride, sigma, stride, other, stride) == MRFGS_STATUS_OK);
+    CHECK(memcmp(other, expected[3].data, bytes) == 0);
+    for (size_t i = 0; i < pixels; i++) sigma[i] *= 2;
+    CHECK(mrfgs_depth_sigma(rig, width, height, map, stride, sigma, stride, sigma, stride) == MRFGS_STATUS_OK);
+    for (size_t i = 0; i < pixels; i++) CHECK(sigma[i] == 2 * other[i]);
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_depth_sigma(rig, width, height, map, stride, NULL, stride, other, stride), "map of sigma", "null");
     refused(MRFGS_STATUS_ARGUMENT, mrfgs_depth(rig, width - 1, height, map, stride, depth, stride), "239 x 180", "240 x 180");
     refused(MRFGS_STATUS_ARGUMENT, mrfgs_depth(rig, width, height, map, 7, depth, stride), "map of disparity", "stride of 7");
     refused(MRFGS_STATUS_ARGUMENT, mrfgs_depth(rig, width, height, map, stride, NULL, stride), "map of depth", "null");
@@ -238,11 +247,11 @@ static void mistakes(const char *path, const mrfgs_calibration *calibration, mrf
 }
 
 int main(int argc, char **argv) {
-    if (argc != 13) return 2;
+    if (argc != 14) return 2;
     const char *path = argv[1];
-    struct pnm files[9];
-    const int at[9] = {3, 4, 5, 6, 7, 8, 10, 11, 12};
-    for (int i = 0; i < 9; i++) files[i] = pnm_read(argv[at[i]]);
+    struct pnm files[10];
+    const int at[10] = {3, 4, 5, 6, 7, 8, 10, 11, 12, 13};
+    for (int i = 0; i < 10; i++) files[i] = pnm_read(argv[at[i]]);
     mrfgs_calibration *calibration, *same_one;
     mrfgs_rectification *by, *again, *wider;
     CHECK(mrfgs_calibration_read(&path, 1, &calibration) == MRFGS_STATUS_OK);
@@ -267,7 +276,7 @@ int main(int argc, char **argv) {
     mrfgs_calibration_free(calibration);
     mrfgs_calibration_free(same_one);
     free(text);
-    for (int i = 0; i < 9; i++) free(files[i].data);
+    for (int i = 0; i < 10; i++) free(files[i].data);
     printf("rectify.c: mrfgs %s: all views, maps and depths are equal\n", mrfgs_version());
     return 0;
 }

@@ -28,6 +28,7 @@ class Matched:
         disparity: npt.NDArray[np.float32],
         raw: npt.NDArray[np.float32],
         confidence: npt.NDArray[np.uint8],
+        sigma: npt.NDArray[np.float32],
         validity: npt.NDArray[np.uint8],
         right: npt.NDArray[np.float32] | None,
         min_disparity: int,
@@ -47,6 +48,10 @@ class Matched:
     def confidence(self) -> npt.NDArray[np.uint8]:
         """How far the best runner-up is behind, in 1/8 nat, as a mean over the pixels around; those with another disparity count 0. It
         is 0 where there is no measurement."""
+    @property
+    def sigma(self) -> npt.NDArray[np.float32]:
+        """The error to expect of every measured disparity in pixels, from its confidence: about two thirds are nearer to the truth.
+        +inf where nothing was measured."""
     @property
     def validity(self) -> npt.NDArray[np.uint8]:
         """Why each pixel is what it is: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
@@ -223,6 +228,9 @@ class Rig:
         `size` unless it is given."""
     def depth(self, disparity: npt.ArrayLike) -> npt.NDArray[np.float32]:
         """The depth of every pixel along the optical axis, in the unit of the baseline, +inf where there is none."""
+    def depth_sigma(self, disparity: npt.ArrayLike, sigma: npt.ArrayLike) -> npt.NDArray[np.float32]:
+        """The error to expect of every depth, in the unit of the baseline, of disparities with these errors (Matched.sigma); +inf where
+        there is none."""
     def millimetres(self, disparity: npt.ArrayLike) -> npt.NDArray[np.uint16]:
         """The depth of every pixel in whole millimetres: 0 where there is none, and where it is above 65535."""
     def points(self, matched: Matched, left: _Image) -> Points:

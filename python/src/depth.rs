@@ -174,6 +174,26 @@ impl PyRig {
         arrays::map(py, py.detach(|| self.rig.depths(&map)))
     }
 
+    /// The error to expect of every depth, float32 in the unit of the baseline, +inf where there is none: Z sigma / (d + doffs).
+    ///
+    /// disparity: as in `depth`.
+    /// sigma: the errors of the disparities, an array of the same shape in pixels, such as Matched.sigma.
+    fn depth_sigma<'py>(
+        &self,
+        py: Python<'py>,
+        disparity: &Bound<PyAny>,
+        sigma: &Bound<PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let (map, sigmas) = (self.disparities(disparity)?, arrays::disparities("sigma", sigma)?);
+        if map.size() != sigmas.size() {
+            let [(w, h), (width, height)] = [sigmas.size(), map.size()];
+            return Err(PyValueError::new_err(format!(
+                "sigma: is {w} x {h}, and disparity {width} x {height}: give maps of one view"
+            )));
+        }
+        arrays::map(py, py.detach(|| self.rig.depth_sigmas(&map, &sigmas)))
+    }
+
     /// The depth of every pixel in whole millimetres, uint16, as ROS and TUM have it: 0 where there is none, and where it is above 65535.
     ///
     /// disparity: as in `depth`.

@@ -17,6 +17,9 @@ pub(crate) struct PyMatched {
     /// How far the best runner-up is behind, in 1/8 nat, uint8, as a mean over the pixels around; those with another disparity count
     /// 0. It is 0 where there is no measurement.
     pub(crate) confidence: Py<PyArray2<u8>>,
+    /// The error to expect of every measured disparity in pixels, float32, from its confidence: about two thirds are nearer to the truth.
+    /// +inf where nothing was measured.
+    pub(crate) sigma: Py<PyArray2<f32>>,
     /// Why each pixel is what it is, uint8: the sum of 1 match outside the right image, 2 occluded, 4 in a small region, 8 low
     /// confidence, 16 filled, 32 masked, 64 a tie of two disparities, 128 outvoted by the pixels around it; 0 is measured and trusted.
     pub(crate) validity: Py<PyArray2<u8>>,
@@ -40,12 +43,14 @@ pub(crate) struct PyMatched {
 impl PyMatched {
     pub(crate) fn of(py: Python, matched: Matched) -> PyResult<Self> {
         let range = matched.range();
+        let sigma = arrays::map(py, matched.sigma())?.unbind();
         let right = matched.maps.right_map().map(|map| arrays::map(py, map)).transpose()?;
         Ok(Self {
             right: right.map(Bound::unbind),
             disparity: arrays::map(py, matched.maps.final_map())?.unbind(),
             raw: arrays::map(py, matched.maps.raw_map())?.unbind(),
             confidence: arrays::map(py, matched.maps.confidence)?.unbind(),
+            sigma,
             validity: arrays::map(py, matched.maps.validity)?.unbind(),
             min_disparity: range.min,
             max_disparity: range.max,
@@ -65,6 +70,7 @@ impl PyMatched {
         disparity: Py<PyArray2<f32>>,
         raw: Py<PyArray2<f32>>,
         confidence: Py<PyArray2<u8>>,
+        sigma: Py<PyArray2<f32>>,
         validity: Py<PyArray2<u8>>,
         right: Option<Py<PyArray2<f32>>>,
         min_disparity: i32,
@@ -78,6 +84,7 @@ impl PyMatched {
             disparity,
             raw,
             confidence,
+            sigma,
             validity,
             right,
             min_disparity,
@@ -91,13 +98,12 @@ impl PyMatched {
 
     /// How `pickle` and `copy` make another one.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
-        let maps =
-            (self.disparity.bind(py), self.raw.bind(py), self.confidence.bind(py), self.validity.bind(py));
-        let (d, r, c, v) = maps;
+        let (d, r, c) = (self.disparity.bind(py), self.raw.bind(py), self.confidence.bind(py));
+        let (s, v) = (self.sigma.bind(py), self.validity.bind(py));
         let Self { min_disparity, max_disparity, iterations, tiles, ran_on, note, .. } = self;
         let right = self.right.as_ref().map(|right| right.bind(py));
         let all =
-            (d, r, c, v, right, min_disparity, max_disparity, iterations, tiles, ran_on, note.as_deref());
+            (d, r, c, s, v, right, min_disparity, max_disparity, iterations, tiles, ran_on, note.as_deref());
         Ok((py.get_type::<Self>(), all.into_pyobject(py)?))
     }
 

@@ -347,7 +347,7 @@ class Match(unittest.TestCase):
         matched = mrfgs.match(*pair(), 15, device="cpu")
         for other in (pickle.loads(pickle.dumps(matched)), copy.copy(matched), copy.deepcopy(matched)):
             self.assertIsInstance(other, mrfgs.Matched)
-            for name in ("disparity", "raw", "confidence", "validity", "min_disparity", "max_disparity", "iterations",
+            for name in ("disparity", "raw", "confidence", "sigma", "validity", "min_disparity", "max_disparity", "iterations",
                          "tiles", "ran_on", "note"):
                 self.assertTrue(np.array_equal(getattr(other, name), getattr(matched, name)), name)
         self.assertIn("80 x 60", repr(matched))
@@ -358,7 +358,7 @@ class Match(unittest.TestCase):
                 text = inspect.getdoc(mrfgs.Matcher) + inspect.getdoc(mrfgs.Matcher.match)
                 self.assertTrue(name == "self" or name in text, name)
         self.assertIn("Matcher", inspect.getdoc(mrfgs.match))
-        for name in ("disparity", "confidence", "validity", "note"):
+        for name in ("disparity", "confidence", "sigma", "validity", "note"):
             self.assertTrue(inspect.getdoc(getattr(mrfgs.Matched, name)), name)
 
     def test_options(self):
@@ -732,7 +732,7 @@ class Rectification(Folder):
     def test_from_raw_frames_to_depth_and_points(self):
         left, right = raw_pair()
         program(self.folder, "match", RAW / "left.png", RAW / "right.png", "d.pfm", "--rectify", "--calib", CAMERAS,
-                "--max-disparity", 31, "--also", "depth,depth-mm,points,points.pcd,points.las,points.laz", "--device", "cpu", "--quiet")
+                "--max-disparity", 31, "--also", "depth,depth-mm,sigma,depth-sigma,points,points.pcd,points.las,points.laz", "--device", "cpu", "--quiet")
         rectification = mrfgs.Rectification(CAMERAS)
         views = rectification.apply(left, right)
         found = mrfgs.match(*views, 31, device="cpu")
@@ -742,6 +742,12 @@ class Rectification(Folder):
         self.assertEqual((depth.dtype, millimetres.dtype, depth.shape), (np.float32, np.uint16, (180, 240)))
         self.assertTrue(np.array_equal(depth, read_pfm(self.folder / "d.depth.pfm")))
         self.assertTrue(np.array_equal(millimetres, read_png(self.folder / "d.depth-mm.png")))
+        self.assertTrue(np.array_equal(found.sigma, read_pfm(self.folder / "d.sigma.pfm")))
+        self.assertEqual((found.sigma.dtype, found.sigma.shape), (np.float32, (180, 240)))
+        sigma = rig.depth_sigma(found.disparity, found.sigma)
+        self.assertTrue(np.array_equal(sigma, read_pfm(self.folder / "d.depth-sigma.pfm")))
+        self.assertTrue(np.array_equal(rig.depth_sigma(found.disparity, 2 * found.sigma), 2 * sigma))
+        self.refused(ValueError, "sigma: is 240 x 179, and disparity 240 x 180", lambda: rig.depth_sigma(found.disparity, found.sigma[1:]))
         near = np.isfinite(depth) & (depth < 65)
         self.assertLessEqual(np.abs(millimetres[near] - depth[near] * 1000).max(), 0.51)
         self.assertTrue((millimetres[~np.isfinite(depth)] == 0).all() and np.isinf(depth).any())

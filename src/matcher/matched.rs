@@ -10,6 +10,7 @@ use crate::maps::Maps;
 use crate::options::DisparityRange;
 use crate::plan::Plan;
 use crate::program::tiles::Tiles;
+use crate::sigma::Sigma;
 use std::time::Duration;
 
 /// The maps of a pair, and what made them.
@@ -95,6 +96,12 @@ impl Matched {
     #[must_use]
     pub fn confidence(&self) -> &Plane<u8> {
         &self.maps.confidence
+    }
+
+    /// The error to expect of every measured disparity, in pixels, from its confidence; `+inf` where nothing was measured.
+    #[must_use]
+    pub fn sigma(&self) -> Plane<f32> {
+        Sigma::of(&self.plan.method).map(&self.maps)
     }
 
     /// Why each pixel is what it is: bits of [`flag`](crate::maps::flag), 0 where it is measured and trusted.

@@ -108,6 +108,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         left: left.as_ref(),
         rig: rig.transpose()?,
         rectifying: None,
+        sigma: None,
         georeferences: [None, None],
     };
     let mut written = Written::default();

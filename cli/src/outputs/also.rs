@@ -13,6 +13,7 @@ use mrfgs::image::write::Writer;
 use mrfgs::image::{Georeference, Image, Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
+use mrfgs::sigma::Sigma;
 
 use crate::args::Sign;
 use crate::failure::{Failure, Result};
@@ -45,6 +46,8 @@ enum Kind {
     Depth,
     /// The same in whole millimetres, as 16-bit PNG.
     Millimetres,
+    /// The errors to expect, of disparities or of depths, as float like depths.
+    Sigma(Of),
     /// A cloud of points, as PLY unless the word has an extension.
     Points(Frame),
     /// The disparity map in colours, as PNG; with the left image on its left if `beside`.
@@ -58,8 +61,15 @@ pub(crate) enum View {
     Right,
 }
 
+/// What an error is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Of {
+    Disparities,
+    Depths,
+}
+
 /// All outputs, in the order in which they are written. One more is one more row.
-static ALL: [Also; 16] = [
+static ALL: [Also; 18] = [
     row(
         "raw",
         "The disparity map before post-processing, in the format of the disparity map",
@@ -116,6 +126,17 @@ static ALL: [Also; 16] = [
          well), 128 outvoted (by the pixels around it); 0 is measured and trusted",
         Kind::Bytes(|maps| &maps.validity),
     ),
+    row(
+        "sigma",
+        "The error to expect of every measured disparity, in pixels, from its confidence: about two thirds are nearer to the truth. \
+         As float: .pfm (+infinity where nothing was measured), or .tif (NaN) if the disparity map is TIFF",
+        Kind::Sigma(Of::Disparities),
+    ),
+    row(
+        "depth-sigma",
+        "The error to expect of every depth, in its unit, likewise: Z sigma / (d + doffs)",
+        Kind::Sigma(Of::Depths),
+    ),
     row("preview", "The disparity map in colours, with a scale: .png", Kind::Picture { beside: false }),
     row("side-by-side", "LEFT and beside it the preview: .png", Kind::Picture { beside: true }),
 ];
@@ -168,6 +189,8 @@ pub(crate) struct Outcome<'a> {
     pub(crate) rig: Option<Rig>,
     /// The rotation from the frame of the left camera to the rectified one, where the images were rectified.
     pub(crate) rectifying: Option<Matrix>,
+    /// How the errors follow from the confidence, where a match found the maps.
+    pub(crate) sigma: Option<Sigma>,
     /// The georeferences of the views.
     pub(crate) georeferences: [Option<Georeference>; 2],
 }
@@ -176,6 +199,30 @@ impl Outcome<'_> {
     /// The disparity map, without what is not sure.
     pub(crate) fn final_map(&self, limits: Limits) -> Plane<f32> {
         limits.sure(self.maps.final_map(), self.maps)
+    }
+
+    /// The errors of what is sure: `None` where they are not known, or those of depths are wanted without cameras.
+    fn sigmas(&self, of: Of, limits: Limits) -> Option<Plane<f32>> {
+        let (mut map, sigmas) = (self.final_map(limits), self.sigma?.map(self.maps));
+        if let Some(rig) = &self.rig {
+            map = limits.near(map, rig);
+        }
+        match of {
+            Of::Depths => Some(self.rig?.depth_sigmas(&map, &sigmas)),
+            Of::Disparities => {
+                let (width, height) = map.size();
+                let sigma = |x, y| if map[(x, y)].is_finite() { sigmas[(x, y)] } else { f32::INFINITY };
+                Some(Plane::from_fn(width, height, sigma))
+            }
+        }
+    }
+
+    /// The median of the errors of all measured disparities; `None` where none is, or errors are not known.
+    pub(crate) fn typical_sigma(&self) -> Option<f32> {
+        let mut sigmas = self.sigma?.map(self.maps).into_data();
+        sigmas.retain(|sigma| sigma.is_finite());
+        let middle = sigmas.len().checked_sub(1)? / 2;
+        Some(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1)
     }
 
     /// What writes a map with the pixels of `view`.
@@ -215,7 +262,9 @@ impl AlsoArgs {
 
     /// The wanted output that takes most of the cameras.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
-        let first = || self.wanted().find(|also| matches!(also.kind, Kind::Depth | Kind::Points(..)));
+        let is_of_cameras =
+            |also: &&Also| matches!(also.kind, Kind::Depth | Kind::Sigma(Of::Depths) | Kind::Points(..));
+        let first = || self.wanted().find(is_of_cameras);
         self.wanted().find(|also| also.takes_unit()).or_else(first)
     }
 
@@ -289,14 +338,14 @@ impl AlsoArgs {
     pub(crate) fn check_recording(&self) -> Result<()> {
         self.check(false)?;
         let is_message = |also: &&Also| match also.kind {
-            Kind::Depth | Kind::Millimetres | Kind::Bytes(_) => true,
+            Kind::Depth | Kind::Millimetres | Kind::Sigma(_) | Kind::Bytes(_) => true,
             Kind::Points(frame) => frame == Frame::Matched && also.word == also.stem(),
             Kind::Disparity(..) | Kind::Picture { .. } => false,
         };
         match self.wanted().find(|also| !is_message(also)) {
             Some(also) => Err(Failure::usage(
                 also.flag(),
-                "is no message of a recording, which takes depth, depth-mm, points, confidence and validity; give the name of a folder \
+                "is no message of a recording, which takes depth, depth-mm, points, confidence, validity, sigma and depth-sigma; give the name of a folder \
                  as OUTPUT",
             )),
             None => Ok(()),
@@ -310,6 +359,13 @@ impl AlsoArgs {
         let content = |also: &Also| match also.kind {
             Kind::Bytes(map) => Some(Content::Bytes(also.word, map(maps).clone())),
             Kind::Depth => rig.map(|rig| Content::Depth(rig.depths(&near(&rig)))),
+            Kind::Sigma(of) => {
+                let sigmas = outcome.sigmas(of, self.limits)?;
+                Some(match of {
+                    Of::Disparities => Content::Sigma(sigmas),
+                    Of::Depths => Content::DepthSigma(sigmas),
+                })
+            }
             Kind::Millimetres => rig.and_then(|rig| rig.millimetres(&near(&rig)).map(Content::Millimetres)),
             Kind::Points(_) => {
                 let (rig, left) = rig.zip(left)?;
@@ -343,6 +399,10 @@ impl AlsoArgs {
                 let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
                 let Some(depths) = rig.and_then(|rig| rig.millimetres(&near(&rig))) else { return Ok(None) };
                 write::picture(path, &depths)?;
+            }
+            Kind::Sigma(of) => {
+                let Some(sigmas) = outcome.sigmas(of, self.limits) else { return Ok(None) };
+                outcome.writer(View::Left).depth(path, &sigmas)?;
             }
             Kind::Points(frame) => {
                 let rig = match frame {
@@ -383,8 +443,8 @@ impl Also {
         let is_tiff = ["tif", "tiff"].iter().any(|tiff| own.eq_ignore_ascii_case(tiff));
         let extension = match self.kind {
             Kind::Disparity(..) => &*own,
-            Kind::Depth if is_tiff => &*own,
-            Kind::Depth => "pfm",
+            Kind::Depth | Kind::Sigma(_) if is_tiff => &*own,
+            Kind::Depth | Kind::Sigma(_) => "pfm",
             Kind::Points(_) => self.word.split_once('.').map_or("ply", |(_, extension)| extension),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => "png",
         };
@@ -395,7 +455,7 @@ impl Also {
     pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> mrfgs::Result<()> {
         match self.kind {
             Kind::Disparity(..) => write::check_disparity_path(path, range.min, range.max),
-            Kind::Depth => write::check_depth_path(path),
+            Kind::Depth | Kind::Sigma(_) => write::check_depth_path(path),
             Kind::Points(..) => write::check_path(path),
             Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => write::check_png_path(path),
         }

@@ -22,6 +22,8 @@ const CAMERA_INFO: &str = "/left/camera_info";
 const DEPTH: &str = "/depth/image_rect";
 const MILLIMETRES: &str = "/depth/image_rect_raw";
 const POINTS: &str = "/points2";
+const SIGMA: &str = "/sigma";
+const DEPTH_SIGMA: &str = "/depth/sigma";
 
 /// What a frame has beside its disparities.
 pub(crate) enum Content {
@@ -30,6 +32,10 @@ pub(crate) enum Content {
     /// 0 where there is none.
     Millimetres(Plane<u16>),
     Points(Cloud),
+    /// Errors in pixels; +infinity where there is none.
+    Sigma(Plane<f32>),
+    /// Errors in the unit of the baseline; +infinity where there is none.
+    DepthSigma(Plane<f32>),
     /// A map of bytes, with its name.
     Bytes(&'static str, Plane<u8>),
 }
@@ -88,12 +94,21 @@ impl RecordedMaps {
         Ok(Self { path: path.to_owned(), range, cameras, writer: None })
     }
 
-    /// Adds the disparities of a frame, its camera and its `contents`. The left view has this `header`.
+    /// Adds the disparities of a frame, its camera and its `contents`. The left view has this `header`, and disparities have this error
+    /// (sigma, in pixels), where it is known.
     ///
     /// # Errors
     /// [`Error::Write`] where it cannot be written.
-    pub(crate) fn add(&mut self, header: &Header, map: &Plane<f32>, contents: Vec<Content>) -> Result<()> {
-        self.put(DISPARITY, header, &disparity(header, map, self.range, self.cameras.as_ref()))?;
+    pub(crate) fn add(
+        &mut self,
+        header: &Header,
+        map: &Plane<f32>,
+        sigma: Option<f32>,
+        contents: Vec<Content>,
+    ) -> Result<()> {
+        let disparity = disparity(header, map, self.range, self.cameras.as_ref());
+        let delta_d = sigma.unwrap_or(disparity.delta_d);
+        self.put(DISPARITY, header, &DisparityImage { delta_d, ..disparity })?;
         if let Some(cameras) = &self.cameras {
             let message = cameras.message(header, map.size());
             self.put(CAMERA_INFO, header, &message)?;
@@ -103,8 +118,13 @@ impl RecordedMaps {
         for content in contents {
             match content {
                 Content::Depth(depth) => {
-                    let depth = depth.map(|v| if v.is_finite() { in_metres(*v, metres) } else { f32::NAN });
-                    self.put(DEPTH, header, &floats(header, &depth))?;
+                    self.put(DEPTH, header, &floats(header, &known(&depth, metres)))?;
+                }
+                Content::Sigma(sigmas) => {
+                    self.put(SIGMA, header, &floats(header, &known(&sigmas, 1.0)))?;
+                }
+                Content::DepthSigma(sigmas) => {
+                    self.put(DEPTH_SIGMA, header, &floats(header, &known(&sigmas, metres)))?;
                 }
                 Content::Millimetres(depth) => {
                     let data = depth.data().iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -145,6 +165,11 @@ impl RecordedMaps {
 
 fn in_metres(v: f32, metres: f64) -> f32 {
     (f64::from(v) * metres) as f32
+}
+
+/// `map` in another unit, and not a number where there is nothing.
+fn known(map: &Plane<f32>, unit: f64) -> Plane<f32> {
+    map.map(|v| if v.is_finite() { in_metres(*v, unit) } else { f32::NAN })
 }
 
 /// The map as ROS has it: shifted so that depth is focal length times baseline by disparity, and below the range where it is invalid.

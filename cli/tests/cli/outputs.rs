@@ -57,6 +57,52 @@ fn depth_is_that_of_the_cameras() {
     assert!((median(known.clone()) - 2.8).abs() < 0.02, "{}", median(known));
 }
 
+/// Each measured pixel has an error, which falls as its confidence rises; that of its depth follows from the cameras.
+#[test]
+fn errors_are_those_of_confidence_and_cameras() {
+    let folder = Folder::new();
+    let named = |name: &str, end: &str| read_pfm(folder.join(format!("{name}.{end}")));
+    let also = "--also depth,sigma,depth-sigma,confidence,validity";
+    matched(&folder, "slanted", &format!("d.pfm {also}"));
+    let [map, depths, sigmas, of_depths] =
+        ["pfm", "depth.pfm", "sigma.pfm", "depth-sigma.pfm"].map(|end| named("d", end));
+    let [confidence, validity] =
+        ["confidence", "validity"].map(|word| read::grey8(&folder.join(format!("d.{word}.png"))).unwrap());
+    let mut by_confidence = BTreeMap::new();
+    let mut filled = 0;
+    for at in (0..180).flat_map(|y| (0..240).map(move |x| (x, y))) {
+        let (sigma, of_depth) = (sigmas[at], of_depths[at]);
+        if validity[at] & flag::INVALID != 0 {
+            assert!(sigma.is_infinite() && of_depth.is_infinite());
+            filled += 1;
+            continue;
+        }
+        assert!(by_confidence.entry(confidence[at]).or_insert(sigma).total_cmp(&sigma).is_eq());
+        let expected = depths[at] * sigma / map[at];
+        assert!((of_depth / expected - 1.0).abs() < 1e-5, "{of_depth} and {expected}");
+    }
+    assert!(filled > 1000 && by_confidence.len() > 40, "{filled}, {}", by_confidence.len());
+    let sigmas: Vec<f32> = by_confidence.into_values().collect();
+    assert!(sigmas.is_sorted_by(|a, b| a >= b) && sigmas[0] > 4.0 * sigmas[sigmas.len() - 1], "{sigmas:?}");
+
+    // `fast` has another scale of confidence. TIFF stays TIFF, and limits count.
+    matched(&folder, "slanted", "fast.tif --method fast --also sigma --min-confidence 20 --quiet");
+    let known = |map: &Plane<f32>| map.data().iter().filter(|v| v.is_finite()).count();
+    let (map, sigmas) = (read_tiff(folder.join("fast.tif")), read_tiff(folder.join("fast.sigma.tif")));
+    assert_eq!(known(&map), known(&sigmas));
+    assert!(known(&sigmas) > 5000 && sigmas.data().iter().all(|v| !v.is_finite() || *v < 0.4));
+    matched(&folder, "slanted", &format!("near.pfm {also} --clip-depth 2 --quiet"));
+    assert!(known(&named("near", "sigma.pfm")) == known(&named("near", "depth-sigma.pfm")));
+    assert!(known(&named("near", "sigma.pfm")) + 500 < 240 * 180 - filled);
+
+    let of_map = run(&folder, "depth d.pfm --calib @slanted/calib.txt --also sigma");
+    of_map.failed(2, "--also sigma: is found by a match, and MAP does not hold it");
+    fs::copy(scene("slanted/im0.png"), folder.join("l.png")).unwrap();
+    fs::copy(scene("slanted/im1.png"), folder.join("r.png")).unwrap();
+    run(&folder, "match l.png r.png no.pfm --max-disparity 31 --also depth-sigma")
+        .failed(2, "--also depth-sigma: takes the cameras");
+}
+
 /// What `match` writes beside its map, `depth` makes of the map afterwards.
 #[test]
 fn depth_and_points_of_a_map_that_is_there() {

@@ -13,6 +13,7 @@ use clap::ValueEnum;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, write};
 use mrfgs::options::Method;
+use mrfgs::sigma::Sigma;
 use mrfgs::{Error, Matched, Matcher};
 
 use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Sign};
@@ -320,7 +321,8 @@ impl Batch<'_> {
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign, left) = (&matched.maps, Sign::default(), pair.as_ref().map(Pair::left));
-        let outcome = Outcome { maps, range, sign, left, rig, rectifying, georeferences };
+        let sigma = Some(Sigma::of(&self.method));
+        let outcome = Outcome { maps, range, sign, left, rig, rectifying, sigma, georeferences };
         self.named(claim, wanted.write(claim.folder(), &listed.name, &outcome))?;
         files.output = Some(wanted.map(&listed.name));
         let mut found = MatchRecord::new(&files, &matched, time, sign);

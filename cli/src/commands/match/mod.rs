@@ -6,6 +6,7 @@ use mrfgs::Matcher;
 use mrfgs::image::{Pair, pfm, write};
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
+use mrfgs::sigma::Sigma;
 
 use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, RegionArgs, Sign};
 use crate::failure::{Failure, Result};
@@ -163,8 +164,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     drop(input);
     let pair = Some(pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
-    let outcome =
-        Outcome { maps: &matched.maps, range, sign: args.sign, left, rig, rectifying, georeferences };
+    let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::of(&method)));
+    let outcome = Outcome { maps, range, sign, left, rig, rectifying, sigma, georeferences };
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
     record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);

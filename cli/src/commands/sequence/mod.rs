@@ -9,6 +9,7 @@ use mrfgs::image::write;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
+use mrfgs::sigma::Sigma;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
@@ -222,10 +223,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let plan = Plan::new(width, height, input.range, &method)?;
         return Ok(console::print(&plan::describe(&plan)?)?);
     }
+    let sigma = Sigma::of(&method);
     let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
     let range = range_of_all(&mut matcher, &input, args)?;
     let rectifying = input.rectifying();
-    let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, rectifying, rate };
+    let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, sigma, rectifying, rate };
     let records = args.json.as_deref().map(Records::new).transpose()?;
     let mut sink = if film {
         writer.begin_film(records)?

@@ -10,6 +10,7 @@ use mrfgs::depth::Rig;
 use mrfgs::image::{Georeference, Pair, write, write::Growing};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
+use mrfgs::sigma::Sigma;
 use mrfgs_ros::messages::{Header, SECOND, Stamp};
 
 use crate::args::Sign;
@@ -27,6 +28,7 @@ pub(super) struct Writer<'a> {
     pub(super) wanted: &'a MapArgs,
     pub(super) range: DisparityRange,
     pub(super) rig: Option<Rig>,
+    pub(super) sigma: Sigma,
     /// The rotation from the frame of the left camera to the rectified one, where frames are rectified.
     pub(super) rectifying: Option<Matrix>,
     /// How many frames there are a second, where that is known.
@@ -155,17 +157,18 @@ impl Sink<'_> {
 
     /// Writes a frame.
     pub(super) fn add(&mut self, found: &Found) -> Result<()> {
-        let Writer { output, wanted, range, rig, rectifying, rate } = self.writer;
+        let Writer { output, wanted, range, rig, sigma, rectifying, rate } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
         let georeferences = found.georeferences.clone();
-        let outcome = Outcome { maps, range, sign: Sign::default(), left, rig, rectifying, georeferences };
+        let (sign, sigma) = (Sign::default(), Some(sigma));
+        let outcome = Outcome { maps, range, sign, left, rig, rectifying, sigma, georeferences };
         match &mut self.to {
             To::Folder => wanted.write(output, &found.name, &outcome)?,
             To::Film(film) => film.add(&wanted.also.film_picture(&outcome))?,
             To::Recording(recording) => {
                 let header = found.header.clone().unwrap_or_else(|| header(&found.name, self.count, rate));
                 let map = outcome.final_map(wanted.also.limits);
-                recording.add(&header, &map, wanted.also.contents(&outcome))?;
+                recording.add(&header, &map, outcome.typical_sigma(), wanted.also.contents(&outcome))?;
             }
         }
         self.count += 1;
