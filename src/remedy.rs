@@ -8,6 +8,7 @@ use crate::error::{
     ReadError, RectificationError,
 };
 use crate::front::check::Warning;
+use crate::maps::FRACTION;
 
 /// What a front end calls what helps. `None` is what it does not have.
 #[derive(Clone, Copy, Debug)]
@@ -108,6 +109,19 @@ pub fn warning(warning: &Warning, Words { min, max, mask, orient, .. }: &Words) 
         _ => String::new(),
     };
     format!("{warning}{remedy}")
+}
+
+/// As [`warning`], of a pair that was rectified, by a calibration or else by its own matches: to rectify is no remedy any more.
+#[must_use]
+pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Words) -> String {
+    let Warning::NotRectified { offset } = warning else { return self::warning(warning, words) };
+    let why = if calibrated {
+        "the calibration is not of these cameras as they are now, or not of images of this size"
+    } else {
+        "the lens may bend lines, or the scene has moved: calibrate the cameras"
+    };
+    let rows = f64::from(*offset) / f64::from(FRACTION);
+    format!("after rectification matches lie {rows:.1} px above or below their row: {why}")
 }
 
 /// `word` after what joins it; nothing without it.

@@ -1,6 +1,6 @@
 //! The program's words for what helps: flags, and the columns of a list.
 
-pub(crate) use mrfgs::remedy::{Words, error, warning};
+pub(crate) use mrfgs::remedy::{Words, error, of_rectified, warning};
 
 /// On the command line.
 pub(crate) const FLAGS: Words = Words {

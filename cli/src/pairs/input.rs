@@ -7,7 +7,6 @@ use mrfgs::check::{self, Warning};
 use mrfgs::depth::Rig;
 use mrfgs::image::calib::{Calibration, Unit};
 use mrfgs::image::{Pair, Rect};
-use mrfgs::maps::FRACTION;
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Options, Rectification, Trust};
 use mrfgs::region::Region;
@@ -303,19 +302,9 @@ impl Input {
         }
         // A range that was found does not show what the user knows.
         let warnings = check::warnings(pair, (!self.by_matches).then_some(self.range));
-        said.extend(warnings.iter().map(|warning| match warning {
-            // To rectify is no remedy any more.
-            Warning::NotRectified { offset } if self.rectification.is_some() => {
-                let why = match self.calibration {
-                    Some(_) => {
-                        "the calibration is not of these cameras as they are now, or not of images of this size"
-                    }
-                    None => "the lens may bend lines, or the scene has moved: calibrate the cameras",
-                };
-                let rows = f64::from(*offset) / f64::from(FRACTION);
-                format!("after rectification matches lie {rows:.1} px above or below their row: {why}")
-            }
-            other => remedy::warning(other, words),
+        said.extend(warnings.iter().map(|warning| match self.rectification {
+            Some(_) => remedy::of_rectified(warning, self.calibration.is_some(), words),
+            None => remedy::warning(warning, words),
         }));
         said
     }
