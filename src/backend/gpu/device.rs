@@ -7,6 +7,7 @@ use futures_channel::oneshot;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use web_time::Instant;
 
 /// Limits and failures injected on purpose: tests run the engine as if on a weaker device, or a failing one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,8 +40,13 @@ const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
 /// and on a processor for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 32;
 const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
-/// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late.
-const SUBMISSIONS: usize = 4;
+/// The same in a browser at first, which does not say whether its device is a driver in software. It doubles whenever a submission is
+/// waited for no longer than [`SHORT`].
+const BROWSER_WORK_PER_SUBMIT: u64 = 1 << 24;
+const SHORT: Duration = Duration::from_millis(30);
+/// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late. In a browser one is enough, and
+/// what the bar shows as done is done.
+const SUBMISSIONS: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
 
 /// The least that a dispatch sees at once.
 pub(super) const ONE_ROW: &str = "one row of the image and what it depends on";
@@ -138,7 +144,11 @@ impl Device {
             max_groups: limits.max_compute_workgroups_per_dimension,
             memory: faults.memory,
             tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
-            work_per_submit: if software { SOFTWARE_WORK_PER_SUBMIT } else { WORK_PER_SUBMIT },
+            work_per_submit: match software {
+                _ if cfg!(target_arch = "wasm32") => BROWSER_WORK_PER_SUBMIT,
+                true => SOFTWARE_WORK_PER_SUBMIT,
+                false => WORK_PER_SUBMIT,
+            },
             patience: faults.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
             lost_after: faults.lost_after,
             under_way: VecDeque::new(),
@@ -231,7 +241,12 @@ impl Device {
         let Some(Submission { index, done }) = self.under_way.pop_front() else { return Ok(()) };
         if cfg!(target_arch = "wasm32") {
             // The browser ends work that takes too long. The device is lost then.
-            return done.await.map_err(|e| failed(&self.name, &e)).and_then(|()| self.check());
+            let clock = Instant::now();
+            done.await.map_err(|e| failed(&self.name, &e))?;
+            if clock.elapsed() < SHORT {
+                self.work_per_submit = (2 * self.work_per_submit).min(WORK_PER_SUBMIT);
+            }
+            return self.check();
         }
         let waiting = wgpu::PollType::Wait { submission_index: Some(index), timeout: Some(self.patience) };
         match self.inner()?.poll(waiting) {
