@@ -39,7 +39,10 @@ export async function serve(mounts, port = 0) {
         response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream' });
         createReadStream(file).pipe(response);
     });
-    await new Promise((resolve) => server.listen(port, '127.0.0.1', resolve));
+    await new Promise((resolve, reject) => {
+        server.once('error', reject);
+        server.listen(port, '127.0.0.1', resolve);
+    });
     return {
         url: `http://127.0.0.1:${server.address().port}`,
         asked,
@@ -51,6 +54,13 @@ export async function serve(mounts, port = 0) {
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-    const { url } = await serve({ '/': process.argv[2] }, Number(process.argv[3] ?? 8000));
-    console.log(`${url}/`);
+    const port = Number(process.argv[3] ?? 8000);
+    try {
+        const { url } = await serve({ '/': process.argv[2] }, port);
+        console.log(`The page is at ${url}/ until Ctrl-C.`);
+    } catch (error) {
+        const taken = error.code === 'EADDRINUSE';
+        console.error(`The page cannot be served on port ${port}: ${taken ? 'something else uses it. Give another one: scripts/web --serve 8001' : error.message}`);
+        process.exit(1);
+    }
 }
