@@ -61,9 +61,14 @@ const page = await bundle(['page.ts', 'style.css'], {
 });
 
 const names = { page: page('page.ts'), style: page('style.css') };
+/** Links to the source and the guide, once there is an address. */
+const source = readFileSync(join(root, 'Cargo.toml'), 'utf8').match(/^repository = "(.*)"$/m)?.[1];
+names.links = source ? `    <a href="${source}">Source</a>\n    <a href="${source}/blob/main/docs/guide.md">Guide</a>\n` : '';
 const html = readFileSync(join(root, 'web/page/index.html'), 'utf8').replace(/\{\{(\w+)\}\}/g, (_, name) => names[name]);
 writeFileSync(join(out, 'index.html'), html);
 copyFileSync(join(root, 'web/page/icon.svg'), join(out, 'icon.svg'));
+const licences = ['LICENSE-MIT', 'LICENSE-APACHE'].map((file) => readFileSync(join(root, file), 'utf8'));
+writeFileSync(join(out, 'licence.txt'), `mrfgs is under either of these licences, at your option.\n\n${licences.join('\n\n')}`);
 // Licences of what the files hold besides this project's own.
 copyFileSync(join(root, 'web/node_modules/three/LICENSE'), join(out, 'three-LICENSE.txt'));
 
@@ -73,7 +78,7 @@ for (const { name } of SCENES) {
     for (const file of ['im0.png', 'im1.png', 'calib.txt']) {
         copyFileSync(join(from, file), join(to, file));
     }
-    writeFileSync(join(to, 'small.png'), shrunk(readFileSync(join(from, 'im0.png')), 120, 90));
+    writeFileSync(join(to, 'small.png'), shrunk(readFileSync(join(from, 'im0.png')), 96, 72));
 }
 
 /** All files below a folder, by their paths from it. */
@@ -83,8 +88,9 @@ const files = (folder) =>
         .map((entry) => relative(folder, join(entry.parentPath ?? entry.path, entry.name)))
         .sort();
 
-// All but the views of the scenes, which are kept once they were opened.
-const kept = files(out).filter((file) => !/\/(im[01]\.png|calib\.txt)$|LICENSE/.test(file));
+// All but the views of the scenes, which are kept once they were opened, and that of the first view.
+const later = (file) => /\/(im[01]\.png|calib\.txt)$/.test(file) && !file.startsWith(`scenes/${SCENES[0].name}/`);
+const kept = files(out).filter((file) => !later(file) && !/licen[cs]e/i.test(file));
 const all = createHash('sha256');
 for (const file of kept) {
     all.update(`${file}\n`).update(readFileSync(join(out, file)));
@@ -101,13 +107,14 @@ await bundle(['service-worker.ts'], {
 rmSync(site, { recursive: true, force: true });
 renameSync(out, site);
 
-const visited = files(site).filter((file) => !/\/(im[01]\.png|calib\.txt)$|LICENSE/.test(file));
-const sizes = visited.map((file) => [file, statSync(join(site, file)).size, gzipSync(readFileSync(join(site, file)), { level: 9 }).length]);
-const sum = (column) => sizes.reduce((total, row) => total + row[column], 0);
-sizes.sort((a, b) => b[2] - a[2]);
-sizes.push(['what a visitor loads', sum(1), sum(2)]);
-const rest = files(site).filter((file) => !visited.includes(file));
-sizes.push(['views of the scenes, when opened', ...[0, 0].map(() => rest.reduce((total, file) => total + statSync(join(site, file)).size, 0))]);
+const sized = (file) => [file, statSync(join(site, file)).size, gzipSync(readFileSync(join(site, file)), { level: 9 }).length];
+const total = (name, rows) => [name, ...[1, 2].map((column) => rows.reduce((sum, row) => sum + row[column], 0))];
+const sizes = files(site).filter((file) => !later(file) && !/licen[cs]e/i.test(file)).map(sized).sort((a, b) => b[2] - a[2]);
+sizes.push(
+    total('the first map', sizes.filter(([file]) => !/^(cloud|service-worker)/.test(file))),
+    total('points in 3-D, when looked at', sizes.filter(([file]) => file.startsWith('cloud'))),
+    total('other scenes, when opened', files(site).filter(later).map(sized)),
+);
 console.log(`${'file'.padEnd(36)}${'bytes'.padStart(11)}${'gzip -9'.padStart(11)}`);
 for (const [file, raw, packed] of sizes) {
     console.log(`${file.padEnd(36)}${raw.toLocaleString('en').padStart(11)}${packed.toLocaleString('en').padStart(11)}`);

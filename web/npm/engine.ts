@@ -41,8 +41,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
                 throw new Error('no range of disparities is found: give minDisparity and maxDisparity');
             }
             keep(range);
-            // This call frees the range that it takes.
-            const warnings = pair.warnings(new engine.Range(range.min, range.max));
+            const warnings = pair.warnings(given && new engine.Range(...given)) as { text: string }[];
             const progress = (stage: string, done: number) => {
                 post({ stage, done }, []);
                 return true;
@@ -51,7 +50,7 @@ export function answering(load: () => Promise<unknown>, post: (reply: Reply, mov
             const { width, height, min, max, device, note } = found;
             return {
                 ...{ width, height, minDisparity: min, maxDisparity: max, device, note },
-                warnings: [...new Set([...warnings, ...found.warnings()])],
+                warnings: [...new Set([...warnings, ...(found.warnings() as { text: string }[])].map(({ text }) => text))],
                 disparity: own(found.disparity()),
                 confidence: own(found.confidence()),
                 reasons: own(found.validity()),

@@ -20,12 +20,14 @@ export function make<K extends keyof HTMLElementTagNameMap>(
 
 /** Shows a text where there is one; a live region is read out when its text changes. */
 export function say(id: string, text: string | undefined): void {
-    const element = by(id);
+    const all = by(id);
+    // A note has a button beside its text.
+    const element = all.classList.contains('note') ? (all.querySelector('span') as HTMLElement) : all;
     if (element.textContent !== (text ?? '')) {
         element.textContent = text ?? '';
     }
-    if (element.classList.contains('note')) {
-        element.hidden = !text;
+    if (all !== element) {
+        all.hidden = !text;
     }
 }
 

@@ -4,7 +4,7 @@ import { by, make } from './dom';
 import type { Reason } from './protocol';
 
 /** A scale below the picture, from its least to its largest value. */
-export function scale(colours: Uint8Array, min: string, max: string, unit: string): void {
+export function scale(colours: Uint8Array, min: string, max: string, unit: string, about = ''): void {
     const canvas = by('scale').querySelector('canvas') as HTMLCanvasElement;
     const pixels = new ImageData(256, 1);
     for (let i = 0; i < 256; i += 1) {
@@ -14,6 +14,7 @@ export function scale(colours: Uint8Array, min: string, max: string, unit: strin
     by('scale-min').textContent = min;
     by('scale-max').textContent = max;
     by('scale-unit').textContent = unit;
+    by('scale').title = about;
     by('scale').hidden = false;
     by('legend').hidden = true;
 }

@@ -26,6 +26,7 @@ export class MapView {
         this.listenToZoom();
         this.listenToPointer();
         this.listenToWipe();
+        this.listenToPinch();
     }
 
     /** Shows a picture; one of another size is fitted anew. */
@@ -180,6 +181,29 @@ export class MapView {
             }
             this.pointed(pixel(event));
         });
+    }
+
+    /** Two fingers zoom the picture, and not the page. */
+    private listenToPinch(): void {
+        let start: { apart: number; zoom: number } | undefined;
+        const fingers = ({ touches }: TouchEvent) => {
+            const [a, b] = [touches[0], touches[1]];
+            return touches.length === 2 && a && b && this.size.width > 0
+                ? { apart: Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY), clientX: (a.clientX + b.clientX) / 2, clientY: (a.clientY + b.clientY) / 2 }
+                : undefined;
+        };
+        this.box.addEventListener('touchstart', (event) => {
+            const at = fingers(event);
+            start = at && { apart: at.apart, zoom: this.scale };
+        }, { passive: true });
+        this.box.addEventListener('touchmove', (event) => {
+            const at = fingers(event);
+            if (at && start) {
+                event.preventDefault();
+                const [least, most] = [ZOOMS[0] ?? 1, ZOOMS.at(-1) ?? 1];
+                this.zoomTo(Math.min(Math.max((start.zoom * at.apart) / Math.max(1, start.apart), least), most), at);
+            }
+        }, { passive: false });
     }
 
     private listenToWipe(): void {

@@ -1,13 +1,38 @@
-// Keeps the page for use without a network.
+// Keeps the page for use without a network, and tells of a newer one.
+
+import { by } from './dom';
 
 export async function keepOffline(): Promise<void> {
-    if ('serviceWorker' in navigator && isSecureContext) {
-        try {
-            await navigator.serviceWorker.register('service-worker.js', { type: 'classic' });
-            await navigator.serviceWorker.ready;
-            document.documentElement.dataset['offline'] = 'ready';
-        } catch {
-            // Some private windows have none; the page works without.
-        }
+    if (!('serviceWorker' in navigator && isSecureContext)) {
+        return;
     }
+    try {
+        const renewed = navigator.serviceWorker.controller !== null;
+        const kept = await navigator.serviceWorker.register('service-worker.js', { type: 'classic' });
+        if (renewed) {
+            tell(kept);
+        }
+        await navigator.serviceWorker.ready;
+        document.documentElement.dataset['offline'] = 'ready';
+    } catch {
+        // Some private windows have none; the page works without.
+    }
+}
+
+/** Tells of a new version once it is there, and takes it when asked. */
+function tell(kept: ServiceWorkerRegistration): void {
+    const show = (next: ServiceWorker | null) => {
+        if (!next) {
+            return;
+        }
+        by('update').hidden = false;
+        by('take-update').onclick = () => {
+            navigator.serviceWorker.addEventListener('controllerchange', () => location.reload());
+            next.postMessage('take over');
+        };
+    };
+    show(kept.waiting);
+    const watch = (next: ServiceWorker | null) => next?.addEventListener('statechange', () => show(kept.waiting));
+    watch(kept.installing);
+    kept.addEventListener('updatefound', () => watch(kept.installing));
 }

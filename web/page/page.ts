@@ -7,10 +7,12 @@ import { type Pixel, MapView } from './map-view';
 import { tooLarge } from './memory';
 import { keepOffline } from './offline';
 import { PointsTab } from './points';
-import type { Colours, Comparison, Device, Facts, Map, Output, Pair, Picture, Range, Result } from './protocol';
+import { lit } from './relief';
+import { left as timeLeft, phase } from './stages';
+import type { Colours, Comparison, Device, Facts, Known, Map, Output, Pair, Picture, Range, Result, Size, Warning } from './protocol';
 import { save, stem } from './save';
 import { Settings } from './settings';
-import { type Scene, Slots } from './slots';
+import { type Scene, Slots, type View as Opened } from './slots';
 import { tabs } from './tabs';
 import { withoutWebGpu } from './webgpu';
 
@@ -18,7 +20,13 @@ import { withoutWebGpu } from './webgpu';
 declare const WORKER: string;
 declare const SCENES: Scene[];
 
+/** How the first scene is matched: at once, on any machine. */
+const FIRST = { device: 'cpu', preset: 'fast' } as const;
+
 type View = Map | 'left' | 'points';
+
+/** What a pair is rectified by. */
+type Rectifier = 'calibration' | 'matches';
 
 /** What the page is at; tests wait for it too. */
 type State = 'starting' | 'empty' | 'loading' | 'ready' | 'matching' | 'comparing' | 'done' | 'failed';
@@ -26,18 +34,26 @@ type State = 'starting' | 'empty' | 'loading' | 'ready' | 'matching' | 'comparin
 const app = by('app');
 const client = new Client(new URL(WORKER, document.baseURI));
 const settings = new Settings(() => void checkRange());
-const slots = new Slots(SCENES, () => void load());
+const slots = new Slots(SCENES, (match) => {
+    rectify = undefined;
+    void load(match);
+});
 const map = new MapView((pixel) => readOut(pixel));
 const points = new PointsTab((cameras) => client.call('points', cameras), () => readOut(undefined));
 const list = tabs(by('tabs'), (tab) => select(tab.dataset['view'] as View));
 
 let facts: Facts | undefined;
-let gpu = true;
+/** Undefined until it was looked for. */
+let gpu: boolean | undefined;
 let view: View = 'disparity';
-let pair: (Pair & { generation: number }) | undefined;
+let pair: (Pair & { generation: number; by: Rectifier | undefined; notes: string[] }) | undefined;
+/** What the user wants to rectify by, or not to; undefined leaves it to the calibration. */
+let rectify: Rectifier | 'nothing' | undefined;
+/** What is probably wrong with the pair and the range, before a match. */
+let suspicions: Warning[] = [];
 /** The range that `automatic` stands for, and where it comes from. */
 let found: { range: Range; by: string } | undefined;
-let result: (Result & { generation: number; pictures: Partial<Record<Map, Picture>>; on: Device; preset: string }) | undefined;
+let result: (Result & { generation: number; pictures: Partial<Record<Map, Picture>>; on: Device; preset: string; suspicions: Warning[] }) | undefined;
 /** Grows when the pair changes: what was asked for an earlier one is not wanted any more. */
 let turn = 0;
 
@@ -61,13 +77,23 @@ async function start(): Promise<void> {
         facts = await client.facts;
         settings.offer(facts.presets);
         document.documentElement.dataset['version'] = facts.version;
+        say('version', `Version ${facts.version}`);
     } catch (error) {
         say('problem', `The engine cannot be started: ${words(error)}. It needs a browser with WebAssembly SIMD: Chrome 91, Firefox 89, Safari 16.4 or later.`);
         be('failed');
         return;
     }
+    // The first view is a result, unless somebody was faster.
+    const linked = new URLSearchParams(location.hash.slice(1));
+    const first = SCENES.find(({ name }) => name === linked.get('scene')) ?? SCENES[0];
+    settings.take(linked);
+    if (first && slots.missing === 'left') {
+        await slots.open(first.name);
+        await busy;
+    }
     try {
         say('engine', `GPU: ${await client.call('open', 'gpu')}`);
+        gpu = true;
     } catch {
         gpu = false;
         settings.withoutGpu(withoutWebGpu());
@@ -79,8 +105,16 @@ async function start(): Promise<void> {
     }
 }
 
+/** Ends when the pair that the slots hold is read, and matched where that was asked for. */
+let busy: Promise<void> = Promise.resolve();
+
+function load(match = false): Promise<void> {
+    busy = read(match);
+    return busy;
+}
+
 /** Reads the pair that the slots hold, as far as they do. */
-async function load(): Promise<void> {
+async function read(matched: boolean): Promise<void> {
     const mine = ++turn;
     const current = () => mine === turn;
     app.dataset['turn'] = String(turn);
@@ -93,7 +127,11 @@ async function load(): Promise<void> {
     forget();
     say('problem', undefined);
     say('range-found', undefined);
-    warn([]);
+    say('range-problem', undefined);
+    suspicions = [];
+    by('warnings').replaceChildren();
+    by('notes').replaceChildren();
+    by('intro').hidden = slots.scene === undefined;
     const { left, right } = slots.views;
     if (!left || !right) {
         be(facts ? 'empty' : 'starting');
@@ -110,20 +148,23 @@ async function load(): Promise<void> {
         }
         if (a && b && (a.width !== b.width || a.height !== b.height)) {
             const [one, other] = [a, b].map(({ width, height }) => `${width} × ${height}`);
-            throw new Error(`The left view has ${one} pixels and the right one ${other}. A rectified pair has views of one size.`);
+            throw new Error(`The left view has ${one} pixels and the right one ${other}. The views of a pair have one size.`);
         }
-        const read = await client.call('pair', left.file, left.name, right.file, right.name);
+        const opened = await open(left, right);
         if (!current()) {
             return;
         }
-        pair = { ...read, generation: client.generation };
-        slots.show('left', read.left);
-        slots.show('right', read.right);
+        pair = { ...opened, generation: client.generation };
+        slots.show('left', pair.left);
+        slots.show('right', pair.right);
         void showView();
-        await calibrate(read.left);
         await findRange(current);
         if (current()) {
             be('ready');
+            note(pair.notes);
+            if (matched) {
+                await match(gpu === undefined ? { ...FIRST, preset: settings.chosen ?? FIRST.preset } : settings);
+            }
         }
     } catch (error) {
         if (current()) {
@@ -152,29 +193,49 @@ function explained(error: unknown): string {
         : words(error);
 }
 
-/** Takes the cameras of a calib.txt, or a guess. */
-async function calibrate({ width, height }: Picture): Promise<void> {
-    const file = slots.calibration;
-    let cameras;
-    if (file) {
+/** Has the engine read the pair, and rectify it where that is wanted. */
+async function open(left: Opened, right: Opened): Promise<Pair & { by: Rectifier | undefined; notes: string[] }> {
+    const raw = await client.call('pair', left.file, left.name, right.file, right.name);
+    const { width, height } = raw.left;
+    const names = slots.calibration.map(({ name }) => name).join(', ');
+    let known: Known | undefined;
+    try {
+        known = slots.calibration.length > 0 ? await client.call('calibration', slots.calibration, width, height) : undefined;
+        const { size } = known ?? {};
+        if (size && (size.width !== width || size.height !== height)) {
+            known = undefined;
+            throw new Error(`${names} is for images of ${size.width} × ${size.height}, and these are ${width} × ${height}: it is not used.`);
+        }
+    } catch (error) {
+        say('pair-problem', words(error));
+    }
+    found = known?.range && { range: known.range, by: names };
+    const wanted = rectify ?? (known && !known.rectified ? 'calibration' : 'nothing');
+    if (wanted !== 'nothing') {
         try {
-            if (file.size && (file.size.width !== width || file.size.height !== height)) {
-                throw new Error(`calib.txt is for images of ${file.size.width} × ${file.size.height}, and these are ${width} × ${height}: it is not used.`);
-            }
-            found = file.range && { range: file.range, by: 'calib.txt' };
-            cameras = file.cameras ? await client.call('cameras', file.text) : undefined;
+            const { cameras, notes, ...views } = await client.call('rectify', wanted === 'calibration' ? slots.calibration : undefined);
+            points.pair(views.left.width, views.left.height, cameras, names);
+            found = undefined;
+            return { ...views, by: wanted, notes };
         } catch (error) {
             say('pair-problem', words(error));
         }
     }
-    points.pair(width, height, cameras);
+    points.pair(width, height, known?.cameras, names);
+    return { ...raw, by: undefined, notes: [] };
+}
+
+/** Does another thing about the rectification of the pair, and matches it. */
+function rectifyBy(by: Rectifier | 'nothing'): void {
+    rectify = by;
+    void load(true);
 }
 
 async function findRange(current: () => boolean): Promise<void> {
     if (!found) {
         say('range-found', 'Looking for the range …');
         const range = await client.call('range');
-        found = range && { range, by: 'sparse matches' };
+        found = range && { range, by: MATCHES };
     }
     if (current()) {
         if (found && settings.automatic) {
@@ -183,6 +244,9 @@ async function findRange(current: () => boolean): Promise<void> {
         await checkRange();
     }
 }
+
+/** Grows with each check of the range: an answer to an earlier one counts no more. */
+let check = 0;
 
 /** The range to search, which is said beside its choice. */
 function range(): Range | undefined {
@@ -193,23 +257,85 @@ function range(): Range | undefined {
 async function checkRange(): Promise<void> {
     const wanted = range();
     const { automatic } = settings;
+    const mine = ++check;
     say('range-found', pair && found && automatic ? `${found.range.min} to ${found.range.max} px, by ${found.by}` : undefined);
     if (!automatic && !wanted) {
         say('range-problem', 'Give two whole numbers, the smaller one first.');
         return;
     }
     say('range-problem', pair && !wanted ? 'Sparse matches find no range. Give one.' : undefined);
-    if (pair) {
-        try {
-            warn(await client.call('warnings', wanted));
-        } catch (error) {
-            say('range-problem', words(error));
-        }
+    if (!pair) {
+        return;
+    }
+    let said: Warning[] = [];
+    let problem: string | undefined;
+    try {
+        // A range that sparse matches found does not show what the user knows.
+        said = await client.call('warnings', automatic && found?.by === MATCHES ? undefined : wanted);
+    } catch (error) {
+        problem = words(error);
+    }
+    if (mine !== check) {
+        return;
+    }
+    suspicions = said;
+    if (problem !== undefined) {
+        say('range-problem', problem);
+    }
+    // What is said of a result stays with it.
+    if (!result) {
+        warn(said);
     }
 }
 
-function warn(texts: string[]): void {
-    by('warnings').replaceChildren(...[...new Set(texts)].map((text) => make('li', {}, text)));
+/** Where a range comes from that no file gives. */
+const MATCHES = 'sparse matches';
+
+const REMEDIES: Record<NonNullable<Warning['remedy']>, string> = { swap: 'Swap the views', rectify: 'Rectify', widen: 'Widen the range' };
+
+/** Shows what is probably wrong, each with a button for what helps. */
+function warn(warnings: Warning[]): void {
+    const unique = warnings.filter(({ text }, i) => warnings.findIndex((other) => other.text === text) === i);
+    by('warnings').replaceChildren(
+        ...unique.map((warning) => {
+            const { remedy } = warning;
+            return make('li', {}, `${warning.text} `, ...(remedy ? [button(REMEDIES[remedy], () => help(warning))] : []));
+        }),
+    );
+}
+
+function button(text: string, act: () => void): HTMLButtonElement {
+    const made = make('button', { type: 'button' }, text);
+    made.addEventListener('click', act);
+    return made;
+}
+
+/** Does what helps about a warning, and matches again. */
+function help({ remedy, min, max }: Warning): void {
+    if (remedy === 'swap') {
+        slots.swap(true);
+    } else if (remedy === 'rectify') {
+        rectifyBy('matches');
+    } else if (remedy === 'widen' && min !== undefined && max !== undefined) {
+        settings.give({ min, max });
+        void checkRange().then(() => match());
+    }
+}
+
+/** Says what was done to a pair, with the way back. */
+function note(notes: string[], short = false): void {
+    const lines = notes.map((text) => make('li', {}, `${text.charAt(0).toUpperCase()}${text.slice(1)}. `));
+    if (pair?.by) {
+        lines[0]?.append(button('Take the images as they are', () => rectifyBy('nothing')));
+    }
+    if (short) {
+        const full = button('Match at full size', () => {
+            settings.size = 'full';
+            void match();
+        });
+        lines.push(make('li', {}, 'At full size this pair takes more memory than a match may have here, so it was matched at half its size. ', full));
+    }
+    by('notes').replaceChildren(...lines);
 }
 
 /** Runs a match with its bar; undefined when it was stopped or failed, which is said. */
@@ -217,13 +343,20 @@ async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefi
     const mine = turn;
     const bar = by<HTMLProgressElement>('progress');
     let said = 0;
+    let last = 0;
+    let since = performance.now();
     bar.value = 0;
-    say('stage', 'starting');
+    say('stage', 'Getting ready');
     say('problem', undefined);
     client.onProgress = (stage, done) => {
-        bar.value = done;
-        bar.setAttribute('aria-valuetext', `${Math.round(100 * done)} percent, ${stage}`);
-        say('stage', `${Math.floor(100 * done)} %, ${stage}`);
+        if (done < last) {
+            // A second match, over a wider range.
+            [since, said] = [performance.now(), 0];
+        }
+        [last, bar.value] = [done, done];
+        const parts = [phase(stage), `${Math.floor(100 * done)} %`, timeLeft(done, performance.now() - since)].filter(Boolean);
+        bar.setAttribute('aria-valuetext', parts.join(', '));
+        say('stage', parts.join(' · '));
         if (done >= said + 0.25) {
             said = Math.floor(4 * done) / 4;
             say('announce', `${100 * said} percent`);
@@ -254,12 +387,12 @@ async function ensurePair(): Promise<void> {
     const { left, right } = slots.views;
     if (pair && left && right && pair.generation !== client.generation) {
         const generation = client.generation;
-        await client.call('pair', left.file, left.name, right.file, right.name);
+        await open(left, right);
         pair.generation = generation;
     }
 }
 
-async function match(): Promise<void> {
+async function match({ device, preset, size }: { device: Device; preset: string; size?: Size } = settings): Promise<void> {
     const missing = slots.missing;
     if (missing) {
         for (const side of ['left', 'right'] as const) {
@@ -279,21 +412,34 @@ async function match(): Promise<void> {
         return;
     }
     const mine = turn;
-    const { device, preset } = settings;
-    forget();
+    const was = suspicions;
+    const wide = settings.automatic && found?.by === MATCHES;
     const matched = await run('matching', async () => {
         await ensurePair();
-        return client.call('match', device, preset, wanted, colours());
+        return client.call('match', device, preset, wanted, wide, size ?? 'automatic', colours());
     });
     if (mine !== turn) {
         return;
     }
     if (matched) {
         const pictures = { disparity: matched.picture };
-        result = { ...matched, generation: client.generation, pictures, on: device, preset };
+        result = { ...matched, generation: client.generation, pictures, on: device, preset, suspicions: was };
         await present();
+        // On a narrow page the result is above the form.
+        if (gpu !== undefined) {
+            const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
+            by('result').scrollIntoView({ block: 'nearest', behavior: calm ? 'instant' : 'smooth' });
+        }
     }
     be(idle());
+}
+
+/** The address holds the scene and the settings, so that it can be passed on. */
+function address(): void {
+    const { chosen, automatic, given } = settings;
+    const parts = { ...(slots.scene && { scene: slots.scene }), ...(chosen && { preset: chosen }), ...(!automatic && given && { range: `${given.min},${given.max}` }) };
+    const hash = slots.scene && gpu !== undefined ? `#${new URLSearchParams(parts)}` : slots.scene ? location.hash : '';
+    history.replaceState(null, '', `${location.pathname}${location.search}${hash}`);
 }
 
 /** Shows the result. */
@@ -301,20 +447,20 @@ async function present(): Promise<void> {
     if (!result) {
         return;
     }
-    const { width, height, note, warnings, device, iterations, took, preset } = result;
+    const { width, height, warnings, device, iterations, took, preset, corrected, tiles, half, short } = result;
     const { min, max } = result.range;
-    warn([...(note ? [note] : []), ...warnings]);
+    const failed = result.note === undefined ? [] : [{ text: result.note, remedy: undefined }];
+    warn([...failed, ...result.suspicions, ...warnings]);
+    note([...(pair?.notes ?? []), ...(corrected ? [corrected] : []), ...(tiles > 1 ? [`matched in ${tiles} tiles`] : [])], short);
     by('outcome').hidden = false;
+    address();
     say('comparison', undefined);
-    const facts = [`${width} × ${height} pixels`, `range ${min} to ${max}`, preset, `${iterations} iterations`, device, duration(took)];
+    const facts = [`${width} × ${height} pixels`, ...(half ? ['at half size'] : []), `range ${min} to ${max}`, preset, `${iterations} iterations`, device, duration(took)];
     say('facts', facts.join(' · '));
     by('compare').title = gpu ? 'Matches by the other path too and counts the pixels that differ' : 'There is no GPU to compare with';
     points.result(true);
     readOut(undefined);
     await showView();
-    // On a narrow page the result is below the form.
-    const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-    by('result').scrollIntoView({ block: 'nearest', behavior: calm ? 'instant' : 'smooth' });
 }
 
 /** A pair that changes takes its result along. */
@@ -366,13 +512,14 @@ async function showView(): Promise<void> {
         if (!seen || mine !== result || shown !== view) {
             return;
         }
-        map.show(seen, pair.left);
+        const relief = shown === 'disparity' && by<HTMLInputElement>('relief').checked;
+        map.show(relief ? lit(seen, mine.disparity, mine.spread) : seen, pair.left);
     } catch (error) {
         say('readout', words(error));
         return;
     }
     if (shown === 'disparity' && facts) {
-        legend.scale(facts.scales[colours()], String(mine.range.min), String(mine.range.max), 'px');
+        legend.scale(facts.scales[colours()], pixels(mine.spread.min), pixels(mine.spread.max), 'px of disparity', '98 % of the measured pixels are between these');
     } else if (shown === 'confidence' && facts) {
         legend.scale(facts.scales.grey, '0', '255', 'in 1/8 nat: how far the runner-up is behind, on average over the pixels around');
     } else if (shown === 'validity' && facts) {
@@ -383,12 +530,15 @@ async function showView(): Promise<void> {
     by('map').dataset['shown'] = shown;
 }
 
+/** A disparity with as many digits as a legend takes. */
+const pixels = (value: number): string => String(Number(value.toFixed(1)));
+
 function select(to: View): void {
     view = to;
     const inPoints = to === 'points';
     by('map').hidden = by('map-tools').hidden = inPoints;
     by('points').hidden = by('points-tools').hidden = !inPoints;
-    by('colours-label').hidden = to !== 'disparity';
+    by('colours-label').hidden = by('relief-label').hidden = to !== 'disparity';
     by('map').setAttribute('aria-labelledby', `tab-${inPoints ? 'disparity' : to}`);
     points.select(inPoints, result !== undefined);
     void showView();
@@ -413,7 +563,7 @@ function readOut(pixel: Pixel | undefined): void {
     const cameras = points.known;
     const apart = cameras && measured ? disparity + cameras.doffs : 0;
     if (cameras && apart > 0) {
-        const unit = cameras.unit === 'unknown' ? '' : ` ${cameras.unit}`;
+        const unit = cameras.unit === 'unknown' ? ' in the unit of the baseline' : ` ${cameras.unit}`;
         parts.push(`depth ${((cameras.baseline * cameras.focalLength) / apart).toPrecision(5)}${unit}`);
     }
     say('readout', parts.join(' · '));
@@ -445,7 +595,7 @@ async function compare(): Promise<void> {
 }
 
 async function download(output: Output | 'ply'): Promise<void> {
-    const name = slots.scene ?? stem(slots.views.left?.name ?? 'pair');
+    const name = stem(slots.name ?? slots.views.left?.name ?? 'pair');
     say('save-problem', undefined);
     try {
         if (!held()) {
@@ -468,6 +618,7 @@ async function download(output: Output | 'ply'): Promise<void> {
     }
 }
 
+by('close-device-note').addEventListener('click', () => (by('device-note').hidden = true));
 by('form').addEventListener('submit', (event) => {
     event.preventDefault();
     void match();
@@ -489,6 +640,7 @@ by('colours').addEventListener('change', () => {
         void showView();
     }
 });
+by('relief').addEventListener('change', () => void showView());
 list.select(by('tab-disparity'));
 void start();
 void keepOffline();

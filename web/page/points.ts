@@ -10,19 +10,18 @@ const ALL = Object.keys(FIELDS) as Field[];
 const field = (key: Field) => by<HTMLInputElement>(FIELDS[key]);
 
 /** Where the cameras come from. */
-type Source = 'calib.txt' | 'given' | 'guess';
+type Source = 'calibration' | 'given' | 'guess';
 
-const NOTES: Record<Source, string> = {
-    'calib.txt': 'From calib.txt. Depths have the unit of its baseline.',
+const NOTES: Record<Exclude<Source, 'calibration'>, string> = {
     given: 'As given here. Depths have the unit of the baseline.',
-    guess: 'A guess, so not to scale: the focal length is the width of the image, the baseline is 1. Give your own, or drop a calib.txt.',
+    guess: 'A guess, so not to scale: the focal length is the width of the image, the baseline is 1. Give your own, or drop a calibration.',
 };
 
 export class PointsTab {
     private view: CloudView | undefined;
     private source: Source = 'guess';
-    /** That of the baseline. */
-    private unit = 'unknown';
+    /** The files of the calibration. */
+    private files = '';
     private size = { width: 0, height: 0 };
     /** Whether the points that are shown are of this result and these cameras. */
     private fresh = false;
@@ -38,12 +37,10 @@ export class PointsTab {
         for (const key of ALL) {
             field(key).addEventListener('change', () => {
                 this.source = 'given';
-                if (key === 'baseline') {
-                    this.unit = 'unknown';
-                }
                 this.renew();
             });
         }
+        by('unit').addEventListener('change', () => this.renew());
         by('least').addEventListener('input', () => this.filter());
         by('reset-view').addEventListener('click', () => this.view?.reset());
     }
@@ -53,7 +50,7 @@ export class PointsTab {
         const of = (key: Field) => field(key).valueAsNumber;
         const cameras = { focalLength: of('focalLength'), cx: of('cx'), cy: of('cy'), doffs: of('doffs'), baseline: of('baseline') };
         const sound = Object.values(cameras).every(Number.isFinite) && cameras.focalLength > 0 && cameras.baseline > 0;
-        return sound ? { ...cameras, unit: this.unit } : undefined;
+        return sound ? { ...cameras, unit: by<HTMLSelectElement>('unit').value } : undefined;
     }
 
     /** The cameras, where they are more than a guess. */
@@ -66,15 +63,16 @@ export class PointsTab {
     }
 
     /** A new pair, whose cameras its calib.txt may tell. */
-    pair(width: number, height: number, read: Cameras | undefined): void {
+    pair(width: number, height: number, read: Cameras | undefined, files: string): void {
+        this.files = files;
         // What was typed in holds for the next pair of this size.
         const same = this.size.width === width && this.size.height === height;
         this.size = { width, height };
         if (read || this.source !== 'given' || !same) {
-            this.source = read ? 'calib.txt' : 'guess';
+            this.source = read ? 'calibration' : 'guess';
             const guess = { focalLength: width, cx: (width - 1) / 2, cy: (height - 1) / 2, doffs: 0, baseline: 1, unit: 'unknown' };
             const cameras = read ?? guess;
-            this.unit = cameras.unit;
+            by<HTMLSelectElement>('unit').value = cameras.unit;
             for (const key of ALL) {
                 field(key).value = String(cameras[key]);
             }
@@ -113,7 +111,7 @@ export class PointsTab {
     }
 
     private note(): void {
-        say('cameras-note', NOTES[this.source]);
+        say('cameras-note', this.source === 'calibration' ? `From ${this.files}. Depths have the unit of its baseline.` : NOTES[this.source]);
         const sound = this.cameras !== undefined;
         say('cameras-problem', sound ? undefined : 'All five take a number; focal length and baseline one above 0.');
     }
@@ -133,6 +131,7 @@ export class PointsTab {
             const cloud = await this.points(cameras);
             this.view.show(cloud, cameras, this.size.width, this.size.height);
             this.tally(cloud.confidences);
+            this.reach();
             this.filter();
         } catch (error) {
             this.fresh = false;
@@ -148,6 +147,13 @@ export class PointsTab {
         for (let i = 254; i >= 0; i -= 1) {
             this.atLeast[i] = (this.atLeast[i] ?? 0) + (this.atLeast[i + 1] ?? 0);
         }
+    }
+
+    /** The slider ends where a point in a hundred is left. */
+    private reach(): void {
+        const slider = by<HTMLInputElement>('least');
+        const all = this.atLeast[0] ?? 0;
+        slider.max = String(Math.max(1, this.atLeast.findLastIndex((left) => 100 * left >= all)));
     }
 
     private filter(): void {

@@ -48,6 +48,41 @@ export interface Pair {
     right: Picture;
 }
 
+/** A pair that was rectified, with what was done, and the cameras where they are known. */
+export interface Rectified extends Pair {
+    notes: string[];
+    cameras: Cameras | undefined;
+}
+
+/** A file of a calibration. */
+export interface Text {
+    name: string;
+    text: string;
+}
+
+/** What a calibration says. */
+export interface Known {
+    /** Of images that are rectified already, by its form. */
+    rectified: boolean;
+    /** Labels 0 to ndisp - 1, as the program takes them. */
+    range: Range | undefined;
+    size: { width: number; height: number } | undefined;
+    /** Those of images that are rectified already. */
+    cameras: Cameras | undefined;
+}
+
+/** What is probably wrong, in the program's words, and what the page can do about it. */
+export interface Warning {
+    text: string;
+    remedy: 'swap' | 'rectify' | 'widen' | undefined;
+    /** The range to take instead. */
+    min?: number;
+    max?: number;
+}
+
+/** At which size a pair is matched: with `automatic` at half of it where the memory is short. */
+export type Size = 'automatic' | 'full' | 'half';
+
 export interface Result {
     width: number;
     height: number;
@@ -56,7 +91,15 @@ export interface Result {
     device: string;
     /** Why the CPU path stepped in. */
     note: string | undefined;
-    warnings: string[];
+    warnings: Warning[];
+    /** What was corrected in the pair, in words. */
+    corrected: string;
+    tiles: number;
+    /** Whether it was matched at half its size, and whether because the memory is short. */
+    half: boolean;
+    short: boolean;
+    /** The disparities between which nearly all measured pixels are. */
+    spread: Range;
     /** Of the match alone, in milliseconds. */
     took: number;
     /** Pixels; +infinity where there is none. */
@@ -103,13 +146,17 @@ export interface Calls {
     /** The range that sparse matches find. */
     range(): Range | undefined;
     /** What is probably wrong with the pair or with this range. */
-    warnings(range: Range | undefined): string[];
-    match(device: Device, preset: string, range: Range, colours: Colours): Result;
+    warnings(range: Range | undefined): Warning[];
+    /** Matches over a range, which may become wider where sparse matches `found` it. */
+    match(device: Device, preset: string, range: Range, found: boolean, size: Size, colours: Colours): Result;
     /** Matches the same pair by another path, and counts the pixels that differ. */
     compare(device: Device): Comparison;
     picture(map: Map, colours: Colours): Picture;
     file(output: Output): Uint8Array<ArrayBuffer>;
-    cameras(calibration: string): Cameras;
+    /** What the files of a calibration say of images of this size. */
+    calibration(files: Text[], width: number, height: number): Known;
+    /** Puts a rectified pair in the place of the pair: by a calibration, or without one by matches. */
+    rectify(files: Text[] | undefined): Rectified;
     points(cameras: Cameras): Cloud;
     ply(cameras: Cameras, leastConfidence: number): Uint8Array<ArrayBuffer>;
 }

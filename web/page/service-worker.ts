@@ -1,6 +1,6 @@
 // Serves the page from a cache, so that it opens without a network. Each build has a cache of its own, named by the content of its
-// files; what did not change is copied from the one before. A new build waits until the pages of the old one are closed, because they
-// may still load chunks.
+// files; what did not change is copied from the one before. A new build waits until a page asks for it, or until
+// the pages of the old one are closed, because they may still load chunks.
 
 export {};
 
@@ -57,6 +57,11 @@ async function answer(request: Request): Promise<Response> {
 }
 
 self.addEventListener('install', (event) => event.waitUntil(install()));
+self.addEventListener('message', ({ data }) => {
+    if (data === 'take over') {
+        void self.skipWaiting();
+    }
+});
 self.addEventListener('activate', (event) => event.waitUntil(activate()));
 self.addEventListener('fetch', (event) => {
     const own = event.request.method === 'GET' && event.request.url.startsWith(self.registration.scope);

@@ -1,19 +1,19 @@
 // Preset, range and device, as the form has them.
 
 import { by, make, say } from './dom';
-import type { Device, Preset, Range } from './protocol';
+import type { Device, Preset, Range, Size } from './protocol';
 
 const radio = (name: string) => document.querySelector<HTMLInputElement>(`input[name="${name}"]:checked`)?.value;
 
 export class Settings {
     private presets: Preset[] = [];
-    /** Whether somebody has chosen a preset. */
-    private chosen = false;
+    /** The preset that somebody has chosen. */
+    chosen: string | undefined;
 
     /** `ranged` is called when the range changes. */
     constructor(ranged: () => void) {
         by('preset').addEventListener('change', () => {
-            this.chosen = true;
+            this.chosen = this.preset;
             this.about();
         });
         for (const input of document.querySelectorAll('input[name="range"]')) {
@@ -35,6 +35,14 @@ export class Settings {
         return radio('device') as Device;
     }
 
+    get size(): Size {
+        return by<HTMLSelectElement>('size').value as Size;
+    }
+
+    set size(size: Size) {
+        by<HTMLSelectElement>('size').value = size;
+    }
+
     get automatic(): boolean {
         return radio('range') === 'automatic';
     }
@@ -43,6 +51,19 @@ export class Settings {
     get given(): Range | undefined {
         const [min, max] = ['min', 'max'].map((id) => by<HTMLInputElement>(id).valueAsNumber) as [number, number];
         return Number.isInteger(min) && Number.isInteger(max) && min <= max ? { min, max } : undefined;
+    }
+
+    /** Takes what a link holds; what makes no sense is left out. */
+    take(link: URLSearchParams): void {
+        const preset = link.get('preset');
+        if (this.presets.some(({ name }) => name === preset) && preset) {
+            by<HTMLSelectElement>('preset').value = this.chosen = preset;
+            this.about();
+        }
+        const [min, max] = (link.get('range') ?? '').split(',').map((end) => (end === '' ? NaN : Number(end)));
+        if (min !== undefined && max !== undefined && Number.isInteger(min) && Number.isInteger(max) && min <= max) {
+            this.give({ min, max });
+        }
     }
 
     offer(presets: Preset[]): void {
@@ -69,6 +90,13 @@ export class Settings {
     suggest({ min, max }: Range): void {
         by<HTMLInputElement>('min').value = String(min);
         by<HTMLInputElement>('max').value = String(max);
+    }
+
+    /** Gives a range in the place of what is given or found. */
+    give(range: Range): void {
+        (document.querySelector('input[name="range"][value="given"]') as HTMLInputElement).checked = true;
+        by('ends').hidden = false;
+        this.suggest(range);
     }
 
     private about(): void {

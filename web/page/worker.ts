@@ -2,7 +2,8 @@
 
 import init, * as engine from 'engine';
 import { broken, buffers, own, words } from './answers';
-import type { Calls, Cameras, Device, Name, Picture, Range, Reply, Request } from './protocol';
+import type { Calls, Cameras, Device, Name, Pair, Picture, Range, Reply, Request, Size, Text, Warning } from './protocol';
+import { spread } from './spread';
 
 declare const self: DedicatedWorkerGlobalScope;
 /** The compiled engine beside this file; the build fills it in. */
@@ -11,7 +12,7 @@ declare const ENGINE: string;
 let pair: engine.StereoPair | undefined;
 let matched: engine.Matched | undefined;
 /** What `matched` was made with. */
-let made: { preset: string; range: Range } | undefined;
+let made: { preset: string; range: Range; found: boolean; half: boolean; spread: Range } | undefined;
 let cancelled = false;
 const matchers = new Map<Device, engine.Matcher>();
 
@@ -55,7 +56,36 @@ function picture(width: number, height: number, pixels: Uint8Array): Picture {
     return { width, height, pixels: new Uint8ClampedArray(own(pixels).buffer, pixels.byteOffset, pixels.length) };
 }
 
-async function run(device: Device, preset: string, range: Range): Promise<{ found: engine.Matched; took: number }> {
+/** Both views as pictures. */
+function pictures(of: engine.StereoPair): Pair {
+    const [left, right] = (['left', 'right'] as const).map((view) => picture(of.width, of.height, of.picture(view))) as [Picture, Picture];
+    return { left, right };
+}
+
+/** What `Cameras` says; it is freed. */
+function told(of: engine.Cameras | undefined): Cameras | undefined {
+    if (!of) {
+        return undefined;
+    }
+    const { focal_length, cx, cy, doffs, baseline, unit } = of;
+    of.free();
+    return { focalLength: focal_length, cx, cy, doffs, baseline, unit };
+}
+
+const known = (files: Text[]) => new engine.Known(files.map(({ name }) => name), files.map(({ text }) => text));
+
+const ends = ({ min, max }: Range, found: boolean) => (found ? new engine.Range(min, max).found() : new engine.Range(min, max));
+
+/** Whether the pair is matched at half its size, and whether that is because it takes too much memory otherwise. */
+async function halved(preset: string, range: Range, size: Size): Promise<{ half: boolean; short: boolean }> {
+    if (size !== 'automatic') {
+        return { half: size === 'half', short: false };
+    }
+    const tiles = await using(ends(range, false), (over) => engine.tiles(need(pair, 'pair'), preset, over, false));
+    return { half: tiles > 1, short: tiles > 1 };
+}
+
+async function run(device: Device, preset: string, range: Range, wide: boolean, half: boolean): Promise<{ found: engine.Matched; took: number }> {
     cancelled = false;
     const [views, path] = [need(pair, 'pair'), await matcher(device)];
     const begun = performance.now();
@@ -63,7 +93,7 @@ async function run(device: Device, preset: string, range: Range): Promise<{ foun
         post({ stage, done });
         return !cancelled;
     };
-    const found = await using(new engine.Range(range.min, range.max), (ends) => path.match(views, preset, ends, progress));
+    const found = await using(ends(range, wide), (over) => path.match(views, preset, over, progress, half));
     if (found.note !== undefined && matchers.delete(device)) {
         // A device that failed is opened anew.
         path.free();
@@ -90,11 +120,24 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
         matched?.free();
         pair = matched = undefined;
         pair = new engine.StereoPair(await bytes(left), leftName, await bytes(right), rightName);
-        const { width, height } = pair;
-        return {
-            left: picture(width, height, pair.picture('left')),
-            right: picture(width, height, pair.picture('right')),
-        };
+        return pictures(pair);
+    },
+    calibration(files, width, height) {
+        return using(known(files), (of) => ({
+            rectified: of.rectified,
+            range: of.labels ? { min: 0, max: of.labels - 1 } : undefined,
+            size: of.width && of.height ? { width: of.width, height: of.height } : undefined,
+            cameras: of.rectified ? told(of.cameras(width, height)) : undefined,
+        }));
+    },
+    async rectify(files) {
+        const raw = need(pair, 'pair');
+        const by = files ? await using(known(files), (of) => of.rectify(raw)) : engine.Rectified.byMatches(raw);
+        const [notes, cameras] = [by.notes, told(by.cameras())];
+        // This call frees what it is asked of.
+        pair = by.pair();
+        raw.free();
+        return { ...pictures(pair), notes, cameras };
     },
     range() {
         const found = need(pair, 'pair').range();
@@ -107,33 +150,36 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
     },
     warnings(range) {
         // This call takes the range and frees it.
-        return need(pair, 'pair').warnings(range && new engine.Range(range.min, range.max));
+        return need(pair, 'pair').warnings(range && new engine.Range(range.min, range.max)) as Warning[];
     },
-    async match(device, preset, range, colours) {
+    async match(device, preset, range, wide, size, colours) {
+        const { half, short } = await halved(preset, range, size);
+        const { found, took } = await run(device, preset, range, wide, half);
+        // The last one stays until there is another.
         matched?.free();
-        matched = undefined;
-        const { found, took } = await run(device, preset, range);
-        [matched, made] = [found, { preset, range }];
-        const { width, height, min, max, iterations, note } = found;
+        const { width, height, min, max, iterations, note, corrected, tiles } = found;
+        const [disparity, validity] = [own(found.disparity()), own(found.validity())];
+        const seen = spread(disparity, validity, { min, max });
+        [matched, made] = [found, { preset, range, found: wide, half, spread: seen }];
         return {
-            ...{ width, height, range: { min, max }, iterations, device: await named(found.device), note, took },
-            warnings: found.warnings(),
-            disparity: own(found.disparity()),
+            ...{ width, height, range: { min, max }, iterations, device: await named(found.device), note, took, corrected, tiles, half, short },
+            ...{ disparity, validity, spread: seen },
+            warnings: found.warnings() as Warning[],
             confidence: own(found.confidence()),
-            validity: own(found.validity()),
-            picture: picture(width, height, found.picture('disparity', colours)),
+            picture: picture(width, height, found.picture('disparity', colours, seen.min, seen.max)),
         };
     },
     async compare(device) {
         const first = need(matched, 'map');
-        const { preset, range } = need(made, 'map');
-        const { found, took } = await run(device, preset, range);
+        const { preset, range, found: wide, half } = need(made, 'map');
+        const { found, took } = await run(device, preset, range, wide, half);
         const by = await named(found.device);
         return using(found, (other) => ({ device: by, note: other.note, differing: first.differing(other), took }));
     },
     picture(map, colours) {
         const { width, height } = need(matched, 'map');
-        return picture(width, height, need(matched, 'map').picture(map, colours));
+        const { min, max } = need(made, 'map').spread;
+        return picture(width, height, need(matched, 'map').picture(map, colours, min, max));
     },
     file(output) {
         const maps = need(matched, 'map');
@@ -148,12 +194,6 @@ const calls: { [N in Name]: (...args: Parameters<Calls[N]>) => ReturnType<Calls[
             case 'validity':
                 return own(maps.png(output));
         }
-    },
-    cameras(calibration) {
-        const read = engine.Cameras.read(calibration);
-        const { focal_length, cx, cy, doffs, baseline, unit } = read;
-        read.free();
-        return { focalLength: focal_length, cx, cy, doffs, baseline, unit };
     },
     points(of) {
         return using(cameras(of), (rig) => {

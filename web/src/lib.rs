@@ -6,6 +6,7 @@
 mod matched;
 mod matcher;
 mod pair;
+mod rectified;
 mod tables;
 mod words;
 

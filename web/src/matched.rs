@@ -3,6 +3,8 @@
 use crate::Thrown;
 use crate::pair::{Cameras, StereoPair, rgba};
 use crate::words::{error, thrown, warning};
+use js_sys::{Array, Reflect};
+use mrfgs::check::Warning;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::image::cloud::{Cloud, Point};
 use mrfgs::image::picture::Picture;
@@ -62,10 +64,37 @@ impl Matched {
         self.matched.note.as_ref().map(error)
     }
 
-    /// What is probably wrong with the range.
+    /// What is probably wrong with the pair or the range: `{ text, remedy }`, where the remedy "widen" has the range to take, `min` and
+    /// `max`.
     #[must_use]
-    pub fn warnings(&self) -> Vec<String> {
-        self.matched.warnings().iter().map(warning).collect()
+    pub fn warnings(&self) -> Array {
+        let of = |cause: &Warning| {
+            let said = warning(cause, None);
+            if let Warning::Clipped { upper, .. } = cause {
+                let range = self.matched.range();
+                let more = (range.labels() / 2) as i32;
+                let (min, max) =
+                    if *upper { (range.min, range.max + more) } else { (range.min - more, range.max) };
+                for (end, value) in [("min", min), ("max", max)] {
+                    // A plain object takes every key.
+                    let _ = Reflect::set(&said, &end.into(), &value.into());
+                }
+            }
+            said
+        };
+        self.matched.warnings().iter().map(of).collect()
+    }
+
+    /// What was done to the pair so that it could be matched, in words; empty where nothing was.
+    #[wasm_bindgen(getter)]
+    pub fn corrected(&self) -> String {
+        self.matched.conditioning.to_string()
+    }
+
+    /// The number of tiles that it was cut into; 1 where it was not.
+    #[wasm_bindgen(getter)]
+    pub fn tiles(&self) -> usize {
+        self.matched.tiles.count()
     }
 
     /// The disparity of every pixel, in pixels; +Infinity where there is none.
@@ -87,13 +116,12 @@ impl Matched {
     }
 
     /// The map "disparity", "raw", "confidence" or "validity" as a picture, RGBA; the first two in the colours "turbo", "viridis" or
-    /// "grey".
+    /// "grey", from the disparity `min` to `max`.
     ///
     /// # Errors
     /// Where there is no such map, or there are no such colours.
-    pub fn picture(&self, map: &str, colours: &str) -> Thrown<Vec<u8>> {
+    pub fn picture(&self, map: &str, colours: &str, min: f32, max: f32) -> Thrown<Vec<u8>> {
         let maps = &self.matched.maps;
-        let (min, max) = (self.min() as f32, self.max() as f32);
         let picture = match map {
             "confidence" => colour::grey(&maps.confidence),
             "validity" => colour::validity(&maps.validity),

@@ -7,8 +7,10 @@ use crate::words::thrown;
 use js_sys::Function;
 use mrfgs::low_level::backend::Backend;
 use mrfgs::low_level::backend::gpu::{FaultInjection, Gpu};
-use mrfgs::options::{DeviceChoice, Execution, Method};
-use mrfgs::{Progress, Result};
+use mrfgs::low_level::plan::Plan;
+use mrfgs::low_level::program::tiles::Tiles;
+use mrfgs::options::{DeviceChoice, Execution, MatchSize, Method};
+use mrfgs::{Error, Found, Progress, Result};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use wasm_bindgen::JsValue;
@@ -18,6 +20,9 @@ thread_local! {
     /// Who listens to the match that runs. It stays here, since listeners of the library may move between threads.
     static LISTENER: RefCell<Option<Function>> = const { RefCell::new(None) };
 }
+
+/// What a match may take of the 4 GiB that WebAssembly can address, in MiB: the views, their pictures and the maps are there too.
+pub const MEMORY: u32 = 1536;
 
 /// Matches pair after pair, and keeps the device in between.
 #[wasm_bindgen]
@@ -43,7 +48,7 @@ impl Matcher {
     }
 
     /// Matches `pair` over `range`. `progress` hears of each stage that begins and of the share of the work that is done, and answers
-    /// whether to go on.
+    /// whether to go on. With `half`, the pair is matched at half its size. One that takes more than [`MEMORY`] is matched in tiles.
     ///
     /// # Errors
     /// Where the pair cannot be matched, or the listener has stopped it.
@@ -54,14 +59,43 @@ impl Matcher {
         preset: &str,
         range: &Range,
         progress: Function,
+        half: Option<bool>,
     ) -> Thrown<Matched> {
-        let method = Method::preset(preset).map_err(thrown)?;
+        let method = method(preset, half.unwrap_or(false)).map_err(thrown)?;
         LISTENER.set(Some(progress));
-        let job = self.matcher.job(&pair.pair, range.range).method(&method);
-        let matched = job.on_progress(tell).run_async().await;
+        let job = if range.found {
+            self.matcher.job(&pair.pair, Found(range.range))
+        } else {
+            self.matcher.job(&pair.pair, range.range)
+        };
+        let matched = job.method(&method).on_progress(tell).run_async().await;
         LISTENER.set(None);
         Ok(Matched { matched: matched.map_err(thrown)? })
     }
+}
+
+/// The number of tiles in which a pair would be matched.
+///
+/// # Errors
+/// Where no tile is small enough.
+#[wasm_bindgen]
+pub fn tiles(pair: &StereoPair, preset: &str, range: &Range, half: bool) -> Thrown<usize> {
+    let (width, height) = pair.pair.size();
+    let count = || {
+        let plan = Plan::new(width, height, range.range, &method(preset, half)?)?;
+        Ok(Tiles::new(&plan)?.count())
+    };
+    count().map_err(|error: Error| thrown(error))
+}
+
+/// The method of a preset in the memory of a browser.
+fn method(preset: &str, half: bool) -> Result<Method> {
+    let mut method = Method::preset(preset)?;
+    method.tiles.memory = method.tiles.memory.min(MEMORY);
+    if half {
+        method.schedule.match_size = MatchSize::Half;
+    }
+    Ok(method)
 }
 
 async fn open(device: &str) -> Result<Matcher> {

@@ -2,6 +2,7 @@
 
 use crate::Thrown;
 use crate::words::{thrown, warning};
+use js_sys::Array;
 use mrfgs::check;
 use mrfgs::depth::Rig;
 use mrfgs::error::{Error, RangeError};
@@ -18,18 +19,28 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 pub struct StereoPair {
     pub(crate) pair: Pair,
+    /// What has rectified it, where it was not.
+    pub(crate) by: Option<By>,
+}
+
+/// What has rectified a pair.
+#[derive(Clone, Copy)]
+pub(crate) enum By {
+    Calibration,
+    Matches,
 }
 
 #[wasm_bindgen]
 impl StereoPair {
-    /// The pair in two files, which errors call by their names.
+    /// The pair in two files, which errors call by their names. Images that are stored turned, are turned upright.
     ///
     /// # Errors
     /// Where a file is no image, or the images differ in size.
     #[wasm_bindgen(constructor)]
     pub fn new(left: &[u8], left_name: &str, right: &[u8], right_name: &str) -> Thrown<Self> {
         let files = ((Path::new(left_name), left), (Path::new(right_name), right));
-        Ok(Self { pair: Reader::default().pair_in_memory(files.0, files.1).map_err(thrown)? })
+        let reader = Reader { orient: true, ..Reader::default() };
+        Ok(Self { pair: reader.pair_in_memory(files.0, files.1).map_err(thrown)?, by: None })
     }
 
     /// The pair in memory: rows of grey, grey and alpha, RGB or RGBA without gaps, as many channels as the samples are for.
@@ -87,16 +98,18 @@ impl StereoPair {
     /// Where there is not enough memory.
     pub fn range(&self) -> Thrown<Option<Range>> {
         match check::range(&self.pair) {
-            Ok(range) => Ok(Some(Range { range })),
+            Ok(range) => Ok(Some(Range { range, found: true })),
             Err(Error::Range(RangeError::NotFound { .. })) => Ok(None),
             Err(error) => Err(thrown(error)),
         }
     }
 
-    /// What is probably wrong with the pair, and with the range where one was given.
+    /// What is probably wrong with the pair, and with the range where one was given: `{ text, remedy }`.
     #[must_use]
-    pub fn warnings(&self, range: Option<Range>) -> Vec<String> {
-        check::warnings(&self.pair, range.map(|r| r.range)).iter().map(warning).collect()
+    pub fn warnings(&self, range: Option<Range>) -> Array {
+        // A range that was found does not show what the user knows.
+        let given = range.filter(|range| !range.found).map(|range| range.range);
+        check::warnings(&self.pair, given).iter().map(|cause| warning(cause, self.by.as_ref())).collect()
     }
 }
 
@@ -107,7 +120,7 @@ fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usi
         Raster::new(width, height, channels, S::samples(Cow::Borrowed(samples)))
     }
     let pair = view(left).and_then(|left| Pair::of_frames(left, view(right)?));
-    Ok(StereoPair { pair: pair.map_err(thrown)? })
+    Ok(StereoPair { pair: pair.map_err(thrown)?, by: None })
 }
 
 /// Disparities to search, in pixels, both ends included.
@@ -115,6 +128,8 @@ fn of_samples<S: Sample>(left: (&[S], (usize, usize)), right: (&[S], (usize, usi
 #[derive(Clone, Copy)]
 pub struct Range {
     pub(crate) range: DisparityRange,
+    /// Whether sparse matches found it: a match may widen it.
+    pub(crate) found: bool,
 }
 
 #[wasm_bindgen]
@@ -125,7 +140,13 @@ impl Range {
     /// Where there are none, or too many.
     #[wasm_bindgen(constructor)]
     pub fn new(min: i32, max: i32) -> Thrown<Self> {
-        Ok(Self { range: DisparityRange::new(min, max).map_err(thrown)? })
+        Ok(Self { range: DisparityRange::new(min, max).map_err(thrown)?, found: false })
+    }
+
+    /// The same as one that [`StereoPair::range`] has found.
+    #[must_use]
+    pub fn found(self) -> Self {
+        Self { found: true, ..self }
     }
 
     /// The least one.
@@ -162,22 +183,7 @@ impl Cameras {
         let text = format!(
             "cam0=[{focal_length} 0 {cx}; 0 {focal_length} {cy}; 0 0 1]\ndoffs={doffs}\nbaseline={baseline}\nunit={unit}"
         );
-        Self::read(&text)
-    }
-
-    /// The cameras that a calibration file in Middlebury's format describes.
-    ///
-    /// # Errors
-    /// Where the text is no such file, or lacks a value.
-    pub fn read(text: &str) -> Thrown<Self> {
-        let calibration = Calibration::of_text(Path::new("calib.txt"), text).map_err(thrown)?;
-        let rig = Rig::new(&calibration).map_err(thrown)?;
-        let (Some(camera), Some(doffs), Some(baseline)) =
-            (calibration.camera, calibration.doffs, calibration.baseline)
-        else {
-            unreachable!("a rig has all three")
-        };
-        Ok(Self { camera, doffs, baseline, rig })
+        Self::of(&Calibration::of_text(Path::new("calib.txt"), &text).map_err(thrown)?)
     }
 
     /// Focal length across, in pixels.
@@ -214,6 +220,22 @@ impl Cameras {
     #[wasm_bindgen(getter)]
     pub fn unit(&self) -> String {
         self.rig.unit().name().into()
+    }
+}
+
+impl Cameras {
+    /// Those of a calibration.
+    ///
+    /// # Errors
+    /// Where it lacks a value.
+    pub(crate) fn of(calibration: &Calibration) -> Thrown<Self> {
+        let rig = Rig::new(calibration).map_err(thrown)?;
+        let (Some(camera), Some(doffs), Some(baseline)) =
+            (calibration.camera, calibration.doffs, calibration.baseline)
+        else {
+            unreachable!("a rig has all three")
+        };
+        Ok(Self { camera, doffs, baseline, rig })
     }
 }
 

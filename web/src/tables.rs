@@ -52,7 +52,7 @@ pub fn scale(name: &str) -> Thrown<Vec<u8>> {
     Ok(picture.crop(&Rect::whole((256, 1))).into_data().into_flattened())
 }
 
-fn object(entries: &[(&str, JsValue)]) -> JsValue {
+pub(crate) fn object(entries: &[(&str, JsValue)]) -> JsValue {
     let object = Object::new();
     for (key, value) in entries {
         // A plain object takes every key.

@@ -4,7 +4,11 @@ use mrfgs::Error;
 use mrfgs::check::Warning;
 use mrfgs::remedy::{self, Words};
 use std::cell::Cell;
+use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
+
+use crate::pair::By;
+use crate::tables::object;
 
 const PAGE: Words = Words {
     min: "the lower end",
@@ -45,7 +49,18 @@ pub(crate) fn error(error: &Error) -> String {
     remedy::error(error, WORDS.get())
 }
 
-/// A warning with its remedy.
-pub(crate) fn warning(warning: &Warning) -> String {
-    remedy::warning(warning, WORDS.get())
+/// A warning of `pair` or of its maps as `{ text, remedy }`: with what helps in words, and where the page can do it, as "swap", "rectify"
+/// or "widen", or else undefined.
+pub(crate) fn warning(warning: &Warning, by: Option<&By>) -> JsValue {
+    let text = match by {
+        Some(by) => remedy::of_rectified(warning, matches!(by, By::Calibration), WORDS.get()),
+        None => remedy::warning(warning, WORDS.get()),
+    };
+    let remedy = match warning {
+        Warning::Swapped { .. } => Some("swap"),
+        Warning::NotRectified { .. } if by.is_none() => Some("rectify"),
+        Warning::Clipped { .. } => Some("widen"),
+        _ => None,
+    };
+    object(&[("text", text.into()), ("remedy", remedy.into())])
 }

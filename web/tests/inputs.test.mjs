@@ -91,10 +91,10 @@ describe('inputs', () => {
         });
     }
 
-    it('opens a rendered scene', async () => {
-        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
+    it('opens a rendered scene, and matches it', async () => {
+        await visit.set({ preset: 'fast', device: 'cpu', range: 'automatic' });
+        assert.equal(await visit.scene('thin'), 'done');
         await visit.says('#range-found', /^0 to 31 px, by calib.txt$/);
-        await visit.match({ preset: 'fast', device: 'cpu', range: 'automatic' });
         const map = await visit.save('pfm');
         assert.equal(map.name, 'thin-disparity.pfm');
         assert.equal(difference(map.bytes, expected.pfm), undefined);
@@ -103,14 +103,15 @@ describe('inputs', () => {
     it('asks for the view that is missing', async () => {
         const other = await visit.browser.newPage();
         await other.goto(visit.url);
+        await other.waitForSelector('html[data-gpu]');
+        await (await other.$('#right-file')).uploadFile(RIGHT);
         await other.waitForSelector('#app[data-state=empty]');
         await other.click('#match');
         await other.waitForFunction(() => /Choose the left view/.test(document.getElementById('left-problem').textContent));
+        assert.equal(await other.$eval('#right-problem', (p) => p.textContent), '');
         await (await other.$('#left-file')).uploadFile(LEFT);
         await other.waitForFunction(() => document.getElementById('left-problem').textContent === '');
-        await other.click('#match');
-        await other.waitForFunction(() => /Choose the right view/.test(document.getElementById('right-problem').textContent));
-        assert.equal(await other.$eval('#left-problem', (p) => p.textContent), '');
+        await other.waitForSelector('#app[data-state=ready]');
         await other.close();
         // Pages in the background draw no frames.
         await visit.tab.bringToFront();
@@ -150,7 +151,8 @@ describe('inputs', () => {
     });
 
     it('refuses a crowd', async () => {
-        await visit.choose('left', LEFT, RIGHT, join(scene('thin'), 'mask0nocc.png'));
+        copyFileSync(LEFT, at('another.png'));
+        await visit.choose('left', at('left.png'), at('right.png'), at('another.png'));
         await visit.says('#pair-problem', /3 files/);
         await works();
     });

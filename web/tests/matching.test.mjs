@@ -44,7 +44,8 @@ describe('a match', () => {
         await visit.set({ device: 'gpu', preset: 'paper', range: [0, 15] });
         await visit.begin();
         await visit.tab.click('#cancel');
-        await visit.state('ready');
+        // The map of the last match stays.
+        await visit.state('done');
         await visit.says('#problem', /^Stopped\.$/);
         await visit.match({ device: 'cpu', preset: 'default', range: 'automatic' });
         assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
@@ -124,13 +125,16 @@ describe('without a network', () => {
         assert.equal(kept.length, 2, kept);
         assert.ok(kept.includes(`mrfgs ${visit.url}other/ 0123456789abcdef`), kept);
         assert.ok(!kept.includes(`mrfgs ${visit.url} 0123456789abcdef`), kept);
-        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
+        await visit.set({ device: 'cpu' });
+        assert.equal(await visit.scene('thin'), 'done');
 
         await visit.host.stop();
         await visit.tab.reload();
-        await visit.settled();
-        assert.equal(await visit.changed(() => visit.tab.click('[data-scene=thin]')), 'ready');
-        await visit.match({ device: 'cpu' });
+        await visit.tab.waitForSelector('html[data-gpu]');
+        // The first view is there, too.
+        assert.equal(await visit.settled(), 'done');
+        await visit.set({ device: 'cpu' });
+        assert.equal(await visit.scene('thin'), 'done');
         assert.equal(difference((await visit.save('pfm')).bytes, native(...views('thin')).pfm), undefined);
         await visit.tab.click('#tab-points');
         // The chunk is there, and says so itself where the browser has no WebGL.
@@ -139,5 +143,24 @@ describe('without a network', () => {
         await visit.says('#pair-problem', /could not be loaded/);
         // The browser tells of the scene that it could not fetch.
         visit.faults = visit.faults.filter((fault) => !/steep|ERR_|Failed to (load|fetch)|NetworkError/.test(fault));
+    });
+});
+
+describe('a new version', () => {
+    let visit;
+    before(async () => (visit = await Visit.open()));
+    after(() => visit.close());
+
+    it('is told, and taken with one click', async () => {
+        await visit.tab.waitForFunction(() => navigator.serviceWorker.controller?.state === 'activated');
+        assert.equal(await visit.tab.$eval('#update', (note) => note.checkVisibility()), false);
+        visit.host.replace('service-worker.js', (text) => `${text}\nself.version = 2;`);
+        await visit.tab.reload();
+        await visit.says('#update', /new version/);
+        const loaded = visit.tab.waitForNavigation();
+        await visit.tab.click('#take-update');
+        await loaded;
+        await visit.tab.waitForSelector('html[data-gpu]');
+        assert.equal(await visit.tab.$eval('#update', (note) => note.checkVisibility()), false);
     });
 });

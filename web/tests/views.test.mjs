@@ -5,7 +5,7 @@ import { after, before, describe, it } from 'node:test';
 import { levels } from '../png.mjs';
 import { native } from './lib/native.mjs';
 import { scene } from './lib/paths.mjs';
-import { Visit } from './lib/visit.mjs';
+import { BROWSER, Visit } from './lib/visit.mjs';
 
 const VIEWS = ['disparity', 'confidence', 'validity', 'left'];
 const views = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
@@ -99,7 +99,13 @@ describe('views', () => {
         assert.ok((await visit.text('#legend')).includes(share), `${share}: ${await visit.text('#legend')}`);
         await visit.tab.click('#tab-disparity');
         await shown('disparity');
-        assert.equal(await visit.text('#scale-max'), '47');
+        // Nearly all that was measured is between the ends of the colours.
+        const map = disparities(expected.pfm);
+        const reasons = levels(expected.validity).levels;
+        const measured = [...reasons.keys()].filter((i) => reasons[i] === 0).map((i) => map.at(i % 320, Math.floor(i / 320))).sort((a, b) => a - b);
+        const end = (part) => measured[Math.round(part * (measured.length - 1))];
+        assert.equal(Number(await visit.text('#scale-min')), Number(end(0.01).toFixed(1)));
+        assert.equal(Number(await visit.text('#scale-max')), Number(end(0.99).toFixed(1)));
     });
 
     it('turns the points, and hides those of less confidence', async (test) => {
@@ -187,11 +193,13 @@ describe('views', () => {
             }
             await visit.tab.keyboard.press('Tab');
         }
-        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'range', 'device', 'match']);
+        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
         await visit.tab.focus('[data-scene=slanted]');
-        assert.equal(await visit.changed(() => visit.tab.keyboard.press('Enter')), 'ready');
+        await visit.changed(() => visit.tab.keyboard.press('Enter'));
+        await visit.state('done');
         await visit.tab.focus('#match');
         await visit.tab.keyboard.press('Enter');
+        await visit.state('matching', 'done');
         await visit.state('done');
         await visit.tab.focus('#tab-disparity');
         for (const view of ['confidence', 'validity', 'left']) {
@@ -219,6 +227,63 @@ describe('views', () => {
                 .map((e) => e.outerHTML),
         );
         assert.deepEqual(nameless, []);
+    });
+
+    it('shows the map in relief', async () => {
+        const sum = () => visit.tab.evaluate(() => {
+            const { data } = document.getElementById('view').getContext('2d').getImageData(0, 0, 240, 180);
+            return data.reduce((all, value) => all + value, 0);
+        });
+        const plain = await sum();
+        await visit.tab.click('#relief');
+        assert.notEqual(await sum(), plain);
+        await visit.tab.click('#relief');
+        assert.equal(await sum(), plain);
+    });
+
+    it('has an address that holds scene and settings', async () => {
+        assert.match(visit.tab.url(), /#scene=slanted$/);
+        const other = await visit.browser.newPage();
+        await other.goto(`${visit.url}#scene=thin&preset=default&range=0,40`);
+        await other.waitForSelector('html[data-gpu]');
+        const facts = await other.$eval('#facts', (facts) => facts.textContent);
+        assert.match(facts, /^240 × 180 pixels · range 0 to 40 · default · .*CPU path/);
+        await other.close();
+        await visit.tab.bringToFront();
+    });
+
+    it('zooms by two fingers, and not the page', { skip: BROWSER !== 'chromium' && 'only Chromium makes events of fingers' }, async () => {
+        await visit.tab.click('#zoom-fit');
+        const size = () => visit.tab.$eval('#sheet', (sheet) => sheet.getBoundingClientRect().width);
+        const before = await size();
+        const prevented = await visit.tab.$eval('#stage-box', (box) => {
+            const { x, y, width, height } = box.getBoundingClientRect();
+            const at = (identifier, by) => new Touch({ identifier, target: box, clientX: x + width / 2 + by, clientY: y + height / 2 });
+            const touch = (type, by) => box.dispatchEvent(new TouchEvent(type, { touches: [at(1, -by), at(2, by)], bubbles: true, cancelable: true }));
+            touch('touchstart', 40);
+            return !touch('touchmove', 80);
+        });
+        assert.ok(prevented);
+        assert.ok(Math.abs((await size()) / before - 2) < 0.02, `${before} to ${await size()}`);
+        await visit.tab.click('#zoom-fit');
+    });
+
+    it('has room for the map on a tablet, and on paper has no form', async () => {
+        await visit.tab.setViewport({ width: 768, height: 1024 });
+        const height = await visit.tab.$eval('#stage-box', (box) => box.getBoundingClientRect().height);
+        assert.ok(height > 500, `${height}`);
+        await visit.tab.emulateMediaType?.('print');
+        const seen = await visit.tab.evaluate(() => ['form', 'map', 'scale'].map((id) => document.getElementById(id).checkVisibility()));
+        await visit.tab.emulateMediaType?.(null);
+        await visit.tab.setViewport({ width: 1280, height: 800 });
+        if (BROWSER === 'chromium') {
+            assert.deepEqual(seen, [false, true, true]);
+        }
+    });
+
+    it('tells those who listen which file a view has', async () => {
+        const held = await visit.tab.evaluate(() => ['left-file', 'right-file'].map((id) => document.getElementById(id).files[0]?.name));
+        assert.deepEqual(held, ['slanted im0.png', 'slanted im1.png']);
     });
 
     it('fits on a phone', async () => {

@@ -1,7 +1,7 @@
 // A static host of the built page, in a sub-folder as GitHub Pages has it. It can be stopped while a page is open.
-import { createReadStream, statSync } from 'node:fs';
+import { createReadStream, readFileSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
-import { extname, join, normalize } from 'node:path';
+import { basename, extname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 const TYPES = {
@@ -17,10 +17,12 @@ const TYPES = {
 
 /**
  * Serves folders below these prefixes: `{ '/mrfgs/': 'target/web/site' }`. A function takes requests itself.
- * @returns {Promise<{ url: string, asked: string[], stop(): Promise<void> }>}
+ * `replace` changes the text of all files with a name.
+ * @returns {Promise<{ url: string, asked: string[], replace(name: string, edit: (text: string) => string): void, stop(): Promise<void> }>}
  */
 export async function serve(mounts, port = 0) {
     const asked = [];
+    const edits = new Map();
     const server = createServer((request, response) => {
         const { pathname } = new URL(request.url, 'http://localhost');
         asked.push(pathname);
@@ -37,6 +39,11 @@ export async function serve(mounts, port = 0) {
             return;
         }
         response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream' });
+        const edit = edits.get(basename(file));
+        if (edit) {
+            response.end(edit(readFileSync(file, 'utf8')));
+            return;
+        }
         createReadStream(file).pipe(response);
     });
     await new Promise((resolve, reject) => {
@@ -46,6 +53,7 @@ export async function serve(mounts, port = 0) {
     return {
         url: `http://127.0.0.1:${server.address().port}`,
         asked,
+        replace: (name, edit) => edits.set(name, edit),
         stop: () => {
             server.closeAllConnections();
             return new Promise((resolve) => server.close(resolve));

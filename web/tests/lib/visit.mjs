@@ -43,6 +43,8 @@ export class Visit {
             await before(this);
         }
         await this.tab.goto(this.url);
+        // The first view is matched before a GPU is looked for.
+        await this.tab.waitForSelector('html[data-gpu]');
         await this.settled();
     }
 
@@ -117,6 +119,13 @@ export class Visit {
     async pair(folder, ...also) {
         const state = await this.changed(() => this.choose('left', join(folder, 'im0.png'), join(folder, 'im1.png'), ...also));
         assert.equal(state, 'ready', await this.text('#pair-problem'));
+    }
+
+    /** Opens a rendered scene, which is matched. */
+    async scene(name) {
+        await this.changed(() => this.tab.click(`[data-scene=${name}]`));
+        // The pair is read, and then matched.
+        return this.state('done', 'empty', 'failed');
     }
 
     async set({ preset, device, range }) {

@@ -1,0 +1,119 @@
+// Images that the engine does not read and the browser does, and images that hold both views.
+
+import { swapped } from './order';
+
+/** A way to cut an image into two views. */
+export type Cut = 'beside' | 'above';
+
+/** The longer side of the small pictures of the halves that are compared. */
+const SMALL = 48;
+
+/** From this correlation on, the halves of an image count as two views of one scene. */
+const ALIKE = 0.6;
+
+function canvas(width: number, height: number): { canvas: OffscreenCanvas; context: OffscreenCanvasRenderingContext2D } {
+    const canvas = new OffscreenCanvas(width, height);
+    const context = canvas.getContext('2d', { willReadFrequently: true });
+    if (!context) {
+        throw new Error(`The browser cannot hold a picture of ${width} × ${height} pixels.`);
+    }
+    return { canvas, context };
+}
+
+/** The file as PNG, upright, by the browser; undefined where it cannot read it either. */
+export async function decoded(file: Blob): Promise<Blob | undefined> {
+    const bitmap = await createImageBitmap(file, { imageOrientation: 'from-image' }).catch(() => undefined);
+    return bitmap && part(bitmap, 0, 0, bitmap.width, bitmap.height).finally(() => bitmap.close());
+}
+
+function part(image: ImageBitmap, x: number, y: number, width: number, height: number): Promise<Blob> {
+    const of = canvas(width, height);
+    of.context.drawImage(image, -x, -y);
+    return of.canvas.convertToBlob({ type: 'image/png' });
+}
+
+/** Both views of one image: the left one is on the left, or above. */
+export async function cut(file: Blob, how: Cut): Promise<[Blob, Blob]> {
+    const image = await createImageBitmap(file);
+    try {
+        const { width, height } = image;
+        const [w, h] = how === 'beside' ? [width >> 1, height] : [width, height >> 1];
+        if (w < 1 || h < 1) {
+            throw new Error('The image is too small to hold two views.');
+        }
+        // A column or row in the middle of an odd number belongs to neither.
+        return await Promise.all([part(image, 0, 0, w, h), part(image, width - w, height - h, w, h)]);
+    } finally {
+        image.close();
+    }
+}
+
+/** How an image is cut that probably holds both views; undefined for one view. */
+export async function guess(file: Blob): Promise<Cut | undefined> {
+    const image = await createImageBitmap(file).catch(() => undefined);
+    if (!image) {
+        return undefined;
+    }
+    const grey = (x: number, y: number, width: number, height: number) => {
+        const scale = SMALL / Math.max(width, height);
+        const [w, h] = [width, height].map((side) => Math.max(1, Math.round(side * scale))) as [number, number];
+        const { context } = canvas(w, h);
+        context.imageSmoothingQuality = 'high';
+        context.drawImage(image, x, y, width, height, 0, 0, w, h);
+        const { data } = context.getImageData(0, 0, w, h);
+        const at = (i: number) => (data[4 * i] ?? 0) + (data[4 * i + 1] ?? 0) + (data[4 * i + 2] ?? 0);
+        return Array.from({ length: h }, (_, y) => Array.from({ length: w }, (_, x) => at(y * w + x)));
+    };
+    const { width, height } = image;
+    const beside = correlation(grey(0, 0, width / 2, height), grey(width / 2, 0, width / 2, height));
+    const above = correlation(grey(0, 0, width, height / 2), grey(0, height / 2, width, height / 2));
+    image.close();
+    // Most single photographs are 4 : 3 to 16 : 9, and most of both views are wider than that or higher than wide.
+    if (beside > ALIKE && beside > above && width > 1.9 * height) {
+        return 'beside';
+    }
+    return above > ALIKE && above > beside && height > 1.05 * width ? 'above' : undefined;
+}
+
+/** The best correlation of two small pictures, of which the second may be moved along its rows. */
+function correlation(left: number[][], right: number[][]): number {
+    const width = left[0]?.length ?? 0;
+    const reach = Math.floor(width / 6);
+    const moved = (by: number) => {
+        const [from, to] = [Math.max(0, by), Math.min(width, width + by)];
+        const [a, b] = [left.flatMap((row) => row.slice(from, to)), right.flatMap((row) => row.slice(from - by, to - by))];
+        const mean = (v: number[]) => v.reduce((sum, value) => sum + value, 0) / v.length;
+        const [ma, mb] = [mean(a), mean(b)];
+        let [ab, aa, bb] = [0, 0, 0];
+        a.forEach((value, i) => {
+            const [da, db] = [value - ma, (b[i] ?? mb) - mb];
+            ab += da * db;
+            aa += da * da;
+            bb += db * db;
+        });
+        return aa > 0 && bb > 0 ? ab / Math.sqrt(aa * bb) : 0;
+    };
+    return Math.max(...Array.from({ length: 2 * reach + 1 }, (_, i) => moved(i - reach)));
+}
+
+/** What a folder of a benchmark calls its views, left and right. */
+const LAYOUTS = [
+    ['im0', 'im1'],
+    ['view1', 'view5'],
+    ['im2', 'im6'],
+] as const;
+
+const stem = (name: string) => name.replace(/^.*[\\/]/, '').replace(/\.[^.]*$/, '').toLowerCase();
+
+/** The two views among the images of a folder; all where nothing tells. */
+export function views<T extends { name: string }>(images: T[]): T[] {
+    if (images.length > 2) {
+        for (const layout of LAYOUTS) {
+            const held = layout.map((name) => images.find((image) => stem(image.name) === name));
+            if (held[0] && held[1]) {
+                return [held[0], held[1]];
+            }
+        }
+    }
+    return [...images].sort((a, b) => (swapped(a.name, b.name) ? 1 : -1));
+}

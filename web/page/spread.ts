@@ -1,0 +1,22 @@
+// The disparities that colours are spread over.
+
+import type { Range } from './protocol';
+
+/** The share of the measured pixels at either end that have the colour of the end. */
+const OUTSIDE = 0.01;
+
+/** The disparities between which nearly all measured pixels are, so that these take all colours; the `searched` ones where that says nothing. */
+export function spread(disparity: Float32Array, validity: Uint8Array, searched: Range): Range {
+    const every = Math.max(1, Math.floor(disparity.length / 200_000));
+    const some: number[] = [];
+    for (let i = 0; i < disparity.length; i += every) {
+        const value = disparity[i] ?? Infinity;
+        if (validity[i] === 0 && Number.isFinite(value)) {
+            some.push(value);
+        }
+    }
+    some.sort((a, b) => a - b);
+    const at = (part: number) => some[Math.round(part * (some.length - 1))] ?? NaN;
+    const [min, max] = [at(OUTSIDE), at(1 - OUTSIDE)];
+    return max - min >= 1 ? { min, max } : searched;
+}

@@ -1,0 +1,139 @@
+// Pairs as people have them: in the formats of browsers, turned, in one image, in a folder.
+import assert from 'node:assert/strict';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { difference, native } from './lib/native.mjs';
+import { ROOT, scene } from './lib/paths.mjs';
+import { Visit } from './lib/visit.mjs';
+
+const { PNG } = createRequire(join(ROOT, 'web/package.json'))('pngjs');
+const VIEWS = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
+const RANGE = [0, 47];
+
+/** JPEG with the tag Orientation of EXIF. */
+function turned(jpeg, orientation) {
+    const tiff = Buffer.from('4d4d002a00000008000101120003000000010000000000000000', 'hex');
+    tiff.writeUInt16BE(orientation, 18);
+    const body = Buffer.concat([Buffer.from('Exif\0\0', 'latin1'), tiff]);
+    const head = Buffer.from([0xff, 0xe1, 0, 0]);
+    head.writeUInt16BE(body.length + 2, 2);
+    return Buffer.concat([jpeg.subarray(0, 2), head, body, jpeg.subarray(2)]);
+}
+
+/** Both views in one image. */
+function joined(beside) {
+    const [left, right] = VIEWS.map((path) => PNG.sync.read(readFileSync(path)));
+    const { width, height } = left;
+    const both = new PNG(beside ? { width: 2 * width, height } : { width, height: 2 * height });
+    PNG.bitblt(left, both, 0, 0, width, height, 0, 0);
+    PNG.bitblt(right, both, 0, 0, width, height, beside ? width : 0, beside ? 0 : height);
+    return PNG.sync.write(both);
+}
+
+describe('photos', () => {
+    let visit;
+    let folder;
+    const at = (name) => join(folder, name);
+    const flags = ['--method', 'fast', '--max-disparity', '47'];
+    const expected = native(...VIEWS, flags);
+    const matches = async () => {
+        await visit.match({ preset: 'fast', device: 'cpu', range: RANGE });
+        return (await visit.save('pfm')).bytes;
+    };
+    /** A view in another format, by the browser; undefined where it writes none of these. */
+    const recoded = async (path, type, turn = false) => {
+        const found = await visit.tab.evaluate(async (content, type, turn) => {
+            const bytes = Uint8Array.from(atob(content), (c) => c.charCodeAt(0));
+            const image = await createImageBitmap(new Blob([bytes]));
+            const [w, h] = turn ? [image.height, image.width] : [image.width, image.height];
+            const canvas = new OffscreenCanvas(w, h);
+            const context = canvas.getContext('2d');
+            if (turn) {
+                context.setTransform(0, -1, 1, 0, 0, image.width);
+            }
+            context.drawImage(image, 0, 0);
+            const blob = await canvas.convertToBlob({ type, quality: 1 });
+            const data = new Uint8Array(await blob.arrayBuffer());
+            return blob.type === type ? btoa(Array.from(data, (byte) => String.fromCharCode(byte)).join('')) : undefined;
+        }, readFileSync(path, 'base64'), type, turn);
+        return found && Buffer.from(found, 'base64');
+    };
+    before(async () => {
+        visit = await Visit.open();
+        folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
+    });
+    after(async () => {
+        rmSync(folder, { recursive: true, force: true });
+        await visit.close();
+    });
+
+    it('takes what the browser decodes: WebP', async (test) => {
+        for (const [i, path] of VIEWS.entries()) {
+            const webp = await recoded(path, 'image/webp');
+            if (!webp) {
+                test.skip('this browser writes no WebP');
+                return;
+            }
+            writeFileSync(at(`im${i}.webp`), webp);
+        }
+        assert.equal(await visit.changed(() => visit.choose('left', at('im0.webp'), at('im1.webp'))), 'ready');
+        await matches();
+        assert.match(await visit.text('#facts'), /^320 × 240/);
+    });
+
+    it('turns photos upright', async () => {
+        for (const [i, path] of VIEWS.entries()) {
+            // Stored a quarter to the left, with the tag that says so.
+            writeFileSync(at(`turned${i}.jpg`), turned(await recoded(path, 'image/jpeg', true), 6));
+        }
+        const files = ['turned0.jpg', 'turned1.jpg'].map(at);
+        assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'ready');
+        const map = await matches();
+        assert.match(await visit.text('#facts'), /^320 × 240/);
+        assert.doesNotMatch(await visit.text('#warnings'), /turned|column/);
+        assert.equal(difference(map, native(...files, [...flags, '--orient']).pfm), undefined);
+    });
+
+    it('cuts an image that holds both views, side by side', async () => {
+        writeFileSync(at('both.png'), joined(true));
+        assert.equal(await visit.changed(() => visit.choose('left', at('both.png'))), 'ready');
+        await visit.says('#pair-note', /left and right half/);
+        assert.equal(difference(await matches(), expected.pfm), undefined);
+        assert.equal((await visit.save('pfm')).name, 'both-disparity.pfm');
+    });
+
+    it('cuts one with a view above the other, by guess and by button', async () => {
+        writeFileSync(at('stack.png'), joined(false));
+        assert.equal(await visit.changed(() => visit.choose('left', at('stack.png'))), 'ready');
+        await visit.says('#pair-note', /upper half/);
+        assert.equal(difference(await matches(), expected.pfm), undefined);
+        // One view alone is left as it is, and a button cuts it.
+        await visit.scene('thin');
+        assert.equal(await visit.changed(() => visit.choose('left', VIEWS[0])), 'empty');
+        assert.equal(await visit.changed(() => visit.tab.click('#cut-above')), 'ready');
+        assert.match(await visit.text('#left .name'), /left/);
+    });
+
+    it('takes a folder of a benchmark, and calls the files after it', async () => {
+        const names = ['im0.png', 'im1.png', 'calib.txt', 'disp0GT.pfm', 'mask0nocc.png'];
+        const files = names.map((name) => ({ name, content: readFileSync(join(scene('thin'), name), 'base64') }));
+        const drop = () => visit.tab.evaluate((files) => {
+            const entries = files.map(({ name, content }) => ({
+                isFile: true,
+                file: (take) => take(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name)),
+            }));
+            const directory = { isDirectory: true, name: 'Motorcycle', createReader: () => ({ readEntries: (take) => take(entries.splice(0, 3)) }) };
+            const transfer = { types: ['Files'], files: [], items: [{ webkitGetAsEntry: () => directory }] };
+            const event = new Event('drop', { bubbles: true, cancelable: true });
+            document.body.dispatchEvent(Object.defineProperty(event, 'dataTransfer', { value: transfer }));
+        }, files);
+        await visit.set({ range: 'automatic' });
+        assert.equal(await visit.changed(drop), 'ready');
+        await visit.says('#range-found', /^0 to 31 px, by calib\.txt$/);
+        await visit.match({ preset: 'fast', device: 'cpu', range: 'automatic' });
+        assert.equal((await visit.save('pfm')).name, 'Motorcycle-disparity.pfm');
+    });
+});

@@ -1,0 +1,186 @@
+// What the page says of a result, and what helps: it stays with the result, and a button does it.
+import assert from 'node:assert/strict';
+import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { difference, native } from './lib/native.mjs';
+import { scene } from './lib/paths.mjs';
+import { Visit } from './lib/visit.mjs';
+
+const views = (name) => ['im0.png', 'im1.png'].map((file) => join(scene(name), file));
+const RAW = ['left.png', 'right.png'].map((file) => join(scene('raw'), file));
+const CAMERAS = join(scene('raw'), 'cameras.yml');
+const FAST = ['--method', 'fast'];
+
+describe('the first view', () => {
+    let visit;
+    before(async () => (visit = await Visit.open()));
+    after(() => visit.close());
+
+    it('is the map of a scene, with what it is', async () => {
+        assert.equal(await visit.tab.$eval('#app', (app) => app.dataset.state), 'done');
+        assert.equal(await visit.tab.$eval('#map', (map) => map.dataset.shown), 'disparity');
+        assert.match(await visit.text('#facts'), /^320 × 240 pixels · .*fast.*CPU path/);
+        assert.match(await visit.says('#intro', /\w/), /rendered scene/);
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...views('mixed'), FAST).pfm), undefined);
+    });
+
+    it('has links, and a version', async () => {
+        assert.match(await visit.text('#version'), /^Version \d+\.\d+\.\d+$/);
+        const licence = await visit.tab.evaluate(async () => (await fetch(document.querySelector('#about a').href)).text());
+        assert.match(licence, /MIT License[^]*Apache License/);
+        // Without an address of the source there is no link to it.
+        const links = await visit.tab.$$eval('a', (all) => all.map((a) => a.getAttribute('href')));
+        assert.ok(links.every((href) => /^(licence\.txt|https:)/.test(href)), links);
+    });
+
+    it('gives way to a view of one\'s own', async () => {
+        assert.equal(await visit.changed(() => visit.choose('left', views('thin')[0])), 'empty');
+        assert.equal(await visit.text('#right .name'), 'choose a file');
+        assert.equal(await visit.tab.$eval('#intro', (intro) => intro.checkVisibility()), false);
+    });
+});
+
+describe('remedies', () => {
+    let visit;
+    let folder;
+    const click = (list, text) => visit.tab.evaluate((list, text) => {
+        [...document.querySelectorAll(`${list} button`)].find((button) => button.textContent === text).click();
+    }, list, text);
+    /** Does what matches again, and waits for it. */
+    const again = async (action) => {
+        await action();
+        await visit.tab.waitForFunction(() => !['done', 'ready', 'empty'].includes(document.getElementById('app').dataset.state));
+        assert.equal(await visit.settled(), 'done', await visit.text('#problem'));
+    };
+    before(async () => {
+        visit = await Visit.open();
+        folder = mkdtempSync(join(tmpdir(), 'mrfgs-'));
+        await visit.set({ preset: 'fast', device: 'cpu' });
+    });
+    after(async () => {
+        rmSync(folder, { recursive: true, force: true });
+        await visit.close();
+    });
+
+    it('swaps views that are swapped', async () => {
+        const [left, right] = views('slanted');
+        copyFileSync(right, join(folder, 'im0.png'));
+        copyFileSync(left, join(folder, 'im1.png'));
+        await visit.pair(folder);
+        await visit.says('#warnings', /views seem to be swapped/);
+        await visit.match({ range: 'automatic' });
+        await visit.says('#warnings', /views seem to be swapped/);
+        await again(() => click('#warnings', 'Swap the views'));
+        assert.doesNotMatch(await visit.text('#warnings'), /swapped/);
+        assert.equal(await visit.text('#left .name'), 'im1.png');
+        assert.equal(difference((await visit.save('pfm')).bytes, native(join(folder, 'im1.png'), join(folder, 'im0.png'), FAST).pfm), undefined);
+    });
+
+    it('rectifies by matches, and takes the images as they are', async () => {
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        await visit.says('#warnings', /not rectified/);
+        await again(() => click('#warnings', 'Rectify'));
+        assert.match(await visit.text('#notes'), /Rectified by its own matches, without a scale: \d+ of \d+ matches agree/);
+        assert.doesNotMatch(await visit.text('#warnings'), /not rectified/);
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...RAW, [...FAST, '--rectify']).pfm), undefined);
+        assert.equal(await visit.changed(() => click('#notes', 'Take the images as they are')), 'ready');
+        assert.doesNotMatch(await visit.text('#notes'), /Rectified/);
+        await visit.says('#warnings', /not rectified/);
+    });
+
+    it('rectifies by a calibration of OpenCV, also one that comes before its pair', async () => {
+        await visit.scene('mixed');
+        await visit.choose('left', CAMERAS);
+        await visit.says('#pair-note', /cameras\.yml is kept/);
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        await visit.says('#notes', /Rectified by cameras\.yml/);
+        await visit.match({ range: 'automatic' });
+        await visit.says('#notes', /Rectified by cameras\.yml/);
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...RAW, [...FAST, '--rectify', '--calib', CAMERAS]).pfm), undefined);
+        assert.match(await visit.tab.$eval('#cameras-note', (note) => note.textContent), /cameras\.yml/);
+    });
+
+    it('keeps a calibration that comes before its pair', async () => {
+        assert.equal(await visit.scene('mixed'), 'done');
+        await visit.choose('left', join(scene('thin'), 'calib.txt'));
+        await visit.says('#pair-note', /calib\.txt is kept/);
+        await visit.pair(scene('thin'));
+        await visit.says('#range-found', /^0 to 31 px, by calib\.txt$/);
+        // It is of that pair, and not of the next one.
+        await visit.pair(scene('slanted'));
+        await visit.says('#range-found', /by sparse matches$/);
+    });
+
+    it('widens a range', async () => {
+        await visit.pair(scene('mixed'));
+        await visit.match({ range: [0, 19] });
+        await visit.says('#warnings', /cuts off part of the scene/);
+        await again(() => click('#warnings', 'Widen the range'));
+        assert.match(await visit.text('#facts'), /range 0 to 29/);
+    });
+
+    it('says that both images are the same, as long as the map is there', async () => {
+        const [left] = views('mixed');
+        for (const name of ['im0.png', 'im1.png']) {
+            copyFileSync(left, join(folder, name));
+        }
+        await visit.pair(folder);
+        await visit.match({ range: [0, 31] });
+        await visit.says('#warnings', /two images are the same/);
+    });
+
+    it('says what was corrected', async () => {
+        await visit.pair(scene('rows'), join(scene('rows'), 'calib.txt'));
+        await visit.match({ preset: 'default', range: 'automatic' });
+        await visit.says('#notes', /right view is moved (up|down) by \d\.\d\d px/);
+    });
+
+    it('matches at half the size', async () => {
+        await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
+        await visit.tab.select('#size', 'half');
+        await visit.match({ preset: 'default' });
+        await visit.tab.select('#size', 'automatic');
+        assert.match(await visit.text('#facts'), /at half size/);
+        assert.equal(difference((await visit.save('pfm')).bytes, native(...views('mixed'), ['--set', 'match-size=half']).pfm), undefined);
+    });
+
+    for (const device of ['cpu', 'gpu']) {
+        it(`says how far a match has come, in words, on the ${device}`, async () => {
+            await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
+            await visit.set({ preset: 'default', device });
+            const seen = await visit.tab.evaluate(async () => {
+                const [app, bar, stage] = ['app', 'progress', 'stage'].map((id) => document.getElementById(id));
+                const begun = performance.now();
+                const all = [];
+                document.getElementById('match').click();
+                while (app.dataset.state !== 'done') {
+                    await new Promise((resolve) => setTimeout(resolve, 20));
+                    if (app.dataset.state === 'matching') {
+                        all.push({ time: performance.now() - begun, done: bar.value, text: stage.textContent });
+                    }
+                }
+                return all;
+            });
+            const end = seen.at(-1).time;
+            const texts = [...new Set(seen.map(({ text }) => text))];
+            assert.ok(texts.some((text) => /^Matching · \d+ %/.test(text)), texts.join('; '));
+            assert.ok(texts.every((text) => /^(Getting ready|(Preparing the views|Matching|Cleaning up) · \d+ %( · .* left)?)$/.test(text)), texts.join('; '));
+            const half = seen.findLast(({ time }) => time < end / 2);
+            assert.ok((half?.done ?? 0) < 0.9, `half of the time: ${JSON.stringify(half)}`);
+        });
+    }
+
+    it('keeps the last map until there is another, also after Cancel', async () => {
+        await visit.match({ preset: 'fast', device: 'cpu' });
+        const before = await visit.save('pfm');
+        await visit.set({ preset: 'paper' });
+        await visit.begin();
+        assert.equal(await visit.tab.$eval('#map', (map) => map.dataset.shown), 'disparity');
+        await visit.tab.click('#cancel');
+        await visit.says('#problem', /^Stopped\.$/);
+        assert.equal(await visit.settled(), 'done');
+        assert.equal(difference((await visit.save('pfm')).bytes, before.bytes), undefined);
+    });
+});
