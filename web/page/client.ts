@@ -9,7 +9,7 @@ export class Interrupted extends Error {}
 export class Broken extends Error {}
 
 /** The longest that a worker may take to stop, in milliseconds. */
-const PATIENCE = 1000;
+const PATIENCE = 2500;
 
 interface Waiting {
     resolve(value: never): void;

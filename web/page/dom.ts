@@ -43,6 +43,9 @@ export function draw(canvas: HTMLCanvasElement, { width, height, pixels }: Pictu
 
 export const words = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
+/** A text that begins with a capital. */
+export const sentence = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
+
 const whole = new Intl.NumberFormat('en');
 
 /** 76,800 */

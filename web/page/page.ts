@@ -1,7 +1,7 @@
 // The page: what follows what.
 
 import { Broken, Client, Interrupted } from './client';
-import { by, count, duration, make, say, words } from './dom';
+import { by, count, duration, make, say, sentence, words } from './dom';
 import * as legend from './legend';
 import { type Pixel, MapView } from './map-view';
 import { tooLarge } from './memory';
@@ -299,7 +299,7 @@ function warn(warnings: Warning[]): void {
     by('warnings').replaceChildren(
         ...unique.map((warning) => {
             const { remedy } = warning;
-            return make('li', {}, `${warning.text} `, ...(remedy ? [button(REMEDIES[remedy], () => help(warning))] : []));
+            return make('li', {}, `${sentence(warning.text)} `, ...(remedy ? [button(REMEDIES[remedy], () => help(warning))] : []));
         }),
     );
 }
@@ -324,7 +324,7 @@ function help({ remedy, min, max }: Warning): void {
 
 /** Says what was done to a pair, with the way back. */
 function note(notes: string[], short = false): void {
-    const lines = notes.map((text) => make('li', {}, `${text.charAt(0).toUpperCase()}${text.slice(1)}. `));
+    const lines = notes.map((text) => make('li', {}, `${sentence(text)}. `));
     if (pair?.by) {
         lines[0]?.append(button('Take the images as they are', () => rectifyBy('nothing')));
     }
@@ -362,8 +362,12 @@ async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefi
             say('announce', `${100 * said} percent`);
         }
     };
+    // The button that was pressed gives way to another one. A match that nobody has pressed takes no focus.
+    const pressed = document.activeElement === by(state === 'comparing' ? 'compare' : 'match');
     be(state);
-    by('cancel').focus();
+    if (pressed) {
+        by('cancel').focus();
+    }
     const begun = performance.now();
     try {
         const value = await match();
@@ -376,7 +380,7 @@ async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefi
         }
         return undefined;
     } finally {
-        if (document.activeElement === by('cancel') || document.activeElement === document.body) {
+        if (document.activeElement === by('cancel') || (pressed && document.activeElement === document.body)) {
             queueMicrotask(() => by('match').focus());
         }
     }

@@ -81,8 +81,18 @@ async function halved(preset: string, range: Range, size: Size): Promise<{ half:
     if (size !== 'automatic') {
         return { half: size === 'half', short: false };
     }
-    const tiles = await using(ends(range, false), (over) => engine.tiles(need(pair, 'pair'), preset, over, false));
-    return { half: tiles > 1, short: tiles > 1 };
+    const short = await using(ends(range, false), (over) => {
+        try {
+            return engine.tiles(need(pair, 'pair'), preset, over, false) > 1;
+        } catch (error) {
+            if (broken(error)) {
+                throw error;
+            }
+            // Not even in tiles.
+            return true;
+        }
+    });
+    return { half: short, short };
 }
 
 async function run(device: Device, preset: string, range: Range, wide: boolean, half: boolean): Promise<{ found: engine.Matched; took: number }> {

@@ -26,6 +26,14 @@ describe('the first view', () => {
         assert.equal(difference((await visit.save('pfm')).bytes, native(...views('mixed'), FAST).pfm), undefined);
     });
 
+    it('takes no focus, and stays at its top', async () => {
+        await visit.tab.setViewport({ width: 720, height: 450 });
+        await visit.tab.reload();
+        await visit.tab.waitForSelector('html[data-gpu]');
+        assert.deepEqual(await visit.tab.evaluate(() => [scrollY, document.activeElement === document.body]), [0, true]);
+        await visit.tab.setViewport({ width: 1280, height: 800 });
+    });
+
     it('has links, and a version', async () => {
         assert.match(await visit.text('#version'), /^Version \d+\.\d+\.\d+$/);
         const licence = await visit.tab.evaluate(async () => (await fetch(document.querySelector('#about a').href)).text());

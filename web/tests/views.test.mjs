@@ -1,5 +1,6 @@
 // What is shown of a result, with mouse and keyboard, on wide and narrow screens.
 import assert from 'node:assert/strict';
+import { createRequire } from 'node:module';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { levels } from '../png.mjs';
@@ -284,6 +285,24 @@ describe('views', () => {
     it('tells those who listen which file a view has', async () => {
         const held = await visit.tab.evaluate(() => ['left-file', 'right-file'].map((id) => document.getElementById(id).files[0]?.name));
         assert.deepEqual(held, ['slanted im0.png', 'slanted im1.png']);
+    });
+
+    it('has nothing that axe finds fault with', { skip: BROWSER !== 'chromium' && 'it is the same page in all browsers' }, async () => {
+        const other = await visit.browser.newPage();
+        // The policy of the page lets no other script in.
+        await other.setBypassCSP(true);
+        await other.goto(visit.url);
+        await other.waitForSelector('html[data-gpu]');
+        await (await other.$('#left-file')).uploadFile(...['left.png', 'right.png'].map((file) => join(scene('raw'), file)));
+        await other.waitForFunction(() => document.querySelector('#warnings button'));
+        await other.addScriptTag({ path: createRequire(import.meta.url).resolve('axe-core/axe.min.js') });
+        for (const scheme of ['light', 'dark']) {
+            await other.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: scheme }]);
+            const found = await other.evaluate(async () => (await window.axe.run()).violations.map(({ id, nodes }) => [id, nodes.map(({ target }) => target.join(' '))]));
+            assert.deepEqual(found, [], scheme);
+        }
+        await other.close();
+        await visit.tab.bringToFront();
     });
 
     it('fits on a phone', async () => {

@@ -40,8 +40,8 @@ const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
 /// and on a processor for a bar that moves.
 const WORK_PER_SUBMIT: u64 = 1 << 32;
 const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
-/// The same in a browser at first, which does not say whether its device is a driver in software. It doubles whenever a submission is
-/// waited for no longer than [`SHORT`].
+/// The same in a browser at first, which does not say whether its device is a driver in software. It doubles whenever a full
+/// submission is waited for no longer than [`SHORT`].
 const BROWSER_WORK_PER_SUBMIT: u64 = 1 << 24;
 const SHORT: Duration = Duration::from_millis(30);
 /// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late. In a browser one is enough, and
@@ -204,7 +204,8 @@ impl Device {
         Ok(())
     }
 
-    pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder) -> Result<()> {
+    /// Submits what is recorded; whether that `is_full` tells whether more is worth trying.
+    pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder, is_full: bool) -> Result<()> {
         let queue = self.queue()?;
         let index = queue.submit([encoder.finish()]);
         let (sender, done) = oneshot::channel();
@@ -214,7 +215,7 @@ impl Device {
                 let _ = sender.send(());
             });
         }
-        self.under_way.push_back(Submission { index, done });
+        self.under_way.push_back(Submission { index, done, is_full });
         self.submitted += 1;
         self.traffic.submissions += 1;
         self.check()
@@ -238,12 +239,12 @@ impl Device {
     }
 
     async fn wait_for_one(&mut self) -> Result<()> {
-        let Some(Submission { index, done }) = self.under_way.pop_front() else { return Ok(()) };
+        let Some(Submission { index, done, is_full }) = self.under_way.pop_front() else { return Ok(()) };
         if cfg!(target_arch = "wasm32") {
             // The browser ends work that takes too long. The device is lost then.
             let clock = Instant::now();
             done.await.map_err(|e| failed(&self.name, &e))?;
-            if clock.elapsed() < SHORT {
+            if is_full && clock.elapsed() < SHORT {
                 self.work_per_submit = (2 * self.work_per_submit).min(WORK_PER_SUBMIT);
             }
             return self.check();
@@ -345,6 +346,8 @@ struct Submission {
     index: wgpu::SubmissionIndex,
     /// In a browser, where there is nothing to poll, says when they are done.
     done: oneshot::Receiver<()>,
+    /// Whether as much was submitted as may be.
+    is_full: bool,
 }
 
 /// Buffers being read back from the device, and whether each is there.

@@ -75,12 +75,13 @@ impl Gpu {
 
     /// Submits everything.
     pub(super) fn submit(&mut self) -> Result<()> {
+        let is_full = self.work >= self.device.work_per_submit;
         (self.passes, self.work) = (0, 0);
         if let Some(mut encoder) = self.encoder.take() {
             if let Some(timer) = &mut self.timer {
                 timer.submit(&self.device, &mut encoder)?;
             }
-            self.device.submit(encoder)?;
+            self.device.submit(encoder, is_full)?;
         }
         self.device.check()
     }
