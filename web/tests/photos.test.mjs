@@ -117,6 +117,31 @@ describe('photos', () => {
         assert.match(await visit.text('#left .name'), /left/);
     });
 
+    it('matches at half the size what takes too much memory, and offers the full one', async () => {
+        for (const [i, path] of VIEWS.entries()) {
+            const from = PNG.sync.read(readFileSync(path));
+            const to = new PNG({ width: 2 * from.width, height: 2 * from.height });
+            for (let at = 0; at < to.width * to.height; at += 1) {
+                const [x, y] = [at % to.width, Math.floor(at / to.width)].map((place) => place >> 1);
+                from.data.copy(to.data, 4 * at, 4 * (y * from.width + x), 4 * (y * from.width + x) + 4);
+            }
+            writeFileSync(at(`large${i}.png`), PNG.sync.write(to));
+        }
+        const files = ['large0.png', 'large1.png'].map(at);
+        assert.equal(await visit.changed(() => visit.choose('left', ...files)), 'ready');
+        await visit.match({ preset: 'fgs', device: 'cpu', range: [0, 600] });
+        assert.match(await visit.text('#facts'), /^640 × 480 pixels · at half size/);
+        const half = native(...files, ['--method', 'fgs', '--max-disparity', '600', '--set', 'match-size=half']);
+        assert.equal(difference((await visit.save('pfm')).bytes, half.pfm), undefined);
+        await visit.says('#notes', /takes more memory than a match may have here/);
+        await visit.tab.evaluate(() => document.querySelector('#notes button').click());
+        await visit.state('matching');
+        await visit.tab.click('#cancel');
+        await visit.state('done');
+        assert.equal(await visit.tab.$eval('#size', (size) => size.value), 'full');
+        await visit.tab.select('#size', 'automatic');
+    });
+
     it('takes a folder of a benchmark, and calls the files after it', async () => {
         const names = ['im0.png', 'im1.png', 'calib.txt', 'disp0GT.pfm', 'mask0nocc.png'];
         const files = names.map((name) => ({ name, content: readFileSync(join(scene('thin'), name), 'base64') }));
