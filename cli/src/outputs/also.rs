@@ -545,9 +545,9 @@ mod tests {
         };
         let of_pfm = "raw.pfm right.pfm depth.pfm depth-mm.png points.ply points.pcd points.las points.laz \
                       points-original.ply points-original.pcd points-original.las points-original.laz \
-                      confidence.png validity.png preview.png";
+                      confidence.png validity.png sigma.pfm depth-sigma.pfm preview.png";
         let of_pfm: Vec<_> = of_pfm.split(' ').map(|end| format!("a/b.c.{end}")).collect();
-        assert_eq!(names("a/b.c.pfm")[..15], of_pfm);
+        assert_eq!(names("a/b.c.pfm")[..17], of_pfm);
         assert_eq!(names("d.png")[..2], ["d.raw.png", "d.right.png"]);
         assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.right.TIFF", "d.depth.TIFF"]);
     }
