@@ -5,6 +5,7 @@
 
 mod matched;
 mod matcher;
+mod object;
 mod pair;
 mod rectified;
 mod tables;

@@ -1,9 +1,10 @@
 //! What comes out: maps, pictures, files and points.
 
 use crate::Thrown;
+use crate::object::set;
 use crate::pair::{Cameras, StereoPair, rgba};
 use crate::words::{error, thrown, warning};
-use js_sys::{Array, Reflect};
+use js_sys::Array;
 use mrfgs::check::Warning;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::image::cloud::{Cloud, Point};
@@ -76,8 +77,7 @@ impl Matched {
                 let (min, max) =
                     if *upper { (range.min, range.max + more) } else { (range.min - more, range.max) };
                 for (end, value) in [("min", min), ("max", max)] {
-                    // A plain object takes every key.
-                    let _ = Reflect::set(&said, &end.into(), &value.into());
+                    set(&said, end, value.into());
                 }
             }
             said

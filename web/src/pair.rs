@@ -1,7 +1,7 @@
 //! What goes in: a pair, the range to search, and the cameras.
 
 use crate::Thrown;
-use crate::words::{thrown, warning};
+use crate::words::{By, thrown, warning};
 use js_sys::Array;
 use mrfgs::check;
 use mrfgs::depth::Rig;
@@ -21,13 +21,6 @@ pub struct StereoPair {
     pub(crate) pair: Pair,
     /// What has rectified it, where it was not.
     pub(crate) by: Option<By>,
-}
-
-/// What has rectified a pair.
-#[derive(Clone, Copy)]
-pub(crate) enum By {
-    Calibration,
-    Matches,
 }
 
 #[wasm_bindgen]

@@ -1,8 +1,8 @@
 //! What is known of two cameras, and pairs that are rectified by it or by their own matches.
 
 use crate::Thrown;
-use crate::pair::{By, Cameras, StereoPair};
-use crate::words::thrown;
+use crate::pair::{Cameras, StereoPair};
+use crate::words::{By, thrown};
 use mrfgs::calibration::{self, cameras::StereoCalibration};
 use mrfgs::rectification::{Options, Rectification};
 use std::path::Path;

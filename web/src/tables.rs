@@ -2,7 +2,8 @@
 
 use crate::Thrown;
 use crate::matched::colours;
-use js_sys::{Array, Object, Reflect, Uint8Array};
+use crate::object::object;
+use js_sys::{Array, Uint8Array};
 use mrfgs::colour::{VALIDITY, preview};
 use mrfgs::image::{Plane, Rect};
 use mrfgs::maps::REASONS;
@@ -50,13 +51,4 @@ pub fn scale(name: &str) -> Thrown<Vec<u8>> {
     let ramp = Plane::from_fn(256, 1, |x, _| x as f32);
     let picture = preview(&ramp, 0.0, 255.0, colours(name)?);
     Ok(picture.crop(&Rect::whole((256, 1))).into_data().into_flattened())
-}
-
-pub(crate) fn object(entries: &[(&str, JsValue)]) -> JsValue {
-    let object = Object::new();
-    for (key, value) in entries {
-        // A plain object takes every key.
-        let _ = Reflect::set(&object, &(*key).into(), value);
-    }
-    object.into()
 }

@@ -7,8 +7,7 @@ use std::cell::Cell;
 use wasm_bindgen::JsValue;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-use crate::pair::By;
-use crate::tables::object;
+use crate::object::object;
 
 const PAGE: Words = Words {
     min: "the lower end",
@@ -31,6 +30,13 @@ const PACKAGE: Words = Words {
 
 thread_local! {
     static WORDS: Cell<&'static Words> = const { Cell::new(&PAGE) };
+}
+
+/// What has rectified a pair.
+#[derive(Clone, Copy)]
+pub(crate) enum By {
+    Calibration,
+    Matches,
 }
 
 /// From now on names what the package for npm takes, and not the fields of the page.
