@@ -18,7 +18,7 @@
 
 static_assert(sizeof(mrfgs_image) == 2 * sizeof(void *) + 16 || sizeof(void *) != 8, "no field moves");
 static_assert(offsetof(mrfgs_maps, right) == 7 * sizeof(void *), "no field moves");
-static_assert(sizeof(mrfgs_maps) == 9 * sizeof(void *), "no field moves");
+static_assert(sizeof(mrfgs_maps) == 11 * sizeof(void *), "no field moves");
 static_assert(sizeof(mrfgs_view) == 6 * sizeof(void *), "no field moves");
 
 namespace {
