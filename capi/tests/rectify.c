@@ -180,7 +180,7 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     mrfgs_matcher_free(matcher);
     mrfgs_options_free(options);
     free_views(&views);
-    free(map), free(of_right), free(depth), free(other);
+    free(map), free(of_right), free(depth), free(other), free(sigma);
 }
 
 static void mistakes(const char *path, const mrfgs_calibration *calibration, mrfgs_rectification *by, const struct pnm raw[2]) {

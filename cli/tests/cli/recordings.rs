@@ -281,9 +281,9 @@ fn messages(path: &Path, topic: &str) -> Vec<(u64, Vec<u8>)> {
 fn what_is_written_holds_what_match_finds() {
     let folder = Folder::new();
     record(&folder.join("drive.mcap"), &[cameras(SIZE), images("image_rect", 0)].concat());
-    let also = "--also depth,depth-mm,confidence";
+    let also = "--also depth,depth-mm,confidence,sigma";
     run(&folder, &format!("sequence drive.mcap found.mcap {RANGE} --quiet {also}")).succeeded();
-    let ends = ["pfm", "depth.pfm", "depth-mm.png", "confidence.png"];
+    let ends = ["pfm", "depth.pfm", "depth-mm.png", "confidence.png", "sigma.pfm"];
     let wanted = wanted(&folder, &ends, &format!("--calib 0.yaml --calib 1.yaml {also}"));
     let header = |stamp: u64| Bytes::with_header(stamp, "camera");
     let image = |start: Bytes, encoding: &str, bytes: usize, data: &[u8]| {
@@ -301,8 +301,16 @@ fn what_is_written_holds_what_match_finds() {
         let disparity = image(header(stamp).with_header_again(stamp), "32FC1", 4, &floats(&files[0], -1.0));
         let end = [60.0_f32, 0.2].into_iter().fold(disparity.filled(4), |all, v| all.bytes(&v.to_le_bytes()));
         let end = end.u32(0).u32(0).u32(SIZE.1).u32(SIZE.0).bytes(&[0]).filled(4);
-        let end = [0.0_f32, 23.0, 1.0 / 256.0].into_iter().fold(end, |all, v| all.bytes(&v.to_le_bytes()));
+        fs::write(folder.join("sigma.pfm"), &files[4]).unwrap();
+        let mut sigmas = read_pfm(folder.join("sigma.pfm")).into_data();
+        sigmas.retain(|sigma| sigma.is_finite());
+        sigmas.sort_by(f32::total_cmp);
+        let end = [0.0_f32, 23.0, sigmas[(sigmas.len() - 1) / 2]]
+            .into_iter()
+            .fold(end, |all, v| all.bytes(&v.to_le_bytes()));
         assert!(all("/disparity")[n] == (stamp, end.0), "frame {n}");
+        let sigma = image(header(stamp), "32FC1", 4, &floats(&files[4], f32::NAN));
+        assert!(all("/sigma")[n] == (stamp, sigma.0), "frame {n}");
         let depth = image(header(stamp), "32FC1", 4, &floats(&files[1], f32::NAN));
         assert!(all("/depth/image_rect")[n] == (stamp, depth.0), "frame {n}");
         let png = |bytes: &[u8]| image::load_from_memory(bytes).unwrap();
