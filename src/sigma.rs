@@ -7,8 +7,8 @@ use crate::options::{MatchSize, Method};
 /// How the error falls as the confidence rises: sigma(c) = sqrt(floor^2 + (`at_zero` 2^(-c / `halving`))^2).
 ///
 /// About two thirds of the measured pixels with a confidence c are nearer to the truth than sigma(c): its reading as a standard
-/// deviation. The errors have longer tails than a normal distribution: about one pixel in twenty is further off than three sigma, at
-/// edges most of all. It was fitted (open) to the errors of 48 pairs from desks, rooms and roads by the presets `default`, `accurate`
+/// deviation. The errors have longer tails than a normal distribution: one pixel in twenty is further off than three sigma, on roads one
+/// in ten. It was fitted (open) to the errors of 48 pairs from desks, rooms and roads by the presets `default`, `accurate`
 /// and `fast`. By other methods it is as good as their confidence is like theirs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigma {
