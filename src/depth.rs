@@ -4,12 +4,14 @@
 //! / Z, where f is the focal length in pixels and doffs the distance of the principal points along the row
 //! (cx1 - cx0). Depth has the unit of the baseline.
 
+use crate::calibration::cameras::{Pose, ThirdCamera};
 use crate::calibration::matrix::{Matrix, rotated, transposed};
 use crate::error::{Error, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::cloud::{Cloud, Frame, Point};
 use crate::image::{Image, Plane};
 use crate::maps::{FRACTION, Maps};
+use crate::registration;
 
 /// A calibrated pair of cameras, rectified.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,8 +20,10 @@ pub struct Rig {
     doffs: f64,
     baseline: f64,
     unit: Unit,
-    /// The rotation from the frame of the rectified left camera to that of the original one, where points are in that.
+    /// The rotation from the frame of the rectified left camera to that of the original one, where that is another one.
     to_original: Option<Matrix>,
+    /// The frame of points.
+    frame: Frame,
 }
 
 impl Rig {
@@ -43,15 +47,21 @@ impl Rig {
         if baseline <= 0.0 {
             return error(format!("baseline={baseline} is not above 0; give the distance of the cameras"));
         }
-        Ok(Self { camera, doffs, baseline, unit, to_original: None })
+        Ok(Self { camera, doffs, baseline, unit, to_original: None, frame: Frame::Matched })
     }
 
-    /// The same rig with points in the frame of the original left camera. `rectifying` is the rotation from that frame to the
-    /// rectified one, the first of [`Rectification::rotations`](crate::rectification::Rectification::rotations). Depths stay
-    /// those along the axis of the rectified camera.
+    /// The same rig, which knows how the original left camera looks: [`Rig::registered`] takes a third camera's pose from there.
+    /// `rectifying` is the rotation from the frame of that camera to the rectified one, the first of
+    /// [`Rectification::rotations`](crate::rectification::Rectification::rotations).
+    #[must_use]
+    pub fn rectified_by(self, rectifying: &Matrix) -> Self {
+        Self { to_original: Some(transposed(rectifying)), ..self }
+    }
+
+    /// The same, with points in the frame of the original left camera. Depths stay those along the axis of the rectified camera.
     #[must_use]
     pub fn in_original_frame(self, rectifying: &Matrix) -> Self {
-        Self { to_original: Some(transposed(rectifying)), ..self }
+        Self { frame: Frame::Original, ..self.rectified_by(rectifying) }
     }
 
     /// The rig of a part of the images, whose first pixel is (x, y).
@@ -82,9 +92,19 @@ impl Rig {
     /// `None` where [`Rig::depth`] is `None`.
     #[must_use]
     pub fn point(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
+        let point = self.matched(x, y, d)?;
+        Some(if self.frame == Frame::Original { self.original(point) } else { point })
+    }
+
+    /// The same in the frame of the rectified left camera.
+    fn matched(&self, x: f64, y: f64, d: f64) -> Option<[f64; 3]> {
         let Camera { focal_length: [fx, fy], principal_point: [cx, cy] } = self.camera;
-        let point = self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])?;
-        Some(self.to_original.map_or(point, |matrix| rotated(&matrix, point)))
+        self.depth(d).map(|z| [(x - cx) * z / fx, (y - cy) * z / fy, z])
+    }
+
+    /// A point of that frame in the one of the original left camera.
+    fn original(&self, point: [f64; 3]) -> [f64; 3] {
+        self.to_original.map_or(point, |matrix| rotated(&matrix, point))
     }
 
     /// The depths of a map of disparities in pixels; +infinity where there is no depth.
@@ -126,10 +146,35 @@ impl Rig {
     #[must_use]
     pub fn millimetres(&self, disparities: &Plane<f32>) -> Option<Plane<u16>> {
         let unit = self.unit.millimetres()?;
-        Some(disparities.map(|&d| {
-            let depth = self.depth(f64::from(d)).map_or(0.0, |depth| (depth * unit).round());
-            if depth <= f64::from(u16::MAX) { depth as u16 } else { 0 }
-        }))
+        Some(disparities.map(|&d| whole(self.depth(f64::from(d)).map_or(0.0, |depth| depth * unit))))
+    }
+
+    /// The depths of a map of disparities as a third camera sees them: along its axis, at its pixels, in the unit of the baseline.
+    /// +infinity where it sees what the map does not. The nearest of several surfaces counts, and each pixel of the map covers what it
+    /// covers there. Where both units are known, that of the camera is turned into that of the baseline.
+    ///
+    /// The camera's pose is that to the original left camera where the rig [knows it](Rig::rectified_by), else that to the rectified one.
+    #[must_use]
+    pub fn registered(&self, disparities: &Plane<f32>, camera: &ThirdCamera) -> Plane<f32> {
+        let per_unit =
+            camera.unit.millimetres().zip(self.unit.millimetres()).map_or(1.0, |(theirs, own)| theirs / own);
+        let Pose { rotation, translation } = camera.pose;
+        registration::render(disparities, camera, |x, y, d| {
+            let turned = rotated(&rotation, self.original(self.matched(x, y, d)?));
+            Some(std::array::from_fn(|i| turned[i] + per_unit * translation[i]))
+        })
+    }
+
+    /// Those [registered](Rig::registered) depths in whole millimetres, as [`Rig::millimetres`].
+    #[must_use]
+    pub fn registered_millimetres(
+        &self,
+        disparities: &Plane<f32>,
+        camera: &ThirdCamera,
+    ) -> Option<Plane<u16>> {
+        let unit = self.unit.millimetres()?;
+        let millimetres = |&depth: &f32| whole(if depth.is_finite() { f64::from(depth) * unit } else { 0.0 });
+        Some(self.registered(disparities, camera).map(millimetres))
     }
 
     /// The points that were measured and are trusted (validity 0), row by row, with the colours of the `left`
@@ -155,9 +200,14 @@ impl Rig {
                 confidence: maps.confidence[(x, y)],
             }));
         }
-        let frame = if self.to_original.is_some() { Frame::Original } else { Frame::Matched };
-        Cloud { points, frame, unit: self.unit }
+        Cloud { points, frame: self.frame, unit: self.unit }
     }
+}
+
+/// A depth in whole millimetres; 0 where it is above 65535.
+fn whole(millimetres: f64) -> u16 {
+    let rounded = millimetres.round();
+    if rounded <= f64::from(u16::MAX) { rounded as u16 } else { 0 }
 }
 
 #[cfg(test)]

@@ -108,6 +108,7 @@ mod plan;
 mod program;
 pub mod rectification;
 pub mod region;
+mod registration;
 #[doc(hidden)]
 pub mod remedy;
 mod roofline;

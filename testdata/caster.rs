@@ -106,6 +106,41 @@ impl World {
         let grid = if width * height > 1 << 20 { 2 } else { 4 };
         Rig { world: self, width, height, unit_disparity, grid }.shoot(name, labels)
     }
+
+    /// What a camera at `eye` sees, as a sensor of its own records it. `ray` leads through a pixel, by 1 along its axis; `pixel` is how
+    /// wide one is at depth 1.
+    pub fn photograph(
+        &self,
+        size: (usize, usize),
+        eye: Vec3,
+        pixel: f64,
+        ray: impl Fn(f64, f64) -> Vec3,
+    ) -> Plane<[u8; 3]> {
+        const GRID: usize = 4;
+        let (samples, sensor) = (GRID * GRID, Sensor::new(2 * self.seed + 2));
+        let part = |i: usize, of: usize| (i as f64 + 0.5) / of as f64 - 0.5;
+        Plane::from_fn(size.0, size.1, |x, y| {
+            let mut sum = [0.0; 3];
+            for i in 0..samples {
+                let along = ray(x as f64 + part(i % GRID, GRID), y as f64 + part(i / GRID, GRID));
+                let lamp = [part(i, samples), part(7 * i % samples, samples)];
+                sum = add(sum, self.colour(&Ray { from: eye, along }, lamp, pixel));
+            }
+            sensor.record(scale(sum, 1.0 / samples as f64), size, x, y)
+        })
+    }
+
+    /// The depths that a camera at `eye` sees along its axis. `ray` leads through a pixel, by 1 along that axis.
+    pub fn depths(
+        &self,
+        (width, height): (usize, usize),
+        eye: Vec3,
+        ray: impl Fn(f64, f64) -> Vec3,
+    ) -> Plane<f32> {
+        Plane::from_fn(width, height, |x, y| {
+            self.nearest(&Ray { from: eye, along: ray(x as f64, y as f64) }).0 as f32
+        })
+    }
 }
 
 impl Rig<'_> {

@@ -51,6 +51,18 @@ pub const CAMERAS: [Camera; 2] = [
     },
 ];
 
+/// A third camera: it sees more, from the right of the left one, from above and a little from behind.
+pub const THIRD: Camera = Camera {
+    focal: 260.0,
+    centre: [203.0, 117.0],
+    lens: Lens::RadialTangential([-0.12, 0.02, 0.001, -0.0007, 0.0]),
+    turn: rotation([0.02, -0.03, 0.012]),
+};
+
+/// Where it stands, from the left one, and the size of its images.
+pub const THIRD_PLACE: [f64; 3] = [0.06, -0.045, -0.03];
+pub const THIRD_SIZE: (usize, usize) = (400, 240);
+
 /// The size of the pair in `testdata/raw`, and how many times larger the scene is rendered that it sees.
 pub const SIZE: (usize, usize) = (240, 180);
 pub const SCALE: usize = 3;
@@ -82,7 +94,7 @@ pub fn turned(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
 
 impl Camera {
     /// The ray through a point of the image, in the frame of the scene.
-    fn ray(&self, x: f64, y: f64) -> [f64; 3] {
+    pub fn ray(&self, x: f64, y: f64) -> [f64; 3] {
         let [u, v] = [(x - self.centre[0]) / self.focal, (y - self.centre[1]) / self.focal];
         let [a, b] = match self.lens {
             Lens::RadialTangential([k1, k2, p1, p2, k3]) => {
@@ -180,15 +192,44 @@ pub fn pose([left, right]: &[Camera; 2], baseline: f64) -> (Matrix, [f64; 3]) {
     (product(&right.turn, &inverse(&left.turn)), turned(&right.turn, [-baseline, 0.0, 0.0]))
 }
 
+/// A matrix, as OpenCV writes it.
+fn matrix(name: &str, rows: usize, numbers: &[f64]) -> String {
+    let data: Vec<_> = numbers.iter().map(|v| format!("{v:?}")).collect();
+    let (columns, data) = (numbers.len() / rows, data.join(", "));
+    format!("{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n")
+}
+
+/// How the third camera, or another one in its place, stands to a left one that is turned by `from`.
+pub fn third_pose(third: &Camera, from: &Matrix) -> (Matrix, [f64; 3]) {
+    (product(&third.turn, &inverse(from)), turned(&third.turn, THIRD_PLACE).map(|v| -v))
+}
+
+/// Where the third camera is in a scene.
+pub fn third_eye(scene: &Scene) -> [f64; 3] {
+    let [x, y, z] = THIRD_PLACE;
+    [x - 0.5 * baseline(scene), y, z]
+}
+
+/// A camera beside a pair, as OpenCV writes it, that stands like `pose` to the left one.
+pub fn third(
+    camera: &Camera,
+    (width, height): (usize, usize),
+    (rotation, translation): (Matrix, [f64; 3]),
+) -> String {
+    let Camera { focal, centre: [cx, cy], lens, .. } = *camera;
+    let (fisheye, coefficients) = match lens {
+        Lens::RadialTangential(k) => (0, k.to_vec()),
+        Lens::Equidistant(k) => (1, k.to_vec()),
+    };
+    format!("%YAML:1.0\n---\nimage_size: [ {width}, {height} ]\nunit: m\nfisheye: {fisheye}\n")
+        + &matrix("K", 3, &[focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0])
+        + &matrix("D", 1, &coefficients)
+        + &matrix("R", 3, rotation.as_flattened())
+        + &matrix("T", 3, &translation)
+}
+
 /// The calibration of a raw pair, as OpenCV writes it.
 pub fn calibration(cameras: &[Camera; 2], (width, height): (usize, usize), baseline: f64) -> String {
-    let matrix = |name: &str, rows: usize, numbers: &[f64]| {
-        let data: Vec<_> = numbers.iter().map(|v| format!("{v:?}")).collect();
-        let (columns, data) = (numbers.len() / rows, data.join(", "));
-        format!(
-            "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n"
-        )
-    };
     let mut text = format!("%YAML:1.0\n---\nimageSize: [ {width}, {height} ]\nunit: m\n");
     for (n, camera) in (1..).zip(cameras) {
         let Camera { focal, centre: [cx, cy], lens, .. } = *camera;

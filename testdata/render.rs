@@ -78,7 +78,7 @@ fn save_passing(folder: &Path, (width, height): (usize, usize), labels: u32, fra
     Ok(())
 }
 
-/// Writes the raw pair and its calibration.
+/// Writes the raw pair, what a third camera sees, and their calibrations.
 fn save_raw(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)?;
     let scene = raw::scene();
@@ -90,6 +90,12 @@ fn save_raw(folder: &Path) -> Result<()> {
     }
     let text = raw::calibration(&raw::CAMERAS, raw::SIZE, raw::baseline(&scene));
     fs::write(folder.join("cameras.yml"), text)?;
+    let third = &raw::THIRD;
+    let pose = raw::third_pose(third, &raw::CAMERAS[0].turn);
+    fs::write(folder.join("third.yml"), raw::third(third, raw::THIRD_SIZE, pose))?;
+    let (size, eye) = (raw::THIRD_SIZE, raw::third_eye(&scene));
+    let seen = scenes::world(scene.name).photograph(size, eye, 1.0 / third.focal, |x, y| third.ray(x, y));
+    write_png(&folder.join("third.png"), size, seen.data().as_flattened(), ExtendedColorType::Rgb8)?;
     println!("{}", folder.display());
     Ok(())
 }

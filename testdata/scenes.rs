@@ -8,8 +8,8 @@
 
 mod caster;
 
-pub use caster::Scene;
-use caster::{Pattern, Sensor, UP, VIEWER, Vec3, World, add, paint, scale, unit};
+use caster::{Pattern, Sensor, UP, VIEWER, Vec3, add, paint, scale, unit};
+pub use caster::{Scene, World};
 
 /// A scene and the size at which `testdata/` holds it.
 #[derive(Clone, Copy, Debug)]
@@ -62,9 +62,20 @@ impl Recipe {
 /// When there is no scene of that name, when no pixel or no label is asked for, and when the image is more than three
 /// times as wide as high or its rows are fewer than half the labels: slanted walls would come too close at its sides.
 pub fn render(name: &str, width: usize, height: usize, labels: u32) -> Scene {
+    Recipe { width, height, labels, ..*recipe(name) }.render()
+}
+
+/// The bodies of scene `name`.
+///
+/// # Panics
+/// When there is no scene of that name.
+pub fn world(name: &str) -> World {
+    (recipe(name).world)()
+}
+
+fn recipe(name: &str) -> &'static Recipe {
     let recipe = ALL.iter().find(|recipe| recipe.name == name);
-    let Some(recipe) = recipe else { panic!("no scene is called {name:?}") };
-    Recipe { width, height, labels, ..*recipe }.render()
+    recipe.unwrap_or_else(|| panic!("no scene is called {name:?}"))
 }
 
 /// The scene `slanted` while a ball and a card pass before it, `step` frames after the first. Where nothing moves, frames

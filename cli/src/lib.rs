@@ -163,11 +163,11 @@ mod tests {
     #[test]
     fn commands_have_few_flags() {
         let caps = [
-            ("match", 27),
+            ("match", 28),
             ("rectify", 8),
-            ("depth", 14),
-            ("sequence", 32),
-            ("batch", 19),
+            ("depth", 15),
+            ("sequence", 33),
+            ("batch", 20),
             ("evaluate", 12),
             ("evaluate map", 8),
             ("evaluate submission", 10),

@@ -48,6 +48,20 @@ pub struct Views {
     pub size: Option<(usize, usize)>,
 }
 
+/// A camera beside the pair, such as the colour camera of a rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThirdCamera {
+    /// Where it shows a ray.
+    pub lens: Lens,
+    /// How it stands to the left camera: a point X in the frame of that one is R X + T in its own. The left camera is the one that took
+    /// the images, not the rectified one, where the two differ.
+    pub pose: Pose,
+    /// Width and height of its images, in pixels.
+    pub size: (usize, usize),
+    /// The unit of T. One that is unknown is taken for that of the pair.
+    pub unit: Unit,
+}
+
 impl Pose {
     /// Of one camera to itself.
     pub(super) const IN_PLACE: Self = Self { rotation: IDENTITY, translation: [0.0; 3] };
@@ -56,6 +70,15 @@ impl Pose {
     pub(super) fn inverse(&self) -> Self {
         let rotation = transposed(&self.rotation);
         Self { rotation, translation: rotated(&rotation, self.translation).map(|v| -v) }
+    }
+
+    /// This one, and then `next`.
+    pub(super) fn then(&self, next: &Self) -> Self {
+        let moved = rotated(&next.rotation, self.translation);
+        Self {
+            rotation: product(&next.rotation, &self.rotation),
+            translation: std::array::from_fn(|i| moved[i] + next.translation[i]),
+        }
     }
 
     /// How the right camera stands to the left one, where both stand like this to a third frame: from that to each of them.

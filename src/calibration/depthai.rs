@@ -1,6 +1,6 @@
 //! The calibration in the memory of OAK cameras, as DepthAI writes it in JSON.
 
-use super::cameras::{Pose, StereoCalibration};
+use super::cameras::{Pose, StereoCalibration, ThirdCamera};
 use super::lens::{Distortion, Lens};
 use super::node::{Entries, Entry};
 use super::opencv;
@@ -14,21 +14,63 @@ pub(super) fn is(entries: &Entries) -> bool {
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
-    let expected = "the sockets of the left and the right camera";
-    let stereo = entries.require("stereorectificationdata", "stereoRectificationData", expected)?;
-    let sockets = stereo.group()?;
-    let left = sockets.number("leftcamerasocket", "leftCameraSocket")? as i64;
-    let right = sockets.number("rightcamerasocket", "rightCameraSocket")? as i64;
-    let cameras = entries.require("cameradata", "cameraData", "a list of cameras")?;
-    // Extrinsics lead along a chain of cameras, so one of both ways is there.
-    let poses = match (chain(&cameras, left, right)?, chain(&cameras, right, left)?) {
-        (Some(pose), _) => [Pose::IN_PLACE, pose],
-        (None, Some(pose)) => [pose, Pose::IN_PLACE],
-        _ => return Err(stereo.error("has cameras between which no extrinsics lead; calibrate again")),
-    };
-    let left = posed(camera(&cameras, left)?, poses[0])?;
-    let right = posed(camera(&cameras, right)?, poses[1])?;
+    let sockets = Sockets::of(entries)?;
+    let left = posed(camera(&sockets.cameras, sockets.left)?, Pose::IN_PLACE)?;
+    let right = posed(camera(&sockets.cameras, sockets.right)?, sockets.pose_of(sockets.right)?)?;
     pair(&left, &right, Unit::Centimetre)
+}
+
+/// The camera that is not one of the pair, in most of them that of colours.
+pub(super) fn third(entries: &Entries) -> Result<ThirdCamera> {
+    let sockets = Sockets::of(entries)?;
+    let mut others = Vec::new();
+    for item in sockets.cameras.items()? {
+        let socket = item.items()?.first().map(Entry::number).transpose()?;
+        others.extend(
+            socket.map(|socket| socket as i64).filter(|s| ![sockets.left, sockets.right].contains(s)),
+        );
+    }
+    let [socket] = others[..] else {
+        return Err(sockets.cameras.error(format_args!(
+            "has {} cameras beside the pair; expected one, or K, D, R, T and image_size of the one you mean",
+            others.len()
+        )));
+    };
+    let third = posed(camera(&sockets.cameras, socket)?, sockets.pose_of(socket)?)?;
+    let size = third.size.ok_or_else(|| third.entry.error("does not say the size of its images"))?;
+    Ok(ThirdCamera { lens: third.lens, pose: third.pose, size, unit: Unit::Centimetre })
+}
+
+/// Which camera is which.
+struct Sockets<'a> {
+    left: i64,
+    right: i64,
+    /// What says so.
+    stereo: Entry<'a>,
+    cameras: Entry<'a>,
+}
+
+impl<'a> Sockets<'a> {
+    fn of(entries: &Entries<'a>) -> Result<Self> {
+        let expected = "the sockets of the left and the right camera";
+        let stereo = entries.require("stereorectificationdata", "stereoRectificationData", expected)?;
+        let sockets = stereo.group()?;
+        let left = sockets.number("leftcamerasocket", "leftCameraSocket")? as i64;
+        let right = sockets.number("rightcamerasocket", "rightCameraSocket")? as i64;
+        let cameras = entries.require("cameradata", "cameraData", "a list of cameras")?;
+        Ok(Self { left, right, stereo, cameras })
+    }
+
+    /// How a camera stands to the left one.
+    fn pose_of(&self, socket: i64) -> Result<Pose> {
+        // Extrinsics lead along a chain of cameras, so one of both ways is there.
+        if let Some(pose) = chain(&self.cameras, self.left, socket)? {
+            return Ok(pose);
+        }
+        let back = chain(&self.cameras, socket, self.left)?;
+        let pose = back.map(|pose| pose.inverse());
+        pose.ok_or_else(|| self.stereo.error("has cameras between which no extrinsics lead; calibrate again"))
+    }
 }
 
 /// The camera of a socket: cameras are pairs of a socket and what is known.

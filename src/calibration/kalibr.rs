@@ -1,6 +1,6 @@
 //! Kalibr's camera chain: cam0 is the left camera, cam1 the right one.
 
-use super::cameras::StereoCalibration;
+use super::cameras::{Pose, StereoCalibration, ThirdCamera};
 use super::lens::{Distortion, Lens, RadialTangential};
 use super::models::Model;
 use super::node::Entries;
@@ -35,6 +35,25 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         unit: Unit::Metre,
         ..StereoCalibration::default()
     })
+}
+
+/// The last camera of a chain that begins with the left one.
+pub(super) fn last(entries: &Entries) -> Result<ThirdCamera> {
+    let mut last = 1;
+    while entries.find(&format!("cam{}", last + 1)).is_some() {
+        last += 1;
+    }
+    let camera = |n: usize| {
+        let name = format!("cam{n}");
+        entries.require(&name, &name, "a camera of the chain beside the left one")?.group()
+    };
+    let mut pose = Pose::IN_PLACE;
+    for n in 1..=last {
+        let expected = format!("a matrix of 4 x 4 from cam{} to cam{n}", n - 1);
+        pose = pose.then(&camera(n)?.require("tcncnm1", "T_cn_cnm1", &expected)?.pose()?);
+    }
+    let camera = camera(last)?;
+    Ok(ThirdCamera { lens: lens(&camera)?, pose, size: size(&camera)?, unit: Unit::Metre })
 }
 
 /// The size of the images of a camera, as EuRoC has it, too.

@@ -2,7 +2,7 @@
 //!
 //! [`read`] takes the files of OpenCV, ROS, Kalibr, EuRoC, ORB-SLAM, VINS-Fusion, Basalt, ZED, OAK and RealSense cameras, COLMAP, KITTI and
 //! Middlebury, and tells them apart by their content. [`Rectification`](crate::rectification::Rectification) rectifies by them, and
-//! [`Rig`](crate::depth::Rig) takes depths from them.
+//! [`Rig`](crate::depth::Rig) takes depths from them. [`third::read`] takes a camera beside the pair, into whose view depths are rendered.
 
 mod basalt;
 pub mod cameras;
@@ -23,6 +23,7 @@ mod posed;
 mod realsense;
 mod ros;
 mod syntax;
+pub mod third;
 pub mod write;
 mod zed;
 

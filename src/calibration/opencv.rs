@@ -6,7 +6,7 @@ use super::matrix::{IDENTITY, Matrix, length, rotation};
 use super::models::Model;
 use super::node::{Entries, Entry};
 use crate::error::Result;
-use crate::image::calib::Camera;
+use crate::image::calib::{Camera, Unit};
 
 // In lower case and without `_`, as `Entries::find` takes them.
 const CAMERA: [&str; 2] = [
@@ -17,8 +17,8 @@ const DISTORTION: [&str; 2] = [
     "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl distcoeffsl distcoeffl distl left.d",
     "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr distcoeffsr distcoeffr distr right.d",
 ];
-const ROTATION: &str = "r rotation rotationmatrix stereor";
-const TRANSLATION: &str = "t translation translationvector trans stereot";
+pub(super) const ROTATION: &str = "r rotation rotationmatrix stereor";
+pub(super) const TRANSLATION: &str = "t translation translationvector trans stereot";
 const RECTIFICATION: [&str; 2] = ["r1 rectification1 rleft rl left.r", "r2 rectification2 rright rr right.r"];
 const PROJECTION: [&str; 2] = ["p1 projection1 pleft pl left.p", "p2 projection2 pright pr right.p"];
 const SIZE: &str = "imagesize size imgsize resolution";
@@ -42,13 +42,8 @@ pub(super) fn is(entries: &Entries) -> bool {
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
-    let mut calibration = StereoCalibration { size: size(entries)?, ..StereoCalibration::default() };
-    if let Some(unit) = entries.find(UNIT) {
-        let word = unit.word()?;
-        calibration.unit = word.parse().map_err(|expected: &str| unit.wrong(expected))?;
-    } else {
-        calibration.unit = crate::image::calib::Unit::Unknown;
-    }
+    let (size, unit) = (size(entries)?, unit(entries)?);
+    let mut calibration = StereoCalibration { size, unit, ..StereoCalibration::default() };
     let has = |names: &str| entries.find(names).is_some();
     let stored = PROJECTION.iter().any(|names| has(names));
     if has_lens(entries) || !stored {
@@ -107,7 +102,14 @@ fn digits(number: f64) -> String {
     }
 }
 
-fn size(entries: &Entries) -> Result<Option<(usize, usize)>> {
+/// The unit that they state.
+pub(super) fn unit(entries: &Entries) -> Result<Unit> {
+    let Some(unit) = entries.find(UNIT) else { return Ok(Unit::Unknown) };
+    unit.word()?.parse().map_err(|expected: &str| unit.wrong(expected))
+}
+
+/// The size of the images.
+pub(super) fn size(entries: &Entries) -> Result<Option<(usize, usize)>> {
     match (entries.find(SIZE), entries.find(WIDTH), entries.find(HEIGHT)) {
         (Some(size), ..) => size.size().map(Some),
         (None, Some(width), Some(height)) => Ok(Some((width.count()?, height.count()?))),
@@ -133,7 +135,7 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
 }
 
 /// Whether the lenses are fisheyes. Files of OpenCV do not say so by themselves; see the guide.
-fn is_fisheye(entries: &Entries) -> Result<bool> {
+pub(super) fn is_fisheye(entries: &Entries) -> Result<bool> {
     let mut said: Option<(Entry, bool)> = None;
     let flag = entries.find(FISHEYE).map(|entry| fisheye_flag(&entry).map(|is| (entry, Some(is))));
     let models = MODEL.iter().filter_map(|names| entries.find(names));
@@ -191,13 +193,18 @@ pub(super) fn camera(entry: &Entry) -> Result<([f64; 2], [f64; 2])> {
     }
 }
 
+/// The rotation from the left camera to another one, which errors call `other`.
+pub(super) fn rotation_to(entries: &Entries, other: &str) -> Result<Matrix> {
+    let expected = format!("the rotation from the left camera to {other}, 3 x 3 or a rotation vector");
+    let entry = entries.require(ROTATION, "R", &expected)?;
+    match entry.numbers::<3>(&expected) {
+        Ok(vector) => Ok(rotation(vector)),
+        Err(_) => entry.rotation(&entry.matrix()?),
+    }
+}
+
 fn pose(entries: &Entries) -> Result<Pose> {
-    let expected = "the rotation from the left camera to the right one, 3 x 3 or a rotation vector";
-    let entry = entries.require(ROTATION, "R", expected)?;
-    let rotation = match entry.numbers::<3>(expected) {
-        Ok(vector) => rotation(vector),
-        Err(_) => entry.rotation(&entry.matrix()?)?,
-    };
+    let rotation = rotation_to(entries, "the right one")?;
     let expected = "3 numbers, the left camera in the frame of the right one";
     let entry = entries.require(TRANSLATION, "T", expected)?;
     let translation: [f64; 3] = entry.numbers(expected)?;

@@ -60,6 +60,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let also = args.also.of_map()?;
+    let third = args.also.third()?;
     let output = args.output.as_deref().unwrap_or(&args.map);
     if args.also.limits.takes_confidence() && args.confidence.is_none() {
         let reason = "takes the confidence of each pixel, which MAP does not hold; give it by --confidence";
@@ -72,7 +73,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         ));
     }
     let inputs = [Some(&args.map), args.left.as_ref(), args.confidence.as_ref()].into_iter().flatten();
-    let inputs: Vec<_> = inputs.chain(&args.calib).map(|path| ("an input", path.as_path())).collect();
+    let inputs: Vec<_> =
+        inputs.chain(&args.calib).chain(&args.also.into).map(|path| ("an input", path.as_path())).collect();
     let outputs: Vec<_> = also.iter().map(|word| (word.flag(), word.beside(output))).collect();
     let named: Vec<_> = outputs.iter().map(|(flag, path)| (flag.as_str(), path.as_path())).collect();
     files::distinct(&inputs, &named)?;
@@ -108,6 +110,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         left: left.as_ref(),
         rig: rig.transpose()?,
         rectifying: None,
+        third,
         sigma: None,
         georeferences: [None, None],
     };

@@ -5,20 +5,20 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use mrfgs::calibration::matrix::Matrix;
+use mrfgs::calibration::cameras::ThirdCamera;
+use mrfgs::calibration::third;
 use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
 use mrfgs::image::cloud::Frame;
 use mrfgs::image::write::Writer;
-use mrfgs::image::{Georeference, Image, Plane, write};
+use mrfgs::image::{Plane, write};
 use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::sigma::Sigma;
 
-use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::files::Written;
 use crate::outputs::limits::Limits;
+use crate::outputs::outcome::{Of, Outcome, View};
 use crate::outputs::recording::Content;
 use crate::text::plural;
 
@@ -46,6 +46,8 @@ enum Kind {
     Depth,
     /// The same in whole millimetres, as 16-bit PNG.
     Millimetres,
+    /// Depths in the view of a third camera, as float or in whole millimetres.
+    Registered { millimetres: bool },
     /// The errors to expect, of disparities or of depths, as float like depths.
     Sigma(Of),
     /// A cloud of points, as PLY unless the word has an extension.
@@ -54,22 +56,8 @@ enum Kind {
     Picture { beside: bool },
 }
 
-/// The view whose pixels a map has.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum View {
-    Left,
-    Right,
-}
-
-/// What an error is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Of {
-    Disparities,
-    Depths,
-}
-
 /// All outputs, in the order in which they are written. One more is one more row.
-static ALL: [Also; 18] = [
+static ALL: [Also; 20] = [
     row(
         "raw",
         "The disparity map before post-processing, in the format of the disparity map",
@@ -95,6 +83,17 @@ static ALL: [Also; 18] = [
         "The depth of every pixel in millimetres, as ROS and TUM have it: 16-bit .png, 0 where there is none or it is above \
          65535. It takes a calibration whose unit is known",
         Kind::Millimetres,
+    ),
+    row(
+        "depth-registered",
+        "The depth as the camera of --into sees it, along its axis and at its pixels, as float like depth: nothing where it sees \
+         what LEFT does not",
+        Kind::Registered { millimetres: false },
+    ),
+    row(
+        "depth-registered-mm",
+        "The same in millimetres, as depth-mm",
+        Kind::Registered { millimetres: true },
     ),
     row(
         "points",
@@ -156,6 +155,10 @@ pub(crate) struct AlsoArgs {
     /// Colours of the previews, from far to near [default: turbo]
     #[arg(long, value_name = "NAME", value_parser = colours())]
     colours: Option<ColourMap>,
+    /// The camera of --also depth-registered, such as that of a rig's colours: its lens, its size, and how it stands to the left
+    /// camera. One camera by the names of OpenCV (K, D, R, T and a size), Kalibr's chain, whose last camera it is, or the file of an OAK
+    #[arg(long, value_name = "FILE")]
+    pub(crate) into: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) limits: Limits,
 }
@@ -178,63 +181,29 @@ fn colours() -> impl TypedValueParser<Value = ColourMap> {
     )
 }
 
-/// What a match has found, for its outputs.
-pub(crate) struct Outcome<'a> {
-    pub(crate) maps: &'a Maps,
-    pub(crate) range: DisparityRange,
-    pub(crate) sign: Sign,
-    /// The left image, where an output [shows it](AlsoArgs::show_left).
-    pub(crate) left: Option<&'a Image>,
-    /// The cameras, where an output [takes them](AlsoArgs::take_cameras).
-    pub(crate) rig: Option<Rig>,
-    /// The rotation from the frame of the left camera to the rectified one, where the images were rectified.
-    pub(crate) rectifying: Option<Matrix>,
-    /// How the errors follow from the confidence, where a match found the maps.
-    pub(crate) sigma: Option<Sigma>,
-    /// The georeferences of the views.
-    pub(crate) georeferences: [Option<Georeference>; 2],
-}
-
-impl Outcome<'_> {
-    /// The disparity map, without what is not sure.
-    pub(crate) fn final_map(&self, limits: Limits) -> Plane<f32> {
-        limits.sure(self.maps.final_map(), self.maps)
-    }
-
-    /// The errors of what is sure: `None` where they are not known, or those of depths are wanted without cameras.
-    fn sigmas(&self, of: Of, limits: Limits) -> Option<Plane<f32>> {
-        let (mut map, sigmas) = (self.final_map(limits), self.sigma?.map(self.maps));
-        if let Some(rig) = &self.rig {
-            map = limits.near(map, rig);
-        }
-        match of {
-            Of::Depths => Some(self.rig?.depth_sigmas(&map, &sigmas)),
-            Of::Disparities => {
-                let (width, height) = map.size();
-                let sigma = |x, y| if map[(x, y)].is_finite() { sigmas[(x, y)] } else { f32::INFINITY };
-                Some(Plane::from_fn(width, height, sigma))
-            }
-        }
-    }
-
-    /// The median of the errors of all measured disparities; `None` where none is, or errors are not known.
-    pub(crate) fn typical_sigma(&self) -> Option<f32> {
-        let mut sigmas = self.sigma?.map(self.maps).into_data();
-        sigmas.retain(|sigma| sigma.is_finite());
-        let middle = sigmas.len().checked_sub(1)? / 2;
-        Some(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1)
-    }
-
-    /// What writes a map with the pixels of `view`.
-    pub(crate) fn writer(&self, view: View) -> Writer {
-        Writer { georeference: self.georeferences[view as usize].clone() }
-    }
-}
-
 impl AlsoArgs {
     /// The wanted outputs, each once, in the order of the table.
     pub(crate) fn wanted(&self) -> impl Iterator<Item = &'static Also> {
         ALL.iter().filter(|also| self.also.iter().any(|wanted| wanted.word == also.word))
+    }
+
+    /// The camera of `--into`.
+    ///
+    /// # Errors
+    /// For a file that makes no sense, and where an output takes a camera that is not given, or none takes the one that is.
+    pub(crate) fn third(&self) -> Result<Option<ThirdCamera>> {
+        match (&self.into, self.wanted().find(|also| matches!(also.kind, Kind::Registered { .. }))) {
+            (Some(file), Some(_)) => Ok(Some(third::read(file)?)),
+            (None, None) => Ok(None),
+            (Some(_), None) => Err(Failure::usage(
+                "--into",
+                "is the camera of --also depth-registered and depth-registered-mm; add one of them, or leave it out",
+            )),
+            (None, Some(also)) => {
+                let reason = "is in the view of a third camera; give that by --into, or take --also depth";
+                Err(Failure::usage(also.flag(), reason))
+            }
+        }
     }
 
     /// Refuses colours without a picture, and the original camera where the images are not rectified.
@@ -262,8 +231,12 @@ impl AlsoArgs {
 
     /// The wanted output that takes most of the cameras.
     pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
-        let is_of_cameras =
-            |also: &&Also| matches!(also.kind, Kind::Depth | Kind::Sigma(Of::Depths) | Kind::Points(..));
+        let is_of_cameras = |also: &&Also| {
+            matches!(
+                also.kind,
+                Kind::Depth | Kind::Registered { .. } | Kind::Sigma(Of::Depths) | Kind::Points(..)
+            )
+        };
         let first = || self.wanted().find(is_of_cameras);
         self.wanted().find(|also| also.takes_unit()).or_else(first)
     }
@@ -285,7 +258,11 @@ impl AlsoArgs {
         let is_of_map = |also: &&Also| {
             matches!(
                 also.kind,
-                Kind::Depth | Kind::Millimetres | Kind::Points(Frame::Matched) | Kind::Picture { .. }
+                Kind::Depth
+                    | Kind::Millimetres
+                    | Kind::Registered { .. }
+                    | Kind::Points(Frame::Matched)
+                    | Kind::Picture { .. }
             )
         };
         match wanted.iter().find(|also| !is_of_map(also)) {
@@ -340,7 +317,7 @@ impl AlsoArgs {
         let is_message = |also: &&Also| match also.kind {
             Kind::Depth | Kind::Millimetres | Kind::Sigma(_) | Kind::Bytes(_) => true,
             Kind::Points(frame) => frame == Frame::Matched && also.word == also.stem(),
-            Kind::Disparity(..) | Kind::Picture { .. } => false,
+            Kind::Disparity(..) | Kind::Registered { .. } | Kind::Picture { .. } => false,
         };
         match self.wanted().find(|also| !is_message(also)) {
             Some(also) => Err(Failure::usage(
@@ -371,14 +348,14 @@ impl AlsoArgs {
                 let (rig, left) = rig.zip(left)?;
                 Some(Content::Points(rig.cloud(&self.limits.trusted(maps, &rig), left)))
             }
-            Kind::Disparity(..) | Kind::Picture { .. } => None,
+            Kind::Disparity(..) | Kind::Registered { .. } | Kind::Picture { .. } => None,
         };
         self.wanted().filter_map(content).collect()
     }
 
     /// Writes `also` to `path`. Returns what there is to say of it.
     pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
-        let &Outcome { maps, sign, left, rig, rectifying, .. } = outcome;
+        let &Outcome { maps, sign, left, rig, rectifying, third, .. } = outcome;
         match also.kind {
             Kind::Disparity(view, map) => {
                 let Some(map) = map(maps) else { return Ok(None) };
@@ -389,16 +366,25 @@ impl AlsoArgs {
                 let Some(rig) = rig else { return Ok(None) };
                 let depths = rig.depths(&self.limits.near(outcome.final_map(self.limits), &rig));
                 outcome.writer(View::Left).depth(path, &depths)?;
-                let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
-                return Ok(Some(match known().reduce(f32::min).zip(known().reduce(f32::max)) {
-                    Some((least, most)) => format!("depths {least:.3} to {most:.3}"),
-                    None => "no pixel has a depth".into(),
-                }));
+                return Ok(Some(format!("depths {}", span(&depths))));
             }
             Kind::Millimetres => {
                 let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
                 let Some(depths) = rig.and_then(|rig| rig.millimetres(&near(&rig))) else { return Ok(None) };
                 write::picture(path, &depths)?;
+            }
+            Kind::Registered { millimetres } => {
+                let Some((rig, camera)) = rig.zip(third) else { return Ok(None) };
+                let map = self.limits.near(outcome.final_map(self.limits), &rig);
+                if !millimetres {
+                    // A third camera sees nothing of a map's georeference.
+                    let depths = rig.registered(&map, &camera);
+                    Writer::default().depth(path, &depths)?;
+                    return Ok(Some(format!("depths of --into {}", span(&depths))));
+                }
+                if let Some(depths) = rig.registered_millimetres(&map, &camera) {
+                    write::picture(path, &depths)?;
+                }
             }
             Kind::Sigma(of) => {
                 let Some(sigmas) = outcome.sigmas(of, self.limits) else { return Ok(None) };
@@ -421,6 +407,15 @@ impl AlsoArgs {
     }
 }
 
+/// The least and the largest of what is known.
+fn span(depths: &Plane<f32>) -> String {
+    let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
+    match known().reduce(f32::min).zip(known().reduce(f32::max)) {
+        Some((least, most)) => format!("{least:.3} to {most:.3}"),
+        None => "of no pixel".into(),
+    }
+}
+
 impl Also {
     /// The flag that asks for it.
     pub(crate) fn flag(&self) -> String {
@@ -429,7 +424,7 @@ impl Also {
 
     /// Whether it takes the unit of the baseline, too.
     pub(crate) fn takes_unit(&self) -> bool {
-        matches!(self.kind, Kind::Millimetres)
+        matches!(self.kind, Kind::Millimetres | Kind::Registered { millimetres: true })
     }
 
     /// Its word without an extension.
@@ -443,10 +438,10 @@ impl Also {
         let is_tiff = ["tif", "tiff"].iter().any(|tiff| own.eq_ignore_ascii_case(tiff));
         let extension = match self.kind {
             Kind::Disparity(..) => &*own,
-            Kind::Depth | Kind::Sigma(_) if is_tiff => &*own,
-            Kind::Depth | Kind::Sigma(_) => "pfm",
+            Kind::Depth | Kind::Registered { millimetres: false } | Kind::Sigma(_) if is_tiff => &*own,
+            Kind::Depth | Kind::Registered { millimetres: false } | Kind::Sigma(_) => "pfm",
             Kind::Points(_) => self.word.split_once('.').map_or("ply", |(_, extension)| extension),
-            Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => "png",
+            Kind::Bytes(_) | Kind::Millimetres | Kind::Registered { .. } | Kind::Picture { .. } => "png",
         };
         output.with_extension(format!("{}.{extension}", self.stem()))
     }
@@ -455,9 +450,13 @@ impl Also {
     pub(crate) fn check(&self, path: &Path, range: DisparityRange) -> mrfgs::Result<()> {
         match self.kind {
             Kind::Disparity(..) => write::check_disparity_path(path, range.min, range.max),
-            Kind::Depth | Kind::Sigma(_) => write::check_depth_path(path),
+            Kind::Depth | Kind::Registered { millimetres: false } | Kind::Sigma(_) => {
+                write::check_depth_path(path)
+            }
             Kind::Points(..) => write::check_path(path),
-            Kind::Bytes(_) | Kind::Millimetres | Kind::Picture { .. } => write::check_png_path(path),
+            Kind::Bytes(_) | Kind::Millimetres | Kind::Registered { .. } | Kind::Picture { .. } => {
+                write::check_png_path(path)
+            }
         }
     }
 }
@@ -543,11 +542,12 @@ mod tests {
         let names = |output: &str| -> Vec<String> {
             all_beside(Path::new(output)).map(|path| path.to_str().unwrap().to_owned()).collect()
         };
-        let of_pfm = "raw.pfm right.pfm depth.pfm depth-mm.png points.ply points.pcd points.las points.laz \
+        let of_pfm = "raw.pfm right.pfm depth.pfm depth-mm.png depth-registered.pfm \
+                      depth-registered-mm.png points.ply points.pcd points.las points.laz \
                       points-original.ply points-original.pcd points-original.las points-original.laz \
                       confidence.png validity.png sigma.pfm depth-sigma.pfm preview.png";
         let of_pfm: Vec<_> = of_pfm.split(' ').map(|end| format!("a/b.c.{end}")).collect();
-        assert_eq!(names("a/b.c.pfm")[..17], of_pfm);
+        assert_eq!(names("a/b.c.pfm")[..19], of_pfm);
         assert_eq!(names("d.png")[..2], ["d.raw.png", "d.right.png"]);
         assert_eq!(names("d.TIFF")[..3], ["d.raw.TIFF", "d.right.TIFF", "d.depth.TIFF"]);
     }

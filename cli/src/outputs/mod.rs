@@ -5,15 +5,17 @@ mod claim;
 pub(crate) mod files;
 mod film;
 mod limits;
+mod outcome;
 mod record;
 mod recording;
 mod staged;
 
-pub(crate) use also::{Also, AlsoArgs, Format, MapArgs, Outcome, View};
+pub(crate) use also::{Also, AlsoArgs, Format, MapArgs};
 pub(crate) use claim::Claim;
 pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;
 pub(crate) use limits::Limits;
+pub(crate) use outcome::{Outcome, View};
 pub(crate) use record::{Files, MatchRecord, stage_and_level};
 pub(crate) use recording::{Cameras, RecordedMaps};
 pub(crate) use staged::StagedFolder;

@@ -243,8 +243,11 @@ impl Input {
             }
         }
         let known = self.calibration.as_ref().map(Known::named);
-        let rig = |word| rig(word, known, left, self.pair.size(), self.remedy);
-        word.map(rig).transpose()
+        let found = word.map(|word| rig(word, known, left, self.pair.size(), self.remedy)).transpose()?;
+        Ok(match self.rectifying() {
+            Some(rectifying) => found.map(|rig| rig.rectified_by(&rectifying)),
+            None => found,
+        })
     }
 
     /// The rotation from the frame of the left camera to the rectified one, where the pair was rectified.

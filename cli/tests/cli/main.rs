@@ -23,6 +23,7 @@ mod outputs;
 mod plugin;
 mod points;
 mod recordings;
+mod registered;
 #[path = "../../../testdata/render-cloud.rs"]
 #[allow(dead_code, reason = "an example has a main function")]
 mod render_cloud;

@@ -43,6 +43,8 @@ pub(super) struct Given<'a> {
     pub(super) rectify: Option<Options>,
     /// The output that takes the cameras.
     pub(super) cameras: Option<&'a Also>,
+    /// The file of the camera that an output is in the view of.
+    pub(super) into: Option<&'a Path>,
     /// What is left out of the outputs.
     pub(super) limits: Limits,
 }
@@ -113,7 +115,8 @@ impl Listed {
             }
         };
         let own = inputs.into_iter().filter(|path| base.join(path).exists());
-        let shared = given.calib.iter().filter(|_| !self.has_calibration());
+        let shared =
+            given.calib.iter().filter(|_| !self.has_calibration()).map(PathBuf::as_path).chain(given.into);
         // Those of the flags do not start at the list.
         let shared = shared.filter_map(|path| path.canonicalize().ok()).map(|path| shown(&path));
         own.chain(shared).collect()

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
+use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, write};
 use mrfgs::options::Method;
@@ -108,6 +109,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 struct Batch<'a> {
     args: &'a Args,
     given: Given<'a>,
+    third: Option<ThirdCamera>,
     method: Method,
     reader: Reader,
     base: PathBuf,
@@ -122,13 +124,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         calib: &args.calib,
         rectify: args.rectification.options_if(args.rectify)?,
         cameras: args.maps.also.take_cameras(),
+        into: args.maps.also.into.as_deref(),
         limits: args.maps.also.limits,
     };
+    let third = args.maps.also.third()?;
     check_folder(args, &base, &pairs, &given)?;
     if let Some(shard) = args.shard {
         pairs.retain(|listed| shard.holds(&listed.name));
     }
-    let batch = Batch { args, given, method: method.clone(), reader: args.reading.reader(), base };
+    let batch = Batch { args, given, third, method: method.clone(), reader: args.reading.reader(), base };
     if args.status {
         return batch.print_status(&pairs);
     }
@@ -321,8 +325,8 @@ impl Batch<'_> {
         let georeferences = pair.georeferences();
         let pair = Some(pair).filter(|_| wanted.also.show_left());
         let (maps, sign, left) = (&matched.maps, Sign::default(), pair.as_ref().map(Pair::left));
-        let sigma = Some(Sigma::of(&self.method));
-        let outcome = Outcome { maps, range, sign, left, rig, rectifying, sigma, georeferences };
+        let (sigma, third) = (Some(Sigma::of(&self.method)), self.third);
+        let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
         self.named(claim, wanted.write(claim.folder(), &listed.name, &outcome))?;
         files.output = Some(wanted.map(&listed.name));
         let mut found = MatchRecord::new(&files, &matched, time, sign);

@@ -114,6 +114,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let cameras = args.also.take_cameras();
     let rectifying = args.rectification.options_if(args.rectify)?;
     args.also.check(args.rectify)?;
+    let third = args.also.third()?;
     if args.rectify && args.pair.calib.is_empty() {
         let flag = cameras.map(Also::flag).or(args.numbers.flag().map(str::to_owned));
         if let Some(flag) = flag {
@@ -165,7 +166,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let pair = Some(pair).filter(|_| args.also.show_left());
     let left = pair.as_ref().map(Pair::left);
     let (maps, sign, sigma) = (&matched.maps, args.sign, Some(Sigma::of(&method)));
-    let outcome = Outcome { maps, range, sign, left, rig, rectifying, sigma, georeferences };
+    let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
     let mut record = MatchRecord::new(&files, &matched, time, args.sign);
     record.rectified = args.rectify;
     record.region = args.region.roi.as_ref().map(|part| [part.x.start, part.y.start]);
@@ -192,6 +193,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     files::json_file(args.json.as_deref()).map_or(Ok(()), write::check_path)?;
     let mut inputs = args.pair.inputs(input);
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
+    inputs.extend(args.also.into.as_deref().map(|path| ("the file of --into", path)));
     let flags: Vec<_> = also.iter().map(|(word, path)| (word.flag(), path.as_path())).collect();
     let outputs = std::iter::once(("OUTPUT", output))
         .chain(flags.iter().map(|(flag, path)| (flag.as_str(), *path)))

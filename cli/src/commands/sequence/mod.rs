@@ -171,6 +171,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if !film && !recording {
         args.maps.also.check(rectify)?;
     }
+    let third = args.maps.also.third()?;
     let method = args.maps.also.made_by(args.method.method()?)?;
     let rectifying = args.rectification.options_if(rectify)?;
     let left_out = recorded.as_ref().map(Recorded::left_out);
@@ -227,7 +228,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
     let range = range_of_all(&mut matcher, &input, args)?;
     let rectifying = input.rectifying();
-    let writer = Writer { output: &args.output, wanted: &args.maps, range, rig, sigma, rectifying, rate };
+    let writer =
+        Writer { output: &args.output, wanted: &args.maps, range, rig, sigma, rectifying, third, rate };
     let records = args.json.as_deref().map(Records::new).transpose()?;
     let mut sink = if film {
         writer.begin_film(records)?
@@ -402,7 +404,8 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     let output = args.output.as_path();
     let mut inputs = frames.files();
     let beside = first_image.map(|image| image.with_file_name(CALIBRATION));
-    inputs.extend(args.mask.iter().chain(&args.calib).chain(&beside).map(PathBuf::as_path));
+    let given = args.mask.iter().chain(&args.calib).chain(&args.maps.also.into).chain(&beside);
+    inputs.extend(given.map(PathBuf::as_path));
     let named: Vec<_> = inputs.iter().map(|file| ("an input", *file)).collect();
     if let Some(json) = files::json_file(args.json.as_deref()) {
         write::check_path(json)?;

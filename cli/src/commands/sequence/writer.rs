@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
+use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::calibration::matrix::Matrix;
 use mrfgs::depth::Rig;
 use mrfgs::image::{Georeference, Pair, write, write::Growing};
@@ -31,6 +32,8 @@ pub(super) struct Writer<'a> {
     pub(super) sigma: Sigma,
     /// The rotation from the frame of the left camera to the rectified one, where frames are rectified.
     pub(super) rectifying: Option<Matrix>,
+    /// The camera that an output is in the view of.
+    pub(super) third: Option<ThirdCamera>,
     /// How many frames there are a second, where that is known.
     pub(super) rate: Option<FrameRate>,
 }
@@ -157,11 +160,11 @@ impl Sink<'_> {
 
     /// Writes a frame.
     pub(super) fn add(&mut self, found: &Found) -> Result<()> {
-        let Writer { output, wanted, range, rig, sigma, rectifying, rate } = self.writer;
+        let Writer { output, wanted, range, rig, sigma, rectifying, third, rate } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
         let georeferences = found.georeferences.clone();
         let (sign, sigma) = (Sign::default(), Some(sigma));
-        let outcome = Outcome { maps, range, sign, left, rig, rectifying, sigma, georeferences };
+        let outcome = Outcome { maps, range, sign, left, rig, rectifying, third, sigma, georeferences };
         match &mut self.to {
             To::Folder => wanted.write(output, &found.name, &outcome)?,
             To::Film(film) => film.add(&wanted.also.film_picture(&outcome))?,
