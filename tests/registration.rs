@@ -145,3 +145,18 @@ fn depths_of_a_raw_pair_go_by_the_camera_that_took_it() {
         assert!(crooked > 2.0 * found, "{of}: {crooked} and {found}");
     }
 }
+
+#[test]
+fn the_files_of_the_third_camera_are_what_the_renderer_makes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/raw");
+    let (scene, pose) = (raw::scene(), raw::third_pose(&THIRD, &CAMERAS[0].turn));
+    assert_eq!(
+        std::fs::read_to_string(folder.join("third.yml")).unwrap(),
+        raw::third(&THIRD, THIRD_SIZE, pose)
+    );
+    let eye = raw::third_eye(&scene);
+    let seen =
+        scenes::world(scene.name).photograph(THIRD_SIZE, eye, 1.0 / THIRD.focal, |x, y| THIRD.ray(x, y));
+    let held = image::open(folder.join("third.png")).unwrap().into_rgb8();
+    assert!(held.as_raw() == seen.data().as_flattened());
+}

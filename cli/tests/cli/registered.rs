@@ -69,7 +69,7 @@ fn depths_go_into_a_third_camera_by_files_of_several_forms() {
         let whole = image::open(folder.join("d.depth-registered-mm.png")).unwrap().into_luma16();
         for (whole, depth) in whole.pixels().zip(depths.data()) {
             let expected = if depth.is_finite() { (1000.0 * f64::from(*depth)).round() } else { 0.0 };
-            assert_eq!(f64::from(whole[0]), expected, "{name}");
+            assert_eq!(whole[0], expected as u16, "{name}");
         }
         let first = first.get_or_insert_with(|| depths.clone());
         // Other units round the numbers of the pose.
@@ -103,7 +103,10 @@ fn a_batch_and_a_sequence_take_a_third_camera() {
     fs::create_dir(folder.join("pairs")).unwrap();
     copy("slanted", &folder.join("pairs/a"));
     let into = |focal: f64| {
-        fs::write(folder.join("t.yml"), format!("K: [{focal}, 0, 60, 0, {focal}, 40, 0, 0, 1]\nD: [0, 0, 0, 0]\nR: [0, 0, 0]\nT: [0, 0, 0]\nsize: [120, 80]\n")).unwrap()
+        let text = format!(
+            "K: [{focal}, 0, 60, 0, {focal}, 40, 0, 0, 1]\nD: [0, 0, 0, 0]\nR: [0, 0, 0]\nT: [0, 0, 0]\nsize: [120, 80]\n"
+        );
+        fs::write(folder.join("t.yml"), text).unwrap();
     };
     let line = "batch pairs out --also depth-registered --into t.yml --device cpu --method fast";
     into(100.0);
