@@ -294,7 +294,11 @@ const FAILURES: &[Failure] = &[
     ("batch pairs.csv out --method best", 2, "--method & default, accurate, fast"),
     ("batch pairs.csv out --set levels=17", 2, "--set levels & 17 is outside 1 to 16"),
     ("batch pairs.csv out --device cpu --device 0", 2, "--device & multiple times"),
-    ("batch pairs.csv out --also raw,row", 2, "--also & 'row' & raw, right, depth, depth-mm, depth-registered"),
+    (
+        "batch pairs.csv out --also raw,row",
+        2,
+        "--also & 'row' & raw, right, depth, depth-mm, depth-registered",
+    ),
     ("batch pairs.csv out --colours grey", 2, "--colours & add --also preview"),
     // Benches.
     ("bench none", 1, "none/im0.png & a folder to match holds im0.png, im1.png, calib.txt; or"),
