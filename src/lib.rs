@@ -78,6 +78,7 @@
 //! - [`check`] warns of what is probably wrong with a pair, and finds its range.
 //! - [`calibration`] reads what is known of the cameras, and [`rectification`] makes rectified pairs of their images.
 //! - [`region`] matches a part of the left view alone.
+//! - [`steady`] lets the maps of a video hold still where the scene does.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
@@ -114,6 +115,7 @@ pub mod remedy;
 mod roofline;
 pub mod sigma;
 mod stage;
+pub mod steady;
 mod text;
 mod watch;
 mod weights;

@@ -6,7 +6,7 @@
 //!
 //! What a body is, what it is painted with and what records its light are rooms of their own.
 //!
-//! Units: the left and right eye look along z from (-b/2, 0, 0) and (b/2, 0, 0); x points right, y down. At depth
+//! Units: the left and right eye look along z from (-b/2, 0, 0) and (b/2, 0, 0), unless the rig stands elsewhere; x points right, y down. At depth
 //! 1 an image is one unit high, and the disparity there is [`REACH`] times the largest label; at depth z it is
 //! that over z. Nothing visible is nearer than depth 1.
 //!
@@ -170,7 +170,7 @@ impl Rig<'_> {
         let half_base = 0.5 * self.unit_disparity / scale;
         let eye = if side == Side::Left { -half_base } else { half_base };
         let [u, v] = place((self.width, self.height), x, y);
-        Ray { from: [eye, 0.0, 0.0], along: [u, v, 1.0] }
+        Ray { from: add(self.world.rig, [eye, 0.0, 0.0]), along: [u, v, 1.0] }
     }
 
     fn disparity(&self, side: Side, x: f64, y: f64) -> f64 {
@@ -210,6 +210,8 @@ impl Rig<'_> {
 /// Bodies, and who looks at them.
 pub struct World {
     bodies: Vec<Body>,
+    /// The middle between the eyes.
+    pub rig: Vec3,
     pub sensors: [Sensor; 2],
     seed: u32,
 }
@@ -233,7 +235,7 @@ struct Met<'a> {
 
 impl World {
     pub fn new(seed: u32) -> Self {
-        Self { bodies: Vec::new(), sensors: [2 * seed, 2 * seed + 1].map(Sensor::new), seed }
+        Self { bodies: Vec::new(), rig: [0.0; 3], sensors: [2 * seed, 2 * seed + 1].map(Sensor::new), seed }
     }
 
     /// Depth and index of the body that the ray meets first.

@@ -3,8 +3,8 @@
 //! With a scene's name and a size it renders that scene alone, as large as one likes:
 //! `cargo run --release --example render-scenes FOLDER mixed 3000 2000 256`.
 //!
-//! With a number of frames it renders the sequence `passing`, which `testdata/` does not hold, to the folders `left`, `right` and
-//! `truth`: `cargo run --release --example render-scenes FOLDER passing 640 480 64 30`.
+//! With a number of frames it renders the sequence `passing` or `moving`, which `testdata/` does not hold, to the folders `left`,
+//! `right` and `truth`: `cargo run --release --example render-scenes FOLDER passing 640 480 64 30`.
 
 #[path = "raw.rs"]
 mod raw;
@@ -29,10 +29,16 @@ fn main() -> Result<()> {
             save_raw(&folder.join("raw"))
         }
         [name] if name == "raw" => save_raw(&folder.join("raw")),
-        [name, size @ ..] if name == "passing" && size.len() == 4 => {
+        [name, size @ ..] if size.len() == 4 => {
+            let sequence = match name.as_str() {
+                "passing" => scenes::passing,
+                "moving" => scenes::moving,
+                _ => return Err(usage()),
+            };
             let numbers: std::result::Result<Vec<u32>, _> = size.iter().map(|n| n.parse()).collect();
             let Ok(&[width, height, labels, frames]) = numbers.as_deref() else { return Err(usage()) };
-            save_passing(&folder, (width as usize, height as usize), labels, frames)
+            let scenes = (0..frames).map(|step| sequence(step, width as usize, height as usize, labels));
+            save_sequence(&folder, scenes)
         }
         [name, size @ ..] if size.len() == 3 => {
             let numbers: std::result::Result<Vec<u32>, _> = size.iter().map(|n| n.parse()).collect();
@@ -44,7 +50,9 @@ fn main() -> Result<()> {
 }
 
 fn usage() -> Error {
-    Error::other("give [FOLDER [SCENE WIDTH HEIGHT LABELS]] or FOLDER passing WIDTH HEIGHT LABELS FRAMES")
+    Error::other(
+        "give [FOLDER [SCENE WIDTH HEIGHT LABELS]], or FOLDER passing WIDTH HEIGHT LABELS FRAMES (or moving)",
+    )
 }
 
 /// Writes a scene in the layout of the Middlebury stereo benchmark.
@@ -61,16 +69,15 @@ fn save(scene: &scenes::Scene, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes the sequence in which things pass by.
-fn save_passing(folder: &Path, (width, height): (usize, usize), labels: u32, frames: u32) -> Result<()> {
+/// Writes the frames of a sequence.
+fn save_sequence(folder: &Path, frames: impl Iterator<Item = scenes::Scene>) -> Result<()> {
     for below in ["left", "right", "truth"] {
         fs::create_dir_all(folder.join(below))?;
     }
-    for step in 0..frames {
-        let scene = scenes::passing(step, width, height, labels);
+    for (step, scene) in frames.enumerate() {
         for (below, view) in [("left", &scene.left), ("right", &scene.right)] {
             let path = folder.join(format!("{below}/{step:06}.png"));
-            write_png(&path, (width, height), view.data().as_flattened(), ExtendedColorType::Rgb8)?;
+            write_png(&path, view.size(), view.data().as_flattened(), ExtendedColorType::Rgb8)?;
         }
         write_pfm(&folder.join(format!("truth/{step:06}.pfm")), &scene.truth)?;
     }

@@ -95,6 +95,19 @@ pub fn passing(step: u32, width: usize, height: usize, labels: u32) -> Scene {
     world.shoot("passing", width, height, labels)
 }
 
+/// The scene `slanted` from a rig that has moved to the right and forward, `step` frames after the first. Everything in the views moves.
+///
+/// # Panics
+/// As [`render`].
+pub fn moving(step: u32, width: usize, height: usize, labels: u32) -> Scene {
+    let mut world = World::new(11);
+    slants(&mut world);
+    let way = f64::from(step);
+    world.rig = [0.01 * way, 0.0, 0.004 * way];
+    world.sensors = [2 * step + 1000, 2 * step + 1001].map(Sensor::new);
+    world.shoot("moving", width, height, labels)
+}
+
 /// Planes at many slants, a ball and a tube: nothing is parallel to the image.
 fn slanted() -> World {
     let mut world = World::new(11);

@@ -166,7 +166,7 @@ mod tests {
             ("match", 28),
             ("rectify", 8),
             ("depth", 15),
-            ("sequence", 33),
+            ("sequence", 34),
             ("batch", 20),
             ("evaluate", 12),
             ("evaluate map", 8),

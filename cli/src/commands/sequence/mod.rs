@@ -10,6 +10,7 @@ use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
 use mrfgs::sigma::Sigma;
+use mrfgs::steady::Steady;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
@@ -65,6 +66,7 @@ Examples:
 /// all frames before are complete.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_missing_positional = true)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
 pub(crate) struct Args {
     /// Frames of the left camera, or frames with both views
     left: PathBuf,
@@ -104,6 +106,10 @@ pub(crate) struct Args {
     rectify: bool,
     #[command(flatten)]
     rectification: RectificationArgs,
+    /// Where the image does not change, the disparity follows that of the frames before, weighted by confidence: still surfaces flicker
+    /// less. Confidence, validity, raw and the map of the right view stay those of the frame alone
+    #[arg(long)]
+    steady: bool,
     #[command(flatten)]
     maps: MapArgs,
     /// Writes a line of JSON for each frame: its `frame` (name), and the fields of `match --json`, where `seconds` count from
@@ -228,8 +234,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut matcher = Matcher::builder().method(method).execution(execution).build()?;
     let range = range_of_all(&mut matcher, &input, args)?;
     let rectifying = input.rectifying();
-    let writer =
-        Writer { output: &args.output, wanted: &args.maps, range, rig, sigma, rectifying, third, rate };
+    let (output, wanted, steady) = (args.output.as_path(), &args.maps, args.steady.then(Steady::new));
+    let writer = Writer { output, wanted, range, rig, sigma, rectifying, third, rate, steady };
     let records = args.json.as_deref().map(Records::new).transpose()?;
     let mut sink = if film {
         writer.begin_film(records)?

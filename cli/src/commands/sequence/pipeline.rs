@@ -240,7 +240,7 @@ fn write(found: Receiver<Found>, sink: &mut Sink, bar: &mut Counter) -> (usize, 
     let mut done = 0;
     let mut ended = Ok(());
     for found in found {
-        ended = sink.add(&found);
+        ended = sink.add(found);
         if ended.is_err() {
             break;
         }

@@ -12,6 +12,7 @@ use mrfgs::image::{Georeference, Pair, write, write::Growing};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 use mrfgs::sigma::Sigma;
+use mrfgs::steady::Steady;
 use mrfgs_ros::messages::{Header, SECOND, Stamp};
 
 use crate::args::Sign;
@@ -36,6 +37,8 @@ pub(super) struct Writer<'a> {
     pub(super) third: Option<ThirdCamera>,
     /// How many frames there are a second, where that is known.
     pub(super) rate: Option<FrameRate>,
+    /// Lets maps follow those before, where that is asked for.
+    pub(super) steady: Option<Steady>,
 }
 
 /// A frame that has been matched.
@@ -150,7 +153,7 @@ impl<'a> Writer<'a> {
 impl Sink<'_> {
     /// Whether it takes the pair, too.
     pub(super) fn takes_pair(&self) -> bool {
-        self.writer.wanted.also.show_left()
+        self.writer.wanted.also.show_left() || self.writer.steady.is_some()
     }
 
     /// Whether it takes records.
@@ -159,8 +162,11 @@ impl Sink<'_> {
     }
 
     /// Writes a frame.
-    pub(super) fn add(&mut self, found: &Found) -> Result<()> {
-        let Writer { output, wanted, range, rig, sigma, rectifying, third, rate } = self.writer;
+    pub(super) fn add(&mut self, mut found: Found) -> Result<()> {
+        if let (Some(steady), Some(pair)) = (&mut self.writer.steady, &found.pair) {
+            steady.follow(pair.left(), &mut found.maps);
+        }
+        let Writer { output, wanted, range, rig, sigma, rectifying, third, rate, .. } = self.writer;
         let (maps, left) = (&found.maps, found.pair.as_ref().map(Pair::left));
         let georeferences = found.georeferences.clone();
         let (sign, sigma) = (Sign::default(), Some(sigma));

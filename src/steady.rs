@@ -1,0 +1,269 @@
+//! Video that holds still where the scene does.
+
+use crate::image::{Image, Plane};
+use crate::maps::{FRACTION, Maps, flag, has_disparity};
+
+/// A filter for the maps of a sequence: where the image does not change, the disparity follows its past, weighted by confidence.
+///
+/// A map of its own knows nothing of the frames before, so noise makes still surfaces flicker. This keeps a mean of the last frames (open)
+/// wherever the left view of the rig shows the same as before. Where something moves, the disparity is that of the frame alone, so moving
+/// things leave no trail; with a camera that moves, that is almost everywhere. Raw disparities, confidence, validity and the map of the
+/// right view stay as they are.
+///
+/// It works in integers, on what a match has found: the maps depend on the sequence alone, on every device.
+///
+/// ```
+/// use mrfgs::steady::Steady;
+/// use mrfgs::{Matcher, Pair};
+///
+/// # fn main() -> mrfgs::Result<()> {
+/// # let frames = [Pair::open("testdata/slanted/im0.png", "testdata/slanted/im1.png")?];
+/// let mut matcher = Matcher::new()?;
+/// let mut steady = Steady::new();
+/// for pair in &frames {
+///     let mut found = matcher.run(pair, 0..=31)?;
+///     steady.follow(pair.left(), &mut found.maps);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Steady {
+    past: Option<Past>,
+}
+
+/// What is known of the frames before.
+#[derive(Clone, Debug)]
+struct Past {
+    /// What the left view shows, grey: a mean of the last frames where it has not changed, else the last one.
+    view: Plane<u16>,
+    /// The disparity so far, in 1/256 px.
+    disparity: Plane<i32>,
+    /// What it weighs, in 1/16 of a step of confidence; 0 where there is none.
+    weight: Plane<u16>,
+}
+
+/// A frame that is measured weighs 16 (confidence + 1), one that is filled in 16.
+const UNIT: u16 = 16;
+/// The past loses 1/8 of its weight with each frame: it remembers about eight of them.
+const FADING: u16 = 8;
+/// Disparities that differ by no more than half a pixel are one measurement with noise.
+const SAME: i32 = FRACTION / 2;
+/// A level of 8 bits.
+const LEVEL: u32 = 256;
+/// Changes are looked at in windows of 5 x 5 pixels.
+const RADIUS: usize = 2;
+/// How many pixels a window has.
+const WINDOW: u32 = 25;
+
+impl Steady {
+    /// A filter that has seen nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Lets the disparities of the next frame follow their past. `left` is the left view that was matched. A frame of another size
+    /// begins a new sequence.
+    ///
+    /// # Panics
+    /// When maps and image differ in size.
+    pub fn follow(&mut self, left: &Image, maps: &mut Maps) {
+        let Maps { disparity, confidence, validity, .. } = maps;
+        assert_eq!(left.pixels.size(), disparity.size(), "the maps of this image");
+        let (width, height) = left.pixels.size();
+        // Masked pixels are never read.
+        let pixels = left.pixels.data().iter().zip(left.masked.data());
+        let grey = pixels.map(|(&[.., grey], masked)| if *masked { 0 } else { grey });
+        let view = Plane::new(width, height, grey.collect());
+        let weights = confidence.data().iter().zip(validity.data()).map(|(c, v)| weight(*c, *v));
+        let weight = Plane::new(width, height, weights.collect());
+        let present = Past { view, disparity: disparity.clone(), weight };
+        let past = self.past.take().filter(|past| past.view.size() == (width, height));
+        let known = match past {
+            Some(past) => past.then(present),
+            None => present,
+        };
+        disparity.data_mut().copy_from_slice(known.disparity.data());
+        self.past = Some(known);
+    }
+}
+
+/// What a pixel of one frame weighs.
+fn weight(confidence: u8, validity: u8) -> u16 {
+    match (has_disparity(validity), validity & flag::INVALID) {
+        (false, _) => 0,
+        (true, 0) => UNIT * (u16::from(confidence) + 1),
+        (true, _) => UNIT,
+    }
+}
+
+impl Past {
+    /// What is known with the next frame.
+    fn then(self, mut next: Self) -> Self {
+        let width = self.view.width();
+        let rows = self.view.data().chunks(width).zip(next.view.data().chunks(width));
+        let changed = |(a, b): (&[u16], &[u16])| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).collect();
+        let changes = window_sums(width, rows.map(changed));
+        let limit = noise(&next.view) + LEVEL / 4 * WINDOW;
+        let Self { view, disparity, weight } = &mut next;
+        let now = view.data_mut().iter_mut().zip(disparity.data_mut()).zip(weight.data_mut());
+        let before = self.view.data().iter().zip(self.disparity.data()).zip(self.weight.data());
+        for ((((shown, d), w), ((&showed, &before), &weighed)), change) in now.zip(before).zip(&changes) {
+            if *change > limit {
+                continue;
+            }
+            // A slow motion, too, leaves a mean behind.
+            *shown = (i32::from(showed) + (i32::from(*shown) - i32::from(showed)) / i32::from(FADING)) as u16;
+            if *w == 0 || weighed == 0 {
+                continue;
+            }
+            if (*d - before).abs() <= SAME {
+                let both = weighed - weighed / FADING + *w;
+                let (whole, moved) = (i32::from(both), i32::from(*w) * (*d - before));
+                // Rounded to the nearest.
+                *d = before + (2 * moved + whole).div_euclid(2 * whole);
+                *w = both;
+            } else if weighed / 2 > *w {
+                // A single frame says otherwise, and is less sure. It is believed soon if it goes on.
+                (*d, *w) = (before, weighed / 2);
+            }
+        }
+        next
+    }
+}
+
+/// How much noise there may be in the windows of a view: how neighbours differ where they differ least, as no surface is plainer than the
+/// noise on it. This holds whatever moves.
+fn noise(view: &Plane<u16>) -> u32 {
+    let sums = window_sums(view.width(), view.data().chunks(view.width()).map(beside));
+    // Borders of one colour, and what is too bright, hold none. Some of all windows tell as much.
+    let mut some: Vec<u32> = sums.into_iter().step_by(7).filter(|sum| *sum > 0).collect();
+    if some.is_empty() {
+        return 0;
+    }
+    let twentieth = some.len() / 20;
+    let (_, plainest, _) = some.select_nth_unstable(twentieth);
+    (*plainest).min(8 * LEVEL * WINDOW)
+}
+
+/// The differences of the pixels of a row to the next ones.
+fn beside(row: &[u16]) -> Vec<u16> {
+    let next = row.iter().skip(1).chain(row.last());
+    row.iter().zip(next).map(|(a, b)| a.abs_diff(*b)).collect()
+}
+
+/// The sums of the windows of a plane, from its rows. Beyond its border a plane has the values of the border.
+fn window_sums(width: usize, rows: impl Iterator<Item = Vec<u16>>) -> Vec<u32> {
+    let mut padded = vec![0; width + 2 * RADIUS];
+    let across: Vec<Vec<u32>> = rows
+        .map(|row| {
+            let (inside, beyond) = padded[RADIUS..].split_at_mut(width);
+            inside.iter_mut().zip(&row).for_each(|(to, value)| *to = u32::from(*value));
+            beyond.fill(inside[width - 1]);
+            let first = padded[RADIUS];
+            padded[..RADIUS].fill(first);
+            let mut sums = vec![0; width];
+            for shift in 0..=2 * RADIUS {
+                add(&mut sums, &padded[shift..]);
+            }
+            sums
+        })
+        .collect();
+    let mut sums = vec![0; width * across.len()];
+    for (y, sums) in sums.chunks_mut(width).enumerate() {
+        for at in y..=y + 2 * RADIUS {
+            add(sums, &across[at.saturating_sub(RADIUS).min(across.len() - 1)]);
+        }
+    }
+    sums
+}
+
+fn add(sums: &mut [u32], values: &[u32]) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (24, 20);
+
+    /// A view whose right half shows another thing from `step` 1 on.
+    fn view(step: u32, changed: bool) -> Image {
+        let level = |x: usize, y: usize| {
+            let noise = (x as u32 * 7 + y as u32 * 13 + step * 5) % 3;
+            let shown = (x * 37 + y * 91) as u32 % 150 + if changed && x >= 12 { 60 } else { 0 };
+            (shown + noise) as u8
+        };
+        Image::from_rgb8(&Plane::from_fn(SIZE.0, SIZE.1, |x, y| [level(x, y); 3]))
+    }
+
+    fn maps(disparity: i32, confidence: u8, validity: u8) -> Maps {
+        let plane = Plane::filled(SIZE.0, SIZE.1, disparity);
+        Maps {
+            raw: plane.clone(),
+            disparity: plane,
+            confidence: Plane::filled(SIZE.0, SIZE.1, confidence),
+            validity: Plane::filled(SIZE.0, SIZE.1, validity),
+            right: None,
+        }
+    }
+
+    /// What a frame becomes after the others, at (4, 10) and at (20, 10), which may change.
+    fn after(frames: &[(i32, u8, u8)], changed: bool) -> [i32; 2] {
+        let mut steady = Steady::new();
+        let mut found = maps(0, 0, 0);
+        for (step, &(disparity, confidence, validity)) in frames.iter().enumerate() {
+            found = maps(disparity, confidence, validity);
+            steady.follow(&view(step as u32, changed && step > 0), &mut found);
+            assert!(
+                found == Maps { disparity: found.disparity.clone(), ..maps(disparity, confidence, validity) }
+            );
+        }
+        [found.disparity[(4, 10)], found.disparity[(20, 10)]]
+    }
+
+    #[test]
+    fn where_nothing_changes_it_is_a_mean_by_confidence() {
+        // The past has lost an eighth of its weight: 1000 at 14 of 16, 1064 at 16.
+        assert_eq!(after(&[(1000, 59, 0), (1064, 59, 0)], false), [1034; 2]);
+        // What is filled in hardly counts.
+        assert_eq!(after(&[(1000, 59, 0), (1064, 59, flag::OCCLUDED | flag::FILLED)], false), [1001; 2]);
+        assert_eq!(after(&[(1000, 59, flag::OCCLUDED | flag::FILLED), (1064, 59, 0)], false), [1063; 2]);
+    }
+
+    #[test]
+    fn where_the_view_changes_the_past_is_forgotten() {
+        assert_eq!(after(&[(1000, 59, 0), (1064, 59, 0)], true), [1034, 1064]);
+    }
+
+    #[test]
+    fn a_jump_is_believed_when_it_goes_on_or_is_surer() {
+        let far = 5000;
+        assert_eq!(after(&[(1000, 59, 0), (far, 20, 0)], false), [1000; 2]);
+        assert_eq!(after(&[(1000, 59, 0), (far, 20, 0), (far, 20, 0)], false), [far; 2]);
+        assert_eq!(after(&[(1000, 59, 0), (far, 59, 0)], false), [far; 2]);
+        // Half a pixel apart is no jump.
+        assert_eq!(after(&[(1000, 59, 0), (1128, 59, 0)], false), [1068; 2]);
+        assert_eq!(after(&[(1000, 59, 0), (1129, 59, 0)], false), [1129; 2]);
+    }
+
+    #[test]
+    fn what_has_no_disparity_leads_nothing() {
+        let none = flag::OCCLUDED;
+        assert_eq!(after(&[(1000, 59, none), (1064, 59, 0)], false), [1064; 2]);
+        assert_eq!(after(&[(1000, 59, 0), (7, 0, none), (1064, 59, 0)], false), [1064; 2]);
+    }
+
+    #[test]
+    fn another_size_begins_anew() {
+        let mut steady = Steady::new();
+        let mut found = maps(1000, 59, 0);
+        steady.follow(&view(0, false), &mut found);
+        let part = crate::image::Rect { x: 0..20, y: 0..20 };
+        let mut small = maps(1064, 59, 0).crop(&part);
+        steady.follow(&view(1, false).crop(&part), &mut small);
+        assert!(small.disparity.data().iter().all(|d| *d == 1064));
+    }
+}
