@@ -123,6 +123,12 @@ typedef struct mrfgs_rectification mrfgs_rectification;
 // The cameras of a rectified pair: from disparities to depths.
 typedef struct mrfgs_rig mrfgs_rig;
 
+// A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before.
+typedef struct mrfgs_steady mrfgs_steady;
+
+// A camera beside the pair, such as the colour camera of a rig: its lens, its size, and how it stands to the left camera.
+typedef struct mrfgs_third_camera mrfgs_third_camera;
+
 // An image in memory.
 typedef struct mrfgs_image {
   // The first pixel of the first row.
@@ -358,6 +364,49 @@ void mrfgs_rig_free(struct mrfgs_rig *rig);
 // What was wrong with the last call of this thread that failed; "" where none has. It stays until the next call of this thread that
 // fails.
 const char *mrfgs_last_error(void);
+
+// A filter that has seen no frame yet.
+enum mrfgs_status mrfgs_steady_new(struct mrfgs_steady **steady);
+
+// Lets the disparities of the next frame follow those of the frames before, weighted by confidence, where the left image has not changed.
+// `left` is the image that was matched, and `maps` are what the match has written: disparity, confidence and validity, of which the
+// disparity is changed and the others are read. A frame of another size begins a new sequence. Calls for one filter take turns.
+enum mrfgs_status mrfgs_steady_follow(const struct mrfgs_steady *steady,
+                                      const struct mrfgs_image *left,
+                                      const struct mrfgs_maps *maps);
+
+// Frees a filter; it may be null.
+void mrfgs_steady_free(struct mrfgs_steady *steady);
+
+// Reads it from a file, in any form that `mrfgs match --into` takes: one camera by the names of OpenCV or ROS, the last camera of
+// Kalibr's chain, or that of an OAK's calibration which is not one of its pair.
+enum mrfgs_status mrfgs_third_camera_read(const char *path,
+                                          struct mrfgs_third_camera **camera);
+
+// The same of the text of such a file. Errors call it "text".
+enum mrfgs_status mrfgs_third_camera_of_text(const char *text, struct mrfgs_third_camera **camera);
+
+// Width and height of its images, in pixels.
+enum mrfgs_status mrfgs_third_camera_size(const struct mrfgs_third_camera *camera, uint32_t *width, uint32_t *height);
+
+// The depths as a third camera sees them, along its axis and at its pixels, in the unit of the baseline: +infinity where it sees what the
+// map does not. `width` and `height` are those of the map of disparities (in pixels), and the map of depths has the size of
+// mrfgs_third_camera_size(). The nearest of several surfaces counts, and each pixel of the map covers what it covers there. Strides are in
+// bytes; the maps are not one.
+//
+// The camera stands to the left camera that took the images where the rig is one of mrfgs_rig_of_rectification(), else to the rectified
+// one. A rig of mrfgs_rig_new() is refused, as it knows no principal point.
+enum mrfgs_status mrfgs_depth_registered(const struct mrfgs_rig *rig,
+                                         uint32_t width,
+                                         uint32_t height,
+                                         const float *disparity,
+                                         size_t disparity_stride,
+                                         const struct mrfgs_third_camera *camera,
+                                         float *depth,
+                                         size_t depth_stride);
+
+// Frees a third camera; it may be null.
+void mrfgs_third_camera_free(struct mrfgs_third_camera *camera);
 
 // Looks for what is probably wrong with a pair (views swapped, turned or not rectified, one of them far darker), and for a range that
 // cuts off a part of the scene; without a range (null) only for the former. mrfgs_last_warnings() says what it has found. It takes a

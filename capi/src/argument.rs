@@ -50,6 +50,21 @@ pub(crate) unsafe fn thing<'a, T>(name: &str, thing: *const T) -> Result<&'a T, 
     unsafe { thing.as_ref() }.ok_or_else(|| Failure::argument(format!("the {name} is null")))
 }
 
+/// Writes width and height to their places.
+///
+/// # Safety
+/// Each place is null, or a number can be written there.
+pub(crate) unsafe fn put_size((width, height): (usize, usize), places: [*mut u32; 2]) -> Result<(), Failure> {
+    for (place, count, name) in [(places[0], width, "width"), (places[1], height, "height")] {
+        if place.is_null() {
+            return Err(Failure::argument(format!("the place for the {name} is null")));
+        }
+        // SAFETY: it is not null, and the caller promises the rest.
+        unsafe { place.write(count as u32) };
+    }
+    Ok(())
+}
+
 /// Puts what `make` makes in its place, and null where that fails.
 ///
 /// # Safety

@@ -16,7 +16,9 @@ mod range;
 mod rectification;
 mod rig;
 mod status;
+mod steady;
 mod text;
+mod third;
 mod warnings;
 mod words;
 

@@ -152,6 +152,33 @@ impl Maps {
     }
 }
 
+/// Refuses the map `name` where it is null, or has a stride that rows of this size do not fit.
+pub(crate) fn check(name: &str, map: *const f32, stride: usize, size: (usize, usize)) -> Result<(), Failure> {
+    if map.is_null() {
+        return Err(Failure::argument(format!("the map of {name} is null")));
+    }
+    extent(stride, size, size_of::<f32>())
+        .map_err(|wrong| Failure::argument(format!("the map of {name} {wrong}")))?;
+    Ok(())
+}
+
+/// A copy of a map that was checked.
+///
+/// # Safety
+/// `map` is as large as stride and size say.
+pub(crate) unsafe fn read<T: Copy>(
+    map: *const T,
+    stride: usize,
+    (width, height): (usize, usize),
+) -> Plane<T> {
+    Plane::from_fn(width, height, |x, y| {
+        // SAFETY: the pixel is in the map, as the caller promises.
+        let at = unsafe { map.byte_add(y * stride + x * size_of::<T>()) };
+        // SAFETY: the same; rows may begin at any address.
+        unsafe { at.read_unaligned() }
+    })
+}
+
 /// Copies a map byte by byte: rows may begin at any address, and hold anything.
 ///
 /// # Safety

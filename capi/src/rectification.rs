@@ -85,15 +85,9 @@ pub unsafe extern "C" fn mrfgs_rectification_size(
 ) -> Status {
     call(|| {
         // SAFETY: the caller promises that the pointer is null or good.
-        let (w, h) = unsafe { argument::thing("rectification", rectification) }?.by.size();
-        for (place, count, name) in [(width, w, "width"), (height, h, "height")] {
-            if place.is_null() {
-                return Err(Failure::argument(format!("the place for the {name} is null")));
-            }
-            // SAFETY: it is not null, and the caller promises that a number can be written there.
-            unsafe { place.write(count as u32) };
-        }
-        Ok(())
+        let rectification = unsafe { argument::thing("rectification", rectification) }?;
+        // SAFETY: the caller promises that a number can be written to each place that is not null.
+        unsafe { argument::put_size(rectification.by.size(), [width, height]) }
     })
 }
 

@@ -7,22 +7,34 @@ use mrfgs::image::calib::{self, Camera, Unit};
 
 use crate::argument;
 use crate::calibration::Calibration;
-use crate::frame::extent;
+use crate::maps;
 use crate::rectification::Rectification;
 use crate::status::{Failure, Status, call};
 
 /// The cameras of a rectified pair: from disparities to depths.
 pub struct Rig {
-    rig: depth::Rig,
+    pub(crate) rig: depth::Rig,
     /// (width, height) of the images, where it is known.
     size: Option<(usize, usize)>,
+    /// Depths along the axis take none.
+    pub(crate) knows_principal_point: bool,
 }
 
 impl Rig {
     fn of(calibration: &calib::Calibration) -> mrfgs::Result<Self> {
         let size = calibration.width.zip(calibration.height);
         let size = size.map(|(width, height)| (width as usize, height as usize));
-        Ok(Self { rig: depth::Rig::new(calibration)?, size })
+        Ok(Self { rig: depth::Rig::new(calibration)?, size, knows_principal_point: true })
+    }
+
+    /// Refuses a map of another size than that of the calibration.
+    pub(crate) fn check(&self, (width, height): (u32, u32)) -> Result<(), Failure> {
+        match self.size.filter(|known| *known != (width as usize, height as usize)) {
+            Some((w, h)) => Err(Failure::argument(format!(
+                "the map is {width} x {height} and the calibration of images of {w} x {h}: depth takes the calibration of this size"
+            ))),
+            None => Ok(()),
+        }
     }
 }
 
@@ -43,7 +55,7 @@ pub unsafe extern "C" fn mrfgs_rig_new(focal: f64, baseline: f64, doffs: f64, ri
         let camera = Camera { focal_length: [focal; 2], principal_point: [0.0; 2] };
         let mut calibration = calib::Calibration::of_cameras(camera, baseline, Unit::Unknown);
         calibration.doffs = Some(doffs);
-        Ok(Rig::of(&calibration)?)
+        Ok(Rig { knows_principal_point: false, ..Rig::of(&calibration)? })
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("rig", rig, make) }
@@ -80,7 +92,9 @@ pub unsafe extern "C" fn mrfgs_rig_of_rectification(
     let make = || {
         // SAFETY: the caller promises that the pointer is null or good.
         let rectification = unsafe { argument::thing("rectification", rectification) }?;
-        Ok(Rig::of(&rectification.by.calibration()?)?)
+        let Rig { rig, size, .. } = Rig::of(&rectification.by.calibration()?)?;
+        let [rectifying, _] = rectification.by.rotations();
+        Ok(Rig { rig: rig.rectified_by(rectifying), size, knows_principal_point: true })
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("rig", rig, make) }
@@ -171,17 +185,9 @@ unsafe fn put_each<const N: usize>(
     value: impl Fn([f32; N]) -> f32,
 ) -> Result<(), Failure> {
     let size = (width as usize, height as usize);
-    if let Some((w, h)) = rig.size.filter(|known| *known != size) {
-        return Err(Failure::argument(format!(
-            "the map is {width} x {height} and the calibration of images of {w} x {h}: depth takes the calibration of this size"
-        )));
-    }
+    rig.check((width, height))?;
     for (name, map, stride) in given.into_iter().chain([(name, to.cast_const(), stride)]) {
-        if map.is_null() {
-            return Err(Failure::argument(format!("the map of {name} is null")));
-        }
-        extent(stride, size, size_of::<f32>())
-            .map_err(|wrong| Failure::argument(format!("the map of {name} {wrong}")))?;
+        maps::check(name, map, stride, size)?;
     }
     for y in 0..size.1 {
         for x in 0..size.0 {

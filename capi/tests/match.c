@@ -1,6 +1,6 @@
 /* Matches frames whose rows lie at odd distances and compares the maps with those of the program: bytes must be equal.
  *
- *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm
+ *     match-c LEFT.pnm RIGHT.pnm MAX-DISPARITY MAP.pfm CONFIDENCE.pgm VALIDITY.pgm RIGHT-MAP.pfm SIGMA.pfm REGION.pfm STEADY.pfm
  *
  * Then it makes every mistake that a caller can make. */
 #include "pnm.h"
@@ -283,8 +283,39 @@ static void mistakes(mrfgs_options *options, mrfgs_matcher *matcher, const struc
     free((void *)image.data);
 }
 
+/* The frame follows one that showed LEFT twice, which is surer of itself: the program's map is `expected`. */
+static void steady(mrfgs_matcher *matcher, const struct pnm frames[2], mrfgs_range range, const struct pnm *expected) {
+    mrfgs_image left = spread(&frames[0], 3), right = spread(&frames[1], 0);
+    size_t width = left.width, height = left.height, stride = width * sizeof(float) + 5, bytes = stride * height;
+    uint8_t *disparity = malloc(bytes), *confidence = malloc(width * height), *validity = malloc(width * height);
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = (float *)(void *)disparity, .disparity_stride = stride, .confidence = confidence,
+                       .confidence_stride = width, .validity = validity, .validity_stride = width}, part = maps;
+    memset(disparity, 0x5a, bytes);
+    mrfgs_steady *filter;
+    CHECK(mrfgs_steady_new(&filter) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_match(matcher, &left, &left, &range, &maps) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_steady_follow(filter, &left, &maps) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_match(matcher, &left, &right, &range, &maps) == MRFGS_STATUS_OK);
+    /* Control: alone it is another map. */
+    CHECK(!same(disparity, stride, expected));
+    CHECK(mrfgs_steady_follow(filter, &left, &maps) == MRFGS_STATUS_OK);
+    CHECK(same(disparity, stride, expected));
+    part.confidence = NULL;
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_steady_follow(filter, &left, &part), "maps.confidence", "null");
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_steady_follow(NULL, &left, &maps), "steady", "null");
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_steady_follow(filter, NULL, &maps), "left image", "null");
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_steady_follow(filter, &left, NULL), "maps", "null");
+    part = maps, part.disparity_stride = 7;
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_steady_follow(filter, &left, &part), "maps.disparity", "stride of 7");
+    refused(MRFGS_STATUS_ARGUMENT, mrfgs_steady_new(NULL), "place", "steady");
+    CHECK(same(disparity, stride, expected));
+    mrfgs_steady_free(filter);
+    mrfgs_steady_free(NULL);
+    free((void *)left.data), free((void *)right.data), free(disparity), free(confidence), free(validity);
+}
+
 int main(int argc, char **argv) {
-    if (argc != 10) return 2;
+    if (argc != 11) return 2;
     CHECK(strlen(mrfgs_last_error()) == 0);
     presets();
     struct pnm frames[2] = {pnm_read(argv[1]), pnm_read(argv[2])};
@@ -302,6 +333,10 @@ int main(int argc, char **argv) {
     struct pnm part = pnm_read(argv[9]);
     region(matcher, frames, range, &part);
     free(part.data);
+    struct pnm led = pnm_read(argv[10]);
+    /* Words and floats are scaled by both views of a pair, and the filter sees one. */
+    if (frames[0].bytes == 1) steady(matcher, frames, range, &led);
+    free(led.data);
     if (frames[0].channels == 3) formats(matcher, frames, range, &maps[0]);
     warnings(matcher, frames, range);
     mistakes(options, matcher, frames);

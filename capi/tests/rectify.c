@@ -1,6 +1,7 @@
 /* Rectifies raw frames, matches the views and takes depths, and compares all with what the program makes: bytes must be equal.
  *
- *     rectify-c CAMERAS.yml RECTIFIED.yml LEFT.ppm RIGHT.ppm VIEW0.ppm VIEW1.ppm MASK0.pgm MASK1.pgm MAX-DISPARITY MAP.pfm RIGHT-MAP.pfm DEPTH.pfm
+ *     rectify-c CAMERAS.yml RECTIFIED.yml LEFT.ppm RIGHT.ppm VIEW0.ppm VIEW1.ppm MASK0.pgm MASK1.pgm MAX-DISPARITY MAP.pfm RIGHT-MAP.pfm \
+ *         DEPTH.pfm DEPTH-SIGMA.pfm THIRD.yml DEPTH-REGISTERED.pfm
  *
  * Then it makes the mistakes that a caller can make. */
 #include "pnm.h"
@@ -183,6 +184,62 @@ static void maps_are_the_programs(const mrfgs_rectification *by, const char *cal
     free(map), free(of_right), free(depth), free(other), free(sigma);
 }
 
+/* Depths in the view of a third camera. */
+static void third_camera_is_the_programs(const mrfgs_rectification *by, const char *rectified_path, const char *third_path,
+                                         const struct pnm *map, const struct pnm *expected) {
+    const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
+    uint32_t width = (uint32_t)map->width, height = (uint32_t)map->height, wide = 0, high = 0;
+    const float *disparity = (const float *)(const void *)map->data;
+    size_t stride = width * sizeof(float), bytes = expected->width * expected->height * sizeof(float);
+    mrfgs_third_camera *camera, *again, *none;
+    mrfgs_rig *rig, *other_rig;
+    CHECK(mrfgs_third_camera_read(third_path, &camera) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_third_camera_size(camera, &wide, &high) == MRFGS_STATUS_OK && wide == expected->width && high == expected->height);
+    CHECK(mrfgs_rig_of_rectification(by, &rig) == MRFGS_STATUS_OK);
+    /* 5 bytes behind each row stay as they are. */
+    size_t out_stride = wide * sizeof(float) + 5;
+    uint8_t *depth = malloc(out_stride * high), *other = malloc(bytes);
+    memset(depth, 0x5a, out_stride * high);
+    CHECK(mrfgs_depth_registered(rig, width, height, disparity, stride, camera, (float *)(void *)depth, out_stride) == MRFGS_STATUS_OK);
+    CHECK(same(depth, out_stride, expected));
+    char *text = text_of(third_path);
+    CHECK(mrfgs_third_camera_of_text(text, &again) == MRFGS_STATUS_OK);
+    size_t row = wide * sizeof(float);
+    float *out = (float *)(void *)other;
+    CHECK(mrfgs_depth_registered(rig, width, height, disparity, stride, again, out, row) == MRFGS_STATUS_OK);
+    CHECK(memcmp(other, expected->data, bytes) == 0);
+    /* Control: without the rotation of the rectification, the camera stands elsewhere. */
+    mrfgs_calibration *calibration;
+    CHECK(mrfgs_calibration_read(&rectified_path, 1, &calibration) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_rig_of_calibration(calibration, &other_rig) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_depth_registered(other_rig, width, height, disparity, stride, camera, out, row) == MRFGS_STATUS_OK);
+    CHECK(memcmp(other, expected->data, bytes) != 0);
+    mrfgs_rig_free(other_rig);
+    mrfgs_calibration_free(calibration);
+
+    CHECK(mrfgs_rig_new(260, 0.1, 0, &other_rig) == MRFGS_STATUS_OK);
+    refused(wrong, mrfgs_depth_registered(other_rig, width, height, disparity, stride, camera, out, row), "principal point", "mrfgs_rig_of");
+    refused(wrong, mrfgs_depth_registered(NULL, width, height, disparity, stride, camera, out, row), "rig", "null");
+    refused(wrong, mrfgs_depth_registered(rig, width, height, disparity, stride, NULL, out, row), "camera", "null");
+    refused(wrong, mrfgs_depth_registered(rig, width, height, NULL, stride, camera, out, row), "map of disparity", "null");
+    refused(wrong, mrfgs_depth_registered(rig, width, height, disparity, stride, camera, NULL, row), "map of depth", "null");
+    refused(wrong, mrfgs_depth_registered(rig, width, height, disparity, stride, camera, out, row - 1), "map of depth", "stride of 1599");
+    refused(wrong, mrfgs_depth_registered(rig, width, height - 1, disparity, stride, camera, out, row), "240 x 179", "240 x 180");
+    refused(MRFGS_STATUS_FILE, mrfgs_third_camera_read("/none/such.yml", &none), "/none/such.yml", "cannot read");
+    refused(MRFGS_STATUS_FILE, mrfgs_third_camera_of_text("K: [1, 2]", &none), "text", "K");
+    CHECK(none == NULL);
+    refused(wrong, mrfgs_third_camera_read(NULL, &none), "path", "null");
+    refused(wrong, mrfgs_third_camera_of_text(text, NULL), "place", "camera");
+    refused(wrong, mrfgs_third_camera_size(NULL, &wide, &high), "camera", "null");
+    refused(wrong, mrfgs_third_camera_size(camera, &wide, NULL), "height", "null");
+    mrfgs_rig_free(other_rig);
+    mrfgs_rig_free(rig);
+    mrfgs_third_camera_free(camera);
+    mrfgs_third_camera_free(again);
+    mrfgs_third_camera_free(NULL);
+    free(text), free(depth), free(other);
+}
+
 static void mistakes(const char *path, const mrfgs_calibration *calibration, mrfgs_rectification *by, const struct pnm raw[2]) {
     const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
     mrfgs_calibration *other;
@@ -247,11 +304,11 @@ static void mistakes(const char *path, const mrfgs_calibration *calibration, mrf
 }
 
 int main(int argc, char **argv) {
-    if (argc != 14) return 2;
+    if (argc != 16) return 2;
     const char *path = argv[1];
-    struct pnm files[10];
-    const int at[10] = {3, 4, 5, 6, 7, 8, 10, 11, 12, 13};
-    for (int i = 0; i < 10; i++) files[i] = pnm_read(argv[at[i]]);
+    struct pnm files[11];
+    const int at[11] = {3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15};
+    for (int i = 0; i < 11; i++) files[i] = pnm_read(argv[at[i]]);
     mrfgs_calibration *calibration, *same_one;
     mrfgs_rectification *by, *again, *wider;
     CHECK(mrfgs_calibration_read(&path, 1, &calibration) == MRFGS_STATUS_OK);
@@ -269,6 +326,7 @@ int main(int argc, char **argv) {
     free_views(&views);
     mrfgs_range range = {0, atoi(argv[9])};
     maps_are_the_programs(by, argv[2], &files[0], range, &files[6]);
+    third_camera_is_the_programs(by, argv[2], argv[14], &files[6], &files[10]);
     mistakes(path, calibration, by, &files[0]);
     mrfgs_rectification_free(by);
     mrfgs_rectification_free(again);
@@ -276,7 +334,7 @@ int main(int argc, char **argv) {
     mrfgs_calibration_free(calibration);
     mrfgs_calibration_free(same_one);
     free(text);
-    for (int i = 0; i < 10; i++) free(files[i].data);
+    for (int i = 0; i < 11; i++) free(files[i].data);
     printf("rectify.c: mrfgs %s: all views, maps and depths are equal\n", mrfgs_version());
     return 0;
 }

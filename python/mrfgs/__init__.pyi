@@ -233,6 +233,10 @@ class Rig:
         there is none."""
     def millimetres(self, disparity: npt.ArrayLike) -> npt.NDArray[np.uint16]:
         """The depth of every pixel in whole millimetres: 0 where there is none, and where it is above 65535."""
+    def registered(self, disparity: npt.ArrayLike, camera: ThirdCamera | _Path) -> npt.NDArray[np.float32]:
+        """The depths as a third camera sees them, along its axis and at its pixels; +inf where it sees what the map does not."""
+    def registered_millimetres(self, disparity: npt.ArrayLike, camera: ThirdCamera | _Path) -> npt.NDArray[np.uint16]:
+        """The same in whole millimetres: 0 where there is none, and where it is above 65535."""
     def points(self, matched: Matched, left: _Image) -> Points:
         """The points that were measured and are trusted (validity 0), with the colours of the rectified left image."""
     @property
@@ -250,6 +254,29 @@ class Rig:
     @property
     def size(self) -> tuple[int, int] | None:
         """(width, height) of the rectified images, in pixels; None where the calibration does not say it."""
+
+@final
+class Steady:
+    """A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before."""
+
+    def __new__(cls) -> Steady: ...
+    def follow(self, matched: Matched, left: _Image) -> Matched:
+        """The same Matched with disparities that follow those of the frames before; left is the left image that was matched."""
+
+@final
+class ThirdCamera:
+    """A camera beside the pair, such as the colour camera of a rig: its lens, its size and how it stands to the left camera."""
+
+    def __new__(cls, file: _Path) -> ThirdCamera: ...
+    @staticmethod
+    def of_text(text: str) -> ThirdCamera:
+        """The same of the text of such a file."""
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of its images, in pixels."""
+    @property
+    def unit(self) -> str:
+        """The unit of its distance from the left camera: "mm", "cm", "m", or "unknown", which is taken for that of the pair."""
 
 @final
 class Points:

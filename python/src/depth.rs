@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use mrfgs::calibration::matrix::Matrix;
 use mrfgs::depth::Rig;
 use mrfgs::image::calib::{Calibration, Camera, Unit};
 use mrfgs::image::cloud::{Cloud, Point};
 use mrfgs::image::{Pair, Plane, write};
-use mrfgs::maps::{FRACTION, Maps, flag};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -16,6 +16,7 @@ use crate::arrays::{self, Image};
 use crate::calibration::{self, PyCalibration};
 use crate::exceptions::exception;
 use crate::matched::PyMatched;
+use crate::third::PyThirdCamera;
 
 /// The cameras of a rectified pair: from disparities to depths and points.
 ///
@@ -34,29 +35,39 @@ pub(crate) struct PyRig {
     size: Option<(usize, usize)>,
     /// What says so, as messages name it.
     names: String,
+    /// The rotation from the frame of the original left camera to the rectified one, where a rectification has made the pair.
+    rectifying: Option<Matrix>,
 }
 
-/// The numbers of a rig: focal lengths, principal point, doffs and baseline, unit, size, and the name of what says so.
-type Numbers = ([f64; 2], [f64; 2], [f64; 2], String, Option<(usize, usize)>, String);
+/// The numbers of a rig: focal lengths, principal point, doffs and baseline, unit, size, the name of what says so, and the rotation of the
+/// rectification.
+type Numbers = ([f64; 2], [f64; 2], [f64; 2], String, Option<(usize, usize)>, String, Option<Matrix>);
 
 impl PyRig {
-    /// That of a rectified pair, by the calibration that it comes from.
-    pub(crate) fn of_rectified(rectified: &Calibration, known: &PyCalibration) -> PyResult<Self> {
-        Self::named(rectified, known.names.clone()).map_err(|error| known.wrong(error))
+    /// That of a rectified pair, by the calibration that it comes from, and by the rotation that rectified the left image, if one did.
+    pub(crate) fn of_rectified(
+        rectified: &Calibration,
+        rectifying: Option<Matrix>,
+        known: &PyCalibration,
+    ) -> PyResult<Self> {
+        Self::named(rectified, rectifying, known.names.clone()).map_err(|error| known.wrong(error))
     }
 
-    fn named(rectified: &Calibration, names: String) -> mrfgs::Result<Self> {
-        let rig = Rig::new(rectified)?;
+    fn named(rectified: &Calibration, rectifying: Option<Matrix>, names: String) -> mrfgs::Result<Self> {
+        let mut rig = Rig::new(rectified)?;
+        if let Some(rectifying) = &rectifying {
+            rig = rig.rectified_by(rectifying);
+        }
         let size =
             rectified.width.zip(rectified.height).map(|(width, height)| (width as usize, height as usize));
         // What a rig has, its calibration says.
         let camera = rectified.camera.unwrap_or(Camera { focal_length: [0.0; 2], principal_point: [0.0; 2] });
         let (doffs, baseline) = (rectified.doffs.unwrap_or_default(), rectified.baseline.unwrap_or_default());
-        Ok(Self { rig, camera, doffs, baseline, size, names })
+        Ok(Self { rig, camera, doffs, baseline, size, names, rectifying })
     }
 
     fn of_numbers(numbers: Numbers) -> PyResult<Self> {
-        let (focal_length, principal_point, [doffs, baseline], unit, size, names) = numbers;
+        let (focal_length, principal_point, [doffs, baseline], unit, size, names, rectifying) = numbers;
         let unit = calibration::unit(&unit)?;
         let mut rectified = Calibration::of_cameras(Camera { focal_length, principal_point }, baseline, unit);
         rectified.doffs = Some(doffs);
@@ -64,7 +75,13 @@ impl PyRig {
             Some((width, height)) => [width, height].map(|count| u32::try_from(count).ok()),
             None => [None; 2],
         };
-        Self::named(&rectified, names).map_err(exception)
+        Self::named(&rectified, rectifying, names).map_err(exception)
+    }
+
+    fn numbers(&self) -> Numbers {
+        let Camera { focal_length, principal_point } = self.camera;
+        let (unit, names) = (self.rig.unit().name().into(), self.names.clone());
+        (focal_length, principal_point, [self.doffs, self.baseline], unit, self.size, names, self.rectifying)
     }
 
     /// Refuses a map of another size than that of the calibration.
@@ -76,6 +93,15 @@ impl PyRig {
             ))),
             _ => Ok(()),
         }
+    }
+
+    /// Millimetres take a known unit.
+    fn unit_unknown(&self) -> PyErr {
+        PyValueError::new_err(format!(
+            "{}: does not say the unit of the baseline; give it by Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\"), or add an \
+             entry `unit` to the file: mm, cm or m",
+            self.names
+        ))
     }
 
     fn disparities(&self, disparity: &Bound<PyAny>) -> PyResult<Plane<f32>> {
@@ -102,7 +128,7 @@ impl PyRig {
                 known.names
             ))
         })?;
-        Self::of_rectified(&rectified, &known)
+        Self::of_rectified(&rectified, None, &known)
     }
 
     /// That of a rectified pair whose cameras no file describes: by their focal length and the distance between them.
@@ -145,24 +171,15 @@ impl PyRig {
         }
         let unit = calibration::unit(unit)?.name().into();
         let names = "Rig.of".into();
-        Self::of_numbers(([focal; 2], principal_point, [doffs, baseline], unit, size, names))
+        Self::of_numbers(([focal; 2], principal_point, [doffs, baseline], unit, size, names, None))
     }
 
     /// That of a part of the images, whose first pixel is (x, y), such as the roi of `match`: for the maps and the left image of that
     /// part. It takes maps of any size.
     fn of_part(&self, x: usize, y: usize) -> PyResult<Self> {
-        let mut camera = self.camera;
-        camera.principal_point = [camera.principal_point[0] - x as f64, camera.principal_point[1] - y as f64];
-        let numbers = [self.doffs, self.baseline];
-        let unit = self.rig.unit().name().into();
-        Self::of_numbers((
-            camera.focal_length,
-            camera.principal_point,
-            numbers,
-            unit,
-            None,
-            self.names.clone(),
-        ))
+        let (focal, [cx, cy], apart, unit, _, names, rectifying) = self.numbers();
+        let principal_point = [cx - x as f64, cy - y as f64];
+        Self::of_numbers((focal, principal_point, apart, unit, None, names, rectifying))
     }
 
     /// The depth of every pixel along the optical axis, float32 in the unit of the baseline, +inf where there is none: where the
@@ -205,14 +222,36 @@ impl PyRig {
         disparity: &Bound<PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<u16>>> {
         let map = self.disparities(disparity)?;
-        let depths = py.detach(|| self.rig.millimetres(&map)).ok_or_else(|| {
-            PyValueError::new_err(format!(
-                "{}: does not say the unit of the baseline; give it by Calibration(..., unit=\"m\") or Rig.of(..., unit=\"m\"), or add \
-                 an entry `unit` to the file: mm, cm or m",
-                self.names
-            ))
-        })?;
+        let depths = py.detach(|| self.rig.millimetres(&map)).ok_or_else(|| self.unit_unknown())?;
         arrays::map(py, depths)
+    }
+
+    /// The depths as a third camera sees them, along its axis and at its pixels: float32 in the unit of the baseline, +inf where it sees
+    /// what the map does not. The nearest of several surfaces counts, and each pixel of the map covers what it covers there.
+    ///
+    /// disparity: as in `depth`.
+    /// camera: a ThirdCamera, or the path of its file. Its pose is that to the left camera which took the images where the rig is that of
+    ///     a Rectification, else that to the rectified one.
+    fn registered<'py>(
+        &self,
+        py: Python<'py>,
+        disparity: &Bound<PyAny>,
+        camera: &Bound<PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let (map, camera) = (self.disparities(disparity)?, PyThirdCamera::of(camera)?);
+        arrays::map(py, py.detach(|| self.rig.registered(&map, &camera)))
+    }
+
+    /// The same in whole millimetres, uint16, as `millimetres` has them. Raises ValueError as that.
+    fn registered_millimetres<'py>(
+        &self,
+        py: Python<'py>,
+        disparity: &Bound<PyAny>,
+        camera: &Bound<PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u16>>> {
+        let (map, camera) = (self.disparities(disparity)?, PyThirdCamera::of(camera)?);
+        let depths = py.detach(|| self.rig.registered_millimetres(&map, &camera));
+        arrays::map(py, depths.ok_or_else(|| self.unit_unknown())?)
     }
 
     /// The points that were measured and are trusted (validity 0), row by row, in the frame of the left camera: x to the right, y down,
@@ -221,29 +260,16 @@ impl PyRig {
     /// matched: what the match of the rectified pair has returned.
     /// left: the rectified left image, as `match` takes it. It gives the colours; 16 bits and floats fill the range of it alone.
     fn points(&self, py: Python, matched: &Bound<PyMatched>, left: &Bound<PyAny>) -> PyResult<PyPoints> {
-        let matched = matched.get();
-        let disparity = arrays::disparities("matched.disparity", matched.disparity.bind(py).as_any())?;
-        let confidence = arrays::bytes("matched.confidence", matched.confidence.bind(py).as_any())?;
-        let mut validity = arrays::bytes("matched.validity", matched.validity.bind(py).as_any())?;
-        self.check("matched", disparity.size())?;
+        let maps = matched.get().maps(py)?;
+        self.check("matched", maps.disparity.size())?;
         let image = Image::of("left", left)?;
         let pair = Pair::of_frames(image.raster()?, image.raster()?).map_err(exception)?;
-        let sizes = [confidence.size(), validity.size(), pair.size()];
-        if sizes.iter().any(|size| *size != disparity.size()) {
-            let ((width, height), (w, h)) = (disparity.size(), pair.size());
+        if pair.size() != maps.disparity.size() {
+            let ((width, height), (w, h)) = (maps.disparity.size(), pair.size());
             return Err(PyValueError::new_err(format!(
                 "left: is {w} x {h} and the maps are {width} x {height}; give the rectified image that was matched"
             )));
         }
-        // Arrays may have been changed since the match.
-        for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
-            *validity |= if d.is_finite() { 0 } else { flag::MASKED };
-        }
-        let (width, height) = disparity.size();
-        // Floats hold every disparity of a match exactly.
-        let disparity = disparity.map(|d| (d * FRACTION as f32) as i32);
-        let maps =
-            Maps { disparity, raw: Plane::filled(width, height, 0), confidence, validity, right: None };
         let cloud = py.detach(|| self.rig.cloud(&maps, pair.left()));
         PyPoints::of(py, &cloud.points, cloud.unit)
     }
@@ -290,10 +316,7 @@ impl PyRig {
 
     /// How `pickle` and `copy` make another one.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Numbers,))> {
-        let Camera { focal_length, principal_point } = self.camera;
-        let (unit, names) = (self.unit().into(), self.names.clone());
-        let numbers = (focal_length, principal_point, [self.doffs, self.baseline], unit, self.size, names);
-        Ok((py.get_type::<Self>().getattr("_again")?, (numbers,)))
+        Ok((py.get_type::<Self>().getattr("_again")?, (self.numbers(),)))
     }
 
     #[classmethod]

@@ -11,6 +11,8 @@ mod options;
 mod range;
 mod rectification;
 mod sequence;
+mod steady;
+mod third;
 mod words;
 
 use numpy::{PyArray1, PyArrayMethods};
@@ -19,7 +21,8 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     // The crate `numpy` finds numpy when it is used first, and panics where Ctrl-C comes in between: so it finds it here.
-    module.py().import("numpy")?;
+    // The same for its masked arrays: Python 3.9 and 3.10 end by a Ctrl-C that interrupts a first import, even where it was caught.
+    module.py().import("numpy.ma")?;
     let _ = PyArray1::<u8>::zeros(module.py(), 0, false).readonly();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("MatchWarning", module.py().get_type::<exceptions::MatchWarning>())?;
@@ -34,5 +37,7 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<matcher::PyMatcher>()?;
     module.add_class::<depth::PyPoints>()?;
     module.add_class::<rectification::PyRectification>()?;
-    module.add_class::<depth::PyRig>()
+    module.add_class::<depth::PyRig>()?;
+    module.add_class::<steady::PySteady>()?;
+    module.add_class::<third::PyThirdCamera>()
 }

@@ -1,7 +1,10 @@
 //! The maps of a pair, and what made them.
 
 use mrfgs::Matched;
+use mrfgs::image::Plane;
+use mrfgs::maps::{FRACTION, Maps, flag};
 use numpy::{PyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 
@@ -58,6 +61,41 @@ impl PyMatched {
             tiles: matched.tiles.count(),
             ran_on: matched.ran_on,
             note: matched.note.as_ref().map(words::error),
+        })
+    }
+
+    /// The maps as the arrays hold them now; there may be no raw ones.
+    pub(crate) fn maps(&self, py: Python) -> PyResult<Maps> {
+        let disparity = arrays::disparities("matched.disparity", self.disparity.bind(py).as_any())?;
+        let confidence = arrays::bytes("matched.confidence", self.confidence.bind(py).as_any())?;
+        let mut validity = arrays::bytes("matched.validity", self.validity.bind(py).as_any())?;
+        let size = disparity.size();
+        if [confidence.size(), validity.size()] != [size; 2] {
+            return Err(PyValueError::new_err(
+                "matched: its maps differ in size; give what a match has returned",
+            ));
+        }
+        // Arrays may have been changed since the match.
+        for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
+            *validity |= if d.is_finite() { 0 } else { flag::MASKED };
+        }
+        // Floats hold every disparity of a match exactly.
+        let disparity = disparity.map(|d| (d * FRACTION as f32) as i32);
+        Ok(Maps { disparity, raw: Plane::filled(size.0, size.1, 0), confidence, validity, right: None })
+    }
+
+    /// The same with other disparities.
+    pub(crate) fn with_disparity(&self, py: Python, disparity: Plane<f32>) -> PyResult<Self> {
+        Ok(Self {
+            disparity: arrays::map(py, disparity)?.unbind(),
+            raw: self.raw.clone_ref(py),
+            confidence: self.confidence.clone_ref(py),
+            sigma: self.sigma.clone_ref(py),
+            validity: self.validity.clone_ref(py),
+            right: self.right.as_ref().map(|right| right.clone_ref(py)),
+            ran_on: self.ran_on.clone(),
+            note: self.note.clone(),
+            ..*self
         })
     }
 }

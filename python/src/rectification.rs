@@ -51,7 +51,8 @@ impl PyRectification {
                 let by =
                     Rectification::new(&known.cameras, size, &options).map_err(|error| known.wrong(error))?;
                 let calibration = by.calibration().map_err(|error| known.wrong(error))?;
-                let rig = Py::new(py, PyRig::of_rectified(&calibration, known)?)?;
+                let [rectifying, _] = *by.rotations();
+                let rig = Py::new(py, PyRig::of_rectified(&calibration, Some(rectifying), known)?)?;
                 (by, Some((calibration, rig)))
             }
             Source::Matches(matches) => {

@@ -765,6 +765,41 @@ class Rectification(Folder):
         rig.points(other, views[0]).save(self.folder / "python.ply")
         self.assertNotEqual((self.folder / "python.ply").read_bytes(), (self.folder / "d.points.ply").read_bytes())
 
+    def test_depths_in_the_view_of_a_third_camera(self):
+        third = RAW / "third.yml"
+        program(self.folder, "match", RAW / "left.png", RAW / "right.png", "d.pfm", "--rectify", "--calib", CAMERAS, "--max-disparity", 31,
+                "--also", "depth-registered,depth-registered-mm", "--into", third, "--device", "cpu", "--quiet")
+        rectification = mrfgs.Rectification(CAMERAS)
+        disparity = mrfgs.match(*rectification.apply(*raw_pair()), 31, device="cpu").disparity
+        expected = read_pfm(self.folder / "d.depth-registered.pfm")
+        camera = mrfgs.ThirdCamera(third)
+        self.assertEqual((camera.size, camera.unit), ((400, 240), "m"))
+        rigs = {"rig": rectification.rig, "pickled": pickle.loads(pickle.dumps(rectification.rig)), "copied": copy.deepcopy(rectification).rig,
+                "part": rectification.rig.of_part(0, 0)}
+        cameras = {"path": str(third), "text": mrfgs.ThirdCamera.of_text(third.read_text()), "pickled": pickle.loads(pickle.dumps(camera))}
+        for name, rig, given in [(name, rig, camera) for name, rig in rigs.items()] + [(name, rigs["rig"], of) for name, of in cameras.items()]:
+            found = rig.registered(disparity, given)
+            self.assertEqual((found.dtype, found.shape), (np.float32, (240, 400)))
+            self.assertTrue(np.array_equal(found, expected), name)
+        millimetres = rectification.rig.registered_millimetres(disparity, camera)
+        self.assertTrue(np.array_equal(millimetres, read_png(self.folder / "d.depth-registered-mm.png")))
+        # A part of the map shows the same there, but where a surface is cut.
+        part = rectification.rig.of_part(40, 30).registered(disparity[30:, 40:], camera)
+        both = np.isfinite(part) & np.isfinite(expected)
+        self.assertGreater((part[both] == expected[both]).mean(), 0.98)
+        self.assertGreater(both.sum(), 0.6 * np.isfinite(expected).sum())
+        # Control: without the rotation of the rectification, the camera stands elsewhere.
+        (self.folder / "rectified.yml").write_text(rectification.cameras_yml())
+        rectified = mrfgs.Rig(self.folder / "rectified.yml")
+        self.assertFalse(np.array_equal(rectified.registered(disparity, camera), expected))
+        self.refused(FileNotFoundError, "none.yml: there is no such file", lambda: mrfgs.ThirdCamera("none.yml"))
+        self.refused(TypeError, "camera: give a ThirdCamera, or the path of its file", lambda: rectified.registered(disparity, 7))
+        self.refused(ValueError, "the text: ", lambda: mrfgs.ThirdCamera.of_text("K: [1, 2]"))
+        self.refused(ValueError, "ThirdCamera.of_text takes", lambda: mrfgs.ThirdCamera(third.read_text()))
+        self.refused(ValueError, "disparity: is 240 x 179", lambda: rectified.registered(disparity[1:], camera))
+        unknown = mrfgs.Rig.of(260, 0.1, size=(240, 180))
+        self.refused(ValueError, "does not say the unit", lambda: unknown.registered_millimetres(disparity, camera))
+
     def test_forms_of_calibrations(self):
         text = CAMERAS.read_text()
 
@@ -1240,6 +1275,29 @@ class Sequences(Folder):
         results.close()
         self.assertEqual(len(taken), 8)
         self.assertEqual(list(results), [])
+
+    def test_steady_maps_are_those_of_the_program(self):
+        left, right = pair(90, 120)
+        random = np.random.default_rng(3)
+        frames = [[np.minimum(255, view + random.integers(0, 4, view.shape)).astype(np.uint8) for view in (left, right)] for _ in range(4)]
+        with tempfile.TemporaryDirectory() as folder:
+            folder = Path(folder)
+            for i, name in enumerate(("left", "right")):
+                (folder / name).mkdir()
+                for step, frame in enumerate(frames):
+                    write_ppm(folder / name / f"{step}.ppm", frame[i])
+            program(folder, "sequence", "left", "right", "maps", "--max-disparity", 15, "--device", "cpu", "--steady", "--quiet")
+            expected = [read_pfm(folder / "maps" / f"{step}.pfm") for step in range(4)]
+        steady, alone = mrfgs.Steady(), list(self.matcher.match_all(frames, 15))
+        for step, (found, frame) in enumerate(zip(alone, frames)):
+            led = steady.follow(found, frame[0])
+            self.assertTrue(np.array_equal(led.disparity, expected[step]), step)
+            for name in ("raw", "confidence", "sigma", "validity"):
+                self.assertIs(getattr(led, name), getattr(found, name))
+            # Control: only the first frame has no past.
+            self.assertEqual(np.array_equal(led.disparity, found.disparity), step == 0, step)
+        self.refused(ValueError, "left: is 120 x 89 and the maps are 120 x 90", lambda: steady.follow(alone[0], left[1:]))
+        self.refused(TypeError, "Matched", lambda: steady.follow(alone[0].disparity, left))
 
     def test_memory_does_not_grow_with_the_sequence(self):
         class Array(np.ndarray):
