@@ -48,7 +48,7 @@ const UNIT: u16 = 16;
 /// The past loses 1/8 of its weight with each frame: it remembers about eight of them.
 const FADING: u16 = 8;
 /// Disparities that differ by no more than half a pixel are one measurement with noise.
-const SAME: i32 = FRACTION / 2;
+const SAME: u32 = FRACTION as u32 / 2;
 /// A level of 8 bits.
 const LEVEL: u32 = 256;
 /// Changes are looked at in windows of 5 x 5 pixels.
@@ -118,7 +118,7 @@ impl Past {
             if *w == 0 || weighed == 0 {
                 continue;
             }
-            if (*d - before).abs() <= SAME {
+            if d.abs_diff(before) <= SAME {
                 let both = weighed - weighed / FADING + *w;
                 let (whole, moved) = (i32::from(both), i32::from(*w) * (*d - before));
                 // Rounded to the nearest.
