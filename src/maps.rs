@@ -1,6 +1,7 @@
 //! The maps that a match leaves behind, and what a pixel of them means.
 
 use crate::image::{Plane, Rect};
+use crate::options::MAX_DISPARITY;
 
 /// Fixed-point units of disparity in one pixel.
 pub const FRACTION: i32 = 256;
@@ -76,6 +77,23 @@ pub fn has_disparity(validity: u8) -> bool {
 }
 
 impl Maps {
+    /// The maps of a disparity map in pixels that a match has written, or another matcher: disparities count in 1/256 px. Pixels without
+    /// a finite one within [`MAX_DISPARITY`] are masked, and nothing more is known of those before post-processing.
+    ///
+    /// # Panics
+    /// When the maps differ in size.
+    #[must_use]
+    pub fn from_pixels(disparity: &Plane<f32>, confidence: Plane<u8>, mut validity: Plane<u8>) -> Self {
+        assert_eq!([confidence.size(), validity.size()], [disparity.size(); 2], "maps of one image");
+        let known = |d: f32| d.is_finite() && d.abs() <= MAX_DISPARITY as f32;
+        for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
+            *validity = if known(*d) { *validity } else { flag::MASKED };
+        }
+        // Floats hold every disparity of a match exactly.
+        let disparity = disparity.map(|d| if known(*d) { (d * FRACTION as f32).round() as i32 } else { 0 });
+        Self { raw: disparity.clone(), disparity, confidence, validity, right: None }
+    }
+
     /// The part of (width, height) from the top left.
     pub(crate) fn cut_to(self, size: (usize, usize)) -> Self {
         Self {
@@ -130,4 +148,28 @@ fn pixels(fixed: &Plane<i32>, validity: &Plane<u8>, known: impl Fn(u8) -> bool) 
     Plane::from_fn(width, height, |x, y| {
         if known(validity[(x, y)]) { fixed[(x, y)] as f32 / FRACTION as f32 } else { f32::INFINITY }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_come_back_from_their_pixels() {
+        let disparity = Plane::new(4, 1, vec![1000, -7, 3, 5]);
+        let validity =
+            Plane::new(4, 1, vec![0, flag::LOW_CONFIDENCE, flag::MASKED, flag::TIE | flag::FILLED]);
+        let confidence = Plane::new(4, 1, vec![9, 1, 0, 0]);
+        let maps = Maps { raw: disparity.clone(), disparity, confidence, validity, right: None };
+        let back = |map: &Plane<f32>| Maps::from_pixels(map, maps.confidence.clone(), maps.validity.clone());
+        let map = maps.final_map();
+        assert_eq!(back(&map).final_map(), map);
+        assert_eq!(back(&map).validity, maps.validity);
+
+        // What a user has taken away is not there, even if it was filled in; nor is what no match finds.
+        let taken = [f32::INFINITY, f32::NAN, 0.5, 2e6];
+        let without = back(&Plane::new(4, 1, taken.to_vec()));
+        assert_eq!(without.validity.data(), [flag::MASKED, flag::MASKED, flag::MASKED, flag::MASKED]);
+        assert_eq!(without.final_map(), Plane::filled(4, 1, f32::INFINITY));
+    }
 }

@@ -75,17 +75,13 @@ impl Steady {
         // Masked pixels are never read.
         let pixels = left.pixels.data().iter().zip(left.masked.data());
         let grey = pixels.map(|(&[.., grey], masked)| if *masked { 0 } else { grey });
-        let view = Plane::new(width, height, grey.collect());
+        let mut view = Plane::new(width, height, grey.collect());
         let weights = confidence.data().iter().zip(validity.data()).map(|(c, v)| weight(*c, *v));
-        let weight = Plane::new(width, height, weights.collect());
-        let present = Past { view, disparity: disparity.clone(), weight };
-        let past = self.past.take().filter(|past| past.view.size() == (width, height));
-        let known = match past {
-            Some(past) => past.then(present),
-            None => present,
-        };
-        disparity.data_mut().copy_from_slice(known.disparity.data());
-        self.past = Some(known);
+        let mut weight = Plane::new(width, height, weights.collect());
+        if let Some(past) = self.past.as_ref().filter(|past| past.view.size() == (width, height)) {
+            past.lead(&mut view, disparity, &mut weight);
+        }
+        self.past = Some(Past { view, disparity: disparity.clone(), weight });
     }
 }
 
@@ -99,14 +95,13 @@ fn weight(confidence: u8, validity: u8) -> u16 {
 }
 
 impl Past {
-    /// What is known with the next frame.
-    fn then(self, mut next: Self) -> Self {
-        let width = self.view.width();
-        let rows = self.view.data().chunks(width).zip(next.view.data().chunks(width));
+    /// Makes of the view, the disparity and the weight of the next frame what is known with it.
+    fn lead(&self, view: &mut Plane<u16>, disparity: &mut Plane<i32>, weight: &mut Plane<u16>) {
+        let width = view.width();
+        let rows = self.view.data().chunks(width).zip(view.data().chunks(width));
         let changed = |(a, b): (&[u16], &[u16])| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).collect();
         let changes = window_sums(width, rows.map(changed));
-        let limit = noise(&next.view) + LEVEL / 4 * WINDOW;
-        let Self { view, disparity, weight } = &mut next;
+        let limit = noise(view) + LEVEL / 4 * WINDOW;
         let now = view.data_mut().iter_mut().zip(disparity.data_mut()).zip(weight.data_mut());
         let before = self.view.data().iter().zip(self.disparity.data()).zip(self.weight.data());
         for ((((shown, d), w), ((&showed, &before), &weighed)), change) in now.zip(before).zip(&changes) {
@@ -129,7 +124,6 @@ impl Past {
                 (*d, *w) = (before, weighed / 2);
             }
         }
-        next
     }
 }
 

@@ -6,9 +6,9 @@
 //!
 //! What a body is, what it is painted with and what records its light are rooms of their own.
 //!
-//! Units: the left and right eye look along z from (-b/2, 0, 0) and (b/2, 0, 0), unless the rig stands elsewhere; x points right, y down. At depth
-//! 1 an image is one unit high, and the disparity there is [`REACH`] times the largest label; at depth z it is
-//! that over z. Nothing visible is nearer than depth 1.
+//! Units: the left and right eye look along z from (-b/2, 0, 0) and (b/2, 0, 0), unless the rig stands elsewhere; x
+//! points right, y down. At depth 1 an image is one unit high, and the disparity there is [`REACH`] times the largest
+//! label; at depth z it is that over z. Nothing visible is nearer than depth 1.
 //!
 //! Arithmetic is limited to + - * / sqrt and integer hashes, which IEEE 754 defines to the last bit: every machine
 //! renders the same bytes. Pixel (x, y) has its centre at (x, y).

@@ -371,6 +371,8 @@ enum mrfgs_status mrfgs_steady_new(struct mrfgs_steady **steady);
 // Lets the disparities of the next frame follow those of the frames before, weighted by confidence, where the left image has not changed.
 // `left` is the image that was matched, and `maps` are what the match has written: disparity, confidence and validity, of which the
 // disparity is changed and the others are read. A frame of another size begins a new sequence. Calls for one filter take turns.
+// For images of 8 bits these are the maps of `mrfgs sequence --steady`; deeper ones are scaled by their own values, where the program
+// looks at both views.
 enum mrfgs_status mrfgs_steady_follow(const struct mrfgs_steady *steady,
                                       const struct mrfgs_image *left,
                                       const struct mrfgs_maps *maps);

@@ -3,8 +3,7 @@
 use std::ptr;
 use std::sync::{Mutex, PoisonError};
 
-use mrfgs::image::Plane;
-use mrfgs::maps::{self, FRACTION, flag};
+use mrfgs::maps;
 use mrfgs::steady;
 
 use crate::argument;
@@ -25,6 +24,8 @@ pub unsafe extern "C" fn mrfgs_steady_new(steady: *mut *mut Steady) -> Status {
 /// Lets the disparities of the next frame follow those of the frames before, weighted by confidence, where the left image has not changed.
 /// `left` is the image that was matched, and `maps` are what the match has written: disparity, confidence and validity, of which the
 /// disparity is changed and the others are read. A frame of another size begins a new sequence. Calls for one filter take turns.
+/// For images of 8 bits these are the maps of `mrfgs sequence --steady`; deeper ones are scaled by their own values, where the program
+/// looks at both views.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_steady_follow(
     steady: *const Steady,
@@ -53,19 +54,8 @@ pub unsafe extern "C" fn mrfgs_steady_follow(
         // SAFETY: the same.
         let confidence = unsafe { read(given.confidence.cast_const(), given.confidence_stride, size) };
         // SAFETY: the same.
-        let mut validity = unsafe { read(given.validity.cast_const(), given.validity_stride, size) };
-        // The caller may have changed it since the match.
-        for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
-            *validity |= if d.is_finite() { 0 } else { flag::MASKED };
-        }
-        let mut found = maps::Maps {
-            // Floats hold every disparity of a match exactly.
-            disparity: disparity.map(|d| (d * FRACTION as f32) as i32),
-            raw: Plane::filled(size.0, size.1, 0),
-            confidence,
-            validity,
-            right: None,
-        };
+        let validity = unsafe { read(given.validity.cast_const(), given.validity_stride, size) };
+        let mut found = maps::Maps::from_pixels(&disparity, confidence, validity);
         steady.0.lock().unwrap_or_else(PoisonError::into_inner).follow(pair.left(), &mut found);
         // SAFETY: the same.
         unsafe { put(&found.final_map(), given.disparity, given.disparity_stride) };

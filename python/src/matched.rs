@@ -2,7 +2,7 @@
 
 use mrfgs::Matched;
 use mrfgs::image::Plane;
-use mrfgs::maps::{FRACTION, Maps, flag};
+use mrfgs::maps::Maps;
 use numpy::{PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -68,20 +68,14 @@ impl PyMatched {
     pub(crate) fn maps(&self, py: Python) -> PyResult<Maps> {
         let disparity = arrays::disparities("matched.disparity", self.disparity.bind(py).as_any())?;
         let confidence = arrays::bytes("matched.confidence", self.confidence.bind(py).as_any())?;
-        let mut validity = arrays::bytes("matched.validity", self.validity.bind(py).as_any())?;
+        let validity = arrays::bytes("matched.validity", self.validity.bind(py).as_any())?;
         let size = disparity.size();
         if [confidence.size(), validity.size()] != [size; 2] {
             return Err(PyValueError::new_err(
                 "matched: its maps differ in size; give what a match has returned",
             ));
         }
-        // Arrays may have been changed since the match.
-        for (validity, d) in validity.data_mut().iter_mut().zip(disparity.data()) {
-            *validity |= if d.is_finite() { 0 } else { flag::MASKED };
-        }
-        // Floats hold every disparity of a match exactly.
-        let disparity = disparity.map(|d| (d * FRACTION as f32) as i32);
-        Ok(Maps { disparity, raw: Plane::filled(size.0, size.1, 0), confidence, validity, right: None })
+        Ok(Maps::from_pixels(&disparity, confidence, validity))
     }
 
     /// The same with other disparities.

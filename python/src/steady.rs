@@ -24,11 +24,11 @@ impl PySteady {
         Self::default()
     }
 
-    /// The same Matched with disparities that follow those of the frames before: the maps of `mrfgs sequence --steady`. Raw, confidence,
-    /// sigma, validity and right stay those of the frame alone.
+    /// The same Matched with disparities that follow those of the frames before: for images of 8 bits the maps of `mrfgs sequence
+    /// --steady`. Raw, confidence, sigma, validity and right stay those of the frame alone.
     ///
     /// matched: what the match of the next frame has returned. One of another size begins a new sequence.
-    /// left: the left image that was matched.
+    /// left: the left image that was matched. Deeper ones are scaled by their own values, where the program looks at both views.
     fn follow(&self, py: Python, matched: &Bound<PyMatched>, left: &Bound<PyAny>) -> PyResult<PyMatched> {
         let matched = matched.get();
         let mut maps = matched.maps(py)?;

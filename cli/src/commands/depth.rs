@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use mrfgs::Error;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::{Image, Pair, Plane};
-use mrfgs::maps::{FRACTION, Maps, flag};
-use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+use mrfgs::maps::Maps;
+use mrfgs::options::DisparityRange;
 
 use crate::args::{CameraArgs, ReadingArgs, Sign};
 use crate::console;
@@ -98,7 +98,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let known = Some((path.as_deref().unwrap_or("--focal".as_ref()), &calibration));
     let takes_unit = also.iter().find(|word| word.takes_unit()).or(also.first());
     let rig = takes_unit.map(|word| input::rig(word, known, &args.map, map.size(), "give one with --calib"));
-    let maps = maps(&map, confidence);
+    let (width, height) = map.size();
+    let confidence = confidence.unwrap_or_else(|| Plane::filled(width, height, u8::MAX));
+    let maps = Maps::from_pixels(&map, confidence, Plane::filled(width, height, 0));
     let range = range(&map);
     for word in &also {
         word.check(&word.beside(output), range)?;
@@ -148,20 +150,6 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
 fn left(args: &Args, path: &Path) -> Result<Image> {
     let raster = args.reading.reader().raster(path)?;
     Ok(Pair::of_frames(raster.clone(), raster)?.left().clone())
-}
-
-/// What a match would have found.
-fn maps(map: &Plane<f32>, confidence: Option<Plane<u8>>) -> Maps {
-    let known = |d: f32| d.is_finite() && d.abs() <= MAX_DISPARITY as f32;
-    let disparity = map.map(|d| if known(*d) { (d * FRACTION as f32).round() as i32 } else { 0 });
-    let (width, height) = map.size();
-    Maps {
-        raw: disparity.clone(),
-        disparity,
-        confidence: confidence.unwrap_or_else(|| Plane::filled(width, height, u8::MAX)),
-        validity: map.map(|d| if known(*d) { 0 } else { flag::MASKED }),
-        right: None,
-    }
 }
 
 /// The disparities that it holds.

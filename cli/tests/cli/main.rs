@@ -31,6 +31,7 @@ mod report;
 mod results;
 mod robust;
 mod sequences;
+mod steady;
 mod unrectified;
 
 use std::collections::BTreeMap;
