@@ -35,7 +35,7 @@ fn far_plane() {
     on_maps(Stage::FarPlane, 30, votes, filled, twin::far_plane::far_plane);
 }
 
-const SIZE: (usize, usize) = (400, 200);
+const SIZE: (usize, usize) = (300, 120);
 
 /// The disparities, in 1/256 px, of a slanted wall that is measured in its first 120 columns, and filled with 9 px elsewhere.
 fn wall(image: &Image, measured: impl Fn(usize, usize) -> i32) -> Vec<(String, Plane<i32>)> {

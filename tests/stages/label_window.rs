@@ -62,7 +62,12 @@ fn label_window() {
         }
         Ok(())
     });
-    assert!(narrower.get() > 100 && narrower.get() < all.get(), "{} of {}", narrower.get(), all.get());
+    assert!(
+        5 * narrower.get() > all.get() && narrower.get() < all.get(),
+        "{} of {}",
+        narrower.get(),
+        all.get()
+    );
 }
 
 fn full(plan: &Plan, level: usize) -> Plane<[u16; 2]> {

@@ -42,7 +42,7 @@ const MINIMA: &[i32] = &[-20, 0, 5, 700, -900];
 const NEIGHBOURS: &[usize] = &[0, 1, 2, 4, 8, 12, 25, 48];
 /// Largest number of cells of the dependency messages of one case.
 const CELLS: usize = 1_000_000;
-/// Cases per size and number of labels.
+/// Cases per size and number of labels, unless `MRFGS_ROUNDS` says another number.
 const ROUNDS: usize = 3;
 
 struct Case {
@@ -82,11 +82,18 @@ impl Case {
     }
 }
 
-/// Every size with every number of labels; everything else is drawn at random.
+/// The [`rounds`] of all tests.
 fn cases() -> Vec<Case> {
+    let given =
+        std::env::var("MRFGS_ROUNDS").ok().map(|rounds| rounds.parse().expect("MRFGS_ROUNDS is a number"));
+    rounds(given.unwrap_or(ROUNDS))
+}
+
+/// Every size with every number of labels in each round; everything else is drawn at random.
+fn rounds(count: usize) -> Vec<Case> {
     let mut cases = Vec::new();
     for (&size, &labels) in SIZES.iter().flat_map(|size| LABELS.iter().map(move |labels| (size, labels))) {
-        for _ in 0..ROUNDS {
+        for _ in 0..count {
             let seed = cases.len() as u64;
             let mut random = Random::new(seed);
             let min = MINIMA[cases.len() % MINIMA.len()];
@@ -144,7 +151,7 @@ fn random_cost(random: &mut Random, plan: &Plan, z: usize) -> Vec<u32> {
 
 #[test]
 fn the_cases_cover_what_they_should() {
-    let cases = cases();
+    let cases = rounds(ROUNDS);
     let seen = |f: &dyn Fn(&Plan) -> String| cases.iter().map(|c| f(&c.plan)).collect::<HashSet<_>>();
     assert_eq!(
         seen(&|p| format!("{:?} {:?}", p.method.messages.potential, p.method.messages.agreement)).len(),

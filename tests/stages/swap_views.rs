@@ -26,7 +26,7 @@ fn swap_views() {
 /// Control: labels that stay where they are, or mirror without a swap, are noticed.
 #[test]
 fn control_a_missing_swap_is_found() {
-    let noticed = std::cell::Cell::new(0);
+    let (noticed, all) = (std::cell::Cell::new(0), std::cell::Cell::new(0));
     on_all(|case, backend, random| {
         let maps = random::finest(random, &case.plan, false);
         maps.write(backend);
@@ -35,7 +35,8 @@ fn control_a_missing_swap_is_found() {
         (mirrored.label, mirrored.right_label) = (maps.label.mirrored(), maps.right_label.mirrored());
         let both = [maps, mirrored].map(|wrong| compare_finest(backend, &wrong).is_err());
         noticed.set(noticed.get() + usize::from(both == [true, true]));
+        all.set(all.get() + 1);
         Ok(())
     });
-    assert!(noticed.get() > 200, "{}", noticed.get());
+    assert!(2 * noticed.get() > all.get(), "{} of {}", noticed.get(), all.get());
 }

@@ -26,7 +26,7 @@ fn no_limit_of_memory_aborts() {
             "match im0.png.{ending} im1.png.{ending} out.pfm --device cpu --threads 1 --quiet {options}"
         );
         // The program itself takes some 60 MiB of addresses.
-        let enough = (80..1024).step_by(20).find(|limit| {
+        let enough = (80..1024).step_by(40).find(|limit| {
             let told = shell(&folder, &format!("ulimit -v {}", limit << 10), &line);
             let enough = told.code == Some(0);
             if enough {
@@ -41,7 +41,7 @@ fn no_limit_of_memory_aborts() {
         });
         assert!(enough.is_some(), "{ending}: 1 GiB is not enough");
     }
-    assert!(refused > 15, "control: the limits are limits: {refused}");
+    assert!(refused > 7, "control: the limits are limits: {refused}");
 }
 
 /// A file that grows no further is told by its own name.
