@@ -128,13 +128,9 @@ fn small_devices() {
                 ..FaultInjection::default()
             },
             minimum(),
-            // From a few bands to bands of one or two rows.
-            binding(4 << 20),
-            binding(1 << 20),
+            // Bands of one or two rows.
             binding(700_000),
-            // From two parts to parts of a few rows.
-            buffer(16 << 20),
-            buffer(5 << 20),
+            // Parts of a few rows.
             buffer(2 << 20),
             // Dispatches that wrap around.
             FaultInjection { max_groups: Some(150), ..FaultInjection::default() },
