@@ -77,6 +77,7 @@
 //! - [`colour`] shows maps as pictures.
 //! - [`check`] warns of what is probably wrong with a pair, and finds its range.
 //! - [`calibration`] reads what is known of the cameras, and [`rectification`] makes rectified pairs of their images.
+//! - [`drift`] finds how the cameras of a rig have turned since they were calibrated, from their frames.
 //! - [`region`] matches a part of the left view alone.
 //! - [`steady`] lets the maps of a video hold still where the scene does.
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
@@ -123,6 +124,7 @@ mod weights;
 pub use error::{Error, Result};
 pub use front::check;
 pub use front::conditioning::Conditioning;
+pub use front::drift;
 pub use image::Pair;
 pub use matcher::{Answer, Builder, Found, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;

@@ -166,7 +166,7 @@ mod tests {
             ("match", 28),
             ("rectify", 8),
             ("depth", 15),
-            ("sequence", 34),
+            ("sequence", 35),
             ("batch", 20),
             ("evaluate", 12),
             ("evaluate map", 8),

@@ -3,6 +3,7 @@
 
 pub mod check;
 pub mod conditioning;
+pub mod drift;
 mod filter;
 pub mod illumination;
 pub mod label_range;

@@ -23,7 +23,7 @@
 
 mod doubts;
 mod from_matches;
-mod least_squares;
+pub(crate) mod least_squares;
 mod options;
 mod sampling;
 mod trust;
@@ -36,8 +36,8 @@ pub use trust::Trust;
 pub use two_views::Correspondence;
 
 use crate::calibration::cameras::{StereoCalibration, Views};
-use crate::calibration::lens::Lens;
-use crate::calibration::matrix::{Matrix, product, rotated, transposed};
+use crate::calibration::lens::{Distortion, Lens};
+use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, transposed};
 use crate::error::{Error, Purpose, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::{Pair, Plane};
@@ -249,6 +249,44 @@ impl Rectification {
             ));
         }
         self.views.calibration(Some(self.size()), self.unit)
+    }
+
+    /// That of a pair that is rectified already, which changes nothing: by the cameras of its calibration.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] where it lacks the camera or the baseline.
+    pub fn of_rectified(calibration: &Calibration, size: (usize, usize)) -> Result<Self> {
+        let Calibration { camera: Some(left), baseline: Some(baseline), .. } = *calibration else {
+            return Err(Error::Calibration("does not say the cameras, cam0 and baseline".into()));
+        };
+        let mut right = left;
+        right.principal_point[0] += calibration.doffs.unwrap_or(0.0);
+        let found = Self::of_cameras([left, right], size)?;
+        let translation = [-baseline, 0.0];
+        Ok(Self { views: Views { translation, ..found.views }, unit: calibration.unit, ..found })
+    }
+
+    /// The same by these cameras, whose distance does not matter.
+    pub(crate) fn of_cameras(cameras: [Camera; 2], size: (usize, usize)) -> Result<Self> {
+        let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
+        let lenses = [lens(cameras[0])?, lens(cameras[1])?];
+        let views = Views { rotations: [IDENTITY; 2], cameras, translation: [-1.0, 0.0], size: None };
+        Self::of_views(&lenses, views, size, Unit::default(), Vec::new())
+    }
+
+    /// The same of a rig whose right camera has turned, by so much in its rectified view.
+    pub(crate) fn with_right_turned(&self, by: &Matrix) -> Result<Self> {
+        let mut turned = Self { places: None, ..self.clone() };
+        turned.views.rotations[1] = product(by, &self.views.rotations[1]);
+        if self.places.is_some() {
+            turned.keep_places()?;
+        }
+        Ok(turned)
+    }
+
+    /// The cameras of the rectified views.
+    pub(crate) fn cameras(&self) -> &[Camera; 2] {
+        &self.views.cameras
     }
 
     /// The rotations from the frame of each camera to that of its rectified view.

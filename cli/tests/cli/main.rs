@@ -32,6 +32,7 @@ mod results;
 mod robust;
 mod sequences;
 mod steady;
+mod turned;
 mod unrectified;
 
 use std::collections::BTreeMap;

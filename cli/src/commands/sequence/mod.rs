@@ -1,6 +1,7 @@
 //! `mrfgs sequence`.
 
 mod pipeline;
+mod rig;
 mod writer;
 
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use std::path::{Path, PathBuf};
 use mrfgs::image::write;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
+use mrfgs::rectification::Rectification;
 use mrfgs::region::Region;
 use mrfgs::sigma::Sigma;
 use mrfgs::steady::Steady;
@@ -110,10 +112,15 @@ pub(crate) struct Args {
     /// less. Confidence, validity, raw and the map of the right view stay those of the frame alone
     #[arg(long)]
     steady: bool,
+    /// Where matches in the frames show that the right camera has turned since the calibration, corrects the frames from then on.
+    /// Without it that is told
+    #[arg(long)]
+    recalibrate: bool,
     #[command(flatten)]
     maps: MapArgs,
     /// Writes a line of JSON for each frame: its `frame` (name), and the fields of `match --json`, where `seconds` count from
-    /// the first frame on; `-` prints them
+    /// the first frame on; and `turned`, how far the right camera looks up, to the right and clockwise since the calibration, in degrees,
+    /// where the cameras are known. `-` prints them
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Checks everything up to the first frame and prints its plan (levels, schedule, memory), but matches and writes nothing
@@ -193,19 +200,24 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let Frame { name, header, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
     let sign = Sign::default();
     let cameras = args.maps.also.take_cameras();
-    let beside =
-        first_image.as_deref().filter(|_| cameras.is_some() || recording || args.search.takes_calibration());
+    let beside = first_image
+        .as_deref()
+        .filter(|_| takes_cameras(args) || recording || args.search.takes_calibration());
     let numbers = Some(&args.numbers);
     let calib = texts.as_deref().map_or(Calib::Files(&args.calib), Calib::Texts);
     let mut input = Input::new(pair, &args.search, sign, calib, numbers, rectifying.as_ref(), beside)?;
     if let Some(by) = &mut input.rectification {
         by.keep_places()?;
     }
+    if args.recalibrate && input.calibration().is_none() {
+        let reason = "takes the cameras; give them with --calib, or --focal and --baseline, or leave it out";
+        return Err(Failure::usage("--recalibrate", reason));
+    }
     if !args.quiet {
         input.say_range(sign, " in the first frame");
     }
-    // A recording also holds the cameras themselves, for which nothing needs to be asked.
-    let mut rig = if recording && cameras.is_none() {
+    // A recording also holds the cameras themselves, for which nothing needs to be asked; nor for what shows how one of them turns.
+    let mut rig = if cameras.is_none() && (recording || args.recalibrate) {
         None
     } else {
         input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?
@@ -249,9 +261,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let files = args.files(&input);
     let (rectified, size) = (rectify, input.pair.size());
     let region = part.map(|part| Region::new(part.clone(), size, range)).transpose()?;
-    let pipeline = Pipeline { matcher, range, region, files, rectified, quiet: args.quiet };
+    let recalibrate = args.recalibrate;
+    let pipeline = Pipeline { matcher, range, region, files, rectified, recalibrate, quiet: args.quiet };
+    let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
+    let rig = rig::Rig::new(input.rectification, known, range, recalibrate);
     let first = Frame { name, header, pair: input.pair };
-    let ended = pipeline.run(first, frames, input.rectification, &mut sink);
+    let ended = pipeline.run(first, frames, rig, &mut sink);
     if let Some(said) = left_out.and_then(|left_out| left_out.said()).filter(|_| !args.quiet) {
         console::say(&said);
     }
@@ -298,7 +313,7 @@ fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBu
     let (topic, beside) = recorded.left_topic();
     if found.is_some() {
         // Rectified images need no cameras for their disparities, whatever is wrong with these.
-        let takes_cameras = args.maps.also.take_cameras().is_some() || args.search.takes_cameras().is_some();
+        let takes_cameras = takes_cameras(args) || args.search.takes_cameras().is_some();
         let counts = !recorded.is_rectified() || takes_cameras || is_recording(&args.output);
         return Ok(found.filter(|_| counts));
     }
@@ -323,6 +338,11 @@ fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBu
         ));
     }
     Ok(None)
+}
+
+/// Whether the cameras are needed.
+fn takes_cameras(args: &Args) -> bool {
+    args.maps.also.take_cameras().is_some() || args.recalibrate
 }
 
 /// The range for all frames: where sparse matches found it, a match of the first frame shows whether that is enough.

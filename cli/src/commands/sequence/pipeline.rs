@@ -6,9 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use mrfgs::Matcher;
+use mrfgs::drift::Turn;
 use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
-use mrfgs::rectification::Rectification;
 use mrfgs::region::Region;
 use serde::Serialize;
 
@@ -20,6 +20,7 @@ use crate::sequences::{Frame, Frames};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
+use super::rig::{self, Rig};
 use super::writer::{Found, Sink};
 
 /// Frames that wait between two steps: enough to keep both at work.
@@ -36,6 +37,8 @@ pub(super) struct Pipeline {
     /// What the records say of the inputs.
     pub(super) files: Files,
     pub(super) rectified: bool,
+    /// Whether frames are corrected where the right camera has turned.
+    pub(super) recalibrate: bool,
     pub(super) quiet: bool,
 }
 
@@ -46,44 +49,42 @@ struct Takes {
     record: bool,
 }
 
-/// A frame, or why there is none.
-type Next = Result<Frame>;
+/// A rectified frame, and how the right camera has turned by then; or why there is none.
+type Next = Result<(Frame, Option<Turn>)>;
 
 impl Pipeline {
-    /// Matches `first`, which is rectified, and all `frames`, which `by` rectifies, and writes what it finds.
+    /// Matches `first`, which is rectified, and all `frames`, which `rig` rectifies, and writes what it finds.
     ///
     /// # Errors
     /// Of reading, matching and writing, and when the user stops it. What was found before is written then.
-    pub(super) fn run(
-        mut self,
-        first: Frame,
-        frames: Frames,
-        by: Option<Rectification>,
-        sink: &mut Sink,
-    ) -> Result<()> {
+    pub(super) fn run(mut self, first: Frame, frames: Frames, mut rig: Rig, sink: &mut Sink) -> Result<()> {
         let start = Instant::now();
         let region = self.region.as_ref();
         let size = region.map_or(first.pair.size(), |region| region.part().size());
         let takes = Takes { pair: sink.takes_pair(), record: sink.takes_records() };
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
+        let turn = rig.followed(&first.pair)?;
         // It may wait for standard input for ever, so nobody waits for it.
-        thread::spawn(move || read(frames, by, &sender));
+        thread::spawn(move || read(frames, rig, &sender));
         let (found, to_write) = sync_channel::<Found>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
-            let matched = self.matched(first, &receiver, takes, start, found);
+            let matched = self.matched((first, turn), &receiver, takes, start, found);
             (matched, writing.join())
         });
         drop(bar);
         let (done, written) =
             written.unwrap_or((0, Err(Failure::Failed("the writer of maps failed".into()))));
-        let Ran { on, note, ended } = matched;
+        let Ran { on, note, turn, ended } = matched;
         // A failure to write ends the matching, so it is the cause.
         let ended = written.and(ended);
         if !self.quiet {
             if let Some(note) = note {
                 console::say(&note);
+            }
+            if let Some(said) = turn.and_then(|turn| rig::said(&turn, self.recalibrate)) {
+                console::say(&said);
             }
             let seconds = start.elapsed().as_secs_f64();
             let (width, height) = size;
@@ -104,7 +105,7 @@ impl Pipeline {
     /// Matches all frames and hands on what it finds.
     fn matched(
         &mut self,
-        first: Frame,
+        first: (Frame, Option<Turn>),
         frames: &Receiver<Next>,
         takes: Takes,
         start: Instant,
@@ -123,27 +124,29 @@ impl Pipeline {
         let mut failure = None;
         let mut next = Some(Ok(first));
         let pairs = std::iter::from_fn(|| {
-            let frame = match next.take().map_or_else(|| received(frames).map(Result::flatten), Some)? {
-                Ok(frame) => frame,
-                Err(error) => {
-                    failure = Some(error);
-                    return None;
-                }
-            };
+            let (frame, turn) =
+                match next.take().map_or_else(|| received(frames).map(Result::flatten), Some)? {
+                    Ok(frame) => frame,
+                    Err(error) => {
+                        failure = Some(error);
+                        return None;
+                    }
+                };
             // The receiver lives as long as this.
             let (part, window) = narrowed(frame.pair);
-            let about = (frame.name, frame.header);
+            let about = (frame.name, frame.header, turn);
             let _ = started.send((about, part.georeferences(), takes.pair.then_some(part)));
             Some((window, range))
         });
-        let mut ran = Ran { on: None, note: None, ended: Ok(()) };
+        let mut ran = Ran { on: None, note: None, turn: None, ended: Ok(()) };
         let told = &mut ran;
         let ended = matcher.run_all_until(pairs, stop::flag(), move |mut matched| {
-            let Ok(((name, header), georeferences, pair)) = under_way.try_recv() else {
+            let Ok(((name, header, turn), georeferences, pair)) = under_way.try_recv() else {
                 return ControlFlow::Break(());
             };
             let note = matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS));
             told.note = note.or(told.note.take());
+            told.turn = turn.or(told.turn);
             if let Some(region) = region {
                 matched.maps = region.maps_of(&matched.maps);
             }
@@ -151,7 +154,7 @@ impl Pipeline {
                 let mut record = MatchRecord::new(files, &matched, start.elapsed(), Sign::default());
                 record.rectified = *rectified;
                 record.region = region.map(|region| [region.part().x.start, region.part().y.start]);
-                line(&name, &record)
+                line(&name, turn.map(|turn| turn.degrees()), &record)
             });
             told.on = Some(matched.ran_on);
             match found.send(Found { name, header, georeferences, maps: matched.maps, pair, record }) {
@@ -170,15 +173,17 @@ impl Pipeline {
 }
 
 /// The record of a frame in a line of JSON.
-fn line(frame: &str, record: &MatchRecord) -> String {
+fn line(frame: &str, turned: Option<[f64; 3]>, record: &MatchRecord) -> String {
     #[derive(Serialize)]
     struct Line<'a> {
         frame: &'a str,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        turned: Option<[f64; 3]>,
         #[serde(flatten)]
         record: &'a MatchRecord<'a>,
     }
     // Its fields are numbers, texts and maps of texts, which JSON holds.
-    serde_json::to_string(&Line { frame, record }).unwrap_or_default() + "\n"
+    serde_json::to_string(&Line { frame, turned, record }).unwrap_or_default() + "\n"
 }
 
 /// What came of the matching.
@@ -187,6 +192,8 @@ struct Ran {
     on: Option<String>,
     /// Why it did not run on the preferred device.
     note: Option<String>,
+    /// How the right camera has turned by the last frame.
+    turn: Option<Turn>,
     ended: Result<()>,
 }
 
@@ -221,13 +228,13 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
 }
 
 /// Reads and rectifies frames until one fails or nobody takes them.
-fn read(frames: Frames, by: Option<Rectification>, to: &SyncSender<Next>) {
+fn read(frames: Frames, mut rig: Rig, to: &SyncSender<Next>) {
     for frame in frames {
-        let rectified = |frame: Frame| match &by {
-            Some(by) => Ok(Frame { pair: by.apply(&frame.pair)?, ..frame }),
-            None => Ok(frame),
+        let rectified = |Frame { name, header, pair }: Frame| {
+            let (pair, turn) = rig.rectified(pair)?;
+            Ok((Frame { name, header, pair }, turn))
         };
-        let frame = frame.and_then(rectified).map_err(Failure::from);
+        let frame = frame.map_err(Failure::from).and_then(rectified);
         let failed = frame.is_err();
         if to.send(frame).is_err() || failed {
             return;

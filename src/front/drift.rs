@@ -1,0 +1,316 @@
+//! A rig that drifts: how its right camera has turned since it was calibrated, by matches in rectified frames.
+//!
+//! Shocks and warmth turn cameras by tenths of a degree, and then the rows of rectified views no longer line up. A match says by how much
+//! at its place: a turn up or down moves all rows alike, a turn about the axis moves them up on one side and down on the other, and
+//! a turn to a side bends them in the corners. [`Drift`] finds the rotation that brings the matches of the last frames back to their rows
+//! (least squares, where matches count less the farther they are off). A turn to a side also changes disparities, which no match can tell
+//! from another distance; its rows say less of it than of the others, and that is in the errors that are told.
+//!
+//! ```
+//! use mrfgs::drift::Drift;
+//! use mrfgs::options::DisparityRange;
+//! use mrfgs::rectification::{Options, Rectification};
+//! use mrfgs::{Pair, calibration};
+//!
+//! # fn main() -> mrfgs::Result<()> {
+//! let cameras = calibration::read(&["testdata/raw/cameras.yml".into()])?;
+//! let raw = Pair::open("testdata/raw/left.png", "testdata/raw/right.png")?;
+//! let calibrated = Rectification::new(&cameras, raw.size(), &Options::default())?;
+//! let mut drift = Drift::of(&calibrated)?;
+//! let mut rectification = calibrated.clone();
+//! for frame in [&raw, &raw] {
+//!     let pair = rectification.apply(frame)?;
+//!     drift.follow(&pair, DisparityRange::new(0, 31)?)?;
+//!     if let Some(better) = drift.correct(&calibrated)? {
+//!         rectification = better;
+//!     }
+//! }
+//! let turn = drift.turn().expect("there is enough to see");
+//! assert!(turn.degrees().iter().all(|angle| angle.abs() < 0.1)); // As it was calibrated.
+//! # Ok(())
+//! # }
+//! ```
+
+use super::matches;
+use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, rotation, rotation_vector, transposed};
+use crate::error::Result;
+use crate::image::calib::Camera;
+use crate::image::{Image, Pair};
+use crate::maps::FRACTION;
+use crate::options::DisparityRange;
+use crate::rectification::Rectification;
+use crate::rectification::least_squares::solved;
+use std::collections::VecDeque;
+
+/// The frames that count: the last so many of those that were looked at.
+const FRAMES: usize = 16;
+/// In the long run one frame in so many is looked at, so that it costs little.
+const STRIDE: u64 = 64;
+/// Matches are searched in a pair whose longer side is at most this, in pixels.
+const SIDE: usize = 1024;
+/// Approximate number of corners that are searched in a frame.
+const CORNERS: usize = 600;
+/// Rows above and below its own on which a corner is searched.
+const ROWS: usize = 4;
+/// Fewer matches than this, in all frames, tell nothing.
+const LEAST: usize = 60;
+/// A frame is searched again, turned by what was found in it, at most this many times: matches are exact near whole pixels, and a little
+/// short of the truth between them.
+const SEARCHES: usize = 3;
+/// Steps of least squares.
+const STEPS: usize = 12;
+/// Matches whose rows are this far apart count a quarter of others, in pixels of the pair that is searched; or the median, if that is more.
+const SCALE: f64 = 0.25;
+/// What is known before any match is seen of a turn to a side, in radians: that it is hardly ever more (open). The others show well.
+const UNUSUAL: f64 = 0.002;
+/// Offset of the rows, in pixels of the images, from which on a turn is worth resampling (open).
+const WORTH: f64 = 0.1;
+/// So many standard errors are no chance.
+const SURE: f64 = 3.0;
+
+/// What the frames of a rig show of how its right camera has turned. It takes one frame after the other; the first, the fourth, the sixteenth and
+/// then every sixty-fourth is looked at, and of these the last sixteen count.
+#[derive(Clone, Debug)]
+pub struct Drift {
+    /// The rectified cameras of the calibration.
+    cameras: [Camera; 2],
+    size: (usize, usize),
+    /// What the frames are corrected by: from what the calibrated right view shows to what it should.
+    applied: Matrix,
+    frames: VecDeque<Vec<Sight>>,
+    count: u64,
+    turn: Option<Turn>,
+}
+
+/// A match in rectified views.
+#[derive(Clone, Copy, Debug)]
+struct Sight {
+    /// The ray of its right end, as the calibrated right view shows it.
+    right: [f64; 3],
+    /// The row of its left end at depth 1.
+    row: f64,
+    /// Pixels at depth 1 in the pair that was searched.
+    focal_length: f64,
+}
+
+/// How the right camera of a rig has turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn {
+    /// The axis of its rotation in its rectified view (x right, y down, z forward), as long as the angle in radians.
+    pub axis: [f64; 3],
+    /// Standard error of each component, in radians, as if all frames showed one still scene.
+    pub errors: [f64; 3],
+    /// How many matches it comes from.
+    pub matches: usize,
+    /// How far it moves rows apart at most, in pixels of the images.
+    pub rows: f64,
+    sure: bool,
+}
+
+impl Turn {
+    /// How far the camera looks up, to the right and clockwise, in degrees, from where it was calibrated.
+    #[must_use]
+    pub fn degrees(&self) -> [f64; 3] {
+        self.axis.map(f64::to_degrees)
+    }
+
+    /// Whether it moves rows apart by a tenth of a pixel or more, and is no chance.
+    #[must_use]
+    pub fn counts(&self) -> bool {
+        self.sure && self.rows >= WORTH
+    }
+}
+
+impl Drift {
+    /// Of a rig with this rectification, from which nothing has turned yet.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`](crate::Error::Calibration) for a rectification by matches of a pair alone, which is no calibration.
+    pub fn of(calibrated: &Rectification) -> Result<Self> {
+        calibrated.calibration()?;
+        Ok(Self {
+            cameras: *calibrated.cameras(),
+            size: calibrated.size(),
+            applied: IDENTITY,
+            frames: VecDeque::new(),
+            count: 0,
+            turn: None,
+        })
+    }
+
+    /// Takes the next frame, rectified by what [`Drift::correct`] gave last, and looks at it if it is its turn. `range` holds its
+    /// disparities. Matches up to four rows off are found, in a pair of at most 1024 pixels a side.
+    ///
+    /// # Errors
+    /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
+    pub fn follow(&mut self, pair: &Pair, range: DisparityRange) -> Result<()> {
+        self.count += 1;
+        if ![1, 4, 16].contains(&self.count) && !self.count.is_multiple_of(STRIDE) {
+            return Ok(());
+        }
+        matches::check_memory(pair)?;
+        let (mut small, mut scale) = (pair.clone(), 1);
+        while small.size().0.max(small.size().1) > SIDE {
+            small = small.map(Image::downsampled);
+            scale *= 2;
+        }
+        let range = DisparityRange { min: range.min.div_euclid(scale), max: range.max.div_euclid(scale) + 1 };
+        if self.frames.len() == FRAMES {
+            self.frames.pop_front();
+        }
+        self.frames.push_back(Vec::new());
+        for _ in 0..SEARCHES {
+            let by = self.turn.map_or(self.applied, |turn| rotation(turn.axis));
+            let sights = self.search(&small, f64::from(scale), range, &by)?;
+            self.frames.pop_back();
+            self.frames.push_back(sights);
+            self.turn = self.fitted();
+            let found = self.turn.map_or(by, |turn| rotation(turn.axis));
+            if self.rows(&between(&by, &found)) < WORTH {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The matches of a pair that is smaller by `scale`, searched after a turn of the calibrated right view `by` so much.
+    fn search(&self, small: &Pair, scale: f64, range: DisparityRange, by: &Matrix) -> Result<Vec<Sight>> {
+        let (width, height) = small.size();
+        let cameras = self.cameras.map(|camera| Camera {
+            focal_length: camera.focal_length.map(|f| f / scale),
+            principal_point: camera.principal_point.map(|c| c / scale),
+        });
+        let change = between(&self.applied, by);
+        let turned = if self.rows(&change) < WORTH {
+            None
+        } else {
+            let by = Rectification::of_cameras(cameras, small.size())?.with_right_turned(&change)?;
+            Some(by.apply(small)?)
+        };
+        let by = if turned.is_some() { by } else { &self.applied };
+        let pair = turned.as_ref().unwrap_or(small);
+        let found = matches::search(pair, None, Some(range), width * height / CORNERS, ROWS);
+        let back = transposed(by);
+        let sight = |m: &matches::Match| {
+            let [disparity, dy] = [m.disparity, m.dy].map(|v| f64::from(v) / f64::from(FRACTION));
+            let at = |x: f64, y: f64, camera: &Camera| {
+                let ([fx, fy], [cx, cy]) = (camera.focal_length, camera.principal_point);
+                [(x - cx) / fx, (y - cy) / fy, 1.0]
+            };
+            let (x, y) = (m.x as f64, m.y as f64);
+            Sight {
+                right: rotated(&back, at(x - disparity, y + dy, &cameras[1])),
+                row: at(x, y, &cameras[0])[1],
+                focal_length: cameras[1].focal_length[1],
+            }
+        };
+        Ok(found.iter().map(sight).collect())
+    }
+
+    /// How the right camera has turned since the calibration, as far as the last frames show it; `None` where they have too few matches.
+    #[must_use]
+    pub fn turn(&self) -> Option<Turn> {
+        self.turn
+    }
+
+    /// What rectifies the next frames, where that is no longer what rectified the last ones: `calibrated`, with the right camera turned.
+    ///
+    /// # Errors
+    /// [`Error::Memory`](crate::Error::Memory) where `calibrated` [keeps its places](Rectification::keep_places) and the machine has not
+    /// enough for others.
+    pub fn correct(&mut self, calibrated: &Rectification) -> Result<Option<Rectification>> {
+        let Some(turn) = self.turn.filter(Turn::counts) else { return Ok(None) };
+        let by = rotation(turn.axis);
+        if self.rows(&between(&self.applied, &by)) < WORTH {
+            return Ok(None);
+        }
+        self.applied = by;
+        calibrated.with_right_turned(&by).map(Some)
+    }
+
+    /// How far a turn moves rows apart at most, in pixels of the images.
+    fn rows(&self, by: &Matrix) -> f64 {
+        let [fx, fy] = self.cameras[1].focal_length;
+        let [cx, cy] = self.cameras[1].principal_point;
+        let (right, bottom) = (self.size.0 as f64 - 1.0, self.size.1 as f64 - 1.0);
+        let places = [0.0, right / 2.0, right].map(|x| [0.0, bottom / 2.0, bottom].map(|y| [x, y]));
+        let apart = places.iter().flatten().map(|[x, y]| {
+            let ray = [(x - cx) / fx, (y - cy) / fy, 1.0];
+            let [_, down, forward] = rotated(by, ray);
+            fy * (down / forward - ray[1]).abs()
+        });
+        apart.fold(0.0, f64::max)
+    }
+
+    fn fitted(&self) -> Option<Turn> {
+        let sights: Vec<&Sight> = self.frames.iter().flatten().collect();
+        if sights.len() < LEAST {
+            return None;
+        }
+        let mut by = IDENTITY;
+        let mut fit = Fit::of(&sights, &by)?;
+        for _ in 0..STEPS {
+            let step = solved(fit.normal, fit.right)?;
+            by = product(&rotation(step), &by);
+            fit = Fit::of(&sights, &by)?;
+        }
+        let axis = rotation_vector(&by);
+        // A still scene is seen no better by many frames.
+        let frames = self.frames.len() as f64;
+        let mut errors = [0.0; 3];
+        for i in 0..3 {
+            let column = solved(fit.normal, std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }))?;
+            errors[i] = (frames * fit.variance * column[i]).max(0.0).sqrt();
+        }
+        let sure = (0..3).any(|i| axis[i].abs() > SURE * errors[i]);
+        Some(Turn { axis, errors, matches: sights.len(), rows: self.rows(&by), sure })
+    }
+}
+
+/// What turns a view after one rotation as the other would have.
+fn between(from: &Matrix, to: &Matrix) -> Matrix {
+    product(to, &transposed(from))
+}
+
+/// The equations of a step of least squares.
+struct Fit {
+    normal: [[f64; 3]; 3],
+    right: [f64; 3],
+    /// Of the rows of matches, in pixels².
+    variance: f64,
+}
+
+impl Fit {
+    /// After a turn `by`.
+    fn of(sights: &[&Sight], by: &Matrix) -> Option<Self> {
+        let turned: Vec<(f64, [f64; 3])> = sights
+            .iter()
+            .map(|sight| {
+                let [x, y, z] = rotated(by, sight.right);
+                let (x, y, f) = (x / z, y / z, sight.focal_length);
+                // How a small turn about each axis moves the row.
+                (f * (y - sight.row), [-f * (1.0 + y * y), f * x * y, f * x])
+            })
+            .collect();
+        let mut off: Vec<f64> = turned.iter().map(|(row, _)| row.abs()).collect();
+        off.sort_unstable_by(f64::total_cmp);
+        let scale = off.get(off.len() / 2)?.max(SCALE);
+        let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
+        let (mut squares, mut weights) = (0.0, 0.0);
+        for (row, slopes) in &turned {
+            let root = 1.0 / (1.0 + row * row / (scale * scale));
+            let weight = root * root;
+            squares += weight * row * row;
+            weights += weight;
+            for i in 0..3 {
+                right[i] -= weight * slopes[i] * row;
+                (0..3).for_each(|j| normal[i][j] += weight * slopes[i] * slopes[j]);
+            }
+        }
+        let variance = squares / weights;
+        let known = variance / (UNUSUAL * UNUSUAL);
+        normal[1][1] += known;
+        right[1] -= known * rotation_vector(by)[1];
+        Some(Self { normal, right, variance })
+    }
+}
