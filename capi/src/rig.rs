@@ -13,7 +13,7 @@ use crate::status::{Failure, Status, call};
 
 /// The cameras of a rectified pair: from disparities to depths.
 pub struct Rig {
-    pub(crate) rig: depth::Rig,
+    pub(crate) inner: depth::Rig,
     /// (width, height) of the images, where it is known.
     size: Option<(usize, usize)>,
     /// Depths along the axis take none.
@@ -24,7 +24,7 @@ impl Rig {
     fn of(calibration: &calib::Calibration) -> mrfgs::Result<Self> {
         let size = calibration.width.zip(calibration.height);
         let size = size.map(|(width, height)| (width as usize, height as usize));
-        Ok(Self { rig: depth::Rig::new(calibration)?, size, knows_principal_point: true })
+        Ok(Self { inner: depth::Rig::new(calibration)?, size, knows_principal_point: true })
     }
 
     /// Refuses a map of another size than that of the calibration.
@@ -92,9 +92,9 @@ pub unsafe extern "C" fn mrfgs_rig_of_rectification(
     let make = || {
         // SAFETY: the caller promises that the pointer is null or good.
         let rectification = unsafe { argument::thing("rectification", rectification) }?;
-        let Rig { rig, size, .. } = Rig::of(&rectification.by.calibration()?)?;
+        let Rig { inner, size, .. } = Rig::of(&rectification.by.calibration()?)?;
         let [rectifying, _] = rectification.by.rotations();
-        Ok(Rig { rig: rig.rectified_by(rectifying), size, knows_principal_point: true })
+        Ok(Rig { inner: inner.rectified_by(rectifying), size, knows_principal_point: true })
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("rig", rig, make) }
@@ -104,7 +104,7 @@ pub unsafe extern "C" fn mrfgs_rig_of_rectification(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_rig_unit(rig: *const Rig) -> *const c_char {
     // SAFETY: the caller promises that the pointer is null or good.
-    let unit = unsafe { rig.as_ref() }.map(|rig| match rig.rig.unit() {
+    let unit = unsafe { rig.as_ref() }.map(|rig| match rig.inner.unit() {
         Unit::Millimetre => c"mm",
         Unit::Centimetre => c"cm",
         Unit::Metre => c"m",
@@ -132,7 +132,7 @@ pub unsafe extern "C" fn mrfgs_depth(
         // SAFETY: the caller promises that the maps are as large as the arguments say.
         unsafe {
             put_each(rig, (width, height), given, ("depth", depth, depth_stride), |[d]| {
-                rig.rig.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32)
+                rig.inner.depth(f64::from(d)).map_or(f32::INFINITY, |depth| depth as f32)
             })
         }
     })
@@ -164,7 +164,7 @@ pub unsafe extern "C" fn mrfgs_depth_sigma(
                 given,
                 ("depth_sigma", depth_sigma, depth_sigma_stride),
                 |[d, sigma]| {
-                    rig.rig
+                    rig.inner
                         .depth_sigma(f64::from(d), f64::from(sigma))
                         .map_or(f32::INFINITY, |sigma| sigma as f32)
                 },
@@ -193,10 +193,11 @@ unsafe fn put_each<const N: usize>(
         for x in 0..size.0 {
             let offset = |stride: usize| y * stride + x * size_of::<f32>();
             // SAFETY: the pixel is in the map, as the caller promises.
-            let values =
-                given.map(|(_, map, stride)| unsafe { map.byte_add(offset(stride)).read_unaligned() });
+            let values = given
+                .map(|(_, map, stride)| unsafe { map.wrapping_byte_add(offset(stride)).read_unaligned() });
+            let values = value(values);
             // SAFETY: the same.
-            unsafe { to.byte_add(offset(stride)).write_unaligned(value(values)) };
+            unsafe { to.wrapping_byte_add(offset(stride)).write_unaligned(values) };
         }
     }
     Ok(())

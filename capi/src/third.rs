@@ -94,7 +94,7 @@ pub unsafe extern "C" fn mrfgs_depth_registered(
         maps::check("depth", depth.cast_const(), depth_stride, camera.0.size)?;
         // SAFETY: it is not null, and the caller promises that it is as large as the arguments say.
         let map = unsafe { maps::read(disparity, disparity_stride, size) };
-        let depths = rig.rig.registered(&map, &camera.0);
+        let depths = rig.inner.registered(&map, &camera.0);
         // SAFETY: the same.
         unsafe { maps::put(&depths, depth, depth_stride) };
         Ok(())
