@@ -1,7 +1,7 @@
 //! `mrfgs sequence`.
 
+mod drift;
 mod pipeline;
-mod rig;
 mod writer;
 
 use std::path::{Path, PathBuf};
@@ -26,6 +26,7 @@ use crate::pairs::input::{Calib, Input};
 use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
+use drift::Rectifier;
 use pipeline::Pipeline;
 use writer::{Records, Writer};
 
@@ -264,9 +265,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let recalibrate = args.recalibrate;
     let pipeline = Pipeline { matcher, range, region, files, rectified, recalibrate, quiet: args.quiet };
     let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
-    let rig = rig::Rig::new(input.rectification, known, range, recalibrate);
+    let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
     let first = Frame { name, header, pair: input.pair };
-    let ended = pipeline.run(first, frames, rig, &mut sink);
+    let ended = pipeline.run(first, frames, rectifier, &mut sink);
     if let Some(said) = left_out.and_then(|left_out| left_out.said()).filter(|_| !args.quiet) {
         console::say(&said);
     }

@@ -20,7 +20,7 @@ use crate::sequences::{Frame, Frames};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
-use super::rig::{self, Rig};
+use super::drift::{self, Rectifier};
 use super::writer::{Found, Sink};
 
 /// Frames that wait between two steps: enough to keep both at work.
@@ -53,20 +53,26 @@ struct Takes {
 type Next = Result<(Frame, Option<Turn>)>;
 
 impl Pipeline {
-    /// Matches `first`, which is rectified, and all `frames`, which `rig` rectifies, and writes what it finds.
+    /// Matches `first`, which is rectified, and all `frames`, which `rectifier` rectifies, and writes what it finds.
     ///
     /// # Errors
     /// Of reading, matching and writing, and when the user stops it. What was found before is written then.
-    pub(super) fn run(mut self, first: Frame, frames: Frames, mut rig: Rig, sink: &mut Sink) -> Result<()> {
+    pub(super) fn run(
+        mut self,
+        first: Frame,
+        frames: Frames,
+        mut rectifier: Rectifier,
+        sink: &mut Sink,
+    ) -> Result<()> {
         let start = Instant::now();
         let region = self.region.as_ref();
         let size = region.map_or(first.pair.size(), |region| region.part().size());
         let takes = Takes { pair: sink.takes_pair(), record: sink.takes_records() };
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
-        let turn = rig.followed(&first.pair)?;
+        let turn = rectifier.followed(&first.pair)?;
         // It may wait for standard input for ever, so nobody waits for it.
-        thread::spawn(move || read(frames, rig, &sender));
+        thread::spawn(move || read(frames, rectifier, &sender));
         let (found, to_write) = sync_channel::<Found>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
@@ -83,7 +89,7 @@ impl Pipeline {
             if let Some(note) = note {
                 console::say(&note);
             }
-            if let Some(said) = turn.and_then(|turn| rig::said(&turn, self.recalibrate)) {
+            if let Some(said) = turn.and_then(|turn| drift::said(&turn, self.recalibrate)) {
                 console::say(&said);
             }
             let seconds = start.elapsed().as_secs_f64();
@@ -228,10 +234,10 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
 }
 
 /// Reads and rectifies frames until one fails or nobody takes them.
-fn read(frames: Frames, mut rig: Rig, to: &SyncSender<Next>) {
+fn read(frames: Frames, mut rectifier: Rectifier, to: &SyncSender<Next>) {
     for frame in frames {
         let rectified = |Frame { name, header, pair }: Frame| {
-            let (pair, turn) = rig.rectified(pair)?;
+            let (pair, turn) = rectifier.rectified(pair)?;
             Ok((Frame { name, header, pair }, turn))
         };
         let frame = frame.map_err(Failure::from).and_then(rectified);

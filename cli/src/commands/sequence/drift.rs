@@ -7,8 +7,8 @@ use mrfgs::rectification::Rectification;
 
 use crate::failure::Result;
 
-/// What rectifies the frames, and what watches whether that is still right.
-pub(super) struct Rig {
+/// Rectifies the frames, and watches whether that is still right.
+pub(super) struct Rectifier {
     /// What rectifies the next frame; `None` where frames are rectified already, and stand as they were calibrated.
     by: Option<Rectification>,
     /// Where the cameras are known.
@@ -23,7 +23,7 @@ struct Watched {
     recalibrate: bool,
 }
 
-impl Rig {
+impl Rectifier {
     /// With frames that `by` rectifies, or that are rectified already by a calibration that would be `known` as such.
     pub(super) fn new(
         by: Option<Rectification>,
