@@ -111,6 +111,9 @@ typedef uint8_t mrfgs_flag;
 // What is known of a pair of cameras.
 typedef struct mrfgs_calibration mrfgs_calibration;
 
+// What the frames of a rig show of how its right camera has turned since it was calibrated.
+typedef struct mrfgs_drift mrfgs_drift;
+
 // Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 typedef struct mrfgs_matcher mrfgs_matcher;
 
@@ -148,6 +151,20 @@ typedef struct mrfgs_range {
   int32_t min;
   int32_t max;
 } mrfgs_range;
+
+// How the right camera of a rig has turned.
+typedef struct mrfgs_turn {
+  // How far it looks up, to the right and clockwise, in degrees, from where it was calibrated.
+  double degrees[3];
+  // The standard errors of these, in degrees, as if all frames showed one still scene.
+  double errors[3];
+  // How far that moves rows apart at most, in pixels.
+  double rows;
+  // How many matches show it: 0 where the frames have too few, and all the rest is 0 then.
+  uint32_t matches;
+  // 1 where it moves rows by 0.1 px or more and is no chance, else 0.
+  uint32_t counts;
+} mrfgs_turn;
 
 // Where maps are written; all of them have the size of the images. Null leaves a map out. Strides are in bytes, from a row to the next
 // one.
@@ -220,6 +237,31 @@ enum mrfgs_status mrfgs_calibration_unit(struct mrfgs_calibration *calibration, 
 
 // Frees a calibration; it may be null.
 void mrfgs_calibration_free(struct mrfgs_calibration *calibration);
+
+// The drift of a rig with this rectification, from which nothing has turned yet. The rectification may be freed before it.
+enum mrfgs_status mrfgs_drift_new(const struct mrfgs_rectification *rectification,
+                                  struct mrfgs_drift **drift);
+
+// Takes the next frame, rectified by what mrfgs_drift_correct() gave last, and before that by the rectification of the calibration. It
+// looks at the first, the fourth, the sixteenth, and then at every 64th, and of these the last 16 count. The masks are those of the views,
+// as mrfgs_match_masked() takes them; each may be null. The range holds the disparities of the frame. Calls for one drift take turns.
+enum mrfgs_status mrfgs_drift_follow(const struct mrfgs_drift *drift,
+                                     const struct mrfgs_image *left,
+                                     const struct mrfgs_image *right,
+                                     const struct mrfgs_image *left_mask,
+                                     const struct mrfgs_image *right_mask,
+                                     const struct mrfgs_range *range);
+
+// How the right camera has turned since the calibration, as far as the last frames show it.
+enum mrfgs_status mrfgs_drift_turn(const struct mrfgs_drift *drift, struct mrfgs_turn *turn);
+
+// Makes the rectification of the next frames: that of the calibration, with the right camera turned. It is null where what rectified the
+// last ones is still right. Free both, the one before when nothing uses it any more.
+enum mrfgs_status mrfgs_drift_correct(const struct mrfgs_drift *drift,
+                                      struct mrfgs_rectification **rectification);
+
+// Frees a drift; it may be null.
+void mrfgs_drift_free(struct mrfgs_drift *drift);
 
 // Opens the device, and makes *matcher; options may be null, and are not needed afterwards. Where it fails, *matcher is null.
 enum mrfgs_status mrfgs_matcher_new(const struct mrfgs_options *options,

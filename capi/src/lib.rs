@@ -8,6 +8,7 @@
 
 mod argument;
 mod calibration;
+mod drift;
 mod frame;
 mod maps;
 mod matcher;

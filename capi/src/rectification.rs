@@ -70,7 +70,7 @@ pub unsafe extern "C" fn mrfgs_rectification_new(
             Options { alpha: Some(alpha).filter(|alpha| *alpha >= 0.0), zero_disparity: zero_disparity != 0 };
         let by = mrfgs::rectification::Rectification::new(&calibration.0, size, &options)?;
         warnings::say(by.doubts().iter().map(ToString::to_string));
-        Ok(Rectification { by, kept: OnceLock::new() })
+        Ok(Rectification::of(by))
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("rectification", rectification, find) }
@@ -128,6 +128,10 @@ pub unsafe extern "C" fn mrfgs_rectification_free(rectification: *mut Rectificat
 }
 
 impl Rectification {
+    pub(crate) fn of(by: mrfgs::rectification::Rectification) -> Self {
+        Self { by, kept: OnceLock::new() }
+    }
+
     /// Many pairs may follow the first, so it finds out once where pixels come from.
     fn with_places(&self) -> mrfgs::Result<&mrfgs::rectification::Rectification> {
         if let Some(kept) = self.kept.get() {

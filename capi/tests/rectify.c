@@ -1,7 +1,7 @@
 /* Rectifies raw frames, matches the views and takes depths, and compares all with what the program makes: bytes must be equal.
  *
  *     rectify-c CAMERAS.yml RECTIFIED.yml LEFT.ppm RIGHT.ppm VIEW0.ppm VIEW1.ppm MASK0.pgm MASK1.pgm MAX-DISPARITY MAP.pfm RIGHT-MAP.pfm \
- *         DEPTH.pfm DEPTH-SIGMA.pfm THIRD.yml DEPTH-REGISTERED.pfm
+ *         DEPTH.pfm DEPTH-SIGMA.pfm THIRD.yml DEPTH-REGISTERED.pfm WRONG.yml CORRECTED.pfm
  *
  * Then it makes the mistakes that a caller can make. */
 #include "pnm.h"
@@ -240,6 +240,77 @@ static void third_camera_is_the_programs(const mrfgs_rectification *by, const ch
     free(text), free(depth), free(other);
 }
 
+/* The map of raw frames, rectified. */
+static void match_rectified(const mrfgs_matcher *matcher, const mrfgs_rectification *by, const mrfgs_image images[2], mrfgs_range range,
+                            mrfgs_drift *drift, float *map) {
+    uint32_t width, height;
+    CHECK(mrfgs_rectification_size(by, &width, &height) == MRFGS_STATUS_OK);
+    struct views views = rectified(by, images, 3, MRFGS_FORMAT_RGB8);
+    mrfgs_image pair[2], masks[2];
+    for (int i = 0; i < 2; i++) {
+        mrfgs_image view = {views.data[i], views.stride, width, height, MRFGS_FORMAT_RGB8},
+                    mask = {views.masks[i], views.mask_stride, width, height, MRFGS_FORMAT_GREY8};
+        pair[i] = view, masks[i] = mask;
+    }
+    mrfgs_maps maps = {.size = sizeof maps, .disparity = map, .disparity_stride = width * sizeof(float)};
+    CHECK(mrfgs_match_masked(matcher, &pair[0], &pair[1], &masks[0], &masks[1], &range, &maps) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_drift_follow(drift, &pair[0], &pair[1], &masks[0], &masks[1], &range) == MRFGS_STATUS_OK);
+    free_views(&views);
+}
+
+/* The second of two frames of a rig that was calibrated wrongly. */
+static void drift_is_the_programs(const char *wrong_path, const struct pnm raw[2], mrfgs_range range, const struct pnm *expected) {
+    const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
+    mrfgs_image images[2] = {image_of(&raw[0], MRFGS_FORMAT_RGB8), image_of(&raw[1], MRFGS_FORMAT_RGB8)};
+    size_t bytes = expected->width * expected->height * sizeof(float);
+    float *map = malloc(bytes);
+    mrfgs_options *options = mrfgs_options_new();
+    mrfgs_matcher *matcher;
+    CHECK(mrfgs_options_preset(options, "fast") == MRFGS_STATUS_OK && mrfgs_options_device(options, "cpu") == MRFGS_STATUS_OK);
+    CHECK(mrfgs_matcher_new(options, &matcher) == MRFGS_STATUS_OK);
+    mrfgs_calibration *calibration;
+    mrfgs_rectification *by, *better, *none;
+    mrfgs_drift *drift, *other;
+    mrfgs_turn turn = {{1, 1, 1}, {1, 1, 1}, 1, 1, 1};
+    CHECK(mrfgs_calibration_read(&wrong_path, 1, &calibration) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_rectification_new(calibration, 0, 0, -1, 1, &by) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_drift_new(by, &drift) == MRFGS_STATUS_OK);
+    CHECK(mrfgs_drift_turn(drift, &turn) == MRFGS_STATUS_OK && turn.matches == 0 && turn.degrees[0] == 0 && turn.counts == 0);
+    CHECK(mrfgs_drift_correct(drift, &better) == MRFGS_STATUS_OK && better == NULL);
+
+    match_rectified(matcher, by, images, range, drift, map);
+    /* Control: the first frame is not corrected. */
+    CHECK(memcmp(map, expected->data, bytes) != 0);
+    /* The principal point is 3 px too high: the camera looks up by about this much. */
+    CHECK(mrfgs_drift_turn(drift, &turn) == MRFGS_STATUS_OK && turn.matches > 100 && turn.counts == 1 && turn.rows > 2);
+    CHECK(turn.degrees[0] < -0.6 && turn.degrees[0] > -1.0 && turn.errors[0] > 0 && turn.errors[0] < 0.1);
+    CHECK(mrfgs_drift_correct(drift, &better) == MRFGS_STATUS_OK && better != NULL);
+    CHECK(mrfgs_drift_correct(drift, &none) == MRFGS_STATUS_OK && none == NULL);
+    mrfgs_rectification_free(by);
+    match_rectified(matcher, better, images, range, drift, map);
+    CHECK(memcmp(map, expected->data, bytes) == 0);
+
+    refused(wrong, mrfgs_drift_new(NULL, &other), "rectification", "null");
+    refused(wrong, mrfgs_drift_new(better, NULL), "place", "drift");
+    refused(wrong, mrfgs_drift_follow(NULL, &images[0], &images[1], NULL, NULL, &range), "drift", "null");
+    refused(wrong, mrfgs_drift_follow(drift, &images[0], NULL, NULL, NULL, &range), "right image", "null");
+    refused(wrong, mrfgs_drift_follow(drift, &images[0], &images[1], NULL, NULL, NULL), "range", "null");
+    images[0].height = images[1].height = 179;
+    refused(wrong, mrfgs_drift_follow(drift, &images[0], &images[1], NULL, NULL, &range), "240 x 180", "240 x 179");
+    refused(wrong, mrfgs_drift_turn(NULL, &turn), "drift", "null");
+    refused(wrong, mrfgs_drift_turn(drift, NULL), "place", "turn");
+    refused(wrong, mrfgs_drift_correct(NULL, &none), "drift", "null");
+    CHECK(none == NULL);
+    refused(wrong, mrfgs_drift_correct(drift, NULL), "place", "rectification");
+    mrfgs_rectification_free(better);
+    mrfgs_calibration_free(calibration);
+    mrfgs_matcher_free(matcher);
+    mrfgs_options_free(options);
+    mrfgs_drift_free(drift);
+    mrfgs_drift_free(NULL);
+    free(map);
+}
+
 static void mistakes(const char *path, const mrfgs_calibration *calibration, mrfgs_rectification *by, const struct pnm raw[2]) {
     const mrfgs_status wrong = MRFGS_STATUS_ARGUMENT;
     mrfgs_calibration *other;
@@ -304,11 +375,11 @@ static void mistakes(const char *path, const mrfgs_calibration *calibration, mrf
 }
 
 int main(int argc, char **argv) {
-    if (argc != 16) return 2;
+    if (argc != 18) return 2;
     const char *path = argv[1];
-    struct pnm files[11];
-    const int at[11] = {3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15};
-    for (int i = 0; i < 11; i++) files[i] = pnm_read(argv[at[i]]);
+    struct pnm files[12];
+    const int at[12] = {3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 17};
+    for (int i = 0; i < 12; i++) files[i] = pnm_read(argv[at[i]]);
     mrfgs_calibration *calibration, *same_one;
     mrfgs_rectification *by, *again, *wider;
     CHECK(mrfgs_calibration_read(&path, 1, &calibration) == MRFGS_STATUS_OK);
@@ -327,6 +398,7 @@ int main(int argc, char **argv) {
     mrfgs_range range = {0, atoi(argv[9])};
     maps_are_the_programs(by, argv[2], &files[0], range, &files[6]);
     third_camera_is_the_programs(by, argv[2], argv[14], &files[6], &files[10]);
+    drift_is_the_programs(argv[16], &files[0], range, &files[11]);
     mistakes(path, calibration, by, &files[0]);
     mrfgs_rectification_free(by);
     mrfgs_rectification_free(again);
@@ -334,7 +406,7 @@ int main(int argc, char **argv) {
     mrfgs_calibration_free(calibration);
     mrfgs_calibration_free(same_one);
     free(text);
-    for (int i = 0; i < 11; i++) free(files[i].data);
+    for (int i = 0; i < 12; i++) free(files[i].data);
     printf("rectify.c: mrfgs %s: all views, maps and depths are equal\n", mrfgs_version());
     return 0;
 }

@@ -23,6 +23,7 @@ the truth, which `read_disparity` reads.
 
 from ._mrfgs import (
     Calibration,
+    Drift,
     Matched,
     MatchedSequence,
     Matcher,
@@ -42,6 +43,7 @@ from ._mrfgs import (
 
 __all__ = [
     "Calibration",
+    "Drift",
     "Matched",
     "MatchedSequence",
     "Matcher",

@@ -256,6 +256,21 @@ class Rig:
         """(width, height) of the rectified images, in pixels; None where the calibration does not say it."""
 
 @final
+class Drift:
+    """What the frames of a rig show of how its right camera has turned since it was calibrated."""
+
+    def __new__(cls, rectification: Rectification) -> Drift:
+        """Of a rig with this rectification, from which nothing has turned yet."""
+    def follow(self, left: _Image, right: _Image, max_disparity: float, *, min_disparity: float | None = None) -> None:
+        """Takes the rectified views of the next frame, and looks at them if it is their turn."""
+    @property
+    def turn(self) -> _Turn | None:
+        """How far the right camera looks up, to the right and clockwise of where it was calibrated: `degrees`, their standard `errors`,
+        how far that moves `rows` apart (pixels), how many `matches` show it, and whether it `counts`; None where they are too few."""
+    def correct(self) -> Rectification | None:
+        """What rectifies the next frames, where that is no longer what rectified the last ones."""
+
+@final
 class Steady:
     """A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before."""
 
@@ -325,6 +340,16 @@ def options() -> dict[str, dict[str, dict[str, Any]]]:
     """Describes the options: a dict from each group to a dict from each of its keys to what it does, which values it takes, where
     it comes from, and its value in each preset."""
 
+_Turn = TypedDict(
+    "_Turn",
+    {
+        "degrees": tuple[float, float, float],
+        "errors": tuple[float, float, float],
+        "rows": float,
+        "matches": int,
+        "counts": bool,
+    },
+)
 _Errors = TypedDict(
     "_Errors",
     {

@@ -3,6 +3,7 @@
 mod arrays;
 mod calibration;
 mod depth;
+mod drift;
 mod evaluation;
 mod exceptions;
 mod matched;
@@ -32,6 +33,7 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::read_disparity, module)?)?;
     module.add_class::<calibration::PyCalibration>()?;
+    module.add_class::<drift::PyDrift>()?;
     module.add_class::<matched::PyMatched>()?;
     module.add_class::<sequence::PyMatchedSequence>()?;
     module.add_class::<matcher::PyMatcher>()?;

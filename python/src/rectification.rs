@@ -32,6 +32,8 @@ pub(crate) struct PyRectification {
     kept: OnceLock<Rectification>,
     /// What it was made of, for copies: calibration or matches, the size of the images, and the options.
     made_of: (Source, (usize, usize), Options),
+    /// How its right camera has turned since, one turn after the other.
+    turns: Vec<[f64; 3]>,
     /// What is known of the rectified pair, unless it comes from matches alone.
     known: Option<(Calibration, Py<PyRig>)>,
 }
@@ -61,7 +63,24 @@ impl PyRectification {
                 (by, None)
             }
         };
-        Ok(Self { by, kept: OnceLock::new(), made_of: (source, size, options), known })
+        Ok(Self { by, kept: OnceLock::new(), made_of: (source, size, options), turns: Vec::new(), known })
+    }
+
+    /// The same of a rig whose right camera has turned about this axis, as long as the angle.
+    pub(crate) fn with_right_turned(&self, py: Python, axis: [f64; 3]) -> PyResult<Self> {
+        let Self { by, made_of, turns, known, .. } = self;
+        Ok(Self {
+            by: by.with_right_turned(axis).map_err(exception)?,
+            kept: OnceLock::new(),
+            made_of: made_of.clone(),
+            turns: turns.iter().copied().chain([axis]).collect(),
+            known: known.as_ref().map(|(calibration, rig)| (calibration.clone(), rig.clone_ref(py))),
+        })
+    }
+
+    /// The rectification of the library.
+    pub(crate) fn by(&self) -> &Rectification {
+        &self.by
     }
 
     /// Many pairs may follow the first, so it finds out once where pixels come from.
@@ -241,7 +260,8 @@ impl PyRectification {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (source, size, Options { alpha, zero_disparity }) = self.made_of.clone();
         let again = py.get_type::<Self>().getattr("_again")?;
-        Ok((again, (source, size, alpha, zero_disparity).into_pyobject(py)?))
+        let turns = self.turns.clone();
+        Ok((again, (source, size, alpha, zero_disparity, turns).into_pyobject(py)?))
     }
 
     /// As the constructor, without saying a second time what is probably wrong.
@@ -252,8 +272,10 @@ impl PyRectification {
         size: (usize, usize),
         alpha: Option<f64>,
         zero_disparity: bool,
+        turns: Vec<[f64; 3]>,
     ) -> PyResult<Self> {
-        Self::of(of.py(), source, size, Options { alpha, zero_disparity })
+        let made = Self::of(of.py(), source, size, Options { alpha, zero_disparity })?;
+        turns.into_iter().try_fold(made, |made, axis| made.with_right_turned(of.py(), axis))
     }
 }
 

@@ -1299,6 +1299,67 @@ class Sequences(Folder):
         self.refused(ValueError, "left: is 120 x 89 and the maps are 120 x 90", lambda: steady.follow(alone[0], left[1:]))
         self.refused(TypeError, "Matched", lambda: steady.follow(alone[0].disparity, left))
 
+    def test_a_rig_that_has_turned_is_corrected_as_the_program_does(self):
+        left, right = (read_png(TESTDATA / "slanted" / name) for name in ("im0.png", "im1.png"))
+        # By how much the right camera looks up and clockwise, in radians; points turn the other way.
+        x, z = np.radians([0.4, -0.5])
+        up = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+        before = up @ np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
+        text = "%YAML:1.0\n---\nimageSize: [ 240, 180 ]\nunit: m\n"
+        lens = np.array([[180, 0, 119.5], [0, 180, 89.5], [0, 0, 1]])
+        for name, matrix in (("K1", lens), ("D1", np.zeros((5, 1))), ("K2", lens), ("D2", np.zeros((5, 1))), ("R", before),
+                             ("T", -0.16 * before[:, :1])):
+            rows, columns = matrix.shape
+            values = ", ".join(f"{value!r}" for value in matrix.ravel().astype(float).tolist())
+            text += f"{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {values} ]\n"
+        with tempfile.TemporaryDirectory() as folder:
+            folder = Path(folder)
+            (folder / "wrong.yml").write_text(text)
+            for name, view in (("left", left), ("right", right)):
+                (folder / name).mkdir()
+                for step in range(4):
+                    write_ppm(folder / name / f"{step}.ppm", view)
+            program(folder, "sequence", "left", "right", "maps", "--rectify", "--calib", "wrong.yml", "--max-disparity", 31, "--device",
+                    "cpu", "--recalibrate", "--json", "records.json", "--quiet")
+            expected = [read_pfm(folder / "maps" / f"{step}.pfm") for step in range(4)]
+            turned = json.loads((folder / "records.json").read_text().splitlines()[-1])["turned"]
+        calibrated = mrfgs.Rectification(mrfgs.Calibration.of_texts(text))
+        drift, by, maps = mrfgs.Drift(calibrated), calibrated, []
+        self.assertIsNone(drift.turn)
+        self.assertIsNone(drift.correct())
+        for step in range(4):
+            views = by.apply(left, right)
+            drift.follow(*views, 31)
+            maps.append(self.matcher.match(*views, 31).disparity)
+            self.assertTrue(np.array_equal(maps[-1], expected[step]), step)
+            by = drift.correct() or by
+        # Control: it was corrected, and the first frame was not.
+        self.assertFalse(np.array_equal(maps[0], maps[-1]))
+        turn = drift.turn
+        self.assertEqual(sorted(turn), ["counts", "degrees", "errors", "matches", "rows"])
+        self.assertTrue(turn["counts"] and turn["rows"] > 1 and turn["matches"] > 100)
+        self.assertTrue(np.allclose(turn["degrees"], turned, atol=1e-3), (turn, turned))
+        self.assertTrue(np.allclose(np.array(turn["degrees"])[[0, 2]], [0.4, -0.5], atol=0.05))
+        self.assertTrue(max(turn["errors"]) < 0.1)
+        # What is corrected is a rectification like others; and of a rig that turns once more.
+        again = mrfgs.Drift(by)
+        again.follow(*calibrated.apply(left, right), 31)
+        twice = again.correct()
+        for corrected in (by, twice):
+            self.assertFalse(np.array_equal(corrected.rotations[1], calibrated.rotations[1]))
+            self.assertTrue(np.array_equal(corrected.rotations[0], calibrated.rotations[0]))
+            self.assertTrue(np.array_equal(corrected.rig.depth(maps[-1]), calibrated.rig.depth(maps[-1])))
+            for other in self.copies(corrected):
+                self.assertTrue(np.array_equal(other.rotations, corrected.rotations))
+                self.assertEqual(other.cameras_yml(), corrected.cameras_yml())
+        self.assertFalse(np.array_equal(by.rotations[1], twice.rotations[1]))
+        self.refused(ValueError, "240 x 180 pixels and these images 240 x 179", lambda: drift.follow(left[1:], right[1:], 31))
+        self.refused(ValueError, "disparit", lambda: drift.follow(left, right, -1))
+        self.refused(TypeError, "max_disparity", lambda: drift.follow(left, right, None))
+        self.refused(TypeError, "max_disparity", lambda: drift.follow(left, right))
+        self.refused(ValueError, "matches", lambda: mrfgs.Drift(mrfgs.Rectification.of_pair(*raw_pair())))
+        self.refused(TypeError, "Rectification", lambda: mrfgs.Drift(CAMERAS))
+
     def test_memory_does_not_grow_with_the_sequence(self):
         class Array(np.ndarray):
             __hash__ = object.__hash__

@@ -33,7 +33,7 @@
 
 use super::matches;
 use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, rotation, rotation_vector, transposed};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::calib::Camera;
 use crate::image::{Image, Pair};
 use crate::maps::FRACTION;
@@ -125,7 +125,7 @@ impl Drift {
     /// Of a rig with this rectification, from which nothing has turned yet.
     ///
     /// # Errors
-    /// [`Error::Calibration`](crate::Error::Calibration) for a rectification by matches of a pair alone, which is no calibration.
+    /// [`Error::Calibration`] for a rectification by matches of a pair alone, which is no calibration.
     pub fn of(calibrated: &Rectification) -> Result<Self> {
         calibrated.calibration()?;
         Ok(Self {
@@ -142,8 +142,15 @@ impl Drift {
     /// disparities. Matches up to four rows off are found, in a pair of at most 1024 pixels a side.
     ///
     /// # Errors
-    /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
+    /// [`Error::Mismatch`] for a pair of another size than the rectified views, [`Error::Memory`] when the machine has not enough for the
+    /// search.
     pub fn follow(&mut self, pair: &Pair, range: DisparityRange) -> Result<()> {
+        if pair.size() != self.size {
+            let ((width, height), (w, h)) = (self.size, pair.size());
+            return Err(Error::Mismatch(format!(
+                "the rectified views have {width} x {height} pixels and these images {w} x {h}"
+            )));
+        }
         self.count += 1;
         if ![1, 4, 16].contains(&self.count) && !self.count.is_multiple_of(STRIDE) {
             return Ok(());
@@ -184,7 +191,8 @@ impl Drift {
         let turned = if self.rows(&change) < WORTH {
             None
         } else {
-            let by = Rectification::of_cameras(cameras, small.size())?.with_right_turned(&change)?;
+            let by = Rectification::of_cameras(cameras, small.size())?
+                .with_right_turned(rotation_vector(&change))?;
             Some(by.apply(small)?)
         };
         let by = if turned.is_some() { by } else { &self.applied };
@@ -216,7 +224,7 @@ impl Drift {
     /// What rectifies the next frames, where that is no longer what rectified the last ones: `calibrated`, with the right camera turned.
     ///
     /// # Errors
-    /// [`Error::Memory`](crate::Error::Memory) where `calibrated` [keeps its places](Rectification::keep_places) and the machine has not
+    /// [`Error::Memory`] where `calibrated` [keeps its places](Rectification::keep_places) and the machine has not
     /// enough for others.
     pub fn correct(&mut self, calibrated: &Rectification) -> Result<Option<Rectification>> {
         let Some(turn) = self.turn.filter(Turn::counts) else { return Ok(None) };
@@ -225,7 +233,7 @@ impl Drift {
             return Ok(None);
         }
         self.applied = by;
-        calibrated.with_right_turned(&by).map(Some)
+        calibrated.with_right_turned(turn.axis).map(Some)
     }
 
     /// How far a turn moves rows apart at most, in pixels of the images.

@@ -37,7 +37,7 @@ pub use two_views::Correspondence;
 
 use crate::calibration::cameras::{StereoCalibration, Views};
 use crate::calibration::lens::{Distortion, Lens};
-use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, transposed};
+use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, rotation, transposed};
 use crate::error::{Error, Purpose, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::{Pair, Plane};
@@ -274,10 +274,14 @@ impl Rectification {
         Self::of_views(&lenses, views, size, Unit::default(), Vec::new())
     }
 
-    /// The same of a rig whose right camera has turned, by so much in its rectified view.
-    pub(crate) fn with_right_turned(&self, by: &Matrix) -> Result<Self> {
+    /// The same of a rig whose right camera has turned about this axis of its rectified view, as long as the angle in radians:
+    /// [`Turn::axis`](crate::drift::Turn::axis).
+    ///
+    /// # Errors
+    /// [`Error::Memory`] where it [keeps its places](Self::keep_places) and the machine has not enough for others.
+    pub fn with_right_turned(&self, axis: [f64; 3]) -> Result<Self> {
         let mut turned = Self { places: None, ..self.clone() };
-        turned.views.rotations[1] = product(by, &self.views.rotations[1]);
+        turned.views.rotations[1] = product(&rotation(axis), &self.views.rotations[1]);
         if self.places.is_some() {
             turned.keep_places()?;
         }
