@@ -37,6 +37,8 @@ const FRAGMENT = `
 
 /** Degrees that an arrow key turns. */
 const TURN = 5;
+/** How long new points swing, how often in that time, and how far to each side. */
+const SWING = { milliseconds: 16_000, times: 2, radians: 0.24 };
 
 export class CloudView {
     private readonly renderer: WebGLRenderer;
@@ -52,6 +54,8 @@ export class CloudView {
     private points: Points | undefined;
     private rig: { cameras: Cameras; width: number; height: number } | undefined;
     private due = 0;
+    /** Where nobody has taken hold of the points yet. */
+    private swings = !matchMedia('(prefers-reduced-motion: reduce)').matches;
 
     /** Throws where the browser has no WebGL. */
     constructor(private readonly canvas: HTMLCanvasElement) {
@@ -63,6 +67,7 @@ export class CloudView {
         this.renderer.setClearColor(0x14161a);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.addEventListener('change', () => this.ask());
+        this.controls.addEventListener('start', () => (this.swings = false));
         canvas.addEventListener('keydown', (event) => this.press(event));
         new ResizeObserver(() => this.resize()).observe(canvas);
     }
@@ -83,6 +88,33 @@ export class CloudView {
         this.rig = { cameras, width, height };
         this.uniform('footprint', 1.2 / cameras.focalLength);
         this.reset();
+        if (this.swings) {
+            this.swing(performance.now());
+        }
+    }
+
+    /** Turns the points to both sides, slowly, so that their depth is seen; until somebody takes hold of them, or looks at something else. */
+    private swing(begun: number): void {
+        const points = this.points;
+        const start = new Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
+        const frame = (now: number) => {
+            const part = (now - begun) / SWING.milliseconds;
+            this.swings &&= part < 1;
+            if (!this.swings || points !== this.points || this.canvas.clientWidth === 0) {
+                return;
+            }
+            const theta = start.theta + SWING.radians * Math.sin(2 * Math.PI * SWING.times * Math.max(0, part));
+            this.look(new Spherical(start.radius, start.phi, theta));
+            requestAnimationFrame(frame);
+        };
+        requestAnimationFrame(frame);
+    }
+
+    /** Looks at the target from there. */
+    private look(from: Spherical): void {
+        this.camera.position.setFromSpherical(from).add(this.controls.target);
+        this.controls.update();
+        this.ask();
     }
 
     /** Gives the memory of the points back. */
@@ -102,8 +134,14 @@ export class CloudView {
         this.ask();
     }
 
+    /** The first view again, at rest. */
+    rest(): void {
+        this.swings = false;
+        this.reset();
+    }
+
     /** The view of the left camera, a little from the side. */
-    reset(): void {
+    private reset(): void {
         if (!this.points || !this.rig) {
             return;
         }
@@ -154,6 +192,7 @@ export class CloudView {
     }
 
     private press(event: KeyboardEvent): void {
+        this.swings = false;
         const { target } = this.controls;
         const offset = this.camera.position.clone().sub(target);
         const keys = step(event);

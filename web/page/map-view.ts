@@ -20,8 +20,11 @@ export class MapView {
     private zoom: number | undefined;
     private marked: Pixel | undefined;
 
-    /** `pointed` is called with the pixel under the pointer; with undefined when there is none. */
-    constructor(private readonly pointed: (pixel: Pixel | undefined) => void) {
+    /** `pointed` is called with the pixel under the pointer, with undefined when there is none, and `picked` with one that is clicked. */
+    constructor(
+        private readonly pointed: (pixel: Pixel | undefined) => void,
+        private readonly picked: (pixel: Pixel) => void,
+    ) {
         new ResizeObserver(() => this.layOut()).observe(this.box);
         this.listenToZoom();
         this.listenToPointer();
@@ -29,17 +32,22 @@ export class MapView {
         this.listenToPinch();
     }
 
-    /** Shows a picture; one of another size is fitted anew. */
-    show(view: Picture, left: Picture): void {
+    /** Draws another picture in the place of the one that is shown, of the same size. */
+    redraw(view: Picture): void {
         draw(by<HTMLCanvasElement>('view'), view);
-        draw(by<HTMLCanvasElement>('under'), left);
+    }
+
+    /** Shows a picture, and another one of its size behind the divider; one of another size is fitted anew. */
+    show(view: Picture, behind: Picture): void {
+        draw(by<HTMLCanvasElement>('view'), view);
+        draw(by<HTMLCanvasElement>('under'), behind);
         by('map').classList.add('shown');
         if (view.width !== this.size.width || view.height !== this.size.height) {
             this.size = { width: view.width, height: view.height };
             this.zoom = undefined;
             this.mark(undefined);
         }
-        const same = view === left;
+        const same = view === behind;
         by('divider').hidden = by('wipe-label').hidden = by('under').hidden = same;
         this.layOut();
     }
@@ -127,6 +135,8 @@ export class MapView {
                 this.mark({ x: clamp(x + moved[0], this.size.width), y: clamp(y + moved[1], this.size.height) });
                 this.probe.scrollIntoView({ block: 'nearest', inline: 'nearest' });
                 this.pointed(this.marked);
+            } else if (event.key === 'Enter' && this.marked) {
+                this.picked(this.marked);
             } else if (event.key === '+' || event.key === '=') {
                 this.zoomBy(1);
             } else if (event.key === '-') {
@@ -157,7 +167,7 @@ export class MapView {
     }
 
     private listenToPointer(): void {
-        const pixel = ({ clientX, clientY }: PointerEvent): Pixel | undefined => {
+        const pixel = ({ clientX, clientY }: MouseEvent): Pixel | undefined => {
             const sheet = this.sheet.getBoundingClientRect();
             const [x, y] = [clientX - sheet.x, clientY - sheet.y].map((v) => Math.floor(v / this.scale)) as [number, number];
             return x >= 0 && y >= 0 && x < this.size.width && y < this.size.height ? { x, y } : undefined;
@@ -174,7 +184,16 @@ export class MapView {
                 this.pointed(undefined);
             }
         });
+        let pressed = { x: 0, y: 0 };
+        this.box.addEventListener('click', (event) => {
+            const at = pixel(event);
+            // Not where the picture was dragged.
+            if (at && Math.hypot(event.clientX - pressed.x, event.clientY - pressed.y) < 4) {
+                this.picked(at);
+            }
+        });
         this.box.addEventListener('pointerdown', (event) => {
+            pressed = { x: event.clientX, y: event.clientY };
             // A finger scrolls by itself.
             if (event.button === 0 && event.pointerType === 'mouse' && this.zoom !== undefined) {
                 this.box.setPointerCapture(event.pointerId);

@@ -6,13 +6,18 @@ import * as legend from './legend';
 import { type Pixel, MapView } from './map-view';
 import { tooLarge } from './memory';
 import { keepOffline } from './offline';
+import { painted } from './paint';
 import { PointsTab } from './points';
 import { lit } from './relief';
 import { left as timeLeft, phase } from './stages';
-import type { Colours, Comparison, Device, Facts, Known, Map, Output, Pair, Picture, Range, Result, Size, Warning } from './protocol';
-import { save, stem } from './save';
+import type { Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Range, Result, Size, Warning } from './protocol';
+import { Ruler, inUnit, place } from './ruler';
+import { stem } from './save';
+import { type File, saveFile } from './saving';
 import { Settings } from './settings';
+import { offerCamera } from './shots';
 import { type Scene, Slots, type View as Opened } from './slots';
+import { Wiggle, aligned, anaglyph } from './stereo';
 import { tabs } from './tabs';
 import { withoutWebGpu } from './webgpu';
 
@@ -23,7 +28,7 @@ declare const SCENES: Scene[];
 /** How the first scene is matched: at once, on any machine. */
 const FIRST = { device: 'cpu', preset: 'fast' } as const;
 
-type View = Map | 'left' | 'points';
+type View = Map | 'left' | 'stereo' | 'points';
 
 /** What a pair is rectified by. */
 type Rectifier = 'calibration' | 'matches';
@@ -38,8 +43,17 @@ const slots = new Slots(SCENES, (match) => {
     rectify = undefined;
     void load(match);
 });
-const map = new MapView((pixel) => readOut(pixel));
-const points = new PointsTab((cameras) => client.call('points', cameras), () => readOut(undefined));
+const map = new MapView((pixel) => readOut(pixel), (pixel) => ruler.pick(pixel));
+const points = new PointsTab((cameras) => client.call('points', cameras), () => {
+    readOut(undefined);
+    ruler.draw();
+});
+const ruler = new Ruler(
+    ({ x, y }) => result?.disparity[y * result.width + x] ?? Infinity,
+    () => points.known,
+    () => result,
+);
+const wiggle = new Wiggle();
 const list = tabs(by('tabs'), (tab) => select(tab.dataset['view'] as View));
 
 let facts: Facts | undefined;
@@ -54,6 +68,8 @@ let suspicions: Warning[] = [];
 /** The range that `automatic` stands for, and where it comes from. */
 let found: { range: Range; by: string } | undefined;
 let result: (Result & { generation: number; pictures: Partial<Record<Map, Picture>>; on: Device; preset: string; suspicions: Warning[] }) | undefined;
+/** The map before this one, of the same pair. */
+let before: { disparity: Float32Array; preset: string } | undefined;
 /** Grows when the pair changes: what was asked for an earlier one is not wanted any more. */
 let turn = 0;
 
@@ -427,6 +443,7 @@ async function match({ device, preset, size }: { device: Device; preset: string;
     }
     if (matched) {
         const pictures = { disparity: matched.picture };
+        before = result && { disparity: result.disparity, preset: result.preset };
         result = { ...matched, generation: client.generation, pictures, on: device, preset, suspicions: was };
         await present();
         // On a narrow page the result is above the form.
@@ -463,16 +480,39 @@ async function present(): Promise<void> {
     say('facts', facts.join(' · '));
     by('compare').title = gpu ? 'Matches by the other path too and counts the pixels that differ' : 'There is no GPU to compare with';
     points.result(true);
+    offerBefore();
+    ruler.clear();
     readOut(undefined);
     await showView();
 }
 
+/** The map before can stand behind the divider. */
+function offerBefore(): void {
+    const behind = by<HTMLSelectElement>('behind');
+    const option = behind.querySelector('[value="before"]') as HTMLOptionElement;
+    option.disabled = !before;
+    option.textContent = before ? `Map before (${before.preset})` : 'Map before';
+    if (!before) {
+        behind.value = 'left';
+    }
+}
+
+/** What is left of the divider. */
+function behind(left: Picture): Picture {
+    if (!before || !result || !facts || by<HTMLSelectElement>('behind').value === 'left') {
+        return left;
+    }
+    return painted(result.width, result.height, before.disparity, facts.scales[colours()], result.spread);
+}
+
 /** A pair that changes takes its result along. */
 function forget(): void {
-    result = undefined;
+    result = before = undefined;
     if (!pair) {
         map.clear();
     }
+    offerBefore();
+    ruler.clear();
     legend.none();
     points.result(false);
     by('outcome').hidden = true;
@@ -502,6 +542,7 @@ async function picture(of: Map): Promise<Picture | undefined> {
 async function showView(): Promise<void> {
     const mine = result;
     const shown = view;
+    wiggle.stop();
     if (!pair || shown === 'points') {
         return;
     }
@@ -512,12 +553,16 @@ async function showView(): Promise<void> {
         return;
     }
     try {
-        const seen = shown === 'left' ? pair.left : await picture(shown);
+        const seen = shown === 'left' || shown === 'stereo' ? pair.left : await picture(shown);
         if (!seen || mine !== result || shown !== view) {
             return;
         }
-        const relief = shown === 'disparity' && by<HTMLInputElement>('relief').checked;
-        map.show(relief ? lit(seen, mine.disparity, mine.spread) : seen, pair.left);
+        if (shown === 'stereo') {
+            showStereo(pair, mine.spread);
+        } else {
+            const relief = shown === 'disparity' && by<HTMLInputElement>('relief').checked;
+            map.show(relief ? lit(seen, mine.disparity, mine.spread) : seen, shown === 'left' ? seen : behind(pair.left));
+        }
     } catch (error) {
         say('readout', words(error));
         return;
@@ -534,6 +579,18 @@ async function showView(): Promise<void> {
     by('map').dataset['shown'] = shown;
 }
 
+/** Both views at once. What is in the middle of the disparities stays where it is. */
+function showStereo({ left, right }: Pair, { min, max }: Range): void {
+    const moved = aligned(right, (min + max) / 2);
+    if (by<HTMLSelectElement>('stereo').value === 'anaglyph') {
+        const both = anaglyph(left, moved);
+        map.show(both, both);
+    } else {
+        map.show(left, left);
+        wiggle.start([left, moved], (picture) => map.redraw(picture));
+    }
+}
+
 /** A disparity with as many digits as a legend takes. */
 const pixels = (value: number): string => String(Number(value.toFixed(1)));
 
@@ -543,6 +600,7 @@ function select(to: View): void {
     by('map').hidden = by('map-tools').hidden = inPoints;
     by('points').hidden = by('points-tools').hidden = !inPoints;
     by('colours-label').hidden = by('relief-label').hidden = to !== 'disparity';
+    by('stereo-label').hidden = to !== 'stereo';
     by('map').setAttribute('aria-labelledby', `tab-${inPoints ? 'disparity' : to}`);
     points.select(inPoints, result !== undefined);
     void showView();
@@ -565,10 +623,9 @@ function readOut(pixel: Pixel | undefined): void {
         legend.named(facts.reasons, validity).map(({ name }) => name).join(', '),
     ];
     const cameras = points.known;
-    const apart = cameras && measured ? disparity + cameras.doffs : 0;
-    if (cameras && apart > 0) {
-        const unit = cameras.unit === 'unknown' ? ' in the unit of the baseline' : ` ${cameras.unit}`;
-        parts.push(`depth ${((cameras.baseline * cameras.focalLength) / apart).toPrecision(5)}${unit}`);
+    const at3 = cameras && place(pixel, disparity, cameras);
+    if (at3) {
+        parts.push(`depth ${inUnit(at3[2], cameras.unit)}`);
     }
     say('readout', parts.join(' · '));
 }
@@ -598,25 +655,15 @@ async function compare(): Promise<void> {
     be(idle());
 }
 
-async function download(output: Output | 'ply'): Promise<void> {
+async function download(file: File): Promise<void> {
+    const [mine, left] = [result, pair?.left];
     const name = stem(slots.name ?? slots.views.left?.name ?? 'pair');
     say('save-problem', undefined);
     try {
-        if (!held()) {
+        if (!held() || !mine || !left) {
             throw new Error('The engine was started again since this match. Match once more to save.');
         }
-        if (output === 'ply') {
-            const cameras = points.cameras;
-            if (!cameras) {
-                throw new Error('The points take the cameras, in the tab Points.');
-            }
-            save(await client.call('ply', cameras, points.leastConfidence), `${name}-points.ply`, 'application/octet-stream');
-        } else {
-            const of = output === 'pfm' || output === 'png' ? 'disparity' : output;
-            const png = output !== 'pfm' && output !== 'raw';
-            const type = png ? 'image/png' : 'application/octet-stream';
-            save(await client.call('file', output), `${name}-${of}.${png ? 'png' : 'pfm'}`, type);
-        }
+        await saveFile(client, file, name, mine, left, points.cameras, points.leastConfidence);
     } catch (error) {
         say('save-problem', explained(error));
     }
@@ -633,9 +680,9 @@ by('cancel').addEventListener('click', () => {
 });
 by('compare').addEventListener('click', () => void compare());
 by('downloads').addEventListener('click', ({ target }) => {
-    const output = (target as HTMLElement).dataset['output'] as Output | 'ply' | undefined;
-    if (output) {
-        void download(output);
+    const file = (target as HTMLElement).dataset['output'] as File | undefined;
+    if (file) {
+        void download(file);
     }
 });
 by('colours').addEventListener('change', () => {
@@ -644,7 +691,12 @@ by('colours').addEventListener('change', () => {
         void showView();
     }
 });
-by('relief').addEventListener('change', () => void showView());
+for (const id of ['relief', 'stereo', 'behind']) {
+    by(id).addEventListener('change', () => void showView());
+}
+offerCamera((views) => {
+    void slots.take(views, undefined, 'camera').then(() => rectifyBy('matches'));
+});
 list.select(by('tab-disparity'));
 void start();
 void keepOffline();

@@ -42,7 +42,7 @@ export class PointsTab {
         }
         by('unit').addEventListener('change', () => this.renew());
         by('least').addEventListener('input', () => this.filter());
-        by('reset-view').addEventListener('click', () => this.view?.reset());
+        by('reset-view').addEventListener('click', () => this.view?.rest());
     }
 
     /** The cameras of the form; undefined where a number is missing or makes no sense. */

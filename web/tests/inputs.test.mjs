@@ -185,6 +185,22 @@ describe('inputs', () => {
         await works();
     });
 
+    it('keeps no complaint of a range that was changed since', async () => {
+        await visit.set({ range: [0, 20] });
+        // Faster than the engine answers.
+        await visit.tab.evaluate(() => {
+            const max = document.getElementById('max');
+            for (const value of ['1000000', '-5', '', '20']) {
+                max.value = value;
+                max.dispatchEvent(new Event('change'));
+            }
+        });
+        // What was asked for before is answered by then.
+        await visit.match();
+        assert.equal(await visit.text('#range-problem'), '');
+        assert.match(await visit.text('#facts'), /range 0 to 20/);
+    });
+
     it('goes on with another worker where one has ended', async () => {
         await visit.set({ range: 'automatic', device: 'cpu', preset: 'default' });
         // The worker does not understand this, and ends with an error that nothing catches.

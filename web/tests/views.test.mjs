@@ -1,6 +1,8 @@
 // What is shown of a result, with mouse and keyboard, on wide and narrow screens.
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { levels } from '../png.mjs';
@@ -24,7 +26,8 @@ describe('views', () => {
     const focused = () => visit.tab.evaluate(() => document.activeElement.id || document.activeElement.dataset.scene || document.activeElement.name);
     const shown = (view) => visit.tab.waitForSelector(`#map[data-shown=${view}]`);
     before(async () => {
-        visit = await Visit.open();
+        // Points that swing would be another picture each time.
+        visit = await Visit.open({ before: ({ tab }) => tab.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: 'reduce' }]) });
         await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
         await visit.match({ device: 'cpu' });
     });
@@ -194,7 +197,7 @@ describe('views', () => {
             }
             await visit.tab.keyboard.press('Tab');
         }
-        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
+        assert.deepEqual(order, ['left-file', 'swap', 'right-file', 'open-camera', 'mixed', 'slanted', 'thin', 'steep', 'preset', 'size', 'range', 'device', 'match']);
         await visit.tab.focus('[data-scene=slanted]');
         await visit.changed(() => visit.tab.keyboard.press('Enter'));
         await visit.state('done');
@@ -282,6 +285,34 @@ describe('views', () => {
         }
     });
 
+    it('shows all of a portrait, and images of 16 bits not dark', async () => {
+        const other = await visit.browser.newPage();
+        await other.goto(visit.url);
+        await other.waitForSelector('html[data-gpu]');
+        const folder = mkdtempSync(join(tmpdir(), 'mrfgs-thumbs-'));
+        // Twelve bits of a camera in 16, taller than wide.
+        const [width, height] = [60, 120];
+        const grey = Buffer.alloc(2 * width * height);
+        for (let i = 0; i < width * height; i += 1) {
+            grey.writeUInt16BE(1000 + ((i * 7919) % 3000), 2 * i);
+        }
+        const file = join(folder, 'tall.pgm');
+        writeFileSync(file, Buffer.concat([Buffer.from(`P5 ${width} ${height} 65535\n`), grey]));
+        await (await other.$('#left-file')).uploadFile(file);
+        await (await other.$('#right-file')).uploadFile(file);
+        await other.waitForFunction(() => document.querySelector('#left canvas:not([hidden])'));
+        const seen = await other.$eval('#left canvas', (canvas) => {
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            const mean = data.reduce((sum, value, i) => sum + (i % 4 === 0 ? value : 0), 0) / (data.length / 4);
+            return { fit: getComputedStyle(canvas).objectFit, shape: canvas.height / canvas.width, mean };
+        });
+        assert.deepEqual([seen.fit, seen.shape], ['contain', 2]);
+        assert.ok(seen.mean > 60, `${seen.mean}`);
+        await other.close();
+        rmSync(folder, { recursive: true });
+        await visit.tab.bringToFront();
+    });
+
     it('tells those who listen which file a view has', async () => {
         const held = await visit.tab.evaluate(() => ['left-file', 'right-file'].map((id) => document.getElementById(id).files[0]?.name));
         assert.deepEqual(held, ['slanted im0.png', 'slanted im1.png']);
@@ -307,7 +338,7 @@ describe('views', () => {
 
     it('fits on a phone', async () => {
         await visit.tab.setViewport({ width: 360, height: 740 });
-        for (const view of [...VIEWS, 'points']) {
+        for (const view of [...VIEWS, 'stereo', 'points']) {
             await visit.tab.click(`#tab-${view}`);
             const wide = await visit.tab.evaluate(() => document.documentElement.scrollWidth);
             assert.ok(wide <= 360, `${view}: ${wide}`);

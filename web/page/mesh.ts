@@ -1,0 +1,160 @@
+// The surface of a map as triangles, for other programs. A chunk of its own, loaded when it is saved.
+
+import type { Cameras, Picture } from './protocol';
+import { place } from './ruler';
+
+export interface Mesh {
+    /** x to the right, y down, z forward of the left camera, in the unit of the baseline. */
+    positions: Float32Array<ArrayBuffer>;
+    /** Where each vertex is in the left view, from 0 to 1. */
+    texture: Float32Array<ArrayBuffer>;
+    colours: Uint8Array<ArrayBuffer>;
+    /** Three vertices each, counter-clockwise as the camera sees them. */
+    triangles: Uint32Array<ArrayBuffer>;
+    unit: string;
+}
+
+/** What a mesh is made of. */
+export interface Surface {
+    width: number;
+    height: number;
+    disparity: Float32Array;
+    confidence: Uint8Array;
+    /** 0 where a disparity is measured and trusted. */
+    validity: Uint8Array;
+}
+
+/** Vertices beyond which neighbours are left out. */
+const MOST = 1_000_000;
+
+/**
+ * The pixels that are measured and trusted with at least this confidence, joined where neighbours differ by at most a pixel for each
+ * pixel that they are apart: surfaces stay whole, and edges are open.
+ */
+export function mesh({ width, height, disparity, confidence, validity }: Surface, cameras: Cameras, left: Picture, least: number): Mesh {
+    const step = Math.ceil(Math.sqrt((width * height) / MOST));
+    const [columns, rows] = [Math.ceil(width / step), Math.ceil(height / step)];
+    const vertex = new Int32Array(columns * rows).fill(-1);
+    const positions = new Float32Array(3 * columns * rows);
+    const texture = new Float32Array(2 * columns * rows);
+    const colours = new Uint8Array(3 * columns * rows);
+    const pixel = (at: number) => step * (Math.floor(at / columns) * width + (at % columns));
+    let count = 0;
+    for (let at = 0; at < vertex.length; at += 1) {
+        const i = pixel(at);
+        const [x, y] = [i % width, Math.floor(i / width)];
+        const there = validity[i] === 0 && (confidence[i] ?? 0) >= least;
+        const point = there ? place({ x, y }, disparity[i] ?? Infinity, cameras) : undefined;
+        if (point) {
+            positions.set(point, 3 * count);
+            texture.set([(x + 0.5) / width, (y + 0.5) / height], 2 * count);
+            colours.set(left.pixels.subarray(4 * i, 4 * i + 3), 3 * count);
+            vertex[at] = count;
+            count += 1;
+        }
+    }
+    const triangles = new Uint32Array(6 * columns * rows);
+    let length = 0;
+    const of = (at: number) => disparity[pixel(at)] ?? Infinity;
+    const join = (...corners: [number, number, number]) => {
+        const seen = corners.map(of);
+        if (corners.every((at) => (vertex[at] ?? -1) >= 0) && Math.max(...seen) - Math.min(...seen) <= step) {
+            triangles.set(corners.map((at) => vertex[at] ?? 0), length);
+            length += 3;
+        }
+    };
+    for (let row = 0; row + 1 < rows; row += 1) {
+        for (let column = 0; column + 1 < columns; column += 1) {
+            const a = row * columns + column;
+            const [b, c, d] = [a + 1, a + columns, a + columns + 1];
+            // Along the diagonal that is the flatter one.
+            if (Math.abs(of(a) - of(d)) <= Math.abs(of(b) - of(c))) {
+                join(a, c, d);
+                join(a, d, b);
+            } else {
+                join(a, c, b);
+                join(b, c, d);
+            }
+        }
+    }
+    return {
+        positions: positions.slice(0, 3 * count),
+        texture: texture.slice(0, 2 * count),
+        colours: colours.slice(0, 3 * count),
+        triangles: triangles.slice(0, length),
+        unit: cameras.unit,
+    };
+}
+
+/** Metres in a unit; glTF has no other. */
+const METRES: Record<string, number> = { mm: 1e-3, cm: 1e-2, m: 1 };
+
+/** The mesh with the left view (PNG) on it, as a binary file of glTF 2.0: y up, z towards the viewer. */
+export function glb({ positions, texture, triangles, unit }: Mesh, image: Uint8Array): Uint8Array<ArrayBuffer> {
+    const scale = METRES[unit] ?? 1;
+    const turned = positions.map((value, i) => (i % 3 === 0 ? scale * value : -scale * value));
+    const [min, max] = [new Array<number>(3).fill(Infinity), new Array<number>(3).fill(-Infinity)];
+    turned.forEach((value, i) => {
+        min[i % 3] = Math.min(min[i % 3] ?? value, value);
+        max[i % 3] = Math.max(max[i % 3] ?? value, value);
+    });
+    const parts = [turned, texture, triangles, image].map((part) => new Uint8Array(part.buffer, part.byteOffset, part.byteLength));
+    let offset = 0;
+    const bufferViews = parts.map(({ byteLength }, i) => {
+        const view = { buffer: 0, byteOffset: offset, byteLength, ...(i < 3 && { target: i < 2 ? 34962 : 34963 }) };
+        offset += Math.ceil(byteLength / 4) * 4;
+        return view;
+    });
+    const text = JSON.stringify({
+        asset: { version: '2.0', generator: 'mrfgs' },
+        extensionsUsed: ['KHR_materials_unlit'],
+        scene: 0,
+        scenes: [{ nodes: [0] }],
+        nodes: [{ mesh: 0 }],
+        meshes: [{ primitives: [{ attributes: { POSITION: 0, TEXCOORD_0: 1 }, indices: 2, material: 0 }] }],
+        materials: [{ doubleSided: true, extensions: { KHR_materials_unlit: {} }, pbrMetallicRoughness: { baseColorTexture: { index: 0 }, metallicFactor: 0 } }],
+        textures: [{ source: 0 }],
+        images: [{ bufferView: 3, mimeType: 'image/png' }],
+        accessors: [
+            { bufferView: 0, componentType: 5126, count: turned.length / 3, type: 'VEC3', min, max },
+            { bufferView: 1, componentType: 5126, count: texture.length / 2, type: 'VEC2' },
+            { bufferView: 2, componentType: 5125, count: triangles.length, type: 'SCALAR' },
+        ],
+        bufferViews,
+        buffers: [{ byteLength: offset }],
+    });
+    const json = new TextEncoder().encode(text.padEnd(Math.ceil(text.length / 4) * 4));
+    const file = new Uint8Array(12 + 8 + json.length + 8 + offset);
+    const words = new DataView(file.buffer);
+    [0x46546c67, 2, file.length, json.length, 0x4e4f534a].forEach((word, i) => words.setUint32(4 * i, word, true));
+    file.set(json, 20);
+    [offset, 0x004e4942].forEach((word, i) => words.setUint32(20 + json.length + 4 * i, word, true));
+    parts.forEach((part, i) => file.set(part, 28 + json.length + (bufferViews[i]?.byteOffset ?? 0)));
+    return file;
+}
+
+/** The mesh with a colour for each vertex, as a binary file of PLY. */
+export function ply({ positions, colours, triangles }: Mesh): Uint8Array<ArrayBuffer> {
+    const [vertices, faces] = [positions.length / 3, triangles.length / 3];
+    const header = new TextEncoder().encode(
+        `ply\nformat binary_little_endian 1.0\ncomment mrfgs\nelement vertex ${vertices}\n` +
+            'property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n' +
+            `element face ${faces}\nproperty list uchar uint vertex_indices\nend_header\n`,
+    );
+    const file = new Uint8Array(header.length + 15 * vertices + 13 * faces);
+    const words = new DataView(file.buffer);
+    file.set(header);
+    for (let i = 0, at = header.length; i < vertices; i += 1, at += 15) {
+        for (let k = 0; k < 3; k += 1) {
+            words.setFloat32(at + 4 * k, positions[3 * i + k] ?? 0, true);
+            file[at + 12 + k] = colours[3 * i + k] ?? 0;
+        }
+    }
+    for (let i = 0, at = header.length + 15 * vertices; i < faces; i += 1, at += 13) {
+        file[at] = 3;
+        for (let k = 0; k < 3; k += 1) {
+            words.setUint32(at + 1 + 4 * k, triangles[3 * i + k] ?? 0, true);
+        }
+    }
+    return file;
+}
