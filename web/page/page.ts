@@ -1,7 +1,7 @@
 // The page: what follows what.
 
 import { Broken, Client, Interrupted } from './client';
-import { by, count, duration, make, say, sentence, words } from './dom';
+import { by, count, duration, say, words } from './dom';
 import * as legend from './legend';
 import { type Pixel, MapView } from './map-view';
 import { tooLarge } from './memory';
@@ -11,6 +11,7 @@ import { PointsTab } from './points';
 import { lit } from './relief';
 import { left as timeLeft, phase } from './stages';
 import type { Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Range, Result, Size, Warning } from './protocol';
+import { Remarks } from './remarks';
 import { Ruler, inUnit, place } from './ruler';
 import { stem } from './save';
 import { type File, saveFile } from './saving';
@@ -54,6 +55,19 @@ const ruler = new Ruler(
     () => result,
 );
 const wiggle = new Wiggle();
+const remarks = new Remarks({
+    swap: () => slots.swap(true),
+    rectify: () => rectifyBy('matches'),
+    widen: (range) => {
+        settings.give(range);
+        void checkRange().then(() => match());
+    },
+    asTheyAre: () => rectifyBy('nothing'),
+    atFullSize: () => {
+        settings.size = 'full';
+        void match();
+    },
+});
 const list = tabs(by('tabs'), (tab) => select(tab.dataset['view'] as View));
 
 let facts: Facts | undefined;
@@ -145,8 +159,7 @@ async function read(matched: boolean): Promise<void> {
     say('range-found', undefined);
     say('range-problem', undefined);
     suspicions = [];
-    by('warnings').replaceChildren();
-    by('notes').replaceChildren();
+    remarks.clear();
     by('intro').hidden = slots.scene === undefined;
     const { left, right } = slots.views;
     if (!left || !right) {
@@ -177,7 +190,7 @@ async function read(matched: boolean): Promise<void> {
         await findRange(current);
         if (current()) {
             be('ready');
-            note(pair.notes);
+            remarks.note(pair.notes, pair.by !== undefined);
             if (matched) {
                 await match(gpu === undefined ? { ...FIRST, preset: settings.chosen ?? FIRST.preset } : settings);
             }
@@ -300,59 +313,12 @@ async function checkRange(): Promise<void> {
     }
     // What is said of a result stays with it.
     if (!result) {
-        warn(said);
+        remarks.warn(said);
     }
 }
 
 /** Where a range comes from that no file gives. */
 const MATCHES = 'sparse matches';
-
-const REMEDIES: Record<NonNullable<Warning['remedy']>, string> = { swap: 'Swap the views', rectify: 'Rectify', widen: 'Widen the range' };
-
-/** Shows what is probably wrong, each with a button for what helps. */
-function warn(warnings: Warning[]): void {
-    const unique = warnings.filter(({ text }, i) => warnings.findIndex((other) => other.text === text) === i);
-    by('warnings').replaceChildren(
-        ...unique.map((warning) => {
-            const { remedy } = warning;
-            return make('li', {}, `${sentence(warning.text)} `, ...(remedy ? [button(REMEDIES[remedy], () => help(warning))] : []));
-        }),
-    );
-}
-
-function button(text: string, act: () => void): HTMLButtonElement {
-    const made = make('button', { type: 'button' }, text);
-    made.addEventListener('click', act);
-    return made;
-}
-
-/** Does what helps about a warning, and matches again. */
-function help({ remedy, min, max }: Warning): void {
-    if (remedy === 'swap') {
-        slots.swap(true);
-    } else if (remedy === 'rectify') {
-        rectifyBy('matches');
-    } else if (remedy === 'widen' && min !== undefined && max !== undefined) {
-        settings.give({ min, max });
-        void checkRange().then(() => match());
-    }
-}
-
-/** Says what was done to a pair, with the way back. */
-function note(notes: string[], short = false): void {
-    const lines = notes.map((text) => make('li', {}, `${sentence(text)}. `));
-    if (pair?.by) {
-        lines[0]?.append(button('Take the images as they are', () => rectifyBy('nothing')));
-    }
-    if (short) {
-        const full = button('Match at full size', () => {
-            settings.size = 'full';
-            void match();
-        });
-        lines.push(make('li', {}, 'At full size this pair takes more memory than a match may have here, so it was matched at half its size. ', full));
-    }
-    by('notes').replaceChildren(...lines);
-}
 
 /** Runs a match with its bar; undefined when it was stopped or failed, which is said. */
 async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefined> {
@@ -471,8 +437,9 @@ async function present(): Promise<void> {
     const { width, height, warnings, device, iterations, took, preset, corrected, tiles, half, short } = result;
     const { min, max } = result.range;
     const failed = result.note === undefined ? [] : [{ text: result.note, remedy: undefined }];
-    warn([...failed, ...result.suspicions, ...warnings]);
-    note([...(pair?.notes ?? []), ...(corrected ? [corrected] : []), ...(tiles > 1 ? [`matched in ${tiles} tiles`] : [])], short);
+    remarks.warn([...failed, ...result.suspicions, ...warnings]);
+    const notes = [...(pair?.notes ?? []), ...(corrected ? [corrected] : []), ...(tiles > 1 ? [`matched in ${tiles} tiles`] : [])];
+    remarks.note(notes, pair?.by !== undefined, short);
     by('outcome').hidden = false;
     address();
     say('comparison', undefined);
