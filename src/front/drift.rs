@@ -104,7 +104,7 @@ pub struct Turn {
     pub matches: usize,
     /// How far it moves rows apart at most, in pixels of the images.
     pub rows: f64,
-    sure: bool,
+    counts: bool,
 }
 
 impl Turn {
@@ -117,7 +117,7 @@ impl Turn {
     /// Whether it moves rows apart by a tenth of a pixel or more, and is no chance.
     #[must_use]
     pub fn counts(&self) -> bool {
-        self.sure && self.rows >= WORTH
+        self.counts
     }
 }
 
@@ -271,7 +271,8 @@ impl Drift {
             errors[i] = (frames * fit.variance * column[i]).max(0.0).sqrt();
         }
         let sure = (0..3).any(|i| axis[i].abs() > SURE * errors[i]);
-        Some(Turn { axis, errors, matches: sights.len(), rows: self.rows(&by), sure })
+        let rows = self.rows(&by);
+        Some(Turn { axis, errors, matches: sights.len(), rows, counts: sure && rows >= WORTH })
     }
 }
 

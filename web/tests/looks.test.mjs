@@ -36,7 +36,7 @@ describe('looks', () => {
     };
     const length = async () => Number((await visit.says('#distance', /^[\d.]+ m apart$/)).split(' ')[0]);
     before(async () => {
-        visit = await Visit.open({ before: ({ tab }) => tab.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: 'reduce' }]) });
+        visit = await Visit.open();
         await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
         await visit.match({ device: 'cpu' });
     });
@@ -183,6 +183,35 @@ describe('looks', () => {
         assert.equal(body.length, 15 * count + 13 * (corners.count / 3));
         place([100, 120]).forEach((value, k) => assert.ok(Math.abs(body.readFloatLE(15 * index + 4 * k) - value) < 1e-4));
         assert.equal(body[15 * count], 3);
+    });
+
+    it('lets points swing where motion is allowed, until somebody takes hold', { skip: BROWSER !== 'chromium' && 'only Chromium allows motion on demand' }, async () => {
+        const other = await visit.browser.newPage();
+        const drawn = () => other.$eval('#cloud', (cloud) => Number(cloud.dataset.drawn));
+        const moment = () => new Promise((resolve) => setTimeout(resolve, 400));
+        const shown = async (motion) => {
+            await other.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: motion }]);
+            await other.goto(visit.url);
+            await other.waitForSelector('html[data-gpu]');
+            await other.click('#tab-points');
+            await other.waitForFunction(() => Number(document.getElementById('cloud').dataset.drawn) > 0);
+            await moment();
+        };
+        await shown('no-preference');
+        const first = await drawn();
+        await other.waitForFunction((first) => Number(document.getElementById('cloud').dataset.drawn) > first + 3, {}, first);
+        await other.focus('#cloud');
+        await other.keyboard.press('ArrowLeft');
+        await moment();
+        const held = await drawn();
+        await moment();
+        assert.equal(await drawn(), held);
+        await shown('reduce');
+        const still = await drawn();
+        await moment();
+        assert.equal(await drawn(), still);
+        await other.close();
+        await visit.tab.bringToFront();
     });
 
     it('says why there is no length where the cameras are a guess', async () => {

@@ -26,8 +26,7 @@ describe('views', () => {
     const focused = () => visit.tab.evaluate(() => document.activeElement.id || document.activeElement.dataset.scene || document.activeElement.name);
     const shown = (view) => visit.tab.waitForSelector(`#map[data-shown=${view}]`);
     before(async () => {
-        // Points that swing would be another picture each time.
-        visit = await Visit.open({ before: ({ tab }) => tab.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: 'reduce' }]) });
+        visit = await Visit.open();
         await visit.pair(scene('mixed'), join(scene('mixed'), 'calib.txt'));
         await visit.match({ device: 'cpu' });
     });

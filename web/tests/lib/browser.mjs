@@ -13,6 +13,8 @@ export function installed(name) {
     return [process.env[variable], ...paths].find((path) => path && existsSync(path));
 }
 
+// Points that swing would be another picture each time.
+const CALM = ['--force-prefers-reduced-motion'];
 const QUIET = ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'];
 const WEBGPU = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader'];
 // WebGL for the points, by software too.
@@ -33,10 +35,11 @@ export async function launch(name, { gpu = true, downloads } = {}) {
                 'gfx.webgpu.ignore-blocklist': gpu,
                 'gfx.webgpu.force-enabled': gpu,
                 'webgl.force-enabled': true,
+                'ui.prefersReducedMotion': 1,
                 ...(downloads && { 'browser.download.folderList': 2, 'browser.download.dir': downloads }),
             },
         });
     }
     const downloadBehavior = downloads && { policy: 'allow', downloadPath: downloads };
-    return puppeteer.launch({ ...common, downloadBehavior, args: [...QUIET, ...WEBGL, ...(gpu ? WEBGPU : [])] });
+    return puppeteer.launch({ ...common, downloadBehavior, args: [...QUIET, ...CALM, ...WEBGL, ...(gpu ? WEBGPU : [])] });
 }
