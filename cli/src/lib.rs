@@ -27,7 +27,7 @@ use clap::error::ErrorKind;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use commands::{
-    batch, bench, completions, demo, depth, devices, evaluate, inspect, man, r#match, presets, rectify,
+    batch, bench, completions, demo, depth, devices, evaluate, inspect, man, r#match, presets, rectify, ros,
     sequence,
 };
 use failure::Failure;
@@ -47,6 +47,7 @@ Examples:
   mrfgs rectify left.png right.png rectified --calib stereo.yml
   mrfgs batch pairs.csv maps                  # many pairs; again, it resumes
   mrfgs sequence left right maps              # the frames of a video
+  mrfgs ros --method fast --also points       # two cameras of ROS 2, live
   mrfgs evaluate Teddy Cones --json figures.json
   mrfgs presets paper > paper.toml
 
@@ -71,6 +72,7 @@ enum Command {
     Rectify(rectify::Args),
     Depth(depth::Args),
     Sequence(sequence::Args),
+    Ros(ros::Args),
     Batch(batch::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
@@ -110,6 +112,7 @@ fn run() -> Result<(), Failure> {
         Command::Rectify(args) => rectify::run(&args)?,
         Command::Depth(args) => depth::run(&args)?,
         Command::Sequence(args) => sequence::run(&args)?,
+        Command::Ros(args) => ros::run(&args)?,
         Command::Batch(args) => batch::run(&args)?,
         Command::Evaluate(args) => evaluate::run(&args)?,
         Command::Bench(args) => bench::run(&args)?,
@@ -167,6 +170,7 @@ mod tests {
             ("rectify", 8),
             ("depth", 15),
             ("sequence", 35),
+            ("ros", 25),
             ("batch", 20),
             ("evaluate", 12),
             ("evaluate map", 8),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::messages::Stamp;
+use crate::messages::{SECOND, Stamp};
 
 /// Most images of a camera that wait for their partners, or for older ones that come later.
 const WAITING: usize = 32;
@@ -16,7 +16,7 @@ pub struct Tally {
     pub alone: [usize; 2],
     /// With the time of another one of the same camera.
     pub repeated: usize,
-    /// Behind so many newer ones that they could not be put in order.
+    /// Behind so many newer ones that they could not be put in order; live, behind a pair that is newer.
     pub late: usize,
 }
 
@@ -104,9 +104,117 @@ impl<T> Pairing<T> {
     }
 }
 
+/// Most images of a camera that wait live for their partners.
+const WAITING_LIVE: usize = 8;
+/// A camera whose times go back by more has begun anew: it was started again, or a recording is played again.
+const RESTART: u64 = SECOND.unsigned_abs();
+
+/// Finds the newest pair among images as they arrive, and waits for nothing: a pair is one as soon as its second image is there, and
+/// all images before it are given up.
+#[derive(Debug)]
+pub struct LivePairing<T> {
+    tolerance: u64,
+    sides: [BTreeMap<Stamp, T>; 2],
+    /// The times of the last pair.
+    last: [Option<Stamp>; 2],
+    tally: Tally,
+}
+
+impl<T> LivePairing<T> {
+    /// Of images whose times differ by at most `tolerance` nanoseconds. Less than half of the time between two images of a camera leaves
+    /// one partner to each.
+    #[must_use]
+    pub fn new(tolerance: u64) -> Self {
+        Self {
+            tolerance,
+            sides: [BTreeMap::new(), BTreeMap::new()],
+            last: [None; 2],
+            tally: Tally::default(),
+        }
+    }
+
+    /// Adds an image of the left (0) or right (1) camera. Returns the pair that it completes, the left image first.
+    pub fn add(&mut self, side: usize, stamp: Stamp, image: T) -> Option<[(Stamp, T); 2]> {
+        if let Some(last) = self.last[side].filter(|last| stamp <= *last) {
+            if stamp.0.abs_diff(last.0) <= RESTART {
+                let which = if stamp == last { &mut self.tally.repeated } else { &mut self.tally.late };
+                *which += 1;
+                return None;
+            }
+            self.last = [None; 2];
+            (0..2).for_each(|side| self.give_up(side, None));
+        }
+        let apart = |other: &Stamp| stamp.0.abs_diff(other.0);
+        let nearest = self.sides[1 - side].keys().copied().min_by_key(apart);
+        let Some(partner) = nearest.filter(|other| apart(other) <= self.tolerance) else {
+            if self.sides[side].insert(stamp, image).is_some() {
+                self.tally.repeated += 1;
+            }
+            if self.sides[side].len() > WAITING_LIVE {
+                self.sides[side].pop_first();
+                self.tally.alone[side] += 1;
+            }
+            return None;
+        };
+        let other = self.sides[1 - side].remove(&partner)?;
+        self.give_up(side, Some(stamp));
+        self.give_up(1 - side, Some(partner));
+        (self.last[side], self.last[1 - side]) = (Some(stamp), Some(partner));
+        let (one, other) = ((stamp, image), (partner, other));
+        Some(if side == 0 { [one, other] } else { [other, one] })
+    }
+
+    /// How many images gave no pair so far.
+    #[must_use]
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// Leaves out what waits on a side and is older than `than`, or all.
+    fn give_up(&mut self, side: usize, than: Option<Stamp>) {
+        let newer = than.map(|than| self.sides[side].split_off(&than)).unwrap_or_default();
+        self.tally.alone[side] += std::mem::replace(&mut self.sides[side], newer).len();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The pairs of live images, `l` or `r` with a time in milliseconds each, in the order in which they arrive.
+    fn live(tolerance: u64, arriving: &str) -> (String, Tally) {
+        let mut pairing = LivePairing::new(tolerance * 1_000_000);
+        let mut pairs = Vec::new();
+        for image in arriving.split(' ') {
+            let (side, ms) = image.split_at(1);
+            let stamp = Stamp(ms.parse::<i64>().unwrap() * 1_000_000);
+            if let Some([(_, l), (_, r)]) = pairing.add(usize::from(side == "r"), stamp, ms) {
+                pairs.push(format!("{l}={r}"));
+            }
+        }
+        (pairs.join(" "), pairing.tally())
+    }
+
+    #[test]
+    fn live_pairs_come_at_once() {
+        let tally = |left, right, repeated, late| Tally { alone: [left, right], repeated, late };
+        for (tolerance, arriving, pairs, expected) in [
+            (0, "l1 r1 r2 l2", "1=1 2=2", tally(0, 0, 0, 0)),
+            // What is older than a pair has no partner any more.
+            (0, "l1 l2 r2 r1 l3 r3", "2=2 3=3", tally(1, 0, 0, 1)),
+            (0, "l1 l1 r1 r1 l1", "1=1", tally(0, 0, 3, 0)),
+            (0, "l10 r11 l20 r21", "", tally(0, 0, 0, 0)),
+            (3, "l10 r11 r19 l20 l30 r40", "10=11 20=19", tally(0, 0, 0, 0)),
+            (3, "r8 r11 l10", "10=11", tally(0, 1, 0, 0)),
+            // The clock of the cameras begins anew.
+            (0, "l5000 r5000 l6000 l10 r10 r20 l20", "5000=5000 10=10 20=20", tally(1, 0, 0, 0)),
+        ] {
+            assert_eq!(live(tolerance, arriving), (pairs.into(), expected), "{arriving}");
+        }
+        // The right camera is silent: old images are given up.
+        let all: Vec<_> = (1..=100).map(|ms| format!("l{ms}")).collect();
+        assert_eq!(live(0, &all.join(" ")), (String::new(), tally(100 - WAITING_LIVE, 0, 0, 0)));
+    }
 
     /// What is paired of times in milliseconds, and what is not.
     fn paired(tolerance: u64, left: &[i64], right: &[i64]) -> (String, Tally) {

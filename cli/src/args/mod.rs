@@ -14,7 +14,7 @@ pub(crate) use cameras::CameraArgs;
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
 pub(crate) use reading::ReadingArgs;
-pub(crate) use recording::{RecordingArgs, Topics};
+pub(crate) use recording::{RecordingArgs, Topics, nanoseconds};
 pub(crate) use rectification::{RectificationArgs, shown};
 pub(crate) use region::RegionArgs;
 pub(crate) use search::{Found, Search, calibrated_range, depth};

@@ -33,7 +33,7 @@ impl FromStr for Topics {
 }
 
 /// Seconds as nanoseconds.
-fn nanoseconds(text: &str) -> Result<u64, String> {
+pub(crate) fn nanoseconds(text: &str) -> Result<u64, String> {
     let seconds = text.parse().ok().filter(|seconds: &f64| (0.0..=3600.0).contains(seconds));
     let seconds = seconds.ok_or("give a number of seconds from 0 to 3600")?;
     Ok((seconds * 1e9).round() as u64)

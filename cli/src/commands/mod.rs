@@ -12,4 +12,5 @@ pub(crate) mod man;
 pub(crate) mod r#match;
 pub(crate) mod presets;
 pub(crate) mod rectify;
+pub(crate) mod ros;
 pub(crate) mod sequence;

@@ -1,9 +1,7 @@
-//! What `--also` writes beside a disparity map: one table, from which every command follows. And the maps of many pairs, each set
-//! named after its pair.
+//! What `--also` writes beside a disparity map: one table, from which every command follows.
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::calibration::third;
@@ -16,10 +14,9 @@ use mrfgs::maps::Maps;
 use mrfgs::options::{DisparityRange, Method};
 
 use crate::failure::{Failure, Result};
-use crate::outputs::files::Written;
 use crate::outputs::limits::Limits;
+use crate::outputs::messages::{self, Content};
 use crate::outputs::outcome::{Of, Outcome, View};
-use crate::outputs::recording::Content;
 use crate::text::plural;
 
 /// An output beside the disparity map.
@@ -311,25 +308,26 @@ impl AlsoArgs {
         }
     }
 
-    /// Refuses outputs that are no message of a recording.
-    pub(crate) fn check_recording(&self) -> Result<()> {
+    /// Refuses outputs that are no message of ROS; `remedy` says what helps.
+    pub(crate) fn check_messages(&self, remedy: &str) -> Result<()> {
         self.check(false)?;
-        let is_message = |also: &&Also| match also.kind {
-            Kind::Depth | Kind::Millimetres | Kind::Sigma(_) | Kind::Bytes(_) => true,
-            Kind::Points(frame) => frame == Frame::Matched && also.word == also.stem(),
-            Kind::Disparity(..) | Kind::Registered { .. } | Kind::Picture { .. } => false,
-        };
-        match self.wanted().find(|also| !is_message(also)) {
-            Some(also) => Err(Failure::usage(
-                also.flag(),
-                "is no message of a recording, which takes depth, depth-mm, points, confidence, validity, sigma and depth-sigma; give the name of a folder \
-                 as OUTPUT",
-            )),
+        match self.wanted().find(|also| also.topic().is_none()) {
+            Some(also) => {
+                let reason = format!(
+                    "is no message of ROS, which are depth, depth-mm, points, confidence, validity, sigma and depth-sigma; {remedy}"
+                );
+                Err(Failure::usage(also.flag(), reason))
+            }
             None => Ok(()),
         }
     }
 
-    /// The wanted outputs for a recording.
+    /// The topics of the wanted outputs, each with the type of its messages.
+    pub(crate) fn topics(&self) -> impl Iterator<Item = messages::Topic> {
+        self.wanted().filter_map(Also::topic)
+    }
+
+    /// The wanted outputs as messages.
     pub(crate) fn contents(&self, outcome: &Outcome) -> Vec<Content> {
         let &Outcome { maps, left, rig, .. } = outcome;
         let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
@@ -422,9 +420,32 @@ impl Also {
         format!("--also {}", self.word)
     }
 
+    /// Its topic in ROS; `None` where it is no message there.
+    fn topic(&self) -> Option<messages::Topic> {
+        match self.kind {
+            Kind::Depth => Some(messages::DEPTH),
+            Kind::Millimetres => Some(messages::MILLIMETRES),
+            Kind::Sigma(Of::Disparities) => Some(messages::SIGMA),
+            Kind::Sigma(Of::Depths) => Some(messages::DEPTH_SIGMA),
+            Kind::Points(Frame::Matched) if self.word == self.stem() => Some(messages::POINTS),
+            Kind::Bytes(_) => Some(messages::of_bytes(self.word)),
+            Kind::Points(_) | Kind::Disparity(..) | Kind::Registered { .. } | Kind::Picture { .. } => None,
+        }
+    }
+
     /// Whether it takes the unit of the baseline, too.
     pub(crate) fn takes_unit(&self) -> bool {
         matches!(self.kind, Kind::Millimetres | Kind::Registered { millimetres: true })
+    }
+
+    /// Refuses it as a message where the unit of the baseline of `rig` is not known.
+    pub(crate) fn check_metres(&self, rig: &Rig) -> Result<()> {
+        if rig.unit().millimetres().is_none() {
+            let reason = "is in metres in ROS, and nothing says the unit of the baseline; add an entry `unit` to the calibration: mm, cm or \
+                          m, or give it with --baseline";
+            return Err(Failure::usage(self.flag(), reason));
+        }
+        Ok(())
     }
 
     /// Its word without an extension.
@@ -458,68 +479,6 @@ impl Also {
                 write::check_png_path(path)
             }
         }
-    }
-}
-
-/// The maps to write of each pair.
-#[derive(clap::Args)]
-pub(crate) struct MapArgs {
-    /// Format of the disparity maps, as the extensions of `mrfgs match` [default: pfm]
-    #[arg(long, value_enum, value_name = "WHICH")]
-    pub(crate) format: Option<Format>,
-    #[command(flatten)]
-    pub(crate) also: AlsoArgs,
-}
-
-impl MapArgs {
-    /// The name of the disparity map of a pair.
-    pub(crate) fn map(&self, name: &str) -> String {
-        format!("{name}.{}", self.format.unwrap_or_default().extension())
-    }
-
-    /// The wanted outputs beside it, with their names.
-    pub(crate) fn also(&self, name: &str) -> impl Iterator<Item = (&'static Also, String)> {
-        let map = self.map(name);
-        self.also.wanted().map(move |word| (word, word.beside(Path::new(&map)).display().to_string()))
-    }
-
-    /// Says before any computing whether those of a pair can be written to `folder`, with disparities in `range`.
-    pub(crate) fn check(&self, folder: &Path, name: &str, range: DisparityRange) -> mrfgs::Result<()> {
-        write::check_disparity_path(&folder.join(self.map(name)), range.min, range.max)?;
-        self.also(name).try_for_each(|(word, file)| word.check(&folder.join(file), range))
-    }
-
-    /// Writes those of a pair to `folder`, all or none.
-    pub(crate) fn write(&self, folder: &Path, name: &str, outcome: &Outcome) -> Result<()> {
-        let map = folder.join(self.map(name));
-        let mut written = Written::default();
-        written
-            .note(&map, outcome.writer(View::Left).disparity(&map, &outcome.final_map(self.also.limits)))?;
-        for (word, file) in self.also(name) {
-            let path = folder.join(file);
-            written.note(&path, self.also.write(word, &path, outcome))?;
-        }
-        written.keep();
-        Ok(())
-    }
-}
-
-/// The format of disparity maps.
-#[derive(Clone, Copy, Default, ValueEnum)]
-pub(crate) enum Format {
-    /// Float, +infinity for invalid pixels
-    #[default]
-    Pfm,
-    /// Float, NaN for invalid pixels
-    Tif,
-    /// 16 bits, disparity times 256, 0 for invalid pixels
-    Png,
-}
-
-impl Format {
-    /// The extension of their files, which is the word for it.
-    pub(crate) fn extension(self) -> String {
-        self.to_possible_value().map(|word| word.get_name().to_owned()).unwrap_or_default()
     }
 }
 

@@ -3,6 +3,8 @@
 mod files;
 mod pairing;
 mod recorded;
+mod rectifier;
+pub(crate) mod ros;
 mod stream;
 
 use std::collections::VecDeque;
@@ -18,6 +20,7 @@ use mrfgs_ros::messages::Header;
 
 pub(crate) use pairing::Pairing;
 pub(crate) use recorded::Recorded;
+pub(crate) use rectifier::{Rectifier, turned};
 use stream::Stream;
 pub(crate) use stream::{FrameRate, RawFrames, raw_frames};
 

@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use mrfgs::image::raster::Raster;
 use mrfgs::image::read::Reader;
 use mrfgs::{Error, Result};
-use mrfgs_ros::messages::{CameraInfo, CompressedImage, Header, Image, Stamp};
+use mrfgs_ros::messages::{CameraInfo, Header, Stamp};
 use mrfgs_ros::pairing::{Pairing, Tally};
-use mrfgs_ros::pixels;
 use mrfgs_ros::recording::{Message, Recording};
 use mrfgs_ros::topics::{self, Topic};
 
 use crate::args::{RecordingArgs, Topics};
+use crate::sequences::ros;
 use crate::text::plural;
 
 /// The pairs of a recording.
@@ -119,8 +119,7 @@ impl Recorded {
     /// Where the cameras are exchanged.
     pub(crate) fn calibration(&self) -> Result<Option<Vec<(PathBuf, String)>>> {
         let Some(cameras) = &self.cameras else { return Ok(None) };
-        let [left, right] = cameras.each_ref().map(|(_, camera)| camera.p[3]);
-        if left != 0.0 && right == 0.0 {
+        if ros::are_exchanged(cameras.each_ref().map(|(_, camera)| camera)) {
             let [left, right] = self.images.topics.each_ref().map(|topic| topic.name.as_str());
             let reason =
                 format!("by its calibration {left} is the right camera; give --topics {right},{left}");
@@ -128,8 +127,7 @@ impl Recorded {
         }
         let texts = cameras.iter().map(|(topic, camera)| {
             let name = format!("{}:{topic}", self.images.path.display());
-            let camera = if self.is_rectified() { &camera.of_rectified() } else { camera };
-            (PathBuf::from(name), camera.text())
+            (PathBuf::from(name), ros::text(camera, self.is_rectified()))
         });
         Ok(Some(texts.collect()))
     }
@@ -199,18 +197,8 @@ impl Images {
     }
 
     fn view(&self, message: &Message) -> Result<Raster<'static>> {
-        let name = self.name_of(message);
-        let error = |reason| Error::read(&name, reason);
-        if self.topics[message.topic].is_compressed() {
-            let image = CompressedImage::decode(&message.data, message.encoding).map_err(error)?;
-            return pixels::compressed(&image, self.reader, &name);
-        }
-        let image = Image::decode(&message.data, message.encoding).map_err(error)?;
-        let raster = pixels::image(&image, self.reader.max_pixels).map_err(error)?;
-        match self.reader.no_data {
-            Some(value) => raster.without(value),
-            None => Ok(raster),
-        }
+        let kind = &self.topics[message.topic].kind;
+        ros::view(kind, &message.data, message.encoding, self.reader, &self.name_of(message))
     }
 }
 
@@ -256,10 +244,6 @@ fn cameras(recording: &Recording, chosen: &[Topic; 2]) -> Result<Option<[(String
     }
     let [l, r] = found;
     let found = l.zip(r).map(|(l, r)| [(left.name.clone(), l), (right.name.clone(), r)]);
-    // Of what is rectified already the projection counts alone.
     let is_rectified = chosen.iter().all(Topic::is_rectified);
-    let is_known = |(_, camera): &(String, CameraInfo)| {
-        if is_rectified { camera.p[0] != 0.0 } else { camera.is_calibrated() }
-    };
-    Ok(found.filter(|all| all.iter().all(is_known)))
+    Ok(found.filter(|all| all.iter().all(|(_, camera)| ros::is_known(camera, is_rectified))))
 }

@@ -18,6 +18,8 @@ mod formats;
 mod forms;
 mod geotiff;
 mod hostile;
+#[cfg(unix)]
+mod live;
 mod matching;
 mod outputs;
 mod plugin;

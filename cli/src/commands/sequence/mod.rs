@@ -1,6 +1,5 @@
 //! `mrfgs sequence`.
 
-mod drift;
 mod pipeline;
 mod writer;
 
@@ -23,10 +22,9 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::{Calib, Input};
-use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, raw_frames};
+use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
-use drift::Rectifier;
 use pipeline::Pipeline;
 use writer::{Records, Writer};
 
@@ -175,7 +173,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if film {
         args.maps.also.check_film()?;
     } else if recording {
-        args.maps.also.check_recording()?;
+        args.maps.also.check_messages("give the name of a folder as OUTPUT")?;
     }
     stop::listen();
     let recorded = open_recording(args)?;
@@ -223,12 +221,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     } else {
         input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?
     };
-    if let (Some(word), Some(rig)) = (cameras.filter(|_| recording), &rig)
-        && rig.unit().millimetres().is_none()
-    {
-        let reason = "is in metres in a recording, and nothing says the unit of the baseline; add an entry `unit` to the calibration: mm, \
-                      cm or m, or give it with --baseline";
-        return Err(Failure::usage(word.flag(), reason));
+    if let (Some(word), Some(rig)) = (cameras.filter(|_| recording), &rig) {
+        word.check_metres(rig)?;
     }
     let part = args.region.roi.as_ref();
     let region = part.map(|part| input.region(part)).transpose()?;

@@ -16,11 +16,10 @@ use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MatchRecord};
 use crate::progress::Counter;
-use crate::sequences::{Frame, Frames};
+use crate::sequences::{Frame, Frames, Rectifier, turned};
 use crate::text::plural;
 use crate::{console, remedy, stop};
 
-use super::drift::{self, Rectifier};
 use super::writer::{Found, Sink};
 
 /// Frames that wait between two steps: enough to keep both at work.
@@ -89,7 +88,7 @@ impl Pipeline {
             if let Some(note) = note {
                 console::say(&note);
             }
-            if let Some(said) = turn.and_then(|turn| drift::said(&turn, self.recalibrate)) {
+            if let Some(said) = turn.and_then(|turn| turned(&turn, self.recalibrate)) {
                 console::say(&said);
             }
             let seconds = start.elapsed().as_secs_f64();

@@ -8,7 +8,7 @@ use mrfgs::rectification::Rectification;
 use crate::failure::Result;
 
 /// Rectifies the frames, and watches whether that is still right.
-pub(super) struct Rectifier {
+pub(crate) struct Rectifier {
     /// What rectifies the next frame; `None` where frames are rectified already, and stand as they were calibrated.
     by: Option<Rectification>,
     /// Where the cameras are known.
@@ -25,7 +25,7 @@ struct Watched {
 
 impl Rectifier {
     /// With frames that `by` rectifies, or that are rectified already by a calibration that would be `known` as such.
-    pub(super) fn new(
+    pub(crate) fn new(
         by: Option<Rectification>,
         known: Option<Rectification>,
         range: DisparityRange,
@@ -39,7 +39,7 @@ impl Rectifier {
     }
 
     /// The next frame, rectified, and how the right camera has turned by then.
-    pub(super) fn rectified(&mut self, pair: Pair) -> Result<(Pair, Option<Turn>)> {
+    pub(crate) fn rectified(&mut self, pair: Pair) -> Result<(Pair, Option<Turn>)> {
         let pair = match &self.by {
             Some(by) => by.apply(&pair)?,
             None => pair,
@@ -49,7 +49,7 @@ impl Rectifier {
     }
 
     /// How the right camera has turned by this frame, which is rectified.
-    pub(super) fn followed(&mut self, pair: &Pair) -> Result<Option<Turn>> {
+    pub(crate) fn followed(&mut self, pair: &Pair) -> Result<Option<Turn>> {
         let Some(Watched { calibrated, drift, range, recalibrate }) = &mut self.watched else {
             return Ok(None);
         };
@@ -62,7 +62,7 @@ impl Rectifier {
 }
 
 /// How the right camera has turned in a sequence, for people; `None` where that does not matter.
-pub(super) fn said(turn: &Turn, recalibrated: bool) -> Option<String> {
+pub(crate) fn turned(turn: &Turn, recalibrated: bool) -> Option<String> {
     const LEAST: f64 = 0.005;
     if !turn.counts() {
         return None;

@@ -1,0 +1,207 @@
+//! What the cameras publish: their topics, and what came of them.
+
+use std::path::PathBuf;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use mrfgs::error::Reason;
+use mrfgs_node::names::Names;
+use mrfgs_node::topics::{Participant, Subscriptions};
+use mrfgs_ros::messages::{CameraInfo, CompressedImage, Encoding, Header, Image, Stamp, Type};
+use mrfgs_ros::pairing::{LivePairing, Tally};
+use mrfgs_ros::topics::Topic;
+
+use crate::failure::{Failure, Result};
+use crate::stop;
+
+use super::of_network;
+
+/// The topics of both cameras.
+#[derive(Clone)]
+pub(super) struct Cameras {
+    images: [Topic; 2],
+    infos: [String; 2],
+}
+
+/// A pair of images as it arrived.
+pub(super) struct Arrived {
+    pub(super) header: Header,
+    /// The messages of both images.
+    pub(super) images: [Vec<u8>; 2],
+    /// When the second one was there.
+    pub(super) at: Instant,
+}
+
+/// How much came so far.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Count {
+    /// Images and calibrations of the left and of the right camera.
+    pub(super) images: [usize; 2],
+    pub(super) infos: [usize; 2],
+    /// Messages that make no sense.
+    pub(super) unreadable: usize,
+    /// Pairs that were left out for newer ones.
+    pub(super) replaced: usize,
+    pub(super) tally: Tally,
+}
+
+#[derive(Default)]
+struct State {
+    /// The newest pair that nobody has taken.
+    pair: Option<Arrived>,
+    infos: [Option<CameraInfo>; 2],
+    count: Count,
+    /// Why a message makes no sense, where that was not told.
+    unreadable: Option<(usize, Reason)>,
+}
+
+/// What arrives, between the thread that receives it and the one that matches.
+#[derive(Default)]
+pub(super) struct Arrivals {
+    state: Mutex<State>,
+    has_pair: Condvar,
+}
+
+impl Cameras {
+    pub(super) fn new(names: &Names) -> Result<Self> {
+        let named = |reason| Failure::usage("--remap", reason);
+        let image = |name: &str| {
+            let name = names.resolve(name).map_err(named)?;
+            let kind = if name.ends_with("/compressed") { CompressedImage::NAME } else { Image::NAME };
+            Ok::<_, Failure>(Topic { name, kind: kind.into(), encoding: Some(Encoding::Cdr), count: None })
+        };
+        let images = [image("left/image_raw")?, image("right/image_raw")?];
+        if images[0].name == images[1].name {
+            return Err(named(
+                format!("both images are {}; give each a topic of its own", images[0].name).into(),
+            ));
+        }
+        // Beside the image, unless that has another name by itself.
+        let info = |name: &str, image: &Topic| {
+            let beside = image.camera_infos().pop().filter(|_| !names.remaps(name));
+            beside.map_or_else(|| names.resolve(name).map_err(named), Ok)
+        };
+        let infos = [info("left/camera_info", &images[0])?, info("right/camera_info", &images[1])?];
+        Ok(Self { images, infos })
+    }
+
+    /// The topic of the images of the left (0) or right (1) camera.
+    pub(super) fn image(&self, side: usize) -> &str {
+        &self.images[side].name
+    }
+
+    /// The type of its messages.
+    pub(super) fn kind(&self, side: usize) -> &str {
+        &self.images[side].kind
+    }
+
+    /// The topic of its calibration.
+    pub(super) fn info(&self, side: usize) -> &str {
+        &self.infos[side]
+    }
+
+    /// Whether the images are rectified, by the names of their topics.
+    pub(super) fn are_rectified(&self) -> bool {
+        self.images.iter().all(Topic::is_rectified)
+    }
+
+    /// What errors call an image of this time.
+    pub(super) fn named(&self, side: usize, stamp: Stamp) -> PathBuf {
+        format!("{} at {stamp}", self.image(side)).into()
+    }
+
+    /// Subscribes to the images, and then to the calibrations.
+    pub(super) fn subscribe(&self, participant: &Participant, reliable: bool) -> Result<Subscriptions> {
+        let mut all = Subscriptions::new().map_err(of_network)?;
+        for topic in &self.images {
+            all.add(participant, &topic.name, &topic.kind, reliable).map_err(of_network)?;
+        }
+        for info in &self.infos {
+            all.add(participant, info, CameraInfo::NAME, reliable).map_err(of_network)?;
+        }
+        Ok(all)
+    }
+}
+
+impl Arrivals {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes what comes until the user stops it or the network fails, and looks that often whether it is stopped.
+    pub(super) fn receive(
+        &self,
+        mut subscriptions: Subscriptions,
+        tolerance: u64,
+        patience: Duration,
+    ) -> mrfgs_node::topics::Result<()> {
+        let mut pairing = LivePairing::new(tolerance);
+        while stop::go_on().is_continue() {
+            subscriptions.wait(patience, |topic, bytes| {
+                let side = topic % 2;
+                let taken = if topic < 2 {
+                    self.add_image(side, bytes, &mut pairing)
+                } else {
+                    self.add_info(side, &bytes)
+                };
+                if let Err(reason) = taken {
+                    let mut state = self.state();
+                    state.count.unreadable += 1;
+                    state.unreadable.get_or_insert((topic, reason));
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    fn add_image(
+        &self,
+        side: usize,
+        bytes: Vec<u8>,
+        pairing: &mut LivePairing<(Header, Vec<u8>)>,
+    ) -> mrfgs_ros::messages::Result<()> {
+        let header = Header::of(&bytes, Encoding::Cdr)?;
+        let pair = pairing.add(side, header.stamp, (header, bytes));
+        let mut state = self.state();
+        state.count.images[side] += 1;
+        state.count.tally = pairing.tally();
+        if let Some([(_, (header, left)), (_, (_, right))]) = pair {
+            let newest = Arrived { header, images: [left, right], at: Instant::now() };
+            state.count.replaced += usize::from(state.pair.replace(newest).is_some());
+            self.has_pair.notify_one();
+        }
+        Ok(())
+    }
+
+    fn add_info(&self, side: usize, bytes: &[u8]) -> mrfgs_ros::messages::Result<()> {
+        let info = CameraInfo::decode(bytes, Encoding::Cdr)?;
+        let mut state = self.state();
+        state.count.infos[side] += 1;
+        // The camera matters, not when it told of itself.
+        state.infos[side] = Some(CameraInfo { header: Header::default(), ..info });
+        Ok(())
+    }
+
+    /// The newest pair; `None` where none comes in that time.
+    pub(super) fn next(&self, patience: Duration) -> Option<Arrived> {
+        let state = self.state();
+        let waited = self.has_pair.wait_timeout_while(state, patience, |state| state.pair.is_none());
+        waited.unwrap_or_else(PoisonError::into_inner).0.pair.take()
+    }
+
+    /// The last calibration of both cameras, where both have sent one.
+    pub(super) fn cameras(&self) -> Option<[CameraInfo; 2]> {
+        let [left, right] = self.state().infos.clone();
+        Some([left?, right?])
+    }
+
+    /// How much came so far.
+    pub(super) fn count(&self) -> Count {
+        self.state().count
+    }
+
+    /// Why a message of a topic made no sense, once.
+    pub(super) fn unreadable(&self) -> Option<(usize, Reason)> {
+        self.state().unreadable.take()
+    }
+}

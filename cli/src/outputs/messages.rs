@@ -1,0 +1,230 @@
+//! The messages of ROS 2 that a frame becomes, and their topics.
+
+use mrfgs::Result;
+use mrfgs::image::Plane;
+use mrfgs::image::calib::Calibration;
+use mrfgs::image::cloud::Cloud;
+use mrfgs::maps::FRACTION;
+use mrfgs::options::DisparityRange;
+use mrfgs_ros::messages::{
+    CameraInfo, DisparityImage, Encode, FLOAT32, Header, Image, PointCloud2, PointField, RegionOfInterest,
+    Type, UINT8,
+};
+
+/// A topic, by what ROS usually calls it and without a namespace, and the type of its messages.
+pub(crate) type Topic = (&'static str, &'static str);
+
+pub(crate) const DISPARITY: Topic = ("disparity", DisparityImage::NAME);
+/// The camera of the disparities, where nobody else tells of it.
+pub(crate) const CAMERA: Topic = ("left/camera_info", CameraInfo::NAME);
+pub(crate) const DEPTH: Topic = ("depth/image_rect", Image::NAME);
+pub(crate) const MILLIMETRES: Topic = ("depth/image_rect_raw", Image::NAME);
+/// The camera of the depths, where ROS looks for it.
+pub(crate) const DEPTH_CAMERA: Topic = ("depth/camera_info", CameraInfo::NAME);
+pub(crate) const POINTS: Topic = ("points2", PointCloud2::NAME);
+pub(crate) const SIGMA: Topic = ("sigma", Image::NAME);
+pub(crate) const DEPTH_SIGMA: Topic = ("depth/sigma", Image::NAME);
+
+/// The topic of a map of bytes called `name`.
+pub(crate) const fn of_bytes(name: &'static str) -> Topic {
+    (name, Image::NAME)
+}
+
+/// What takes the messages of a frame.
+pub(crate) trait Sink {
+    /// Takes a message of `topic`, which has this `header`.
+    ///
+    /// # Errors
+    /// Where it cannot be written or sent.
+    fn put(&mut self, topic: Topic, header: &Header, message: &impl Encode) -> Result<()>;
+}
+
+/// What a frame has beside its disparities.
+pub(crate) enum Content {
+    /// In the unit of the baseline; +infinity where there is none.
+    Depth(Plane<f32>),
+    /// 0 where there is none.
+    Millimetres(Plane<u16>),
+    Points(Cloud),
+    /// Errors in pixels; +infinity where there is none.
+    Sigma(Plane<f32>),
+    /// Errors in the unit of the baseline; +infinity where there is none.
+    DepthSigma(Plane<f32>),
+    /// A map of bytes, with its name.
+    Bytes(&'static str, Plane<u8>),
+}
+
+/// The cameras of the maps.
+#[derive(Clone)]
+pub(crate) struct Cameras {
+    focal_length: [f64; 2],
+    principal_point: [f64; 2],
+    doffs: f64,
+    /// In metres; 0 where its unit is not known.
+    baseline: f64,
+    /// How many metres the unit is.
+    metres: f64,
+}
+
+impl Cameras {
+    /// Those of a calibration, where it says them, of maps whose first pixel is at `origin` in the left view.
+    pub(crate) fn of(calibration: &Calibration, origin: (usize, usize)) -> Option<Self> {
+        let (camera, doffs, baseline) = (calibration.camera?, calibration.doffs?, calibration.baseline?);
+        let metres = calibration.unit.millimetres().map_or(0.0, |millimetres| millimetres / 1000.0);
+        let [cx, cy] = camera.principal_point;
+        Some(Self {
+            focal_length: camera.focal_length,
+            principal_point: [cx - origin.0 as f64, cy - origin.1 as f64],
+            doffs,
+            baseline: baseline * metres,
+            metres,
+        })
+    }
+
+    fn message(&self, header: &Header, (width, height): (usize, usize)) -> CameraInfo {
+        let ([fx, fy], [cx, cy]) = (self.focal_length, self.principal_point);
+        let p = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let info = CameraInfo { header: header.clone(), p, ..CameraInfo::default() };
+        CameraInfo { width: width as u32, height: height as u32, ..info.of_rectified() }
+    }
+}
+
+/// The messages of frames whose disparities are in `range`, and whose cameras are these where they are known.
+#[derive(Clone)]
+pub(crate) struct Messages {
+    range: DisparityRange,
+    cameras: Option<Cameras>,
+}
+
+impl Messages {
+    pub(crate) fn new(range: DisparityRange, cameras: Option<Cameras>) -> Self {
+        Self { range, cameras }
+    }
+
+    /// The disparities of a frame. The left view has this `header`, and disparities have this error (sigma, in pixels), where it is
+    /// known.
+    pub(crate) fn disparity<'a>(
+        &self,
+        header: &Header,
+        map: &Plane<f32>,
+        sigma: Option<f32>,
+    ) -> DisparityImage<'a> {
+        let disparity = disparity(header, map, self.range, self.cameras.as_ref());
+        let delta_d = sigma.unwrap_or(disparity.delta_d);
+        DisparityImage { delta_d, ..disparity }
+    }
+
+    /// The camera of maps of this `size`, where it is known.
+    pub(crate) fn camera(&self, header: &Header, size: (usize, usize)) -> Option<CameraInfo> {
+        self.cameras.as_ref().map(|cameras| cameras.message(header, size))
+    }
+
+    /// Hands what a frame has beside its disparities to `sink`.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub(crate) fn put(&self, header: &Header, contents: Vec<Content>, sink: &mut impl Sink) -> Result<()> {
+        // Both are checked before: such contents come with a known unit.
+        let metres = self.cameras.as_ref().map_or(1.0, |cameras| cameras.metres);
+        for content in contents {
+            match content {
+                Content::Depth(depth) => sink.put(DEPTH, header, &floats(header, &known(&depth, metres)))?,
+                Content::Sigma(sigmas) => sink.put(SIGMA, header, &floats(header, &known(&sigmas, 1.0)))?,
+                Content::DepthSigma(sigmas) => {
+                    sink.put(DEPTH_SIGMA, header, &floats(header, &known(&sigmas, metres)))?;
+                }
+                Content::Millimetres(depth) => {
+                    let data = depth.data().iter().flat_map(|v| v.to_le_bytes()).collect();
+                    sink.put(MILLIMETRES, header, &image(header, depth.size(), "16UC1", data))?;
+                }
+                Content::Points(cloud) => sink.put(POINTS, header, &points(header, &cloud, metres))?,
+                Content::Bytes(name, map) => {
+                    let size = map.size();
+                    sink.put(of_bytes(name), header, &image(header, size, "mono8", map.into_data()))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn in_metres(v: f32, metres: f64) -> f32 {
+    (f64::from(v) * metres) as f32
+}
+
+/// `map` in another unit, and not a number where there is nothing.
+fn known(map: &Plane<f32>, unit: f64) -> Plane<f32> {
+    map.map(|v| if v.is_finite() { in_metres(*v, unit) } else { f32::NAN })
+}
+
+/// The map as ROS has it: shifted so that depth is focal length times baseline by disparity, and below the range where it is invalid.
+fn disparity<'a>(
+    header: &Header,
+    map: &Plane<f32>,
+    range: DisparityRange,
+    cameras: Option<&Cameras>,
+) -> DisparityImage<'a> {
+    let doffs = cameras.map_or(0.0, |cameras| cameras.doffs);
+    let shifted = |d: f64| (d + doffs) as f32;
+    let invalid = shifted(f64::from(range.min) - 1.0);
+    let map = map.map(|d| if d.is_finite() { shifted(f64::from(*d)) } else { invalid });
+    let (width, height) = map.size();
+    DisparityImage {
+        header: header.clone(),
+        image: floats(header, &map),
+        f: cameras.map_or(0.0, |cameras| cameras.focal_length[0] as f32),
+        t: cameras.map_or(0.0, |cameras| cameras.baseline as f32),
+        valid_window: RegionOfInterest {
+            width: width as u32,
+            height: height as u32,
+            ..RegionOfInterest::default()
+        },
+        min_disparity: shifted(f64::from(range.min)),
+        max_disparity: shifted(f64::from(range.max)),
+        delta_d: 1.0 / FRACTION as f32,
+    }
+}
+
+fn floats(header: &Header, map: &Plane<f32>) -> Image<'static> {
+    image(header, map.size(), "32FC1", map.data().iter().flat_map(|v| v.to_le_bytes()).collect())
+}
+
+fn image(
+    header: &Header,
+    (width, height): (usize, usize),
+    encoding: &'static str,
+    data: Vec<u8>,
+) -> Image<'static> {
+    Image {
+        header: header.clone(),
+        height: height as u32,
+        width: width as u32,
+        encoding: encoding.into(),
+        is_bigendian: false,
+        step: (data.len() / height) as u32,
+        data: data.into(),
+    }
+}
+
+/// Position, colours as PCL packs them, and confidence, in 20 bytes.
+fn points(header: &Header, cloud: &Cloud, metres: f64) -> PointCloud2 {
+    let field = |name, offset, datatype| PointField { name, offset, datatype };
+    let mut data = Vec::with_capacity(20 * cloud.points.len());
+    for point in &cloud.points {
+        data.extend(point.position.iter().flat_map(|v| in_metres(*v, metres).to_le_bytes()));
+        let [r, g, b] = point.colour;
+        data.extend([b, g, r, 0, point.confidence, 0, 0, 0]);
+    }
+    PointCloud2 {
+        header: header.clone(),
+        fields: vec![
+            field("x", 0, FLOAT32),
+            field("y", 4, FLOAT32),
+            field("z", 8, FLOAT32),
+            field("rgb", 12, FLOAT32),
+            field("confidence", 16, UINT8),
+        ],
+        point_step: 20,
+        data,
+    }
+}

@@ -1,0 +1,198 @@
+//! `mrfgs ros`: a node that matches what cameras publish. The cameras are here, over the same DDS; `scripts/node` has those of others.
+
+use mrfgs::Matcher;
+use mrfgs::options::Method;
+use mrfgs_node::topics::{Participant, Publication, Subscriptions};
+use mrfgs_ros::messages::{CameraInfo, DisparityImage, Encode, Encoding, Header, Image, Stamp, Type};
+
+use super::*;
+
+/// A domain that is hardly anybody else's.
+fn domain() -> u16 {
+    100 + (std::process::id() % 100) as u16
+}
+
+/// A node, which does not outlive its test.
+struct Node(Child);
+
+impl Drop for Node {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+    }
+}
+
+impl Node {
+    fn new(flags: &str) -> Self {
+        let line = format!("ros --device cpu --method fast --max-disparity 47 --domain {} {flags}", domain());
+        Self(started(Path::new("."), &line))
+    }
+
+    /// Stops it; what it said.
+    fn stop(mut self) -> String {
+        send("-INT", &self.0);
+        let mut said = String::new();
+        std::io::Read::read_to_string(&mut self.0.stderr.take().unwrap(), &mut said).unwrap();
+        assert_eq!(self.0.wait().unwrap().code(), Some(0), "{said}");
+        said
+    }
+}
+
+/// Two cameras, and a subscriber to disparities.
+struct Peer {
+    images: [Publication; 2],
+    infos: [Publication; 2],
+    disparities: Subscriptions,
+    sent: i64,
+}
+
+impl Peer {
+    fn new() -> Self {
+        let participant = Participant::new(domain()).unwrap();
+        let publish = |name: &str, kind| participant.publish(name, kind).unwrap();
+        let mut disparities = Subscriptions::new().unwrap();
+        disparities.add(&participant, "/robot/disparity", DisparityImage::NAME, true).unwrap();
+        Self {
+            images: ["left", "right"].map(|side| publish(&format!("/cam/{side}/image_rect"), Image::NAME)),
+            infos: ["left", "right"]
+                .map(|side| publish(&format!("/cam/{side}/camera_info"), CameraInfo::NAME)),
+            disparities,
+            sent: 0,
+        }
+    }
+
+    /// Sends a pair, whose rows have this many bytes.
+    fn send(&mut self, views: &[image::RgbImage; 2], step: u32) {
+        self.sent += 1;
+        let header = Header { stamp: Stamp(self.sent * 50_000_000), frame_id: "eye".into() };
+        for (side, view) in views.iter().enumerate() {
+            let (width, height) = view.dimensions();
+            let mut p = [0.0; 12];
+            (p[0], p[2], p[5], p[6], p[10]) = (300.0, 119.5, 300.0, 89.5, 1.0);
+            p[3] = -36.0 * side as f64;
+            let info = CameraInfo { header: header.clone(), width, height, p, ..CameraInfo::default() };
+            self.infos[side].send(info.encode()).unwrap();
+            let (encoding, data) = ("rgb8".into(), view.as_raw().as_slice().into());
+            let image =
+                Image { header: header.clone(), height, width, encoding, is_bigendian: false, step, data };
+            self.images[side].send(image.encode()).unwrap();
+        }
+    }
+
+    /// Sends pairs until a disparity image comes back.
+    fn disparity(&mut self, views: &[image::RgbImage; 2]) -> Vec<u8> {
+        let start = Instant::now();
+        let mut found = None;
+        while found.is_none() {
+            assert!(start.elapsed() < Duration::from_secs(60), "no disparities came");
+            self.send(views, 3 * views[0].width());
+            self.disparities.wait(Duration::from_millis(100), |_, bytes| found = Some(bytes)).unwrap();
+        }
+        found.unwrap()
+    }
+}
+
+/// The message of a map, laid out by hand: what the node must send for it.
+fn message(map: &Plane<f32>, header: &Header, delta_d: f32) -> Vec<u8> {
+    let (width, height) = map.size();
+    let (width, height) = (width as u32, height as u32);
+    let data: Vec<u8> =
+        map.data().iter().flat_map(|d| if d.is_finite() { *d } else { -1.0 }.to_le_bytes()).collect();
+    let valid_window = mrfgs_ros::messages::RegionOfInterest { width, height, ..Default::default() };
+    let image = Image {
+        header: header.clone(),
+        height,
+        width,
+        encoding: "32FC1".into(),
+        is_bigendian: false,
+        step: 4 * width,
+        data: data.into(),
+    };
+    let header = header.clone();
+    let (min_disparity, max_disparity) = (0.0, 47.0);
+    DisparityImage { header, image, f: 300.0, t: 0.12, valid_window, min_disparity, max_disparity, delta_d }
+        .encode()
+}
+
+#[test]
+fn a_node_matches_what_cameras_publish() {
+    let node = Node::new(
+        "--remap left/image_raw:=/cam/left/image_rect -r right/image_raw:=/cam/right/image_rect --ros-args -r __ns:=/robot",
+    );
+    let views =
+        ["im0.png", "im1.png"].map(|name| image::open(scene("slanted").join(name)).unwrap().to_rgb8());
+    let mut peer = Peer::new();
+    let found = peer.disparity(&views);
+
+    let pair = mrfgs::Pair::open(scene("slanted/im0.png"), scene("slanted/im1.png")).unwrap();
+    let mut matcher =
+        Matcher::builder().method(Method::preset("fast").unwrap()).device("cpu").build().unwrap();
+    let matched = matcher.run(&pair, 0..=47).unwrap();
+    let header = Header::of(&found, Encoding::Cdr).unwrap();
+    assert_eq!(header.frame_id, "eye");
+    assert!(
+        header.stamp.0 > 0 && header.stamp.0 <= peer.sent * 50_000_000 && header.stamp.0 % 50_000_000 == 0
+    );
+    let mut sigmas = matched.sigma().into_data();
+    sigmas.retain(|sigma| sigma.is_finite());
+    sigmas.sort_by(f32::total_cmp);
+    let typical = sigmas[(sigmas.len() - 1) / 2];
+    let mut map = matched.disparity();
+    assert!(found == message(&map, &header, typical), "the bits of the library");
+    map[(7, 7)] = f32::from_bits(map[(7, 7)].to_bits() ^ 1);
+    assert!(found != message(&map, &header, typical), "control: one bit shows");
+
+    // Rows that are too short, then another size: it goes on.
+    for _ in 0..3 {
+        peer.send(&views, 7);
+        // Or the next one takes its place.
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    let part = views.each_ref().map(|view| image::imageops::crop_imm(view, 20, 10, 160, 120).to_image());
+    let start = Instant::now();
+    let height = loop {
+        assert!(start.elapsed() < Duration::from_secs(60), "no disparities of another size");
+        let bytes = peer.disparity(&part);
+        // Behind the first bytes and the headers of message and image: a time, and the length and the text of the frame.
+        let at = 4 + 2 * (8 + 4 + 4);
+        let height = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        if height != 180 {
+            break height;
+        }
+    };
+    assert_eq!(height, 120);
+    let said = node.stop();
+    for words in
+        ["publishes /robot/disparity", "cannot read /cam/left/image_rect at ", " frames in ", " failed"]
+    {
+        assert!(said.contains(words), "no `{words}` in {said}");
+    }
+}
+
+#[test]
+fn flags_of_a_node_that_make_no_sense() {
+    let folder = Folder::new();
+    for (line, words) in [
+        ("--remap left/image_raw", "--remap & FROM:=TO"),
+        ("--remap left/image_raw:=/a//b", "--remap & /a//b & no name of ROS"),
+        ("--remap left/image_raw:=right/image_raw", "--remap & /right/image_raw & a topic of its own"),
+        ("--remap __node:=1", "--remap & no name of a node"),
+        ("--domain 233", "--domain & 233"),
+        ("--tolerance -1", "--tolerance & from 0 to 3600"),
+        ("--also preview", "--also preview & no message of ROS"),
+        ("--also depth-registered", "--also depth-registered & no message of ROS"),
+        ("--also points.pcd", "--also points.pcd & no message of ROS"),
+        (
+            "--alpha 0.5 -r left/image_raw:=left/image_rect -r right/image_raw:=right/image_rect",
+            "--alpha & rectification",
+        ),
+        ("--method nothing", "nothing"),
+        ("--clip-depth 5", "--clip-depth & depths"),
+        ("left right", "left"),
+    ] {
+        run(&folder, &format!("ros --device cpu {line}")).failed(2, words);
+    }
+    for domain in ["x", "233", "-1"] {
+        let run = run_with(&folder, "ros --device cpu", &[("ROS_DOMAIN_ID", domain)]);
+        run.failed(2, "ROS_DOMAIN_ID & give a number from 0 to 232");
+    }
+}

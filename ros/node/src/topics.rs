@@ -1,0 +1,228 @@
+//! Subscriptions and publications over DDS.
+
+use std::convert::Infallible;
+use std::time::Duration;
+
+use bytes::Bytes;
+use mio::{Events, Interest, Poll, Token};
+use mrfgs::error::Reason;
+use rustdds::dds::WriteError;
+use rustdds::no_key::{
+    DataReader, DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter,
+};
+use rustdds::policy::{Durability, History, Reliability, ResourceLimits};
+use rustdds::{
+    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, Publisher, QosPolicies, QosPolicyBuilder,
+    RepresentationIdentifier, StatusEvented, Subscriber, Topic, TopicKind,
+};
+
+/// Largest domain that `ROS_DOMAIN_ID` may name.
+pub const MOST_DOMAIN: u16 = 232;
+/// Bytes of a message that say how the rest is laid out.
+const HEAD: usize = 4;
+/// Messages of a subscription that wait to be taken, as many as ROS keeps of sensors.
+const WAITING: i32 = 5;
+/// Messages of a publication that may still have to be sent again.
+const SENT: i32 = 2;
+/// Messages that subscribers may leave unconfirmed: those of two seconds at most rates.
+const UNCONFIRMED: i32 = 64;
+/// How long a publication waits for its subscribers before it gives a message up.
+const PATIENCE: rustdds::Duration = rustdds::Duration::from_millis(20);
+
+/// Shorthand for what comes of DDS.
+pub type Result<T> = std::result::Result<T, Reason>;
+
+/// A member of a domain of DDS, which finds the others by itself.
+pub struct Participant {
+    inner: DomainParticipant,
+    subscriber: Subscriber,
+    publisher: Publisher,
+}
+
+impl Participant {
+    /// Joins `domain`: 0 to [`MOST_DOMAIN`].
+    ///
+    /// # Errors
+    /// Where the network cannot be used.
+    pub fn new(domain: u16) -> Result<Self> {
+        let inner = DomainParticipantBuilder::new(domain).build().map_err(failed)?;
+        let qos = QosPolicyBuilder::new().build();
+        let subscriber = inner.create_subscriber(&qos).map_err(failed)?;
+        let publisher = inner.create_publisher(&qos).map_err(failed)?;
+        Ok(Self { inner, subscriber, publisher })
+    }
+
+    /// The topic `name`, a full one, of messages of the type `kind`, such as `sensor_msgs/msg/Image`.
+    fn topic(&self, name: &str, kind: &str, qos: &QosPolicies) -> Result<Topic> {
+        // So ROS calls its topics and types in DDS: `rt/disparity` and `sensor_msgs::msg::dds_::Image_`.
+        let (package, own) = kind.rsplit_once('/').unwrap_or(("", kind));
+        let kind = format!("{}::dds_::{own}_", package.replace('/', "::"));
+        self.inner.create_topic(format!("rt{name}"), kind, qos, TopicKind::NoKey).map_err(failed)
+    }
+
+    /// Publishes messages of the type `kind` on the topic `name`, which is a full one. They are sent again to those who ask for that.
+    ///
+    /// # Errors
+    /// Where DDS fails.
+    pub fn publish(&self, name: &str, kind: &str) -> Result<Publication> {
+        let qos = qos(Reliability::Reliable { max_blocking_time: PATIENCE }, SENT, UNCONFIRMED);
+        let topic = self.topic(name, kind, &qos)?;
+        let writer = self.publisher.create_datawriter_no_key(&topic, Some(qos)).map_err(failed)?;
+        Ok(Publication { writer, listeners: 0, _participant: self.inner.clone() })
+    }
+}
+
+/// Of a topic that keeps so many messages, and so many of them at all until they are confirmed or taken.
+fn qos(reliability: Reliability, depth: i32, most: i32) -> QosPolicies {
+    let qos = QosPolicyBuilder::new().reliability(reliability).durability(Durability::Volatile);
+    let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
+    qos.history(History::KeepLast { depth }).resource_limits(limits).build()
+}
+
+fn failed(error: impl std::fmt::Display) -> Reason {
+    format!("DDS: {error}").into()
+}
+
+/// Messages as they lie in [`mrfgs_ros::messages`], with what says how.
+struct Message(Vec<u8>);
+
+/// What hands on the bytes of messages as they are.
+#[derive(Clone)]
+struct AsTheyAre;
+
+impl<'a> Decode<'a, Message> for AsTheyAre {
+    type Error = Infallible;
+
+    fn decode_bytes(
+        self,
+        content: &'a [u8],
+        encoding: RepresentationIdentifier,
+    ) -> std::result::Result<Message, Infallible> {
+        let mut bytes = Vec::with_capacity(HEAD + content.len());
+        bytes.extend([0, u8::from(encoding == RepresentationIdentifier::CDR_LE), 0, 0]);
+        bytes.extend_from_slice(content);
+        Ok(Message(bytes))
+    }
+}
+
+impl DeserializerAdapter<Message> for AsTheyAre {
+    type Error = Infallible;
+    type Decoded = Message;
+
+    fn supported_encodings() -> &'static [RepresentationIdentifier] {
+        &[RepresentationIdentifier::CDR_LE, RepresentationIdentifier::CDR_BE]
+    }
+
+    fn transform_decoded(decoded: Message) -> Message {
+        decoded
+    }
+}
+
+impl DefaultDecoder<Message> for AsTheyAre {
+    type Decoder = Self;
+
+    const DECODER: Self = Self;
+}
+
+impl SerializerAdapter<Bytes> for AsTheyAre {
+    type Error = Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(content: &Bytes) -> std::result::Result<Bytes, Infallible> {
+        Ok(content.clone())
+    }
+}
+
+/// A topic that somebody listens to, or may.
+pub struct Publication {
+    writer: DataWriter<Bytes, AsTheyAre>,
+    listeners: usize,
+    /// Nothing is sent without it.
+    _participant: DomainParticipant,
+}
+
+impl Publication {
+    /// Whether anybody listens. It takes in who has come and gone, so ask often.
+    pub fn has_listeners(&mut self) -> bool {
+        while let Some(status) = self.writer.try_recv_status() {
+            if let DataWriterStatus::PublicationMatched { current, .. } = status {
+                self.listeners = current.count().max(0).unsigned_abs() as usize;
+            }
+        }
+        self.listeners > 0
+    }
+
+    /// Sends a message, in the bytes of [`Encode`](mrfgs_ros::messages::Encode).
+    ///
+    /// # Errors
+    /// Where its subscribers are too slow, or DDS fails.
+    pub fn send(&self, message: Vec<u8>) -> Result<()> {
+        let message = Bytes::from(message);
+        let content = message.slice(HEAD.min(message.len())..);
+        self.writer.write(content, None).map_err(|error| match error {
+            WriteError::WouldBlock { .. } => "its subscribers do not confirm what they get".into(),
+            error => failed(error),
+        })
+    }
+}
+
+/// Subscriptions of one thread, which it waits for together.
+pub struct Subscriptions {
+    /// Each with its participant, without which nothing comes.
+    readers: Vec<(DataReader<Message, AsTheyAre>, DomainParticipant)>,
+    poll: Poll,
+    events: Events,
+}
+
+impl Subscriptions {
+    /// None yet.
+    ///
+    /// # Errors
+    /// Where the system has nothing to wait with.
+    pub fn new() -> Result<Self> {
+        let poll = Poll::new().map_err(failed)?;
+        Ok(Self { readers: Vec::new(), poll, events: Events::with_capacity(16) })
+    }
+
+    /// Adds the topic `name`, a full one, of messages of the type `kind`. Those are the sender's who sends once, and if `reliable` only
+    /// those of one who sends again what was lost.
+    ///
+    /// # Errors
+    /// Where DDS fails.
+    pub fn add(&mut self, to: &Participant, name: &str, kind: &str, reliable: bool) -> Result<()> {
+        let reliability = if reliable {
+            Reliability::Reliable { max_blocking_time: PATIENCE }
+        } else {
+            Reliability::BestEffort
+        };
+        let qos = qos(reliability, WAITING, WAITING);
+        let topic = to.topic(name, kind, &qos)?;
+        let mut reader = to.subscriber.create_datareader_no_key(&topic, Some(qos)).map_err(failed)?;
+        let token = Token(self.readers.len());
+        self.poll.registry().register(&mut reader, token, Interest::READABLE).map_err(failed)?;
+        self.readers.push((reader, to.inner.clone()));
+        Ok(())
+    }
+
+    /// Waits for messages, for at most so long, and hands on those that came: the number of the topic, in the order in which they were
+    /// added, and the bytes as [`mrfgs_ros::messages`] takes them.
+    ///
+    /// # Errors
+    /// Where DDS fails for good.
+    pub fn wait(&mut self, patience: Duration, mut take: impl FnMut(usize, Vec<u8>)) -> Result<()> {
+        match self.poll.poll(&mut self.events, Some(patience)) {
+            Err(error) if error.kind() != std::io::ErrorKind::Interrupted => return Err(failed(error)),
+            _ => {}
+        }
+        // All are asked, whatever the events say: one that was missed would wait for the next message.
+        for (number, (reader, _)) in self.readers.iter_mut().enumerate() {
+            while let Some(sample) = reader.take_next_sample().map_err(failed)? {
+                take(number, sample.into_value().0);
+            }
+        }
+        Ok(())
+    }
+}
