@@ -1,7 +1,7 @@
 //! Rigs that drift, and how they are put right.
 
 use std::ptr;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use mrfgs::drift;
 
@@ -15,6 +15,12 @@ use crate::status::{Failure, Status, call};
 pub struct Drift {
     calibrated: mrfgs::rectification::Rectification,
     inner: Mutex<drift::Drift>,
+}
+
+impl Drift {
+    fn inner(&self) -> MutexGuard<'_, drift::Drift> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// How the right camera of a rig has turned.
@@ -69,7 +75,7 @@ pub unsafe extern "C" fn mrfgs_drift_follow(
         // SAFETY: the caller promises that the pointer is null or good.
         let range = unsafe { Range::searched(range) }?;
         let range = range.ok_or_else(|| Failure::argument("the range is null"))?;
-        drift.inner.lock().unwrap_or_else(PoisonError::into_inner).follow(&pair, range)?;
+        drift.inner().follow(&pair, range)?;
         Ok(())
     })
 }
@@ -83,7 +89,7 @@ pub unsafe extern "C" fn mrfgs_drift_turn(drift: *const Drift, turn: *mut Turn) 
         if turn.is_null() {
             return Err(Failure::argument("the place for the turn is null"));
         }
-        let found = drift.inner.lock().unwrap_or_else(PoisonError::into_inner).turn();
+        let found = drift.inner().turn();
         let told = found.map(|found| Turn {
             degrees: found.degrees(),
             errors: found.errors.map(f64::to_degrees),
@@ -112,8 +118,7 @@ pub unsafe extern "C" fn mrfgs_drift_correct(
         unsafe { rectification.write(ptr::null_mut()) };
         // SAFETY: the caller promises that the pointer is null or good.
         let drift = unsafe { argument::thing("drift", drift) }?;
-        let corrected =
-            drift.inner.lock().unwrap_or_else(PoisonError::into_inner).correct(&drift.calibrated)?;
+        let corrected = drift.inner().correct(&drift.calibrated)?;
         if let Some(by) = corrected {
             let made = Box::new(Rectification::of(by));
             // SAFETY: as above.
