@@ -119,6 +119,25 @@ impl Messages {
         self.cameras.as_ref().map(|cameras| cameras.message(header, size))
     }
 
+    /// Hands the disparities of a frame, its camera and its `contents` to `sink`.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub(crate) fn put_frame(
+        &self,
+        header: &Header,
+        map: &Plane<f32>,
+        sigma: Option<f32>,
+        contents: Vec<Content>,
+        sink: &mut impl Sink,
+    ) -> Result<()> {
+        sink.put(DISPARITY, header, &self.disparity(header, map, sigma))?;
+        if let Some(camera) = self.camera(header, map.size()) {
+            sink.put(CAMERA, header, &camera)?;
+        }
+        self.put(header, contents, sink)
+    }
+
     /// Hands what a frame has beside its disparities to `sink`.
     ///
     /// # Errors

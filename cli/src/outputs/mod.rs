@@ -11,6 +11,7 @@ mod outcome;
 mod record;
 mod recording;
 mod staged;
+mod viewer;
 
 pub(crate) use also::{Also, AlsoArgs};
 pub(crate) use claim::Claim;
@@ -23,3 +24,4 @@ pub(crate) use outcome::{Outcome, View};
 pub(crate) use record::{Files, MatchRecord, stage_and_level};
 pub(crate) use recording::RecordedMaps;
 pub(crate) use staged::StagedFolder;
+pub(crate) use viewer::ShownMaps;

@@ -11,7 +11,7 @@ use mrfgs::{Error, Result};
 use mrfgs_ros::messages::{Encode, Header};
 use mrfgs_ros::recording::Writer;
 
-use crate::outputs::messages::{self, Cameras, Content, Messages, Sink, Topic};
+use crate::outputs::messages::{Cameras, Content, Messages, Sink, Topic};
 
 /// A recording in the making. The file appears when it is [finished](Self::finish).
 pub(crate) struct RecordedMaps {
@@ -48,12 +48,7 @@ impl RecordedMaps {
         sigma: Option<f32>,
         contents: Vec<Content>,
     ) -> Result<()> {
-        let Self { messages, file } = self;
-        file.put(messages::DISPARITY, header, &messages.disparity(header, map, sigma))?;
-        if let Some(camera) = messages.camera(header, map.size()) {
-            file.put(messages::CAMERA, header, &camera)?;
-        }
-        messages.put(header, contents, file)
+        self.messages.put_frame(header, map, sigma, contents, &mut self.file)
     }
 
     /// Ends the recording, with its index.

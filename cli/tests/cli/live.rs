@@ -1,4 +1,5 @@
 //! `mrfgs ros`: a node that matches what cameras publish. The cameras are here, over the same DDS; `scripts/node` has those of others.
+//! And addresses where viewers connect to a sequence; `scripts/viewer` has viewers of others.
 
 use mrfgs::Matcher;
 use mrfgs::options::Method;
@@ -194,5 +195,28 @@ fn flags_of_a_node_that_make_no_sense() {
     for domain in ["x", "233", "-1"] {
         let run = run_with(&folder, "ros --device cpu", &[("ROS_DOMAIN_ID", domain)]);
         run.failed(2, "ROS_DOMAIN_ID & give a number from 0 to 232");
+    }
+}
+
+#[test]
+fn a_sequence_shows_itself_to_viewers() {
+    let folder = Folder::new();
+    for (view, name) in [("left", "im0.png"), ("right", "im1.png")] {
+        fs::create_dir(folder.join(view)).unwrap();
+        fs::copy(scene("slanted").join(name), folder.join(view).join("0.png")).unwrap();
+    }
+    let line = "sequence left right --max-disparity 47 --method fast --device cpu";
+    let shown = run(&folder, &format!("{line} ws://127.0.0.1:0 --also confidence")).succeeded();
+    shown.says("open ws://127.0.0.1: & in Foxglove");
+    shown.says("1 frame of 240 x 180");
+    for (rest, code, words) in [
+        ("ws://127.0.0.1:0 --format tif", 2, "--format & OUTPUT is a viewer"),
+        ("ws://127.0.0.1:0 --also preview", 2, "--also preview & no message of ROS"),
+        ("ws://127.0.0.1:0 --also depth", 2, "--also depth & calib"),
+        ("ws://", 1, "cannot write ws://"),
+        ("ws://127.0.0.1", 1, "cannot write ws://127.0.0.1"),
+        ("ws://127.0.0.1:99999", 1, "cannot write ws://127.0.0.1:99999"),
+    ] {
+        run(&folder, &format!("{line} --quiet {rest}")).failed(code, words);
     }
 }

@@ -1,5 +1,6 @@
 //! `mrfgs sequence`.
 
+mod kind;
 mod pipeline;
 mod writer;
 
@@ -25,6 +26,7 @@ use crate::pairs::input::{Calib, Input};
 use crate::sequences::{Frame, Frames, Layout, Pairing, RawFrames, Recorded, Rectifier, raw_frames};
 use crate::{console, ffmpeg, plan, stop};
 
+use kind::Kind;
 use pipeline::Pipeline;
 use writer::{Records, Writer};
 
@@ -40,6 +42,8 @@ Examples:
   # A recording of ROS, with the calibration in it:
   mrfgs sequence drive.mcap maps --also depth-mm
   mrfgs sequence drive.mcap found.mcap --also depth,points
+  # The same to look at, in Foxglove:
+  mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points
   # Raw images and a calibration, to depth in millimetres:
   mrfgs sequence left right maps --rectify --calib c.yml --also depth-mm";
 
@@ -59,7 +63,8 @@ Examples:
 /// .mov, .webm or .avi. A folder gets a map of each frame, named after
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
 /// with --also side-by-side, LEFT stands beside it. NAME.mcap is a recording of ROS 2: disparities on /disparity, and with --also
-/// depth, depth-mm, points, confidence or validity these, with the times of the left images.
+/// depth, depth-mm, points, confidence or validity these, with the times of the left images. `ws://HOST:PORT` shows the same to Foxglove
+/// while frames are matched; a viewer that is slow gets the newest.
 ///
 /// Without --max-disparity the range is that of the calibration, or that of the first frame. While frames are matched, the next ones are
 /// read and rectified, and the last one is written. The CPU path matches as many at once as it has threads, as
@@ -73,7 +78,8 @@ pub(crate) struct Args {
     left: PathBuf,
     /// Frames of the right camera
     right: Option<PathBuf>,
-    /// Folder for the maps, film to write: NAME.y4m, NAME.mp4 or -, or recording to write: NAME.mcap
+    /// Folder for the maps, film to write: NAME.y4m, NAME.mp4 or -, recording to write: NAME.mcap, or where Foxglove looks:
+    /// `ws://localhost:8765`
     #[arg(required = true)]
     output: PathBuf,
 
@@ -154,25 +160,13 @@ impl Args {
 /// What films are called that are not written here.
 const OTHER_FILMS: [&str; 4] = ["mpg", "mpeg", "wmv", "gif"];
 
-/// Whether an output is a film.
-fn is_film(output: &Path) -> bool {
-    let is_y4m = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m"));
-    is_printed(output) || is_y4m || ffmpeg::writes(output) && !output.is_dir()
-}
-
-/// Whether an output is a recording.
-fn is_recording(output: &Path) -> bool {
-    let is_mcap = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
-    is_mcap && !output.is_dir()
-}
-
 pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();
-    let (film, recording) = (is_film(&args.output), is_recording(&args.output));
+    let kind = Kind::of(&args.output);
     check_flags(args)?;
-    if film {
+    if kind == Kind::Film {
         args.maps.also.check_film()?;
-    } else if recording {
+    } else if kind.takes_messages() {
         args.maps.also.check_messages("give the name of a folder as OUTPUT")?;
     }
     stop::listen();
@@ -180,7 +174,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let texts = recorded.as_ref().map(|recorded| calibration_of(recorded, args)).transpose()?.flatten();
     // What a recording has not rectified is rectified by what it says of its cameras.
     let rectify = args.rectify || texts.is_some() && recorded.as_ref().is_some_and(|one| !one.is_rectified());
-    if !film && !recording {
+    if kind == Kind::Folder {
         args.maps.also.check(rectify)?;
     }
     let third = args.maps.also.third()?;
@@ -201,7 +195,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let cameras = args.maps.also.take_cameras();
     let beside = first_image
         .as_deref()
-        .filter(|_| takes_cameras(args) || recording || args.search.takes_calibration());
+        .filter(|_| takes_cameras(args) || kind.takes_messages() || args.search.takes_calibration());
     let numbers = Some(&args.numbers);
     let calib = texts.as_deref().map_or(Calib::Files(&args.calib), Calib::Texts);
     let mut input = Input::new(pair, &args.search, sign, calib, numbers, rectifying.as_ref(), beside)?;
@@ -215,13 +209,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if !args.quiet {
         input.say_range(sign, " in the first frame");
     }
-    // A recording also holds the cameras themselves, for which nothing needs to be asked; nor for what shows how one of them turns.
-    let mut rig = if cameras.is_none() && (recording || args.recalibrate) {
+    // Messages also hold the cameras themselves, for which nothing needs to be asked; nor for what shows how one of them turns.
+    let mut rig = if cameras.is_none() && (kind.takes_messages() || args.recalibrate) {
         None
     } else {
         input.rig(cameras, first_image.as_deref().unwrap_or(&args.left))?
     };
-    if let (Some(word), Some(rig)) = (cameras.filter(|_| recording), &rig) {
+    if let (Some(word), Some(rig)) = (cameras.filter(|_| kind.takes_messages()), &rig) {
         word.check_metres(rig)?;
     }
     let part = args.region.roi.as_ref();
@@ -244,14 +238,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let (output, wanted, steady) = (args.output.as_path(), &args.maps, args.steady.then(Steady::new));
     let writer = Writer { output, wanted, range, rig, sigma, rectifying, third, rate, steady };
     let records = args.json.as_deref().map(Records::new).transpose()?;
-    let mut sink = if film {
-        writer.begin_film(records)?
-    } else if recording {
-        let origin = part.map_or((0, 0), |part| (part.x.start, part.y.start));
-        let cameras = input.calibration().and_then(|calibration| Cameras::of(calibration, origin));
-        writer.begin_recording(cameras, records)?
-    } else {
-        writer.begin_folder(records)?
+    let origin = part.map_or((0, 0), |part| (part.x.start, part.y.start));
+    let cameras = || input.calibration().and_then(|calibration| Cameras::of(calibration, origin));
+    let mut sink = match (kind, kind::address(output)) {
+        (Kind::Viewer, Some(address)) => {
+            let (sink, address) = writer.begin_viewer(address, cameras(), records)?;
+            if !args.quiet {
+                console::say(&format!("open {address} in Foxglove"));
+            }
+            sink
+        }
+        (Kind::Film, _) => writer.begin_film(records)?,
+        (Kind::Recording, _) => writer.begin_recording(cameras(), records)?,
+        _ => writer.begin_folder(records)?,
     };
     let files = args.files(&input);
     let (rectified, size) = (rectify, input.pair.size());
@@ -309,7 +308,7 @@ fn calibration_of(recorded: &Recorded, args: &Args) -> Result<Option<Vec<(PathBu
     if found.is_some() {
         // Rectified images need no cameras for their disparities, whatever is wrong with these.
         let takes_cameras = takes_cameras(args) || args.search.takes_cameras().is_some();
-        let counts = !recorded.is_rectified() || takes_cameras || is_recording(&args.output);
+        let counts = !recorded.is_rectified() || takes_cameras || Kind::of(&args.output).takes_messages();
         return Ok(found.filter(|_| counts));
     }
     let path = recorded.path().display();
@@ -361,12 +360,12 @@ fn check_flags(args: &Args) -> Result<()> {
         let reason = "says how both views share a frame, and RIGHT is given; leave out one of them";
         return Err(Failure::usage("--layout", reason));
     }
-    if args.maps.format.is_some() && is_film(&args.output) {
-        let reason = "is that of maps in a folder, and OUTPUT is a film; leave it out, or give the name of a folder as OUTPUT";
-        return Err(Failure::usage("--format", reason));
-    }
-    if args.maps.format.is_some() && is_recording(&args.output) {
-        let reason = "is that of maps in a folder, and OUTPUT is a recording; leave it out, or give the name of a folder as OUTPUT";
+    let kind = Kind::of(&args.output);
+    if args.maps.format.is_some() && kind != Kind::Folder {
+        let reason = format!(
+            "is that of maps in a folder, and OUTPUT is {}; leave it out, or give the name of a folder as OUTPUT",
+            kind.name()
+        );
         return Err(Failure::usage("--format", reason));
     }
     let extension = args.output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -438,14 +437,16 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
         }
         return Ok(console::check_takes_data()?);
     }
-    if is_recording(output) {
-        return files::distinct(&named, &[("OUTPUT", output)]);
-    }
-    if is_film(output) {
-        if ffmpeg::writes(output) {
-            ffmpeg::check(output)?;
+    match Kind::of(output) {
+        Kind::Viewer => return Ok(()),
+        Kind::Recording => return files::distinct(&named, &[("OUTPUT", output)]),
+        Kind::Film => {
+            if ffmpeg::writes(output) {
+                ffmpeg::check(output)?;
+            }
+            return files::distinct(&named, &[("OUTPUT", output)]);
         }
-        return files::distinct(&named, &[("OUTPUT", output)]);
+        Kind::Folder => {}
     }
     let place = files::folder_place(output)?;
     let inside = |file: &&Path| file.canonicalize().is_ok_and(|file| file.parent() == Some(&place));

@@ -18,7 +18,7 @@ use mrfgs_ros::messages::{Header, SECOND, Stamp};
 use crate::args::Sign;
 use crate::console;
 use crate::failure::Result;
-use crate::outputs::{Cameras, Film, MapArgs, Outcome, RecordedMaps, files, is_printed};
+use crate::outputs::{Cameras, Film, MapArgs, Outcome, RecordedMaps, ShownMaps, files, is_printed};
 use crate::sequences::FrameRate;
 
 /// Frames a second where nothing says it.
@@ -94,6 +94,7 @@ enum To {
     Folder,
     Film(Film),
     Recording(RecordedMaps),
+    Viewer(ShownMaps),
 }
 
 /// The output, with what is in it so far.
@@ -135,6 +136,21 @@ impl<'a> Writer<'a> {
         Ok(self.begin(recording, records))
     }
 
+    /// Begins to show maps, which these `cameras` have where they are known, at an address. Returns where that is.
+    ///
+    /// # Errors
+    /// Where nobody can listen there.
+    pub(super) fn begin_viewer(
+        self,
+        address: &str,
+        cameras: Option<Cameras>,
+        records: Option<Records>,
+    ) -> Result<(Sink<'a>, String)> {
+        let shown = ShownMaps::new(address, self.range, cameras)?;
+        let address = shown.address();
+        Ok((self.begin(To::Viewer(shown), records), address))
+    }
+
     /// Begins a folder, which may be there.
     ///
     /// # Errors
@@ -174,10 +190,15 @@ impl Sink<'_> {
         match &mut self.to {
             To::Folder => wanted.write(output, &found.name, &outcome)?,
             To::Film(film) => film.add(&wanted.also.film_picture(&outcome))?,
-            To::Recording(recording) => {
+            To::Recording(_) | To::Viewer(_) => {
                 let header = found.header.clone().unwrap_or_else(|| header(&found.name, self.count, rate));
                 let map = outcome.final_map(wanted.also.limits);
-                recording.add(&header, &map, outcome.typical_sigma(), wanted.also.contents(&outcome))?;
+                let (sigma, contents) = (outcome.typical_sigma(), wanted.also.contents(&outcome));
+                match &mut self.to {
+                    To::Recording(recording) => recording.add(&header, &map, sigma, contents)?,
+                    To::Viewer(viewer) => viewer.add(&header, &map, sigma, contents)?,
+                    To::Folder | To::Film(_) => {}
+                }
             }
         }
         self.count += 1;
@@ -190,7 +211,7 @@ impl Sink<'_> {
     /// Ends film or recording, and records.
     pub(super) fn finish(&mut self) -> Result<()> {
         let ended = match std::mem::replace(&mut self.to, To::Folder) {
-            To::Folder => Ok(()),
+            To::Folder | To::Viewer(_) => Ok(()),
             To::Film(film) => film.finish(),
             To::Recording(recording) => recording.finish(),
         };

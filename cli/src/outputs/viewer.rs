@@ -1,0 +1,55 @@
+//! Maps for Foxglove, while they come.
+
+use mrfgs::image::Plane;
+use mrfgs::options::DisparityRange;
+use mrfgs::{Error, Result};
+use mrfgs_node::viewer::Viewer;
+use mrfgs_ros::messages::{Encode, Header};
+
+use crate::outputs::messages::{Cameras, Content, Messages, Sink, Topic};
+
+/// Shows maps to whoever connects.
+pub(crate) struct ShownMaps {
+    messages: Messages,
+    viewer: Viewer,
+}
+
+impl ShownMaps {
+    /// At `address`, of disparities in `range`.
+    ///
+    /// # Errors
+    /// [`Error::Write`] where nobody can listen there.
+    pub(crate) fn new(address: &str, range: DisparityRange, cameras: Option<Cameras>) -> Result<Self> {
+        let viewer =
+            Viewer::new(address).map_err(|reason| Error::write(format!("ws://{address}"), reason))?;
+        Ok(Self { messages: Messages::new(range, cameras), viewer })
+    }
+
+    /// Where Foxglove connects.
+    pub(crate) fn address(&self) -> String {
+        format!("ws://{}", self.viewer.address())
+    }
+
+    /// Shows what [`RecordedMaps::add`](super::RecordedMaps::add) writes.
+    ///
+    /// # Errors
+    /// None: viewers come and go.
+    pub(crate) fn add(
+        &mut self,
+        header: &Header,
+        map: &Plane<f32>,
+        sigma: Option<f32>,
+        contents: Vec<Content>,
+    ) -> Result<()> {
+        self.messages.put_frame(header, map, sigma, contents, &mut Shown(&mut self.viewer))
+    }
+}
+
+struct Shown<'a>(&'a mut Viewer);
+
+impl Sink for Shown<'_> {
+    fn put(&mut self, (topic, _): Topic, header: &Header, message: &impl Encode) -> Result<()> {
+        self.0.show(&format!("/{topic}"), header.stamp, message);
+        Ok(())
+    }
+}
