@@ -1,6 +1,7 @@
 //! Adapters: listing them, and choosing one.
 
 use crate::error::{DeviceError, ExecutionError, Result};
+use std::sync::OnceLock;
 
 /// An adapter, as `mrfgs devices` lists it.
 #[derive(Clone, Debug)]
@@ -45,6 +46,9 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
     descriptor.backend_options.noop.enable = backends.contains(wgpu::Backends::NOOP);
     let instance = wgpu::Instance::new(descriptor);
     if !cfg!(target_arch = "wasm32") {
+        if !backends.contains(wgpu::Backends::NOOP) {
+            keep_drivers(&instance);
+        }
         return instance.enumerate_adapters(backends).await;
     }
     // A browser shows one of its adapters, the one that is asked for.
@@ -53,6 +57,13 @@ pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> 
         ..Default::default()
     };
     instance.request_adapter(&wanted).await.into_iter().collect()
+}
+
+/// Keeps the libraries of the drivers for as long as the process lives. With the last instance they would be unloaded, and threads that
+/// have used them call them once more when they end: with NVIDIA's driver that is a segmentation fault.
+fn keep_drivers(instance: &wgpu::Instance) {
+    static KEPT: OnceLock<wgpu::Instance> = OnceLock::new();
+    KEPT.get_or_init(|| instance.clone());
 }
 
 pub(super) fn api(backend: wgpu::Backend) -> &'static str {
