@@ -179,6 +179,32 @@ fn devices_agree() {
     }
 }
 
+/// A device keeps what both sizes take from match to match, as far as the memory of the method goes.
+#[test]
+fn both_sizes_stay_on_the_device() {
+    let pair = scene("slanted");
+    let [own, _] = both(&accurate());
+    let held = |methods: &[&Method]| {
+        let gpu = devices::open(FaultInjection::default())?;
+        let mut matcher = Matcher::on(Ok(gpu), false, &mrfgs::options::Execution::default()).unwrap();
+        let held = |method: &&Method| {
+            let found = matcher.job(&pair, RANGE).method(method).run().unwrap();
+            found.traffic.bytes_held
+        };
+        Some(methods.iter().map(held).collect::<Vec<_>>())
+    };
+    let Some(alone) = held(&[&own, &own]) else { return };
+    let mut all = accurate();
+    let both = held(&[&all, &all]).unwrap();
+    assert!(both[0] > 4 * alone[0], "{both:?}, {alone:?}");
+    assert_eq!(both[0], both[1]);
+    // Control: as much as the larger one takes is not enough for both.
+    let memory = (both[0] - alone[0] / 2) >> 20;
+    all.set("memory", &memory.to_string()).unwrap();
+    let larger = held(&[&all, &all]).unwrap();
+    assert!(larger[1] < both[0] && larger[1] <= memory << 20, "{larger:?} of {memory} MiB, {both:?}");
+}
+
 /// What is wrong with a pair is corrected once, before it is enlarged.
 #[test]
 fn the_larger_pair_is_conditioned() {

@@ -31,7 +31,7 @@ mod words;
 
 use super::probe::Probe;
 use super::{Backend, Map, Promise, Requests, Stage, Ticket, Traffic};
-use crate::error::{Purpose, Result};
+use crate::error::{Error, Purpose, Result};
 use crate::front::Prepared;
 use crate::image::Plane;
 use crate::maps::Maps;
@@ -114,6 +114,8 @@ pub struct Gpu {
     work: u64,
     timer: Option<Timer>,
     state: Option<State>,
+    /// That of another size, where both are small enough: a match at two sizes goes to and fro.
+    other: Option<State>,
     requests: Requests<RequestedMaps>,
 }
 
@@ -165,6 +167,7 @@ impl Gpu {
             work: 0,
             timer: None,
             state: None,
+            other: None,
             requests: Requests::default(),
         })
     }
@@ -225,6 +228,18 @@ impl Gpu {
 
     fn state(&self) -> &State {
         self.state.as_ref().expect("prepare comes before every stage")
+    }
+
+    /// Buffers and commands for a plan.
+    fn begin(&mut self, plan: &Plan) -> Result<State> {
+        if self.device.software {
+            memory::check(plan.bytes(), Purpose::Match)?;
+        }
+        let mut buffers = Buffers::new(&mut self.device, plan)?;
+        let commands = self.all_commands(plan, &mut buffers)?;
+        let upload = self.recorded_at(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
+        let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
+        Ok(State { plan: plan.clone(), buffers, commands, upload, words: vec![0; words] })
     }
 
     /// Puts the pair and its label ranges into the buffers, and messages at their start.
@@ -337,6 +352,9 @@ impl Backend for Gpu {
         }
         (self.encoder, self.passes, self.work) = (None, 0, 0);
         self.device.traffic = Traffic::default();
+        if !self.state.as_ref().is_some_and(|state| plan.fits(&state.plan)) {
+            std::mem::swap(&mut self.state, &mut self.other);
+        }
         let mut state = match self.state.take() {
             Some(mut state) if plan.fits(&state.plan) => {
                 if state.plan.core != plan.core {
@@ -345,22 +363,22 @@ impl Backend for Gpu {
                 }
                 state
             }
-            other => {
-                // What the last match holds goes before the next one asks for more.
-                drop(other);
-                if self.device.software {
-                    memory::check(plan.bytes(), Purpose::Match)?;
+            // What the match before the last one holds goes before this one asks for more.
+            older => {
+                drop(older);
+                let most = u64::from(plan.memory) << 20;
+                if self.other.as_ref().is_some_and(|other| other.buffers.bytes() + plan.bytes() > most) {
+                    self.other = None;
                 }
-                let mut buffers = Buffers::new(&mut self.device, plan)?;
-                let commands = self.all_commands(plan, &mut buffers)?;
-                let upload =
-                    self.recorded_at(0, plan, &buffers, None, |recorder| upload::record(recorder))?;
-                let words = buffers.levels[0].params.pixel_pitch as usize * plan.size().1;
-                State { plan: plan.clone(), buffers, commands, upload, words: vec![0; words] }
+                match self.begin(plan) {
+                    Err(Error::Memory(_)) if self.other.take().is_some() => self.begin(plan)?,
+                    begun => begun?,
+                }
             }
         };
         self.load(&mut state, &prepared)?;
-        self.device.traffic.bytes_held = state.buffers.bytes();
+        let held = [Some(&state), self.other.as_ref()].into_iter().flatten();
+        self.device.traffic.bytes_held = held.map(|state| state.buffers.bytes()).sum();
         self.state = Some(state);
         Ok(())
     }

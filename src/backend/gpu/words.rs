@@ -1,12 +1,14 @@
-//! Images, label ranges and label windows in words, as the shaders read them.
+//! Images, label ranges and label windows in words, as the shaders read them. Rows of images are made at once: on a GPU little else takes
+//! time.
 
 use super::uniform::LevelParams;
 use crate::image::{Image, Pixel, Plane};
+use rayon::prelude::*;
 
 /// Writes pixels as red | green << 8 | blue << 16, | 1 << 24 if masked, to `words`, as long as that says all: as long as they are
 /// in whole 8-bit levels, and grey follows from colour. Returns whether it does.
 pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool {
-    let mut rows = words.chunks_exact_mut(pitch as usize).enumerate();
+    let rows = words.par_chunks_exact_mut(pitch as usize).enumerate();
     rows.all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
 }
 
@@ -28,13 +30,13 @@ fn narrow_row_on<S: pulp::Simd>(_: S, pixels: &[Pixel], masked: &[bool], words: 
 pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
     let pitch = 4 * pitch as usize;
     let mut words = vec![0; pitch * image.height()];
-    for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
+    words.par_chunks_exact_mut(pitch).enumerate().for_each(|(y, row)| {
         let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
         for (out, (pixel, &masked)) in row.chunks_exact_mut(4).zip(pixels) {
             let [r, g, b, grey] = pixel.map(u32::from);
             out.copy_from_slice(&[r | g << 16, b | grey << 16, masked.into(), 0]);
         }
-    }
+    });
     words
 }
 
@@ -43,13 +45,13 @@ pub(super) fn image_words(image: &Image, pitch: u32) -> Vec<u32> {
 pub(super) fn full_words(image: &Image, pitch: u32) -> Vec<u32> {
     let pitch = 2 * pitch as usize;
     let mut words = vec![0; pitch * image.height()];
-    for (y, row) in words.chunks_exact_mut(pitch).enumerate() {
+    words.par_chunks_exact_mut(pitch).enumerate().for_each(|(y, row)| {
         let pixels = image.pixels.row(y).iter().zip(image.masked.row(y));
         for (out, (pixel, &masked)) in row.as_chunks_mut().0.iter_mut().zip(pixels) {
             let [r, g, b, grey] = pixel.map(u32::from);
             *out = [r >> 8 | g >> 8 << 8 | b >> 8 << 16 | u32::from(masked) << 24, grey];
         }
-    }
+    });
     words
 }
 
