@@ -170,7 +170,7 @@ mod tests {
             ("rectify", 8),
             ("depth", 15),
             ("sequence", 35),
-            ("ros", 25),
+            ("ros", 26),
             ("batch", 20),
             ("evaluate", 12),
             ("evaluate map", 8),

@@ -11,7 +11,7 @@ const TOO_MANY: &str = "240 x 180 & at most 43199 & raise --max-pixels";
 /// range, and `R` for one of raw images.
 const FAILURES: &[Failure] = &[
     // The command line itself.
-    ("", 2, "subcommand & match, rectify, depth, sequence, batch & --help"),
+    ("", 2, "subcommand & match, rectify, depth, sequence, ros, batch & --help"),
     ("frobnicate", 2, "frobnicate & --help"),
     ("match left.png", 2, "<RIGHT> <OUTPUT> & mrfgs match --help"),
     ("completions", 2, "<SHELL> & mrfgs completions --help"),

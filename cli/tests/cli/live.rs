@@ -205,8 +205,9 @@ fn a_sequence_shows_itself_to_viewers() {
         fs::create_dir(folder.join(view)).unwrap();
         fs::copy(scene("slanted").join(name), folder.join(view).join("0.png")).unwrap();
     }
-    let line = "sequence left right --max-disparity 47 --method fast --device cpu";
-    let shown = run(&folder, &format!("{line} ws://127.0.0.1:0 --also confidence")).succeeded();
+    let flags = "--max-disparity 47 --method fast --device cpu";
+    let line = format!("sequence left right ws://127.0.0.1:0 --also confidence {flags}");
+    let shown = run(&folder, &line).succeeded();
     shown.says("open ws://127.0.0.1: & in Foxglove");
     shown.says("1 frame of 240 x 180");
     for (rest, code, words) in [
@@ -217,6 +218,6 @@ fn a_sequence_shows_itself_to_viewers() {
         ("ws://127.0.0.1", 1, "cannot write ws://127.0.0.1"),
         ("ws://127.0.0.1:99999", 1, "cannot write ws://127.0.0.1:99999"),
     ] {
-        run(&folder, &format!("{line} --quiet {rest}")).failed(code, words);
+        run(&folder, &format!("sequence left right {rest} --quiet {flags}")).failed(code, words);
     }
 }

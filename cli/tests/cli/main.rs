@@ -331,13 +331,14 @@ fn has_gpu() -> bool {
 }
 
 /// The program, its commands and theirs.
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 17] = [
     "",
     "demo",
     "match",
     "rectify",
     "depth",
     "sequence",
+    "ros",
     "batch",
     "evaluate",
     "evaluate map",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use mrfgs::Error;
 use mrfgs::error::Reason;
 use mrfgs_node::names::Names;
 use mrfgs_node::topics::{Participant, Subscriptions};
@@ -14,7 +15,10 @@ use mrfgs_ros::topics::Topic;
 use crate::failure::{Failure, Result};
 use crate::stop;
 
-use super::of_network;
+/// An error of the network.
+pub(super) fn of_network(reason: impl Into<Reason>) -> Failure {
+    Error::read("the network", reason.into()).into()
+}
 
 /// The topics of both cameras.
 #[derive(Clone)]

@@ -20,7 +20,7 @@ use crate::pairs::input::{Calib, Input};
 use crate::sequences::{Rectifier, ros};
 use crate::{console, remedy, stop};
 
-use super::Args;
+use super::args::Args;
 use super::arrivals::{Arrived, Cameras};
 use super::log::Log;
 use super::publications::Publications;

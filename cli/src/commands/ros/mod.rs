@@ -1,5 +1,6 @@
 //! `mrfgs ros`.
 
+mod args;
 mod arrivals;
 mod log;
 mod matching;
@@ -9,122 +10,19 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-use mrfgs::Error;
-use mrfgs_node::names::{Names, Rule};
-use mrfgs_node::topics::{MOST_DOMAIN, Participant};
+use mrfgs_node::topics::Participant;
 
-use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search, nanoseconds};
 use crate::failure::{Failure, Result};
-use crate::outputs::AlsoArgs;
 use crate::{console, stop};
 
-use arrivals::{Arrivals, Cameras};
+pub(crate) use args::Args;
+use arrivals::{Arrivals, Cameras, of_network};
 use log::Log;
 use matching::Matching;
 use publications::Publications;
 
-/// The name of the node, unless it is given another one.
-const NODE: &str = "mrfgs";
-/// The variable that names the domain.
-const DOMAIN: &str = "ROS_DOMAIN_ID";
 /// How often a wait for a pair looks whether the user has stopped it.
 const PATIENCE: Duration = Duration::from_millis(50);
-
-const EXAMPLES: &str = "\
-Examples:
-  mrfgs ros --method fast --max-disparity 63
-  mrfgs ros --remap left/image_raw:=/camera/infra1/image_rect_raw --remap right/image_raw:=/camera/infra2/image_rect_raw
-  mrfgs ros --remap __ns:=/stereo --also depth,points --method fast
-  # Images as JPEG, cameras that are not triggered together:
-  mrfgs ros -r left/image_raw:=left/image_raw/compressed -r right/image_raw:=right/image_raw/compressed --tolerance 0.005";
-
-/// Match what two cameras publish in ROS 2, live
-///
-/// A node of ROS 2 that takes no ROS: it speaks DDS, as ROS does by Cyclone DDS, Fast DDS and others. It subscribes to the images
-/// `left/image_raw` and `right/image_raw` and to the `camera_info` beside each, and publishes `disparity`
-/// (`stereo_msgs/msg/DisparityImage`) with the time and the frame of the left image. With --also depth, depth-mm, points, sigma, depth-sigma,
-/// confidence and validity it publishes these, too: on `depth/image_rect`, `depth/image_rect_raw`, `points2`, `sigma`, `depth/sigma`,
-/// `confidence` and `validity`, and depths with a `depth/camera_info`.
-///
-/// Images on topics such as `image_rect` are rectified; others are rectified by their `camera_info`. Topics that end in `/compressed`
-/// hold `CompressedImage`.
-///
-/// A node that is slower than its cameras leaves out all pairs but the newest one. While nobody subscribes, nothing is matched. Every
-/// ten seconds it says how many frames it has matched, how long they took and what it left out. It ends with Ctrl-C or SIGTERM, and then
-/// its exit status is 0. What a camera sends that makes no sense is told and left out.
-#[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
-#[allow(clippy::struct_excessive_bools, reason = "each is a flag")]
-pub(crate) struct Args {
-    /// Gives a topic another name, as ROS does: `FROM:=TO`. `__ns:=/NAMESPACE` puts all topics below a namespace, and `__node:=NAME`
-    /// renames the node, below which topics are that begin with ~/
-    #[arg(short, long, value_name = "FROM:=TO")]
-    remap: Vec<Rule>,
-    /// What launch files of ROS begin their flags with
-    #[arg(long = "ros-args", hide = true)]
-    _from_launch_file: bool,
-    /// The domain, 0 to 232: nodes of other domains are not seen [default: that of the variable `ROS_DOMAIN_ID`, or 0]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(..=i64::from(MOST_DOMAIN)))]
-    domain: Option<u16>,
-    /// Has images that were lost sent again, by cameras that offer it. Else they are lost, as ROS has it for sensors
-    #[arg(long)]
-    reliable: bool,
-    /// How far the times of two images may be apart that are a pair, in seconds: less than half of the time between two images of a
-    /// camera [default: 0]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = nanoseconds)]
-    tolerance: Option<u64>,
-    #[command(flatten)]
-    search: Search,
-    /// Calibration, in the place of what the cameras say: as `mrfgs match` takes it
-    #[arg(long, value_name = "FILE")]
-    calib: Vec<std::path::PathBuf>,
-    #[command(flatten)]
-    numbers: CameraArgs,
-    #[command(flatten)]
-    rectification: RectificationArgs,
-    /// Where the image does not change, the disparity follows that of the frames before, weighted by confidence: still surfaces flicker
-    /// less
-    #[arg(long)]
-    steady: bool,
-    /// Where matches in the frames show that the right camera has turned since the calibration, corrects the frames from then on
-    #[arg(long)]
-    recalibrate: bool,
-    #[command(flatten)]
-    also: AlsoArgs,
-    /// Prints errors only
-    #[arg(long)]
-    quiet: bool,
-
-    #[command(flatten)]
-    method: MethodArgs,
-    #[command(flatten)]
-    execution: ExecutionArgs,
-}
-
-impl Args {
-    fn names(&self) -> Result<Names> {
-        Names::new(NODE, &self.remap).map_err(|reason| Failure::usage("--remap", reason))
-    }
-
-    fn domain(&self) -> Result<u16> {
-        if let Some(domain) = self.domain {
-            return Ok(domain);
-        }
-        match std::env::var(DOMAIN) {
-            Ok(text) if !text.is_empty() => {
-                let domain = text.trim().parse().ok().filter(|domain| *domain <= MOST_DOMAIN);
-                let reason = format!("{text:?} is no domain; give a number from 0 to {MOST_DOMAIN}");
-                domain.ok_or_else(|| Failure::usage(DOMAIN, reason))
-            }
-            _ => Ok(0),
-        }
-    }
-}
-
-/// An error of the network.
-fn of_network(reason: impl Into<mrfgs::error::Reason>) -> Failure {
-    Error::read("the network", reason.into()).into()
-}
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();

@@ -9,7 +9,7 @@ use crate::failure::{self, Failure};
 use crate::outputs::AlsoArgs;
 use crate::outputs::messages::{self, Sink, Topic};
 
-use super::of_network;
+use super::arrivals::of_network;
 
 /// The topics of disparities and of what is wanted beside them.
 pub(super) struct Publications(Vec<(Topic, String, Publication)>);
