@@ -77,3 +77,21 @@ pub(super) fn unpacked(packed: &[u8], method: &str, size: u64) -> Result<Vec<u8>
         Err(error) => Err(format!("is damaged: {}", error.to_string().replace('\n', " ")).into()),
     }
 }
+
+/// What is in a message of its own that is packed by Zstandard.
+///
+/// # Errors
+/// Where nothing can be unpacked, in words that go after the name of the message.
+pub(super) fn unpacked_alone(packed: &[u8]) -> Result<Vec<u8>, Reason> {
+    let mut bytes = Vec::new();
+    let from = StreamingDecoder::new(packed).map_err(|error| format!("is no zstd: {error}"))?;
+    let read = from.take(MAX_RECORD + 1).read_to_end(&mut bytes);
+    read.map_err(|error| format!("is damaged: {}", error.to_string().replace('\n', " ")))?;
+    if bytes.len() as u64 > MAX_RECORD {
+        return Err(format!(
+            "holds more than {MAX_RECORD} bytes, which is the most that is unpacked at once"
+        )
+        .into());
+    }
+    Ok(bytes)
+}

@@ -1,7 +1,7 @@
 //! Files whose records say how long they are, which need not be true.
 
 use std::fs;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use mrfgs::error::Reason;
@@ -76,7 +76,9 @@ impl File {
 
     pub(super) fn seek(&mut self, to: u64) -> Result<()> {
         let to = to.min(self.len);
-        self.from.seek(SeekFrom::Start(to)).map_err(|e| Error::read(&self.path, e))?;
+        // What is in the buffer already stays.
+        let way = to.cast_signed() - self.at.cast_signed();
+        self.from.seek_relative(way).map_err(|e| Error::read(&self.path, e))?;
         self.at = to;
         Ok(())
     }

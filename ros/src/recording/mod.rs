@@ -1,10 +1,12 @@
-//! Recordings: MCAP files of ROS 2, and bags of ROS 1.
+//! Recordings: MCAP files and bags of ROS 2, and bags of ROS 1.
 
 mod bag;
 mod chunk;
+mod db3;
 mod file;
 mod mcap;
 mod message;
+mod sqlite;
 mod write;
 
 use std::fs;
@@ -16,6 +18,7 @@ use mrfgs::{Error, Result};
 use crate::topics::Topic;
 
 use bag::Bag;
+use db3::Db3;
 use mcap::Mcap;
 pub use message::Message;
 pub use write::Writer;
@@ -39,6 +42,7 @@ pub struct Recording {
 enum Format {
     Mcap,
     Bag,
+    Db3,
 }
 
 impl Recording {
@@ -71,6 +75,7 @@ impl Recording {
             let more = match format {
                 Format::Mcap => Mcap::topics(file)?,
                 Format::Bag => Bag::topics(file)?,
+                Format::Db3 => Db3::topics(file)?,
             };
             for topic in more {
                 match topics.iter_mut().find(|one| one.name == topic.name) {
@@ -122,6 +127,7 @@ fn open(file: &Path, format: Format, names: Vec<String>) -> Messages {
     let opened = match format {
         Format::Mcap => Mcap::open(file, names).map(|file| Box::new(file) as Messages),
         Format::Bag => Bag::open(file, names).map(|file| Box::new(file) as Messages),
+        Format::Db3 => Db3::open(file, &names).map(|file| Box::new(file) as Messages),
     };
     opened.unwrap_or_else(|error| Box::new(std::iter::once(Err(error))))
 }
@@ -136,25 +142,19 @@ fn extension(path: &Path) -> Option<String> {
 fn format(path: &Path) -> Result<Option<Format>> {
     let mut file = file::File::open(path)?;
     let start = file.take(file.left().min(16))?;
-    let known = [(MAGIC, Format::Mcap), (bag::MAGIC, Format::Bag)];
+    let known = [(MAGIC, Format::Mcap), (bag::MAGIC, Format::Bag), (sqlite::MAGIC, Format::Db3)];
     Ok(known.into_iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, format)| format))
 }
 
 fn known(path: &Path) -> Result<Format> {
-    if extension(path).is_some_and(|extension| extension == "db3") {
-        return Err(Error::read(
-            path,
-            "is a bag of ROS 2 in SQLite; convert it to MCAP with `ros2 bag convert`, or with rosbags-convert of \
-                                      the Python package rosbags",
-        ));
-    }
     let reason = match format(path)? {
         Some(format) => return Ok(format),
         None if fs::metadata(path).is_ok_and(|file| file.len() == 0) => "is empty",
-        None if path.extension().is_some_and(|extension| extension == "bag") => {
-            "is no bag of ROS 1: it does not begin with #ROSBAG V2.0"
-        }
-        None => "is no MCAP file: it does not begin as one",
+        None => match extension(path).as_deref() {
+            Some("bag") => "is no bag of ROS 1: it does not begin with #ROSBAG V2.0",
+            Some("db3") => "is no bag of ROS 2: it does not begin as a database of SQLite",
+            _ => "is no MCAP file: it does not begin as one",
+        },
     };
     Err(Error::read(path, reason))
 }
@@ -168,12 +168,9 @@ fn in_folder(folder: &Path) -> Result<Vec<(PathBuf, Format)>> {
     if let Some(packed) = paths.iter().find(|path| ends(path, ".mcap.zstd") || ends(path, ".db3.zstd")) {
         return Err(Error::read(packed, "is packed as a whole; unpack it with `zstd -d`"));
     }
-    if let Some(other) = paths.iter().find(|path| ends(path, ".db3")) {
-        return Err(known(other).err().unwrap_or_else(|| Error::read(other, "is no MCAP file")));
-    }
-    paths.retain(|path| ends(path, ".mcap") && path.is_file());
+    paths.retain(|path| (ends(path, ".mcap") || ends(path, ".db3")) && path.is_file());
     if paths.is_empty() {
-        return Err(Error::read(folder, "has a metadata.yaml and no MCAP file"));
+        return Err(Error::read(folder, "has a metadata.yaml and no MCAP or .db3 file"));
     }
     // The number at the end says their order, and 9 comes before 10.
     paths.sort_by_key(|path| {

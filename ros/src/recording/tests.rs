@@ -268,6 +268,66 @@ fn bags_are_read() {
     }
 }
 
+/// A bag of ROS 2 that SQLite has made, of ten images between many texts.
+fn of_sqlite(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/recording").join(name)
+}
+
+#[test]
+fn bags_in_sqlite_are_read() {
+    let all: Vec<_> = (0..10).map(|number| frame(number).encode()).collect();
+    // Pages of 4096 bytes by rosbags, and of 512 with interior ones and a long entry of a topic.
+    for (name, others) in [("rosbags.db3", 10), ("small.db3", 120)] {
+        let path = of_sqlite(name);
+        assert_eq!(read(&path), (all.clone(), None), "{name}");
+        let recording = Recording::open(&path).unwrap();
+        let topics: Vec<_> =
+            recording.topics().iter().map(|topic| (topic.name.as_str(), topic.count)).collect();
+        assert_eq!(topics, [("/left/image", Some(10)), ("/other", Some(others))]);
+    }
+}
+
+/// Whatever is wrong with it, nothing panics or goes on for ever, and what was read is as it was.
+#[test]
+fn damaged_databases_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.db3");
+    let whole = fs::read(of_sqlite("small.db3")).unwrap();
+    let all: Vec<_> = (0..10).map(|number| frame(number).encode()).collect();
+    for length in (0..whole.len()).step_by(97) {
+        fs::write(&path, &whole[..length]).unwrap();
+        let (messages, said) = read(&path);
+        assert_eq!(messages, all[..messages.len()], "{length}");
+        assert!(said.is_some_and(|said| said.contains("a.db3")), "{length}");
+    }
+    let mut refused = 0;
+    for at in 0..whole.len() {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x81;
+        fs::write(&path, damaged).unwrap();
+        refused += usize::from(read(&path).1.is_some());
+    }
+    // A byte of a message or of what nothing reads is not noticed: SQLite has no checksums.
+    assert!((200..whole.len() / 2).contains(&refused), "{refused}");
+    // What came last stands beside it.
+    fs::write(&path, &whole).unwrap();
+    assert_eq!(read(&path).1, None);
+    fs::write(folder.path().join("a.db3-wal"), "x").unwrap();
+    let said = read(&path).1.unwrap();
+    assert!(said.contains("was not closed") && said.contains("a.db3-wal"), "{said}");
+}
+
+#[test]
+fn messages_may_be_packed_alone() {
+    let bytes = frame(3).encode();
+    let zstd = ruzstd::encoding::compress_to_vec(&bytes[..], ruzstd::encoding::CompressionLevel::Fastest);
+    assert_eq!(chunk::unpacked_alone(&zstd).unwrap(), bytes);
+    for broken in [&zstd[..zstd.len() / 2], b"\x28\xb5\x2f\xfd"] {
+        let said = chunk::unpacked_alone(broken).unwrap_err().to_string();
+        assert!(said.contains("is damaged") || said.contains("is no zstd"), "{said}");
+    }
+}
+
 #[test]
 fn folders_have_their_files_in_order() {
     let folder = TempDir::new().unwrap();
@@ -278,7 +338,7 @@ fn folders_have_their_files_in_order() {
         let said = Recording::open(folder.path()).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");
     };
-    said("no MCAP file");
+    said("no MCAP or .db3 file");
     for number in [0_i64, 9, 10] {
         let mut writer = Writer::new(fs::File::create(at(&format!("drive_{number}.mcap"))).unwrap()).unwrap();
         writer.add("/left/image", Stamp(number), &frame(number)).unwrap();
@@ -288,7 +348,9 @@ fn folders_have_their_files_in_order() {
     assert_eq!(read(folder.path()), ([0, 9, 10].map(|number| frame(number).encode()).to_vec(), None));
     assert_eq!(Recording::open(folder.path()).unwrap().topics()[0].count, Some(3));
     fs::write(at("drive_11.db3"), "").unwrap();
-    said("rosbags-convert");
+    said("drive_11.db3: is empty");
+    fs::copy(of_sqlite("small.db3"), at("drive_11.db3")).unwrap();
+    assert_eq!(Recording::open(folder.path()).unwrap().topics()[0].count, Some(13));
     fs::write(at("drive_12.mcap.zstd"), "").unwrap();
     said("zstd -d");
 }
@@ -301,7 +363,8 @@ fn what_is_no_recording_is_told() {
         ("a.mcap", b"a text", "is no MCAP file"),
         ("a.bag", b"a text", "is no bag of ROS 1"),
         ("a.bag", b"#ROSBAG V1.2\n", "is no bag of ROS 1"),
-        ("a.db3", b"SQLite format 3\0", "rosbags-convert"),
+        ("a.db3", b"a text", "is no bag of ROS 2"),
+        ("a.db3", b"SQLite format 3\0", "is no database of SQLite: it is shorter"),
         ("a.bag", b"#ROSBAG V2.0\n\xff\xff\xff\xff", "is cut off"),
     ] {
         let path = folder.path().join(name);
