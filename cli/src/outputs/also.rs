@@ -203,6 +203,12 @@ impl AlsoArgs {
         }
     }
 
+    /// The camera of `--into` for messages, in a frame that is called as the file without its extension.
+    pub(crate) fn framed(&self, third: Option<&ThirdCamera>) -> Option<messages::Third> {
+        let stem = self.into.as_ref()?.file_stem()?;
+        third.map(|camera| messages::Third { frame_id: stem.to_string_lossy().into_owned(), camera: *camera })
+    }
+
     /// Refuses colours without a picture, and the original camera where the images are not rectified.
     pub(crate) fn check(&self, rectifies: bool) -> Result<()> {
         self.check_clip()?;
@@ -314,7 +320,8 @@ impl AlsoArgs {
         match self.wanted().find(|also| also.topic().is_none()) {
             Some(also) => {
                 let reason = format!(
-                    "is no message of ROS, which are depth, depth-mm, points, confidence, validity, sigma and depth-sigma; {remedy}"
+                    "is no message of ROS, which are depth, depth-mm, depth-registered, depth-registered-mm, points, confidence, validity, \
+                     sigma and depth-sigma; {remedy}"
                 );
                 Err(Failure::usage(also.flag(), reason))
             }
@@ -329,7 +336,7 @@ impl AlsoArgs {
 
     /// The wanted outputs as messages.
     pub(crate) fn contents(&self, outcome: &Outcome) -> Vec<Content> {
-        let &Outcome { maps, left, rig, .. } = outcome;
+        let &Outcome { maps, left, rig, third, .. } = outcome;
         let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
         let content = |also: &Also| match also.kind {
             Kind::Bytes(map) => Some(Content::Bytes(also.word, map(maps).clone())),
@@ -346,7 +353,16 @@ impl AlsoArgs {
                 let (rig, left) = rig.zip(left)?;
                 Some(Content::Points(rig.cloud(&self.limits.trusted(maps, &rig), left)))
             }
-            Kind::Disparity(..) | Kind::Registered { .. } | Kind::Picture { .. } => None,
+            Kind::Registered { millimetres } => {
+                let (rig, camera) = rig.zip(third)?;
+                if millimetres {
+                    let depths = rig.registered_millimetres(&near(&rig), &camera)?;
+                    Some(Content::RegisteredMillimetres(depths))
+                } else {
+                    Some(Content::Registered(rig.registered(&near(&rig), &camera)))
+                }
+            }
+            Kind::Disparity(..) | Kind::Picture { .. } => None,
         };
         self.wanted().filter_map(content).collect()
     }
@@ -429,7 +445,9 @@ impl Also {
             Kind::Sigma(Of::Depths) => Some(messages::DEPTH_SIGMA),
             Kind::Points(Frame::Matched) if self.word == self.stem() => Some(messages::POINTS),
             Kind::Bytes(_) => Some(messages::of_bytes(self.word)),
-            Kind::Points(_) | Kind::Disparity(..) | Kind::Registered { .. } | Kind::Picture { .. } => None,
+            Kind::Registered { millimetres: false } => Some(messages::REGISTERED),
+            Kind::Registered { millimetres: true } => Some(messages::REGISTERED_MILLIMETRES),
+            Kind::Points(_) | Kind::Disparity(..) | Kind::Picture { .. } => None,
         }
     }
 

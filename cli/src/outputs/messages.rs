@@ -1,6 +1,8 @@
 //! The messages of ROS 2 that a frame becomes, and their topics.
 
 use mrfgs::Result;
+use mrfgs::calibration::cameras::ThirdCamera;
+use mrfgs::calibration::lens::Distortion;
 use mrfgs::image::Plane;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::cloud::Cloud;
@@ -21,6 +23,10 @@ pub(crate) const DEPTH: Topic = ("depth/image_rect", Image::NAME);
 pub(crate) const MILLIMETRES: Topic = ("depth/image_rect_raw", Image::NAME);
 /// The camera of the depths, where ROS looks for it.
 pub(crate) const DEPTH_CAMERA: Topic = ("depth/camera_info", CameraInfo::NAME);
+/// Depths in the view of a third camera, and that camera.
+pub(crate) const REGISTERED: Topic = ("depth_registered/image", Image::NAME);
+pub(crate) const REGISTERED_MILLIMETRES: Topic = ("depth_registered/image_raw", Image::NAME);
+pub(crate) const REGISTERED_CAMERA: Topic = ("depth_registered/camera_info", CameraInfo::NAME);
 pub(crate) const POINTS: Topic = ("points2", PointCloud2::NAME);
 pub(crate) const SIGMA: Topic = ("sigma", Image::NAME);
 pub(crate) const DEPTH_SIGMA: Topic = ("depth/sigma", Image::NAME);
@@ -45,6 +51,9 @@ pub(crate) enum Content {
     Depth(Plane<f32>),
     /// 0 where there is none.
     Millimetres(Plane<u16>),
+    /// The same two in the view of a third camera.
+    Registered(Plane<f32>),
+    RegisteredMillimetres(Plane<u16>),
     Points(Cloud),
     /// Errors in pixels; +infinity where there is none.
     Sigma(Plane<f32>),
@@ -89,16 +98,49 @@ impl Cameras {
     }
 }
 
+/// A third camera, and the name of its frame of coordinates.
+#[derive(Clone)]
+pub(crate) struct Third {
+    pub(crate) frame_id: String,
+    pub(crate) camera: ThirdCamera,
+}
+
+impl Third {
+    fn message(&self, header: Header) -> CameraInfo {
+        let ThirdCamera { lens, size: (width, height), .. } = &self.camera;
+        let ([fx, fy], [cx, cy]) = (lens.focal_length(), lens.principal_point());
+        // ROS has names for these alone.
+        let (model, d) = match lens.distortion() {
+            Distortion::RadialTangential(model) => match model.coefficients() {
+                d if d.len() > 5 => ("rational_polynomial", d),
+                d => ("plumb_bob", d),
+            },
+            Distortion::Equidistant(k) => ("equidistant", k.to_vec()),
+            _ => ("", Vec::new()),
+        };
+        let pinhole = CameraInfo {
+            header,
+            width: *width as u32,
+            height: *height as u32,
+            p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+            ..CameraInfo::default()
+        };
+        CameraInfo { distortion_model: model.into(), d, ..pinhole.of_rectified() }
+    }
+}
+
 /// The messages of frames whose disparities are in `range`, and whose cameras are these where they are known.
 #[derive(Clone)]
 pub(crate) struct Messages {
     range: DisparityRange,
     cameras: Option<Cameras>,
+    third: Option<Third>,
 }
 
 impl Messages {
-    pub(crate) fn new(range: DisparityRange, cameras: Option<Cameras>) -> Self {
-        Self { range, cameras }
+    /// Depths may be those of a `third` camera, too.
+    pub(crate) fn new(range: DisparityRange, cameras: Option<Cameras>, third: Option<Third>) -> Self {
+        Self { range, cameras, third }
     }
 
     /// The disparities of a frame. The left view has this `header`, and disparities have this error (sigma, in pixels), where it is
@@ -145,6 +187,14 @@ impl Messages {
     pub(crate) fn put(&self, header: &Header, contents: Vec<Content>, sink: &mut impl Sink) -> Result<()> {
         // Both are checked before: such contents come with a known unit.
         let metres = self.cameras.as_ref().map_or(1.0, |cameras| cameras.metres);
+        let of_third =
+            |content: &Content| matches!(content, Content::Registered(_) | Content::RegisteredMillimetres(_));
+        let third = self.third.as_ref().filter(|_| contents.iter().any(of_third));
+        let frame_id = third.map_or_else(String::new, |third| third.frame_id.clone());
+        let there = Header { stamp: header.stamp, frame_id };
+        if let Some(third) = third {
+            sink.put(REGISTERED_CAMERA, &there, &third.message(there.clone()))?;
+        }
         for content in contents {
             match content {
                 Content::Depth(depth) => sink.put(DEPTH, header, &floats(header, &known(&depth, metres)))?,
@@ -152,9 +202,12 @@ impl Messages {
                 Content::DepthSigma(sigmas) => {
                     sink.put(DEPTH_SIGMA, header, &floats(header, &known(&sigmas, metres)))?;
                 }
-                Content::Millimetres(depth) => {
-                    let data = depth.data().iter().flat_map(|v| v.to_le_bytes()).collect();
-                    sink.put(MILLIMETRES, header, &image(header, depth.size(), "16UC1", data))?;
+                Content::Millimetres(depth) => sink.put(MILLIMETRES, header, &words(header, &depth))?,
+                Content::Registered(depth) => {
+                    sink.put(REGISTERED, &there, &floats(&there, &known(&depth, metres)))?;
+                }
+                Content::RegisteredMillimetres(depth) => {
+                    sink.put(REGISTERED_MILLIMETRES, &there, &words(&there, &depth))?;
                 }
                 Content::Points(cloud) => sink.put(POINTS, header, &points(header, &cloud, metres))?,
                 Content::Bytes(name, map) => {
@@ -206,6 +259,10 @@ fn disparity<'a>(
 
 fn floats(header: &Header, map: &Plane<f32>) -> Image<'static> {
     image(header, map.size(), "32FC1", map.data().iter().flat_map(|v| v.to_le_bytes()).collect())
+}
+
+fn words(header: &Header, map: &Plane<u16>) -> Image<'static> {
+    image(header, map.size(), "16UC1", map.data().iter().flat_map(|v| v.to_le_bytes()).collect())
 }
 
 fn image(

@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use mrfgs::image::Plane;
 use mrfgs::image::write;
 use mrfgs::image::write::Growing;
-use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 use mrfgs_ros::messages::{Encode, Header};
 use mrfgs_ros::recording::Writer;
 
-use crate::outputs::messages::{Cameras, Content, Messages, Sink, Topic};
+use crate::outputs::messages::{Content, Messages, Sink, Topic};
 
 /// A recording in the making. The file appears when it is [finished](Self::finish).
 pub(crate) struct RecordedMaps {
@@ -26,14 +25,14 @@ struct File {
 }
 
 impl RecordedMaps {
-    /// One at `path`, of disparities in `range`.
+    /// One at `path`, of these `messages`.
     ///
     /// # Errors
     /// [`Error::Write`] where it cannot be written.
-    pub(crate) fn new(path: &Path, range: DisparityRange, cameras: Option<Cameras>) -> Result<Self> {
+    pub(crate) fn new(path: &Path, messages: Messages) -> Result<Self> {
         write::check_path(path)?;
         let file = File { path: path.to_owned(), writer: None };
-        Ok(Self { messages: Messages::new(range, cameras), file })
+        Ok(Self { messages, file })
     }
 
     /// Adds the disparities of a frame, its camera and its `contents`. The left view has this `header`, and disparities have this error

@@ -1,12 +1,11 @@
 //! Maps for Foxglove, while they come.
 
 use mrfgs::image::Plane;
-use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 use mrfgs_node::viewer::Viewer;
 use mrfgs_ros::messages::{Encode, Header};
 
-use crate::outputs::messages::{Cameras, Content, Messages, Sink, Topic};
+use crate::outputs::messages::{Content, Messages, Sink, Topic};
 
 /// Shows maps to whoever connects.
 pub(crate) struct ShownMaps {
@@ -15,14 +14,14 @@ pub(crate) struct ShownMaps {
 }
 
 impl ShownMaps {
-    /// At `address`, of disparities in `range`.
+    /// These `messages`, at `address`.
     ///
     /// # Errors
     /// [`Error::Write`] where nobody can listen there.
-    pub(crate) fn new(address: &str, range: DisparityRange, cameras: Option<Cameras>) -> Result<Self> {
+    pub(crate) fn new(address: &str, messages: Messages) -> Result<Self> {
         let viewer =
             Viewer::new(address).map_err(|reason| Error::write(format!("ws://{address}"), reason))?;
-        Ok(Self { messages: Messages::new(range, cameras), viewer })
+        Ok(Self { messages, viewer })
     }
 
     /// Where Foxglove connects.

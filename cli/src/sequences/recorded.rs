@@ -41,9 +41,17 @@ struct Images {
     reader: Reader,
 }
 
-/// What gave no pair, while and after the pairs are read.
+/// What was left out, while and after the pairs are read.
 #[derive(Clone, Default)]
-pub(crate) struct LeftOut(Arc<Mutex<Tally>>);
+pub(crate) struct LeftOut(Arc<Mutex<Remarks>>);
+
+#[derive(Clone, Default)]
+struct Remarks {
+    /// What gave no pair.
+    tally: Tally,
+    /// Where and when a calibration became another one.
+    changed: Option<(String, Stamp)>,
+}
 
 /// Both views of one time, and the header of the left one.
 pub(super) type Views = (Header, [Raster<'static>; 2]);
@@ -68,11 +76,13 @@ impl Recorded {
             None => topics::pair(all, "--topics"),
         };
         let chosen = chosen.map_err(|reason| Error::read(path, reason))?.map(Topic::clone);
-        let names = chosen.each_ref().map(|topic| topic.name.as_str());
+        let cameras = cameras(&recording, &chosen)?;
+        let infos = cameras.iter().flatten().map(|(topic, _)| topic.as_str());
+        let names: Vec<_> = chosen.iter().map(|topic| topic.name.as_str()).chain(infos).collect();
         Ok(Self {
             files: recording.files().map(Path::to_owned).collect(),
-            cameras: cameras(&recording, &chosen)?,
             messages: Box::new(recording.messages(&names)),
+            cameras,
             pairing: Pairing::new(args.tolerance.unwrap_or(0)),
             error: None,
             ended: false,
@@ -136,7 +146,7 @@ impl Recorded {
     pub(super) fn next(&mut self) -> Option<Result<Views>> {
         loop {
             let pair = self.pairing.next(self.ended);
-            *self.left_out.0.lock().unwrap_or_else(PoisonError::into_inner) = self.pairing.tally();
+            self.left_out.note(|remarks| remarks.tally = self.pairing.tally());
             if let Some([(_, left), (_, right)]) = pair {
                 self.count += 1;
                 let images = &self.images;
@@ -158,6 +168,10 @@ impl Recorded {
 
     fn add(&mut self, message: Message) -> Result<()> {
         let (side, bytes) = (message.topic, message.data.len());
+        if let Some(side) = side.checked_sub(self.images.topics.len()) {
+            self.check_camera(side, &message);
+            return Ok(());
+        }
         let Header { stamp, .. } = header(&message).map_err(|reason| self.images.at(&message, reason))?;
         self.first[side].get_or_insert(stamp);
         if stamp.0 == 0 && std::mem::replace(&mut self.has_zero[side], true) {
@@ -167,6 +181,16 @@ impl Recorded {
         }
         self.pairing.add(side, stamp, message, bytes);
         Ok(())
+    }
+
+    /// Notes where a camera says something else than before. (What makes no sense does not count: the first one did.)
+    fn check_camera(&self, side: usize, message: &Message) {
+        let Some((topic, first)) = self.cameras.as_ref().map(|cameras| &cameras[side]) else { return };
+        let Ok(now) = CameraInfo::decode(&message.data, message.encoding) else { return };
+        let stamp = now.header.stamp;
+        if (CameraInfo { header: first.header.clone(), ..now }) != *first {
+            self.left_out.note(|remarks| _ = remarks.changed.get_or_insert((topic.clone(), stamp)));
+        }
     }
 
     /// Why there is no pair at all.
@@ -203,10 +227,14 @@ impl Images {
 }
 
 impl LeftOut {
+    fn note(&self, change: impl FnOnce(&mut Remarks)) {
+        change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
     /// In words, where there is something to say.
     pub(crate) fn said(&self) -> Option<String> {
-        let Tally { alone: [left, right], repeated, late } =
-            *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let Remarks { tally, changed } = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Tally { alone: [left, right], repeated, late } = tally;
         let mut said = Vec::new();
         if left + right > 0 {
             said.push(format!("{left} left and {right} right image{} had no partner", plural(right)));
@@ -218,6 +246,12 @@ impl LeftOut {
             said.push(format!(
                 "{late} image{} came too late in the recording to be put in order",
                 plural(late)
+            ));
+        }
+        if let Some((topic, stamp)) = changed {
+            said.push(format!(
+                "the calibration on {topic} changes at {stamp}, and all frames were matched by the first one; match what comes then as a \
+                 recording of its own"
             ));
         }
         (!said.is_empty()).then(|| said.join(", "))

@@ -38,11 +38,13 @@ impl Node {
     }
 }
 
-/// Two cameras, and a subscriber to disparities.
+/// Two cameras, and a subscriber to disparities and depths.
 struct Peer {
     images: [Publication; 2],
     infos: [Publication; 2],
     disparities: Subscriptions,
+    /// Depths in the view of a third camera.
+    depths: Subscriptions,
     sent: i64,
 }
 
@@ -52,7 +54,10 @@ impl Peer {
         let publish = |name: &str, kind| participant.publish(name, kind).unwrap();
         let mut disparities = Subscriptions::new().unwrap();
         disparities.add(&participant, "/robot/disparity", DisparityImage::NAME, true).unwrap();
+        let mut depths = Subscriptions::new().unwrap();
+        depths.add(&participant, "/robot/depth_registered/image", Image::NAME, true).unwrap();
         Self {
+            depths,
             images: ["left", "right"].map(|side| publish(&format!("/cam/{side}/image_rect"), Image::NAME)),
             infos: ["left", "right"]
                 .map(|side| publish(&format!("/cam/{side}/camera_info"), CameraInfo::NAME)),
@@ -116,9 +121,13 @@ fn message(map: &Plane<f32>, header: &Header, delta_d: f32) -> Vec<u8> {
 
 #[test]
 fn a_node_matches_what_cameras_publish() {
-    let node = Node::new(
-        "--remap left/image_raw:=/cam/left/image_rect -r right/image_raw:=/cam/right/image_rect --ros-args -r __ns:=/robot",
-    );
+    let folder = Folder::new();
+    let third = "K: [200, 0, 60, 0, 200, 40, 0, 0, 1]\nD: [0, 0, 0, 0]\nR: [0, 0, 0]\nT: [0, 0, 0]\nsize: [120, 80]\n";
+    fs::write(folder.join("eye_2.yml"), third).unwrap();
+    let into = format!("--also depth-registered --into {}", folder.join("eye_2.yml").display());
+    let node = Node::new(&format!(
+        "{into} --remap left/image_raw:=/cam/left/image_rect -r right/image_raw:=/cam/right/image_rect --ros-args -r __ns:=/robot",
+    ));
     let views =
         ["im0.png", "im1.png"].map(|name| image::open(scene("slanted").join(name)).unwrap().to_rgb8());
     let mut peer = Peer::new();
@@ -141,6 +150,25 @@ fn a_node_matches_what_cameras_publish() {
     assert!(found == message(&map, &header, typical), "the bits of the library");
     map[(7, 7)] = f32::from_bits(map[(7, 7)].to_bits() ^ 1);
     assert!(found != message(&map, &header, typical), "control: one bit shows");
+
+    // The depths of the third camera are those of `match`.
+    let mut depths = None;
+    while depths.is_none() {
+        peer.disparity(&views);
+        peer.depths.wait(Duration::from_millis(100), |_, bytes| depths = Some(bytes)).unwrap();
+    }
+    let depths = depths.unwrap();
+    let depths = Image::decode(&depths, Encoding::Cdr).unwrap();
+    let calib = "cam0=[300 0 119.5; 0 300 89.5; 0 0 1]\ndoffs=0\nbaseline=0.12\nunit=m\n";
+    fs::write(folder.join("calib.txt"), calib).unwrap();
+    let line = "match @slanted/im0.png @slanted/im1.png d.pfm --device cpu --method fast --max-disparity 47 --calib calib.txt --quiet";
+    run(&folder, &format!("{line} --also depth-registered --into eye_2.yml")).succeeded();
+    let wanted = read_pfm(folder.join("d.depth-registered.pfm"));
+    assert!(wanted.data().iter().filter(|v| v.is_finite()).count() > 2000);
+    let bytes = |v: &f32| if v.is_finite() { *v } else { f32::NAN }.to_le_bytes();
+    let wanted: Vec<u8> = wanted.data().iter().flat_map(bytes).collect();
+    assert_eq!((depths.width, depths.height, depths.header.frame_id.as_str()), (120, 80, "eye_2"));
+    assert!(depths.data[..] == wanted[..], "the depths of match");
 
     // Rows that are too short, then another size: it goes on.
     for _ in 0..3 {
@@ -180,7 +208,7 @@ fn flags_of_a_node_that_make_no_sense() {
         ("--domain 233", "--domain & 233"),
         ("--tolerance -1", "--tolerance & from 0 to 3600"),
         ("--also preview", "--also preview & no message of ROS"),
-        ("--also depth-registered", "--also depth-registered & no message of ROS"),
+        ("--also depth-registered", "--also depth-registered & --into"),
         ("--also points.pcd", "--also points.pcd & no message of ROS"),
         (
             "--alpha 0.5 -r left/image_raw:=left/image_rect -r right/image_raw:=right/image_rect",

@@ -337,6 +337,68 @@ fn what_is_written_holds_what_match_finds() {
     assert_eq!(times, [START, START + STEP, START + 2 * STEP]);
 }
 
+/// Depths in the view of a third camera have its frame and come with its lens.
+#[test]
+fn depths_of_a_third_camera_are_written() {
+    let folder = Folder::new();
+    record(&folder.join("drive.mcap"), &[cameras(SIZE), images("image_raw", 0)].concat());
+    let third = "K: [50, 0, 24, 0, 51, 20, 0, 0, 1]\nD: [-0.1, 0.01, 0, 0.001, 0]\nR: [0, 0.02, 0.01]\nT: [0.05, 0, 0]\n\
+                 size: [50, 40]\nunit: m\n";
+    let file = folder.join("colour.yml");
+    fs::write(&file, third).unwrap();
+    let also = format!("--also depth-registered,depth-registered-mm --into {}", file.display());
+    run(&folder, &format!("sequence drive.mcap found.mcap {RANGE} --quiet {also}")).succeeded();
+    let rectify = "--rectify --calib 0.yaml --calib 1.yaml";
+    let ends = ["depth-registered.pfm", "depth-registered-mm.png"];
+    let wanted = wanted(&folder, &ends, &format!("{rectify} {also}"));
+    let all = |topic: &str| messages(&folder.join("found.mcap"), &format!("/depth_registered/{topic}"));
+    for (n, files) in wanted.iter().enumerate() {
+        let stamp = START + STEP * n as u64;
+        let header = || Bytes::with_header(stamp, "colour").u32(40).u32(50);
+        let image = |encoding: &str, bytes: u32, data: &[u8]| {
+            header().text(encoding).bytes(&[0]).u32(50 * bytes).u32(data.len() as u32).bytes(data).0
+        };
+        fs::write(folder.join("map.pfm"), &files[0]).unwrap();
+        let map = read_pfm(folder.join("map.pfm"));
+        assert!(map.data().iter().filter(|v| v.is_finite()).count() > 500);
+        let floats = map.data().iter().flat_map(|v| if v.is_finite() { *v } else { f32::NAN }.to_le_bytes());
+        assert!(all("image")[n] == (stamp, image("32FC1", 4, &floats.collect::<Vec<_>>())), "frame {n}");
+        let words = image::load_from_memory(&files[1]).unwrap().to_luma16();
+        let words: Vec<u8> = words.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert!(all("image_raw")[n] == (stamp, image("16UC1", 2, &words)), "frame {n}");
+        let lens = header().text("plumb_bob").u32(5).doubles(&[-0.1, 0.01, 0.0, 0.001, 0.0]);
+        let lens = lens.doubles(&[50.0, 0.0, 24.0, 0.0, 51.0, 20.0, 0.0, 0.0, 1.0]);
+        let lens = lens.doubles(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        let lens = lens.doubles(&[50.0, 0.0, 24.0, 0.0, 0.0, 51.0, 20.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        let info = (0..6).fold(lens, |all, _| all.u32(0)).bytes(&[0]).0;
+        assert!(all("camera_info")[n] == (stamp, info), "frame {n}");
+    }
+    // Control: the depths of the left camera are others.
+    run(&folder, &format!("sequence drive.mcap left.mcap {RANGE} --quiet --also depth")).succeeded();
+    let left = messages(&folder.join("left.mcap"), "/depth/image_rect");
+    assert_ne!(left[0].1.len(), all("image")[0].1.len());
+}
+
+/// The first calibration counts, and a later one that differs is told.
+#[test]
+fn a_calibration_that_changes_is_told() {
+    let folder = Folder::new();
+    let path = folder.join("drive.mcap");
+    let line = format!("sequence drive.mcap maps {RANGE} --also depth");
+    record(&path, &[cameras(SIZE), images("image_raw", 0), cameras(SIZE)].concat());
+    let unchanged = run(&folder, &line).succeeded();
+    assert!(!unchanged.stderr.contains("changes"), "control: {unchanged:?}");
+    let mut messages = [cameras(SIZE), images("image_raw", 0)].concat();
+    let mut later = camera_info(0, SIZE);
+    let at = later.windows(8).position(|bytes| bytes == 60.0_f64.to_le_bytes()).unwrap();
+    later[at..at + 8].copy_from_slice(&61.0_f64.to_le_bytes());
+    messages.push(("/left/camera_info".into(), CAMERA, later));
+    record(&path, &messages);
+    run(&folder, &line)
+        .succeeded()
+        .says("the calibration on /left/camera_info changes at 0.000000000 & by the first one");
+}
+
 /// What is wrong with a recording is told in one line, and whole frames stay.
 #[test]
 fn recordings_that_are_wrong_are_told_in_one_line() {
@@ -391,7 +453,7 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
         ("empty.mcap OUT", 1, 0, "empty.mcap: is empty"),
         ("words.mcap OUT", 1, 0, "words.mcap: is no MCAP file"),
         ("words.bag OUT", 1, 0, "words.bag: is no bag of ROS 1"),
-        ("a.db3 OUT", 1, 0, "a.db3 & ros2 bag convert"),
+        ("a.db3 OUT", 1, 0, "a.db3 & no database of SQLite"),
         ("cut.mcap OUT", 1, 1, "cut.mcap: is cut off"),
         ("flipped.mcap OUT", 1, 2, "flipped.mcap: the chunk at byte & checksum"),
         ("encoding.mcap OUT", 1, 2, "encoding.mcap:/left/image_rect at 1700000000.100000000 & `abc9`"),

@@ -66,6 +66,12 @@ impl Names {
         &self.node
     }
 
+    /// Its namespace, which begins with a slash.
+    #[must_use]
+    pub fn namespace(&self) -> &str {
+        &self.namespace
+    }
+
     /// The full name of the topic `name`, remapped.
     ///
     /// # Errors

@@ -6,20 +6,27 @@ use std::time::Duration;
 use bytes::Bytes;
 use mio::{Events, Interest, Poll, Token};
 use mrfgs::error::Reason;
+use mrfgs_ros::messages::{Encode, NodeEntitiesInfo, ParticipantEntitiesInfo, Type};
 use rustdds::dds::WriteError;
 use rustdds::no_key::{
     DataReader, DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter,
 };
 use rustdds::policy::{Durability, History, Reliability, ResourceLimits};
 use rustdds::{
-    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, Publisher, QosPolicies, QosPolicyBuilder,
-    RepresentationIdentifier, StatusEvented, Subscriber, Topic, TopicKind,
+    DataWriterStatus, DomainParticipant, DomainParticipantBuilder, GUID, Publisher, QosPolicies,
+    QosPolicyBuilder, RTPSEntity, RepresentationIdentifier, StatusEvented, Subscriber, Topic, TopicKind,
 };
 
 /// Largest domain that `ROS_DOMAIN_ID` may name.
 pub const MOST_DOMAIN: u16 = 232;
 /// Bytes of a message that say how the rest is laid out.
 const HEAD: usize = 4;
+/// The topic on which members of a domain say which nodes they are.
+const GRAPH: &str = "ros_discovery_info";
+/// The bytes that identify a reader or a writer in ROS 2 since Iron.
+pub const GID_BYTES: usize = 16;
+/// The same in Humble and before.
+pub const LONG_GID_BYTES: usize = 24;
 /// Messages of a subscription that wait to be taken, as many as ROS keeps of sensors.
 const WAITING: i32 = 5;
 /// Messages of a publication that may still have to be sent again.
@@ -54,10 +61,8 @@ impl Participant {
 
     /// The topic `name`, a full one, of messages of the type `kind`, such as `sensor_msgs/msg/Image`.
     fn topic(&self, name: &str, kind: &str, qos: &QosPolicies) -> Result<Topic> {
-        // So ROS calls its topics and types in DDS: `rt/disparity` and `sensor_msgs::msg::dds_::Image_`.
-        let (package, own) = kind.rsplit_once('/').unwrap_or(("", kind));
-        let kind = format!("{}::dds_::{own}_", package.replace('/', "::"));
-        self.inner.create_topic(format!("rt{name}"), kind, qos, TopicKind::NoKey).map_err(failed)
+        // So ROS calls its topics in DDS: `rt/disparity`.
+        self.inner.create_topic(format!("rt{name}"), in_dds(kind), qos, TopicKind::NoKey).map_err(failed)
     }
 
     /// Publishes messages of the type `kind` on the topic `name`, which is a full one. They are sent again to those who ask for that.
@@ -70,6 +75,50 @@ impl Participant {
         let writer = self.publisher.create_datawriter_no_key(&topic, Some(qos)).map_err(failed)?;
         Ok(Publication { writer, listeners: 0, _participant: self.inner.clone() })
     }
+
+    /// Tells the tools of ROS that this member of the domain is the node `name` in `namespace`, as long as what is returned is kept.
+    /// Identifiers take `gid_bytes`: [`GID_BYTES`], or those of older releases.
+    ///
+    /// # Errors
+    /// Where DDS fails.
+    pub fn announce<'a>(
+        &self,
+        [namespace, name]: [&str; 2],
+        gid_bytes: usize,
+        publications: impl Iterator<Item = &'a Publication>,
+        subscriptions: &Subscriptions,
+    ) -> Result<Announcement> {
+        let gid = |guid: GUID| {
+            let mut gid = guid.to_bytes().to_vec();
+            gid.resize(gid_bytes, 0);
+            gid
+        };
+        let node = NodeEntitiesInfo {
+            namespace: namespace.into(),
+            name: name.into(),
+            readers: subscriptions.readers.iter().map(|(reader, _)| gid(reader.guid())).collect(),
+            writers: publications.map(|publication| gid(publication.writer.guid())).collect(),
+        };
+        let told = ParticipantEntitiesInfo { gid: gid(self.inner.guid()), nodes: vec![node] };
+        let qos = QosPolicyBuilder::new()
+            .reliability(Reliability::Reliable { max_blocking_time: PATIENCE })
+            // Who comes later gets it, too.
+            .durability(Durability::TransientLocal)
+            .history(History::KeepLast { depth: 1 })
+            .build();
+        let kind = in_dds(ParticipantEntitiesInfo::NAME);
+        let topic = self.inner.create_topic(GRAPH.into(), kind, &qos, TopicKind::NoKey).map_err(failed)?;
+        let writer = self.publisher.create_datawriter_no_key(&topic, Some(qos)).map_err(failed)?;
+        let publication = Publication { writer, listeners: 0, _participant: self.inner.clone() };
+        publication.send(told.encode())?;
+        Ok(Announcement { _publication: publication })
+    }
+}
+
+/// What ROS calls a type in DDS: `sensor_msgs::msg::dds_::Image_`.
+fn in_dds(kind: &str) -> String {
+    let (package, own) = kind.rsplit_once('/').unwrap_or(("", kind));
+    format!("{}::dds_::{own}_", package.replace('/', "::"))
 }
 
 /// Of a topic that keeps so many messages, and so many of them at all until they are confirmed or taken.
@@ -167,6 +216,11 @@ impl Publication {
             error => failed(error),
         })
     }
+}
+
+/// What tools of ROS are told of a node.
+pub struct Announcement {
+    _publication: Publication,
 }
 
 /// Subscriptions of one thread, which it waits for together.

@@ -146,6 +146,11 @@ impl Encoder {
         self.bytes.extend(bytes);
     }
 
+    /// Bytes whose number is known.
+    pub(super) fn array(&mut self, bytes: &[u8]) {
+        self.bytes.extend(bytes);
+    }
+
     pub(super) fn string(&mut self, text: &str) {
         self.u32(text.len() as u32 + 1);
         self.bytes.extend(text.as_bytes());

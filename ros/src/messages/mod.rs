@@ -5,10 +5,12 @@
 mod basics;
 mod bytes;
 mod definitions;
+mod graph;
 mod types;
 
 pub use basics::{Encoding, Result, SECOND, Stamp};
 pub use definitions::definition;
+pub use graph::{Gid, NodeEntitiesInfo, ParticipantEntitiesInfo};
 pub use types::{
     CameraInfo, CompressedImage, DisparityImage, Encode, FLOAT32, Header, Image, PointCloud2, PointField,
     RegionOfInterest, Type, UINT8,

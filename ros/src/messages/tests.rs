@@ -88,6 +88,34 @@ fn calibrations_come_back_and_are_those_of_a_file() {
     assert_eq!((view.k[0], &view.d[..], view.p), (500.0, &[0.0; 5][..], info.p));
 }
 
+/// As Cyclone DDS lays it out: identifiers stand where the last text ends, and only numbers are filled up to.
+#[test]
+fn nodes_are_told_as_ros_has_it() {
+    let node = NodeEntitiesInfo {
+        namespace: "/".into(),
+        name: "eye".into(),
+        readers: vec![vec![3; 16]],
+        writers: vec![vec![4; 16], vec![5; 16]],
+    };
+    let told = ParticipantEntitiesInfo { gid: vec![2; 16], nodes: vec![node] };
+    let number = u32::to_le_bytes;
+    let bytes = [
+        &[0, 1, 0, 0][..],
+        &[2; 16],
+        &number(1),
+        &number(2),
+        b"/\0\0\0",
+        &number(4),
+        b"eye\0",
+        &number(1),
+        &[3; 16],
+        &number(2),
+        &[4; 16],
+        &[5; 16],
+    ];
+    assert_eq!(told.encode(), bytes.concat());
+}
+
 #[test]
 fn times_have_nine_decimals() {
     for (time, text) in [

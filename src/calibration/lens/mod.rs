@@ -160,6 +160,24 @@ impl Lens {
         Ok(Self { focal_length, principal_point, distortion, reach: distortion.reach() })
     }
 
+    /// Focal length across and down, in pixels.
+    #[must_use]
+    pub fn focal_length(&self) -> [f64; 2] {
+        self.focal_length
+    }
+
+    /// Where the optical axis meets the image, in pixels.
+    #[must_use]
+    pub fn principal_point(&self) -> [f64; 2] {
+        self.principal_point
+    }
+
+    /// How it departs from a pinhole.
+    #[must_use]
+    pub fn distortion(&self) -> Distortion {
+        self.distortion
+    }
+
     /// Where the ray (x, y, z), z forward, meets the image. `None` for a ray from behind, and so far from the axis that the
     /// radius in the image has turned back.
     #[must_use]
@@ -246,6 +264,18 @@ mod tests {
     fn thin_prism_fisheye() -> Distortion {
         let (tangential, prism) = ([0.001, -0.002], [0.003, -0.001]);
         Distortion::ThinPrismFisheye { k: [0.02, -0.01, 0.003, 0.001], tangential, prism }
+    }
+
+    #[test]
+    fn coefficients_come_back() {
+        let all: Vec<f64> = (1..=14).map(|i| f64::from(i) / 100.0).collect();
+        for (given, kept) in [(0, 5), (4, 5), (5, 5), (8, 8), (12, 12), (14, 14)] {
+            let found = RadialTangential::new(&all[..given]).unwrap().coefficients();
+            assert_eq!(found.len(), kept);
+            // The angles of the tilt come back by way of its matrix.
+            let all = all[..given].iter().chain(&[0.0; 5]);
+            assert!(found.iter().zip(all).all(|(found, c)| (found - c).abs() < 1e-15), "{found:?}");
+        }
     }
 
     #[test]

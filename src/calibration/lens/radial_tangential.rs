@@ -41,6 +41,21 @@ impl RadialTangential {
         Ok(Self { prism: [c(8), c(9), c(10), c(11)], tilt, ..plain })
     }
 
+    /// Its coefficients, as [`new`](Self::new) takes them: 5, or as many more as are not 0.
+    #[must_use]
+    pub fn coefficients(&self) -> Vec<f64> {
+        let [k1, k2, rest @ ..] = self.radial;
+        // The last row of the turn stands in the way to the sensor as it is.
+        let tilt = self.tilt.map_or([0.0; 2], |[[_, _, [x, y, z]], _]| [libm::atan2(-y, z), libm::asin(x)]);
+        let mut all = [&[k1, k2], &self.tangential[..], &rest, &self.prism, &tilt].concat();
+        for (shorter, longer) in [(12, 14), (8, 12), (5, 8)] {
+            if all.len() == longer && all[shorter..].iter().all(|c| *c == 0.0) {
+                all.truncate(shorter);
+            }
+        }
+        all
+    }
+
     /// That of k1, k2, p1, p2, k3 to k6.
     pub(crate) fn polynomials([k1, k2, p1, p2, k3, k4, k5, k6]: [f64; 8]) -> Self {
         Self { radial: [k1, k2, k3, k4, k5, k6], tangential: [p1, p2], ..Self::NONE }

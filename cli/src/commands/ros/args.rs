@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mrfgs_node::names::{Names, Rule};
-use mrfgs_node::topics::MOST_DOMAIN;
+use mrfgs_node::topics::{GID_BYTES, LONG_GID_BYTES, MOST_DOMAIN};
 
 use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search, nanoseconds};
 use crate::failure::{Failure, Result};
@@ -13,6 +13,9 @@ use crate::outputs::AlsoArgs;
 const NODE: &str = "mrfgs";
 /// The variable that names the domain.
 const DOMAIN: &str = "ROS_DOMAIN_ID";
+/// The variable that names the release of ROS, and those whose identifiers are longer.
+const RELEASE: &str = "ROS_DISTRO";
+const LONG: [&str; 3] = ["foxy", "galactic", "humble"];
 const EXAMPLES: &str = "\
 Examples:
   mrfgs ros --method fast --max-disparity 63
@@ -106,4 +109,10 @@ impl Args {
             _ => Ok(0),
         }
     }
+}
+
+/// The bytes of identifiers in the release of ROS whose set-up this shell has read, or in today's.
+pub(super) fn gid_bytes() -> usize {
+    let is_old = std::env::var(RELEASE).is_ok_and(|release| LONG.contains(&release.as_str()));
+    if is_old { LONG_GID_BYTES } else { GID_BYTES }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::Matcher;
+use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::depth::Rig;
 use mrfgs::image::Pair;
 use mrfgs::image::read::Reader;
@@ -31,6 +32,8 @@ pub(super) struct Matching<'a> {
     cameras: Cameras,
     matcher: Matcher,
     sigma: Sigma,
+    /// The camera of `--into`.
+    third: Option<ThirdCamera>,
     /// `None` before the first pair.
     known: Option<Known>,
     /// Whether it was told that the match runs elsewhere than asked for.
@@ -51,14 +54,14 @@ struct Known {
 
 impl<'a> Matching<'a> {
     pub(super) fn new(args: &'a Args, cameras: Cameras, execution: Execution) -> Result<Self> {
-        args.also.third()?;
+        let third = args.also.third()?;
         let method = args.also.made_by(args.method.method()?)?;
         let sigma = Sigma::of(&method);
         if args.are_rectified(&cameras) {
             args.rectification.options_if(false)?;
         }
         let matcher = Matcher::builder().method(method).execution(execution).build()?;
-        Ok(Self { args, cameras, matcher, sigma, known: None, noted: false })
+        Ok(Self { args, cameras, matcher, sigma, third, known: None, noted: false })
     }
 
     /// Matches a pair whose cameras say this, and publishes what it finds. What makes no sense is told by the log.
@@ -118,7 +121,7 @@ impl<'a> Matching<'a> {
             left: Some(pair.left()),
             rig: known.rig,
             rectifying: None,
-            third: None,
+            third: self.third,
             sigma: Some(self.sigma),
             georeferences: [None, None],
         };
@@ -173,7 +176,10 @@ impl<'a> Matching<'a> {
         let cameras = input.calibration().and_then(|calibration| Maps::of(calibration, (0, 0)));
         let known = input.calibration().and_then(|known| Rectification::of_rectified(known, size).ok());
         let rectifier = Rectifier::new(input.rectification, known, range, args.recalibrate);
-        let (messages, steady) = (Messages::new(range, cameras), args.steady.then(Steady::new));
+        let (messages, steady) = (
+            Messages::new(range, cameras, args.also.framed(self.third.as_ref())),
+            args.steady.then(Steady::new),
+        );
         Ok(Known { size, infos, range, rectifier, rig, messages, steady })
     }
 

@@ -16,6 +16,7 @@ use crate::failure::{Failure, Result};
 use crate::{console, stop};
 
 pub(crate) use args::Args;
+use args::gid_bytes;
 use arrivals::{Arrivals, Cameras, of_network};
 use log::Log;
 use matching::Matching;
@@ -35,6 +36,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut publications = Publications::new(&participant, &names, &args.also)?;
     let arrivals = Arc::new(Arrivals::default());
     let subscriptions = cameras.subscribe(&participant, args.reliable)?;
+    let node = [names.namespace(), names.node()];
+    let announced = participant.announce(node, gid_bytes(), publications.iter(), &subscriptions);
+    let _announcement = announced.map_err(of_network)?;
     if !args.quiet {
         console::say(&format!(
             "{} takes {} and {}, and publishes {}; domain {domain}",

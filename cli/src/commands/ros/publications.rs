@@ -22,6 +22,10 @@ impl Publications {
         if topics.iter().any(|topic| [messages::DEPTH, messages::MILLIMETRES].contains(topic)) {
             topics.push(messages::DEPTH_CAMERA);
         }
+        if topics.iter().any(|topic| [messages::REGISTERED, messages::REGISTERED_MILLIMETRES].contains(topic))
+        {
+            topics.push(messages::REGISTERED_CAMERA);
+        }
         let published = topics.into_iter().map(|topic| {
             let name = names.resolve(topic.0).map_err(|reason| Failure::usage("--remap", reason))?;
             let publication = participant.publish(&name, topic.1).map_err(of_network)?;
@@ -33,6 +37,11 @@ impl Publications {
     /// Their full names.
     pub(super) fn names(&self) -> Vec<&str> {
         self.0.iter().map(|(_, name, _)| name.as_str()).collect()
+    }
+
+    /// Each of them.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Publication> {
+        self.0.iter().map(|(.., publication)| publication)
     }
 
     /// Whether anybody listens to any of them. It takes in who has come and gone, so ask often.

@@ -20,6 +20,7 @@ use crate::args::{
     Sign,
 };
 use crate::failure::{Failure, Result};
+use crate::outputs::messages::Messages;
 use crate::outputs::{Cameras, Files, MapArgs, files, is_printed};
 use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input::{Calib, Input};
@@ -55,7 +56,7 @@ Examples:
 /// that have the same number are a pair (--pairing). Without RIGHT each frame holds both views, as --layout says. All frames have
 /// one size.
 ///
-/// LEFT alone may also be a recording of ROS: an MCAP file, the folder of a bag of ROS 2 in MCAP, or a .bag of ROS 1. Its images are
+/// LEFT alone may also be a recording of ROS: an MCAP file, the folder of a bag of ROS 2 or a .db3 of one, or a .bag of ROS 1. Its images are
 /// paired by the times in their headers, and frames are called by these. Images on topics such as `image_rect` are rectified, others are
 /// rectified by the `camera_info` beside them.
 ///
@@ -63,7 +64,7 @@ Examples:
 /// .mov, .webm or .avi. A folder gets a map of each frame, named after
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
 /// with --also side-by-side, LEFT stands beside it. NAME.mcap is a recording of ROS 2: disparities on /disparity, and with --also
-/// depth, depth-mm, points, confidence or validity these, with the times of the left images. `ws://HOST:PORT` shows the same to Foxglove
+/// depth, depth-mm, depth-registered, points, confidence or validity these, with the times of the left images. `ws://HOST:PORT` shows the same to Foxglove
 /// while frames are matched; a viewer that is slow gets the newest.
 ///
 /// Without --max-disparity the range is that of the calibration, or that of the first frame. While frames are matched, the next ones are
@@ -239,17 +240,20 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let writer = Writer { output, wanted, range, rig, sigma, rectifying, third, rate, steady };
     let records = args.json.as_deref().map(Records::new).transpose()?;
     let origin = part.map_or((0, 0), |part| (part.x.start, part.y.start));
-    let cameras = || input.calibration().and_then(|calibration| Cameras::of(calibration, origin));
+    let messages = || {
+        let cameras = input.calibration().and_then(|calibration| Cameras::of(calibration, origin));
+        Messages::new(range, cameras, args.maps.also.framed(third.as_ref()))
+    };
     let mut sink = match (kind, kind::address(output)) {
         (Kind::Viewer, Some(address)) => {
-            let (sink, address) = writer.begin_viewer(address, cameras(), records)?;
+            let (sink, address) = writer.begin_viewer(address, messages(), records)?;
             if !args.quiet {
                 console::say(&format!("open {address} in Foxglove"));
             }
             sink
         }
         (Kind::Film, _) => writer.begin_film(records)?,
-        (Kind::Recording, _) => writer.begin_recording(cameras(), records)?,
+        (Kind::Recording, _) => writer.begin_recording(messages(), records)?,
         _ => writer.begin_folder(records)?,
     };
     let files = args.files(&input);

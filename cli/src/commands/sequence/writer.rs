@@ -18,7 +18,8 @@ use mrfgs_ros::messages::{Header, SECOND, Stamp};
 use crate::args::Sign;
 use crate::console;
 use crate::failure::Result;
-use crate::outputs::{Cameras, Film, MapArgs, Outcome, RecordedMaps, ShownMaps, files, is_printed};
+use crate::outputs::messages::Messages;
+use crate::outputs::{Film, MapArgs, Outcome, RecordedMaps, ShownMaps, files, is_printed};
 use crate::sequences::FrameRate;
 
 /// Frames a second where nothing says it.
@@ -123,30 +124,26 @@ impl<'a> Writer<'a> {
         Ok(self.begin(film, records))
     }
 
-    /// Begins a recording of maps that these `cameras` have, where they are known.
+    /// Begins a recording of these `messages`.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub(super) fn begin_recording(
-        self,
-        cameras: Option<Cameras>,
-        records: Option<Records>,
-    ) -> Result<Sink<'a>> {
-        let recording = To::Recording(RecordedMaps::new(self.output, self.range, cameras)?);
+    pub(super) fn begin_recording(self, messages: Messages, records: Option<Records>) -> Result<Sink<'a>> {
+        let recording = To::Recording(RecordedMaps::new(self.output, messages)?);
         Ok(self.begin(recording, records))
     }
 
-    /// Begins to show maps, which these `cameras` have where they are known, at an address. Returns where that is.
+    /// Begins to show these `messages` at an address. Returns where that is.
     ///
     /// # Errors
     /// Where nobody can listen there.
     pub(super) fn begin_viewer(
         self,
         address: &str,
-        cameras: Option<Cameras>,
+        messages: Messages,
         records: Option<Records>,
     ) -> Result<(Sink<'a>, String)> {
-        let shown = ShownMaps::new(address, self.range, cameras)?;
+        let shown = ShownMaps::new(address, messages)?;
         let address = shown.address();
         Ok((self.begin(To::Viewer(shown), records), address))
     }
