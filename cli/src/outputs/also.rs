@@ -2,22 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use mrfgs::calibration::cameras::ThirdCamera;
-use mrfgs::calibration::third;
-use mrfgs::colour::{self, ColourMap};
 use mrfgs::depth::Rig;
 use mrfgs::image::cloud::Frame;
-use mrfgs::image::write::Writer;
 use mrfgs::image::{Plane, write};
 use mrfgs::maps::Maps;
-use mrfgs::options::{DisparityRange, Method};
+use mrfgs::options::DisparityRange;
 
 use crate::failure::{Failure, Result};
-use crate::outputs::limits::Limits;
-use crate::outputs::messages::{self, Content};
-use crate::outputs::outcome::{Of, Outcome, View};
-use crate::text::plural;
+use crate::outputs::messages;
+use crate::outputs::outcome::{Of, View};
 
 /// An output beside the disparity map.
 #[derive(Debug)]
@@ -26,15 +19,15 @@ pub(crate) struct Also {
     /// the word alone.
     pub(crate) word: &'static str,
     /// Empty where the help of another word tells of it.
-    help: &'static str,
-    kind: Kind,
+    pub(super) help: &'static str,
+    pub(super) kind: Kind,
     /// The key of the method that makes it.
-    key: Option<&'static str>,
+    pub(super) key: Option<&'static str>,
 }
 
 /// What an output shows, and thereby the format of its file.
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+pub(super) enum Kind {
     /// A map of disparities of a view, in the format of the disparity map.
     Disparity(View, fn(&Maps) -> Option<Plane<f32>>),
     /// A map of bytes, as 8-bit PNG.
@@ -54,7 +47,7 @@ enum Kind {
 }
 
 /// All outputs, in the order in which they are written. One more is one more row.
-static ALL: [Also; 20] = [
+pub(super) static ALL: [Also; 20] = [
     row(
         "raw",
         "The disparity map before post-processing, in the format of the disparity map",
@@ -141,295 +134,6 @@ const fn row(word: &'static str, help: &'static str, kind: Kind) -> Also {
     Also { word, help, kind, key: None }
 }
 
-/// The outputs beside the disparity map.
-#[derive(clap::Args)]
-#[command(next_help_heading = "More outputs")]
-pub(crate) struct AlsoArgs {
-    /// Writes more files beside the disparity map, as STEM.WORD.EXTENSION: `--also raw,validity` with d.pfm writes d.raw.pfm
-    /// and d.validity.png
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parser())]
-    also: Vec<&'static Also>,
-    /// Colours of the previews, from far to near [default: turbo]
-    #[arg(long, value_name = "NAME", value_parser = colours())]
-    colours: Option<ColourMap>,
-    /// The camera of --also depth-registered, such as that of a rig's colours: its lens, its size, and how it stands to the left
-    /// camera. One camera by the names of OpenCV (K, D, R, T and a size), Kalibr's chain, whose last camera it is, or the file of an OAK
-    #[arg(long, value_name = "FILE")]
-    pub(crate) into: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) limits: Limits,
-}
-
-fn parser() -> impl TypedValueParser<Value = &'static Also> {
-    let words =
-        ALL.iter().map(|also| PossibleValue::new(also.word).help(also.help).hide(also.help.is_empty()));
-    PossibleValuesParser::new(words)
-        .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
-}
-
-fn colours() -> impl TypedValueParser<Value = ColourMap> {
-    let maps = [
-        ("turbo", "Cold to warm", ColourMap::Turbo),
-        ("viridis", "Violet to yellow, with even steps of lightness", ColourMap::Viridis),
-        ("grey", "Dark to bright", ColourMap::Grey),
-    ];
-    PossibleValuesParser::new(maps.map(|(name, help, _)| PossibleValue::new(name).help(help))).try_map(
-        move |word| maps.into_iter().find(|map| map.0 == word).map(|map| map.2).ok_or("no such word"),
-    )
-}
-
-impl AlsoArgs {
-    /// The wanted outputs, each once, in the order of the table.
-    pub(crate) fn wanted(&self) -> impl Iterator<Item = &'static Also> {
-        ALL.iter().filter(|also| self.also.iter().any(|wanted| wanted.word == also.word))
-    }
-
-    /// The camera of `--into`.
-    ///
-    /// # Errors
-    /// For a file that makes no sense, and where an output takes a camera that is not given, or none takes the one that is.
-    pub(crate) fn third(&self) -> Result<Option<ThirdCamera>> {
-        match (&self.into, self.wanted().find(|also| matches!(also.kind, Kind::Registered { .. }))) {
-            (Some(file), Some(_)) => Ok(Some(third::read(file)?)),
-            (None, None) => Ok(None),
-            (Some(_), None) => Err(Failure::usage(
-                "--into",
-                "is the camera of --also depth-registered and depth-registered-mm; add one of them, or leave it out",
-            )),
-            (None, Some(also)) => {
-                let reason = "is in the view of a third camera; give that by --into, or take --also depth";
-                Err(Failure::usage(also.flag(), reason))
-            }
-        }
-    }
-
-    /// The camera of `--into` for messages, in a frame that is called as the file without its extension.
-    pub(crate) fn framed(&self, third: Option<&ThirdCamera>) -> Option<messages::Third> {
-        let stem = self.into.as_ref()?.file_stem()?;
-        third.map(|camera| messages::Third { frame_id: stem.to_string_lossy().into_owned(), camera: *camera })
-    }
-
-    /// Refuses colours without a picture, and the original camera where the images are not rectified.
-    pub(crate) fn check(&self, rectifies: bool) -> Result<()> {
-        self.check_clip()?;
-        let is_picture = |also: &Also| matches!(also.kind, Kind::Picture { .. });
-        if self.colours.is_some() && !self.wanted().any(is_picture) {
-            let reason = "are those of a preview; add --also preview, or leave --colours out";
-            return Err(Failure::usage("--colours", reason));
-        }
-        let is_original = |also: &&Also| matches!(also.kind, Kind::Points(Frame::Original));
-        if let Some(word) = self.wanted().find(is_original).filter(|_| !rectifies) {
-            let reason =
-                "is of images that `mrfgs match` rectifies; add --rectify there, or take --also points";
-            return Err(Failure::usage(word.flag(), reason));
-        }
-        Ok(())
-    }
-
-    /// `method`, which makes every wanted output.
-    pub(crate) fn made_by(&self, mut method: Method) -> Result<Method> {
-        method.set_all(self.wanted().filter_map(|also| also.key).map(|key| (key, "true")))?;
-        Ok(method)
-    }
-
-    /// The wanted output that takes most of the cameras.
-    pub(crate) fn take_cameras(&self) -> Option<&'static Also> {
-        let is_of_cameras = |also: &&Also| {
-            matches!(
-                also.kind,
-                Kind::Depth | Kind::Registered { .. } | Kind::Sigma(Of::Depths) | Kind::Points(..)
-            )
-        };
-        let first = || self.wanted().find(is_of_cameras);
-        self.wanted().find(|also| also.takes_unit()).or_else(first)
-    }
-
-    /// Whether a wanted output shows the left image.
-    pub(crate) fn show_left(&self) -> bool {
-        self.wanted().any(|also| matches!(also.kind, Kind::Points(..) | Kind::Picture { beside: true }))
-    }
-
-    /// The wanted outputs of a map that is there: depth where none are named.
-    ///
-    /// # Errors
-    /// For an output that takes more than the map.
-    pub(crate) fn of_map(&self) -> Result<Vec<&'static Also>> {
-        let mut wanted: Vec<_> = self.wanted().collect();
-        if wanted.is_empty() {
-            wanted.extend(ALL.iter().find(|also| also.word == "depth"));
-        }
-        let is_of_map = |also: &&Also| {
-            matches!(
-                also.kind,
-                Kind::Depth
-                    | Kind::Millimetres
-                    | Kind::Registered { .. }
-                    | Kind::Points(Frame::Matched)
-                    | Kind::Picture { .. }
-            )
-        };
-        match wanted.iter().find(|also| !is_of_map(also)) {
-            Some(word) => Err(Failure::usage(
-                word.flag(),
-                "is found by a match, and MAP does not hold it; leave it out",
-            )),
-            None => Ok(wanted),
-        }
-    }
-
-    /// Refuses a limit of depths without depths.
-    fn check_clip(&self) -> Result<()> {
-        if self.limits.clip_depth.is_some() && self.take_cameras().is_none() {
-            let reason = "is of depths and points; add --also depth or points, or leave it out";
-            return Err(Failure::usage("--clip-depth", reason));
-        }
-        Ok(())
-    }
-
-    /// The disparity map in colours, with the left image `beside` it.
-    fn picture(&self, beside: bool, outcome: &Outcome) -> Plane<[u8; 3]> {
-        let (DisparityRange { min, max }, map) = (outcome.range, outcome.final_map(self.limits));
-        let colours = self.colours.unwrap_or_default();
-        let preview = colour::preview(&map, min as f32, max as f32, colours);
-        match outcome.left.filter(|_| beside) {
-            Some(left) => colour::side_by_side(&left.to_rgb8(), &preview),
-            None => preview,
-        }
-    }
-
-    /// What a film shows: the preview, or that with the left image beside it where that is the wanted output.
-    pub(crate) fn film_picture(&self, outcome: &Outcome) -> Plane<[u8; 3]> {
-        self.picture(self.show_left(), outcome)
-    }
-
-    /// Refuses outputs that no film shows.
-    pub(crate) fn check_film(&self) -> Result<()> {
-        self.check_clip()?;
-        match self.wanted().find(|also| !matches!(also.kind, Kind::Picture { .. })) {
-            Some(also) => Err(Failure::usage(
-                also.flag(),
-                "is a file of each frame, and OUTPUT is a film; give the name of a folder as OUTPUT",
-            )),
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses outputs that are no message of ROS; `remedy` says what helps.
-    pub(crate) fn check_messages(&self, remedy: &str) -> Result<()> {
-        self.check(false)?;
-        match self.wanted().find(|also| also.topic().is_none()) {
-            Some(also) => {
-                let reason = format!(
-                    "is no message of ROS, which are depth, depth-mm, depth-registered, depth-registered-mm, points, confidence, validity, \
-                     sigma and depth-sigma; {remedy}"
-                );
-                Err(Failure::usage(also.flag(), reason))
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// The topics of the wanted outputs, each with the type of its messages.
-    pub(crate) fn topics(&self) -> impl Iterator<Item = messages::Topic> {
-        self.wanted().filter_map(Also::topic)
-    }
-
-    /// The wanted outputs as messages.
-    pub(crate) fn contents(&self, outcome: &Outcome) -> Vec<Content> {
-        let &Outcome { maps, left, rig, third, .. } = outcome;
-        let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
-        let content = |also: &Also| match also.kind {
-            Kind::Bytes(map) => Some(Content::Bytes(also.word, map(maps).clone())),
-            Kind::Depth => rig.map(|rig| Content::Depth(rig.depths(&near(&rig)))),
-            Kind::Sigma(of) => {
-                let sigmas = outcome.sigmas(of, self.limits)?;
-                Some(match of {
-                    Of::Disparities => Content::Sigma(sigmas),
-                    Of::Depths => Content::DepthSigma(sigmas),
-                })
-            }
-            Kind::Millimetres => rig.and_then(|rig| rig.millimetres(&near(&rig)).map(Content::Millimetres)),
-            Kind::Points(_) => {
-                let (rig, left) = rig.zip(left)?;
-                Some(Content::Points(rig.cloud(&self.limits.trusted(maps, &rig), left)))
-            }
-            Kind::Registered { millimetres } => {
-                let (rig, camera) = rig.zip(third)?;
-                if millimetres {
-                    let depths = rig.registered_millimetres(&near(&rig), &camera)?;
-                    Some(Content::RegisteredMillimetres(depths))
-                } else {
-                    Some(Content::Registered(rig.registered(&near(&rig), &camera)))
-                }
-            }
-            Kind::Disparity(..) | Kind::Picture { .. } => None,
-        };
-        self.wanted().filter_map(content).collect()
-    }
-
-    /// Writes `also` to `path`. Returns what there is to say of it.
-    pub(crate) fn write(&self, also: &Also, path: &Path, outcome: &Outcome) -> Result<Option<String>> {
-        let &Outcome { maps, sign, left, rig, rectifying, third, .. } = outcome;
-        match also.kind {
-            Kind::Disparity(view, map) => {
-                let Some(map) = map(maps) else { return Ok(None) };
-                outcome.writer(view).disparity(path, &sign.map(map))?;
-            }
-            Kind::Bytes(map) => write::picture(path, map(maps))?,
-            Kind::Depth => {
-                let Some(rig) = rig else { return Ok(None) };
-                let depths = rig.depths(&self.limits.near(outcome.final_map(self.limits), &rig));
-                outcome.writer(View::Left).depth(path, &depths)?;
-                return Ok(Some(format!("depths {}", span(&depths))));
-            }
-            Kind::Millimetres => {
-                let near = |rig: &Rig| self.limits.near(outcome.final_map(self.limits), rig);
-                let Some(depths) = rig.and_then(|rig| rig.millimetres(&near(&rig))) else { return Ok(None) };
-                write::picture(path, &depths)?;
-            }
-            Kind::Registered { millimetres } => {
-                let Some((rig, camera)) = rig.zip(third) else { return Ok(None) };
-                let map = self.limits.near(outcome.final_map(self.limits), &rig);
-                if !millimetres {
-                    // A third camera sees nothing of a map's georeference.
-                    let depths = rig.registered(&map, &camera);
-                    Writer::default().depth(path, &depths)?;
-                    return Ok(Some(format!("depths of --into {}", span(&depths))));
-                }
-                if let Some(depths) = rig.registered_millimetres(&map, &camera) {
-                    write::picture(path, &depths)?;
-                }
-            }
-            Kind::Sigma(of) => {
-                let Some(sigmas) = outcome.sigmas(of, self.limits) else { return Ok(None) };
-                outcome.writer(View::Left).depth(path, &sigmas)?;
-            }
-            Kind::Points(frame) => {
-                let rig = match frame {
-                    Frame::Matched => rig,
-                    Frame::Original => rig.zip(rectifying).map(|(rig, by)| rig.in_original_frame(&by)),
-                };
-                let (Some(rig), Some(left)) = (rig, left) else { return Ok(None) };
-                let cloud = rig.cloud(&self.limits.trusted(maps, &rig), left);
-                write::cloud(path, &cloud)?;
-                let count = cloud.points.len();
-                return Ok(Some(format!("{count} point{}", plural(count))));
-            }
-            Kind::Picture { beside } => write::picture(path, &self.picture(beside, outcome))?,
-        }
-        Ok(None)
-    }
-}
-
-/// The least and the largest of what is known.
-fn span(depths: &Plane<f32>) -> String {
-    let known = || depths.data().iter().copied().filter(|depth| depth.is_finite());
-    match known().reduce(f32::min).zip(known().reduce(f32::max)) {
-        Some((least, most)) => format!("{least:.3} to {most:.3}"),
-        None => "of no pixel".into(),
-    }
-}
-
 impl Also {
     /// The flag that asks for it.
     pub(crate) fn flag(&self) -> String {
@@ -437,7 +141,7 @@ impl Also {
     }
 
     /// Its topic in ROS; `None` where it is no message there.
-    fn topic(&self) -> Option<messages::Topic> {
+    pub(super) fn topic(&self) -> Option<messages::Topic> {
         match self.kind {
             Kind::Depth => Some(messages::DEPTH),
             Kind::Millimetres => Some(messages::MILLIMETRES),

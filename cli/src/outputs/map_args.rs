@@ -7,7 +7,8 @@ use mrfgs::image::write;
 use mrfgs::options::DisparityRange;
 
 use crate::failure::Result;
-use crate::outputs::also::{Also, AlsoArgs};
+use crate::outputs::also::Also;
+use crate::outputs::also_args::AlsoArgs;
 use crate::outputs::files::Written;
 use crate::outputs::outcome::{Outcome, View};
 

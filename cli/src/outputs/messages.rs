@@ -36,6 +36,15 @@ pub(crate) const fn of_bytes(name: &'static str) -> Topic {
     (name, Image::NAME)
 }
 
+/// The camera that the depths on `topic` come with; `None` for others.
+pub(crate) fn camera_of(topic: Topic) -> Option<Topic> {
+    match topic {
+        DEPTH | MILLIMETRES => Some(DEPTH_CAMERA),
+        REGISTERED | REGISTERED_MILLIMETRES => Some(REGISTERED_CAMERA),
+        _ => None,
+    }
+}
+
 /// What takes the messages of a frame.
 pub(crate) trait Sink {
     /// Takes a message of `topic`, which has this `header`.

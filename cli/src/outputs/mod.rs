@@ -1,6 +1,7 @@
 //! Outputs: all checked before any computing, and all written or none left behind.
 
 pub(crate) mod also;
+mod also_args;
 mod claim;
 pub(crate) mod files;
 mod film;
@@ -13,7 +14,8 @@ mod recording;
 mod staged;
 mod viewer;
 
-pub(crate) use also::{Also, AlsoArgs};
+pub(crate) use also::Also;
+pub(crate) use also_args::AlsoArgs;
 pub(crate) use claim::Claim;
 pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;

@@ -31,7 +31,7 @@ pub(crate) struct Recorded {
     first: [Option<Stamp>; 2],
     /// Whether an image of time 0 came of each camera.
     has_zero: [bool; 2],
-    left_out: LeftOut,
+    remarks: Remarks,
 }
 
 /// Where messages are from, and how they become images.
@@ -41,12 +41,12 @@ struct Images {
     reader: Reader,
 }
 
-/// What was left out, while and after the pairs are read.
+/// What there is to say of a recording, while and after the pairs are read.
 #[derive(Clone, Default)]
-pub(crate) struct LeftOut(Arc<Mutex<Remarks>>);
+pub(crate) struct Remarks(Arc<Mutex<Noted>>);
 
 #[derive(Clone, Default)]
-struct Remarks {
+struct Noted {
     /// What gave no pair.
     tally: Tally,
     /// Where and when a calibration became another one.
@@ -89,7 +89,7 @@ impl Recorded {
             count: 0,
             first: [None; 2],
             has_zero: [false; 2],
-            left_out: LeftOut::default(),
+            remarks: Remarks::default(),
             images: Images { path: path.to_owned(), topics: chosen, reader },
         })
     }
@@ -102,9 +102,9 @@ impl Recorded {
         self.files.iter().map(PathBuf::as_path)
     }
 
-    /// What gave no pair so far.
-    pub(crate) fn left_out(&self) -> LeftOut {
-        self.left_out.clone()
+    /// What there is to say so far.
+    pub(crate) fn remarks(&self) -> Remarks {
+        self.remarks.clone()
     }
 
     /// Whether the images are rectified, by the names of their topics.
@@ -146,7 +146,7 @@ impl Recorded {
     pub(super) fn next(&mut self) -> Option<Result<Views>> {
         loop {
             let pair = self.pairing.next(self.ended);
-            self.left_out.note(|remarks| remarks.tally = self.pairing.tally());
+            self.remarks.note(|noted| noted.tally = self.pairing.tally());
             if let Some([(_, left), (_, right)]) = pair {
                 self.count += 1;
                 let images = &self.images;
@@ -189,7 +189,7 @@ impl Recorded {
         let Ok(now) = CameraInfo::decode(&message.data, message.encoding) else { return };
         let stamp = now.header.stamp;
         if (CameraInfo { header: first.header.clone(), ..now }) != *first {
-            self.left_out.note(|remarks| _ = remarks.changed.get_or_insert((topic.clone(), stamp)));
+            self.remarks.note(|noted| _ = noted.changed.get_or_insert((topic.clone(), stamp)));
         }
     }
 
@@ -226,14 +226,14 @@ impl Images {
     }
 }
 
-impl LeftOut {
-    fn note(&self, change: impl FnOnce(&mut Remarks)) {
+impl Remarks {
+    fn note(&self, change: impl FnOnce(&mut Noted)) {
         change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// In words, where there is something to say.
     pub(crate) fn said(&self) -> Option<String> {
-        let Remarks { tally, changed } = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Noted { tally, changed } = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let Tally { alone: [left, right], repeated, late } = tally;
         let mut said = Vec::new();
         if left + right > 0 {

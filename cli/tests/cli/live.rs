@@ -152,8 +152,9 @@ fn a_node_matches_what_cameras_publish() {
     assert!(found != message(&map, &header, typical), "control: one bit shows");
 
     // The depths of the third camera are those of `match`.
-    let mut depths = None;
+    let (mut depths, start) = (None, Instant::now());
     while depths.is_none() {
+        assert!(start.elapsed() < Duration::from_secs(60), "no depths came");
         peer.disparity(&views);
         peer.depths.wait(Duration::from_millis(100), |_, bytes| depths = Some(bytes)).unwrap();
     }

@@ -10,7 +10,7 @@ use mrfgs::error::Reason;
 
 use super::chunk::{Chunk, unpacked};
 use super::file::{File, MAX_RECORD};
-use super::message::{Message, topic};
+use super::message::{Message, Source, damage, topic};
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
@@ -33,7 +33,6 @@ pub(super) struct Bag {
     chunk: Chunk,
     /// Where the messages end and the index begins; 0 where the bag was not closed.
     index: u64,
-    ended: bool,
 }
 
 impl Bag {
@@ -49,7 +48,6 @@ impl Bag {
             topics: Vec::new(),
             chunk: Chunk::default(),
             index: 0,
-            ended: false,
         };
         let head = bag.part()?;
         let _padding = bag.part()?;
@@ -69,7 +67,7 @@ impl Bag {
         }
         let mut bag = Self::open(path, Vec::new())?;
         // Damage is told when the messages are read: what lies before it counts.
-        match bag.by_ref().find_map(Result::err) {
+        match damage(&mut bag) {
             Some(error) if bag.topics.is_empty() => Err(error),
             _ => Ok(bag.topics),
         }
@@ -125,8 +123,9 @@ impl Bag {
             _ => Ok(None),
         }
     }
+}
 
-    /// The next message.
+impl Source for Bag {
     fn message(&mut self) -> Result<Option<Message>> {
         loop {
             let mut chunk = mem::take(&mut self.chunk);
@@ -158,19 +157,6 @@ impl Bag {
                 return Ok(Some(message));
             }
         }
-    }
-}
-
-impl Iterator for Bag {
-    type Item = Result<Message>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
-        let message = self.message();
-        self.ended = !matches!(message, Ok(Some(_)));
-        message.transpose()
     }
 }
 

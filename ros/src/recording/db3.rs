@@ -7,7 +7,7 @@ use mrfgs::Result;
 use mrfgs::error::Reason;
 
 use super::chunk::unpacked_alone;
-use super::message::{Message, topic};
+use super::message::{Message, Source, topic};
 use super::sqlite::{Database, Rows, Table, Value};
 use crate::messages::Encoding;
 use crate::topics::Topic;
@@ -23,7 +23,6 @@ pub(super) struct Db3 {
     columns: [usize; 2],
     /// By the numbers of the topics: which of those that are wanted it is, and how its messages are laid out.
     wanted: HashMap<i64, (usize, Encoding)>,
-    ended: bool,
 }
 
 impl Db3 {
@@ -35,7 +34,7 @@ impl Db3 {
             let which = wanted.iter().position(|name| *name == topic.name)?;
             Some((id, (which, topic.encoding?)))
         });
-        Ok(Self { rows: database.rows(&messages), columns, wanted: wanted.collect(), ended: false, database })
+        Ok(Self { rows: database.rows(&messages), columns, wanted: wanted.collect(), database })
     }
 
     /// The topics of a file.
@@ -50,8 +49,9 @@ impl Db3 {
         };
         Ok(topics.into_iter().map(counted).collect())
     }
+}
 
-    /// The next message.
+impl Source for Db3 {
     fn message(&mut self) -> Result<Option<Message>> {
         let [of, data] = self.columns;
         while let Some(row) = self.rows.next(&mut self.database)? {
@@ -70,19 +70,6 @@ impl Db3 {
             return Ok(Some(Message { topic, encoding, data: data.map_err(error)? }));
         }
         Ok(None)
-    }
-}
-
-impl Iterator for Db3 {
-    type Item = Result<Message>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
-        let message = self.message();
-        self.ended = !matches!(message, Ok(Some(_)));
-        message.transpose()
     }
 }
 

@@ -6,12 +6,12 @@ use std::path::Path;
 
 use mcap::MAGIC;
 use mcap::records::{Record, op};
+use mrfgs::Result;
 use mrfgs::error::Reason;
-use mrfgs::{Error, Result};
 
 use super::chunk::{Chunk, unpacked};
 use super::file::{File, MAX_RECORD};
-use super::message::{Message, topic};
+use super::message::{Message, Source, damage, topic};
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
@@ -28,7 +28,6 @@ pub(super) struct Mcap {
     channels: HashMap<u16, Channel>,
     topics: Vec<Topic>,
     chunk: Chunk,
-    ended: bool,
 }
 
 /// Where the messages of a channel belong.
@@ -53,7 +52,6 @@ impl Mcap {
             channels: HashMap::new(),
             topics: Vec::new(),
             chunk: Chunk::default(),
-            ended: false,
         })
     }
 
@@ -65,8 +63,7 @@ impl Mcap {
         }
         let mut file = Self::open(path, Vec::new())?;
         // Damage is told when the messages are read: what lies before it counts.
-        let damage = file.by_ref().find_map(Result::err);
-        match damage {
+        match damage(&mut file) {
             Some(error) if file.topics.is_empty() => Err(error),
             _ => Ok(file.topics),
         }
@@ -161,8 +158,9 @@ impl Mcap {
             Err(reason) => Err(format!("has a damaged record: {reason}").into()),
         }
     }
+}
 
-    /// The next message.
+impl Source for Mcap {
     fn message(&mut self) -> Result<Option<Message>> {
         loop {
             let mut chunk = mem::take(&mut self.chunk);
@@ -201,19 +199,6 @@ impl Mcap {
                 _ => self.file.skip(length)?,
             }
         }
-    }
-}
-
-impl Iterator for Mcap {
-    type Item = Result<Message>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
-        let message: Result<Option<Message>, Error> = self.message();
-        self.ended = !matches!(message, Ok(Some(_)));
-        message.transpose()
     }
 }
 

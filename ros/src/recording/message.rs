@@ -1,5 +1,9 @@
 //! What comes out of a recording.
 
+use std::iter;
+
+use mrfgs::{Error, Result};
+
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
@@ -12,6 +16,36 @@ pub struct Message {
     pub encoding: Encoding,
     /// Its bytes.
     pub data: Vec<u8>,
+}
+
+/// What reads the messages of a file.
+pub(super) trait Source {
+    /// The next message; `None` after the last one.
+    fn message(&mut self) -> Result<Option<Message>>;
+}
+
+/// The messages of a source, up to its end or its first error.
+pub(super) fn messages(mut source: impl Source) -> impl Iterator<Item = Result<Message>> {
+    let mut ended = false;
+    iter::from_fn(move || {
+        if ended {
+            return None;
+        }
+        let message = source.message();
+        ended = !matches!(message, Ok(Some(_)));
+        message.transpose()
+    })
+}
+
+/// Reads a source to its end. Returns what is wrong with it.
+pub(super) fn damage(source: &mut impl Source) -> Option<Error> {
+    loop {
+        match source.message() {
+            Ok(Some(_)) => {}
+            Ok(None) => return None,
+            Err(error) => return Some(error),
+        }
+    }
 }
 
 /// A topic that a file speaks of, whose type may be in the words of ROS 1.

@@ -21,6 +21,7 @@ use bag::Bag;
 use db3::Db3;
 use mcap::Mcap;
 pub use message::Message;
+use message::messages;
 pub use write::Writer;
 
 /// The names that the files of recordings end with.
@@ -125,9 +126,9 @@ type Messages = Box<dyn Iterator<Item = Result<Message>> + Send>;
 /// The messages of a file.
 fn open(file: &Path, format: Format, names: Vec<String>) -> Messages {
     let opened = match format {
-        Format::Mcap => Mcap::open(file, names).map(|file| Box::new(file) as Messages),
-        Format::Bag => Bag::open(file, names).map(|file| Box::new(file) as Messages),
-        Format::Db3 => Db3::open(file, &names).map(|file| Box::new(file) as Messages),
+        Format::Mcap => Mcap::open(file, names).map(|file| Box::new(messages(file)) as Messages),
+        Format::Bag => Bag::open(file, names).map(|file| Box::new(messages(file)) as Messages),
+        Format::Db3 => Db3::open(file, &names).map(|file| Box::new(messages(file)) as Messages),
     };
     opened.unwrap_or_else(|error| Box::new(std::iter::once(Err(error))))
 }

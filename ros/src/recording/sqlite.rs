@@ -1,6 +1,8 @@
 //! Tables of SQLite, row by row, from files that need not be sound. (SQLite itself is C, which nothing else here takes a compiler for, and
 //! of a bag two tables are read from their start to their end.) The format is that of <https://www.sqlite.org/fileformat2.html>.
 
+use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use mrfgs::Result;
@@ -86,9 +88,12 @@ impl Database {
         }
         for end in UNFINISHED {
             let beside = PathBuf::from(format!("{}{end}", path.display()));
-            if beside.metadata().is_ok_and(|beside| beside.len() > 0) {
+            // One that was done with begins with a 0, or is empty.
+            let mut first = [0];
+            let is_used = fs::File::open(&beside).and_then(|mut beside| beside.read(&mut first)).is_ok();
+            if is_used && first != [0] {
                 return Err(file.error(format!(
-                    "was not closed: what came last is in {}; `sqlite3 FILE 'PRAGMA wal_checkpoint(TRUNCATE)'` puts it in",
+                    "was not closed, and {} says what came last; `sqlite3 FILE 'PRAGMA wal_checkpoint(TRUNCATE)'` takes it in",
                     beside.display()
                 )));
             }

@@ -32,7 +32,8 @@ Examples:
 /// `left/image_raw` and `right/image_raw` and to the `camera_info` beside each, and publishes `disparity`
 /// (`stereo_msgs/msg/DisparityImage`) with the time and the frame of the left image. With --also depth, depth-mm, points, sigma, depth-sigma,
 /// confidence and validity it publishes these, too: on `depth/image_rect`, `depth/image_rect_raw`, `points2`, `sigma`, `depth/sigma`,
-/// `confidence` and `validity`, and depths with a `depth/camera_info`.
+/// `confidence` and `validity`, and depths with a `depth/camera_info`; with --also depth-registered and depth-registered-mm the depths that
+/// the camera of --into sees, on `depth_registered/image` and `depth_registered/image_raw`, with a `depth_registered/camera_info`.
 ///
 /// Images on topics such as `image_rect` are rectified; others are rectified by their `camera_info`. Topics that end in `/compressed`
 /// hold `CompressedImage`.

@@ -19,13 +19,10 @@ impl Publications {
     pub(super) fn new(participant: &Participant, names: &Names, also: &AlsoArgs) -> failure::Result<Self> {
         let mut topics = vec![messages::DISPARITY];
         topics.extend(also.topics());
-        if topics.iter().any(|topic| [messages::DEPTH, messages::MILLIMETRES].contains(topic)) {
-            topics.push(messages::DEPTH_CAMERA);
-        }
-        if topics.iter().any(|topic| [messages::REGISTERED, messages::REGISTERED_MILLIMETRES].contains(topic))
-        {
-            topics.push(messages::REGISTERED_CAMERA);
-        }
+        let mut cameras: Vec<_> = topics.iter().copied().filter_map(messages::camera_of).collect();
+        // One for depths in both units.
+        cameras.dedup();
+        topics.extend(cameras);
         let published = topics.into_iter().map(|topic| {
             let name = names.resolve(topic.0).map_err(|reason| Failure::usage("--remap", reason))?;
             let publication = participant.publish(&name, topic.1).map_err(of_network)?;
@@ -39,7 +36,7 @@ impl Publications {
         self.0.iter().map(|(_, name, _)| name.as_str()).collect()
     }
 
-    /// Each of them.
+    /// Each of them, in no order.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Publication> {
         self.0.iter().map(|(.., publication)| publication)
     }

@@ -56,16 +56,16 @@ Examples:
 /// that have the same number are a pair (--pairing). Without RIGHT each frame holds both views, as --layout says. All frames have
 /// one size.
 ///
-/// LEFT alone may also be a recording of ROS: an MCAP file, the folder of a bag of ROS 2 or a .db3 of one, or a .bag of ROS 1. Its images are
-/// paired by the times in their headers, and frames are called by these. Images on topics such as `image_rect` are rectified, others are
+/// LEFT alone may also be a recording of ROS: an MCAP file, the folder of a bag of ROS 2 or a .db3 of one, or a .bag of ROS 1. Its
+/// images are paired by the times in their headers, and frames are called by these. Images on topics such as `image_rect` are rectified, others are
 /// rectified by the `camera_info` beside them.
 ///
 /// OUTPUT is a folder, or a film: NAME.y4m, - for such a film on standard output, and where ffmpeg is installed NAME.mp4, .mkv,
 /// .mov, .webm or .avi. A folder gets a map of each frame, named after
 /// the left image (streams: 000000 and so on), and what --also asks for. A film shows the maps in colours, with a scale;
 /// with --also side-by-side, LEFT stands beside it. NAME.mcap is a recording of ROS 2: disparities on /disparity, and with --also
-/// depth, depth-mm, depth-registered, points, confidence or validity these, with the times of the left images. `ws://HOST:PORT` shows the same to Foxglove
-/// while frames are matched; a viewer that is slow gets the newest.
+/// depth, depth-mm, depth-registered, points, confidence or validity these, with the times of the left images. `ws://HOST:PORT` shows
+/// the same to Foxglove while frames are matched; a viewer that is slow gets the newest.
 ///
 /// Without --max-disparity the range is that of the calibration, or that of the first frame. While frames are matched, the next ones are
 /// read and rectified, and the last one is written. The CPU path matches as many at once as it has threads, as
@@ -181,7 +181,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let third = args.maps.also.third()?;
     let method = args.maps.also.made_by(args.method.method()?)?;
     let rectifying = args.rectification.options_if(rectify)?;
-    let left_out = recorded.as_ref().map(Recorded::left_out);
+    let remarks = recorded.as_ref().map(Recorded::remarks);
     let mut frames = match recorded {
         Some(recorded) => masked(Frames::of_recording(recorded), args)?,
         None => open(args)?,
@@ -265,7 +265,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
     let first = Frame { name, header, pair: input.pair };
     let ended = pipeline.run(first, frames, rectifier, &mut sink);
-    if let Some(said) = left_out.and_then(|left_out| left_out.said()).filter(|_| !args.quiet) {
+    if let Some(said) = remarks.and_then(|remarks| remarks.said()).filter(|_| !args.quiet) {
         console::say(&said);
     }
     ended
