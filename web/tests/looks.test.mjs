@@ -106,7 +106,8 @@ describe('looks', () => {
             const { data } = document.getElementById('view').getContext('2d').getImageData(0, 0, 320, 240);
             return data.reduce((sum, value, i) => (sum + value * (i % 977)) % 1_000_003, 0);
         });
-        for (let i = 0; i < 40 && seen.size < 2; i += 1) {
+        // As long as some turns take, however fast this machine looks.
+        for (const end = Date.now() + 10_000; seen.size < 2 && Date.now() < end;) {
             seen.add(await hash());
         }
         assert.equal(seen.size, 2);
