@@ -378,7 +378,7 @@ impl Network {
 }
 
 /// The neighbours of all pixels of row `y`.
-#[pulp::with_simd(choose_row = pulp::Arch::new())]
+#[pulp::with_simd(choose_row = crate::vectors::widest())]
 #[inline(always)]
 fn choose_row_on<'a, S: pulp::Simd>(_: S, guide: &'a Guide, y: usize, keys: &'a mut Keys, row: &'a mut [u8]) {
     let Guide { network, window, .. } = guide;

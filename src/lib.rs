@@ -118,6 +118,7 @@ pub mod sigma;
 mod stage;
 pub mod steady;
 mod text;
+mod vectors;
 mod watch;
 mod weights;
 

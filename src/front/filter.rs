@@ -151,7 +151,7 @@ fn across<T: Pixels>(pixels: &Plane<T>, taps: &Taps) -> Plane<T> {
 }
 
 /// Sums of `terms` by their weights; `sums` is room for them.
-#[pulp::with_simd(weigh = pulp::Arch::new())]
+#[pulp::with_simd(weigh = crate::vectors::widest())]
 #[inline(always)]
 fn weigh_on<'a, S: pulp::Simd>(
     _: S,

@@ -67,7 +67,7 @@ pub fn homomorphic(image: &Image) -> Image {
 }
 
 /// Multiplies the colours of unmasked pixels by their gains.
-#[pulp::with_simd(correct = pulp::Arch::new())]
+#[pulp::with_simd(correct = crate::vectors::widest())]
 #[inline(always)]
 fn correct_on<'a, S: pulp::Simd>(_: S, masked: &'a [bool], gains: &'a [f64], pixels: &'a mut [Pixel]) {
     for ((pixel, gain), masked) in pixels.iter_mut().zip(gains).zip(masked) {
@@ -118,7 +118,7 @@ pub(super) fn smooth(plane: &Plane<f64>, [across, down]: [&[f64]; 2]) -> Plane<f
 }
 
 /// Adds weighted rows, one after the other.
-#[pulp::with_simd(add_all = pulp::Arch::new())]
+#[pulp::with_simd(add_all = crate::vectors::widest())]
 #[inline(always)]
 fn add_all_on<'a, S: pulp::Simd>(_: S, weights: &'a [f64], rows: &'a [&'a [f64]], out: &'a mut [f64]) {
     for (weight, row) in weights.iter().zip(rows) {

@@ -195,7 +195,7 @@ impl Features {
 
 /// The features of an octave for row `y`, `dimensions` apart; each pixel's two more places are the next octave's to fill. `line` is
 /// for the row's nodes.
-#[pulp::with_simd(interpolate = pulp::Arch::new())]
+#[pulp::with_simd(interpolate = crate::vectors::widest())]
 #[inline(always)]
 fn interpolate_on<'a, S: pulp::Simd>(
     _: S,
@@ -259,7 +259,7 @@ impl Scale {
 }
 
 /// [`Scale::apply`] to many values.
-#[pulp::with_simd(apply_all = pulp::Arch::new())]
+#[pulp::with_simd(apply_all = crate::vectors::widest())]
 #[inline(always)]
 fn apply_all_on<'a, S: pulp::Simd>(_: S, scale: Scale, values: &'a [f64], out: &'a mut [i16]) {
     out.iter_mut().zip(values).for_each(|(out, value)| *out = scale.apply(*value));

@@ -62,7 +62,7 @@ impl Image {
 }
 
 /// The same where nothing is masked; `room` is room for sums.
-#[pulp::with_simd(low_pass = pulp::Arch::new())]
+#[pulp::with_simd(low_pass = crate::vectors::widest())]
 #[inline(always)]
 fn low_pass_on<'a, S: pulp::Simd>(
     _: S,

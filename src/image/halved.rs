@@ -55,7 +55,7 @@ impl Image {
     }
 }
 
-#[pulp::with_simd(means = pulp::Arch::new())]
+#[pulp::with_simd(means = crate::vectors::widest())]
 #[inline(always)]
 fn means_on<'a, S: pulp::Simd>(_: S, rows: [&'a [Pixel]; 2], out: &'a mut [Pixel]) {
     let [above, below] = rows.map(|row| row.as_chunks::<2>().0);

@@ -45,7 +45,7 @@ pub(super) fn resample(
 }
 
 /// The colours of a row, those that there are, and which pixels are masked.
-#[pulp::with_simd(sample_row = pulp::Arch::new())]
+#[pulp::with_simd(sample_row = crate::vectors::widest())]
 #[inline(always)]
 fn sample_row_on<'a, S: pulp::Simd, F: Fn(usize) -> Place>(
     _: S,
@@ -62,7 +62,7 @@ fn sample_row_on<'a, S: pulp::Simd, F: Fn(usize) -> Place>(
 }
 
 /// Values from colours. With `bytes`, they are whole 8-bit levels.
-#[pulp::with_simd(round_row = pulp::Arch::new())]
+#[pulp::with_simd(round_row = crate::vectors::widest())]
 #[inline(always)]
 fn round_row_on<'a, S: pulp::Simd>(_: S, colours: &'a [f64], bytes: bool, out: &'a mut [u16]) {
     const ONE: f64 = (1u64 << (2 * BITS)) as f64;
@@ -76,7 +76,7 @@ fn round_row_on<'a, S: pulp::Simd>(_: S, colours: &'a [f64], bytes: bool, out: &
 }
 
 /// Sets the grey of each pixel.
-#[pulp::with_simd(grey_row = pulp::Arch::new())]
+#[pulp::with_simd(grey_row = crate::vectors::widest())]
 #[inline(always)]
 fn grey_row_on<S: pulp::Simd>(_: S, pixels: &mut [Pixel]) {
     for pixel in pixels {

@@ -52,7 +52,7 @@ impl<'a, U: Units> Summands<'a, U> {
 
 /// The beliefs of row `y`, from the dependency messages of the factors, `dependency` being those from the cell `first` on.
 /// `None` means that the factors have not sent any yet.
-#[pulp::with_simd(row = pulp::Arch::new())]
+#[pulp::with_simd(row = crate::vectors::widest())]
 #[inline(always)]
 pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
     _: S,

@@ -14,7 +14,7 @@ pub(super) fn run<U: Units>(v: &mut Volumes<U>) {
 }
 
 /// The labels of a row, and the sum of their squared changes.
-#[pulp::with_simd(label_row = pulp::Arch::new())]
+#[pulp::with_simd(label_row = crate::vectors::widest())]
 #[inline(always)]
 fn label_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,

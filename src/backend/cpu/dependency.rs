@@ -83,7 +83,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows:
 }
 
 /// The messages of the factors of row `y`.
-#[pulp::with_simd(row = pulp::Arch::new())]
+#[pulp::with_simd(row = crate::vectors::widest())]
 #[inline(always)]
 pub(super) fn row_on<'a, S: pulp::Simd, U: Units>(
     _: S,

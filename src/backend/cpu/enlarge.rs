@@ -42,7 +42,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
 }
 
 /// The two rows of the full size of row `y`, where it is not `plain`.
-#[pulp::with_simd(edges_row = pulp::Arch::new())]
+#[pulp::with_simd(edges_row = crate::vectors::widest())]
 #[inline(always)]
 fn edges_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -227,7 +227,7 @@ fn each_known(known: &[bool; LANES], values: &[i32; LANES], other: i32) -> [i32;
 }
 
 /// Where the disparities of 3 x 3 pixels span at most a pixel of the full size.
-#[pulp::with_simd(flat_row = pulp::Arch::new())]
+#[pulp::with_simd(flat_row = crate::vectors::widest())]
 #[inline(always)]
 fn flat_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -254,7 +254,7 @@ fn flat_row_on<'a, S: pulp::Simd>(
 }
 
 /// A row of the full size, between the row of half the size that it is in and the one beside that.
-#[pulp::with_simd(between_row = pulp::Arch::new())]
+#[pulp::with_simd(between_row = crate::vectors::widest())]
 #[inline(always)]
 fn between_row_on<'a, S: pulp::Simd>(
     _: S,

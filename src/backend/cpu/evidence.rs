@@ -58,7 +58,7 @@ impl<'a, C> Costs<'a, C> {
     }
 }
 
-#[pulp::with_simd(evidence_row = pulp::Arch::new())]
+#[pulp::with_simd(evidence_row = crate::vectors::widest())]
 #[inline(always)]
 fn evidence_row_on<'a, S: pulp::Simd, C: StoredCost, U: Units>(
     _: S,

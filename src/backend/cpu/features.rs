@@ -51,7 +51,7 @@ impl Features {
     }
 }
 
-#[pulp::with_simd(cost_row = pulp::Arch::new())]
+#[pulp::with_simd(cost_row = crate::vectors::widest())]
 #[inline(always)]
 fn cost_row_on<'a, S: pulp::Simd>(_: S, plan: &'a Plan, features: &'a RowFeatures, out: &'a mut [u8]) {
     let row = RowCosts { plan, features };
@@ -60,7 +60,7 @@ fn cost_row_on<'a, S: pulp::Simd>(_: S, plan: &'a Plan, features: &'a RowFeature
     }
 }
 
-#[pulp::with_simd(window_row = pulp::Arch::new())]
+#[pulp::with_simd(window_row = crate::vectors::widest())]
 #[inline(always)]
 fn window_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -75,7 +75,7 @@ fn window_row_on<'a, S: pulp::Simd>(
     }
 }
 
-#[pulp::with_simd(near_row = pulp::Arch::new())]
+#[pulp::with_simd(near_row = crate::vectors::widest())]
 #[inline(always)]
 fn near_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -332,7 +332,7 @@ impl Row {
 }
 
 /// Fills a row with row `y` of an image.
-#[pulp::with_simd(fill_row = pulp::Arch::new())]
+#[pulp::with_simd(fill_row = crate::vectors::widest())]
 #[inline(always)]
 fn fill_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut Row, image: &'a Image, greys: &'a Greys, y: usize) {
     let centre = greys.row(y);
@@ -381,7 +381,7 @@ impl Sums {
 }
 
 /// The weight of colour at each pixel of row `y`, from the variance of grey around it.
-#[pulp::with_simd(colour_weights = pulp::Arch::new())]
+#[pulp::with_simd(colour_weights = crate::vectors::widest())]
 #[inline(always)]
 fn colour_weights_on<'a, S: pulp::Simd>(
     _: S,

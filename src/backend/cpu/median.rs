@@ -55,7 +55,7 @@ pub(super) fn smooth(
 }
 
 /// The results of the touched pixels of the row that `window` is open at.
-#[pulp::with_simd(median_row = pulp::Arch::new())]
+#[pulp::with_simd(median_row = crate::vectors::widest())]
 #[inline(always)]
 fn median_row_on<'a, S: pulp::Simd>(_: S, window: &'a mut Window, seen: &'a Seen, row: &'a mut [i32]) {
     let mut x = 0;
@@ -103,7 +103,7 @@ impl Seen {
 }
 
 /// The guides of a row, and where it is known.
-#[pulp::with_simd(seen_row = pulp::Arch::new())]
+#[pulp::with_simd(seen_row = crate::vectors::widest())]
 #[inline(always)]
 fn seen_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -271,7 +271,7 @@ impl Window {
 
 /// Divides `values`, less `origin`, into `steps` of 2 to `bits`. (A function of its own, as is the search: within another, compilers
 /// take vectors apart.)
-#[pulp::with_simd(divide = pulp::Arch::new())]
+#[pulp::with_simd(divide = crate::vectors::widest())]
 #[inline(always)]
 fn divide_on<'a, S: pulp::Simd>(
     _: S,
@@ -288,7 +288,7 @@ fn divide_on<'a, S: pulp::Simd>(
 }
 
 /// The medians of `steps`, whose number is even: the largest values below which there is less weight than they `need`.
-#[pulp::with_simd(search = pulp::Arch::new())]
+#[pulp::with_simd(search = crate::vectors::widest())]
 #[inline(always)]
 fn search_on<'a, S: pulp::Simd>(
     _: S,

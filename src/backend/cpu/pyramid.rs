@@ -172,7 +172,7 @@ impl<S: Copy + Default> Scratch<S> {
 }
 
 /// A row of a level, from five of the finer one.
-#[pulp::with_simd(reduce_row = pulp::Arch::new())]
+#[pulp::with_simd(reduce_row = crate::vectors::widest())]
 #[inline(always)]
 fn reduce_row_on<'a, D: pulp::Simd, C: StoredCost>(
     _: D,

@@ -179,7 +179,7 @@ impl View<'_> {
     }
 }
 
-#[pulp::with_simd(census_row = pulp::Arch::new())]
+#[pulp::with_simd(census_row = crate::vectors::widest())]
 #[inline(always)]
 fn census_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -204,7 +204,7 @@ fn census_row_on<'a, S: pulp::Simd>(
 }
 
 /// The costs of a row of half-size pixels.
-#[pulp::with_simd(cost_row = pulp::Arch::new())]
+#[pulp::with_simd(cost_row = crate::vectors::widest())]
 #[inline(always)]
 fn cost_row_on<'a, S: pulp::Simd>(
     _: S,
@@ -238,7 +238,7 @@ fn cost_row_on<'a, S: pulp::Simd>(
 
 /// The disparities of a row, from the optima and the costs of the row above, itself and the row below, of which those in `inside`
 /// are there.
-#[pulp::with_simd(fit_row = pulp::Arch::new())]
+#[pulp::with_simd(fit_row = crate::vectors::widest())]
 #[inline(always)]
 fn fit_row_on<'a, S: pulp::Simd>(
     _: S,

@@ -83,7 +83,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, level: usize, sent: Sent, rows:
 }
 
 /// The messages of the factors of coarse row `y`, from the windows and the beliefs of the finer and the coarser level.
-#[pulp::with_simd(row = pulp::Arch::new())]
+#[pulp::with_simd(row = crate::vectors::widest())]
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "volumes of both levels")]
 fn row_on<'a, S: pulp::Simd, U: Units>(

@@ -27,7 +27,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     );
 }
 
-#[pulp::with_simd(right_row = pulp::Arch::new())]
+#[pulp::with_simd(right_row = crate::vectors::widest())]
 #[inline(always)]
 fn right_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,

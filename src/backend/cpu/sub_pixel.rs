@@ -130,7 +130,7 @@ fn collect(level: &LevelPlan, cost: &[u8], y: usize, optima: &[Optimum], words: 
 }
 
 /// The sums of a row from its own costs and those of the rows around it.
-#[pulp::with_simd(sum_row = pulp::Arch::new())]
+#[pulp::with_simd(sum_row = crate::vectors::widest())]
 #[inline(always)]
 fn sum_row_on<'a, S: pulp::Simd>(_: S, near: [&'a Near; 3], sums: &'a mut [Sums]) {
     for (x, sums) in (0..).step_by(LANES).zip(sums) {

@@ -67,7 +67,7 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, _: &Pair) {
 }
 
 /// The sums over the places of each pixel of the row in the middle.
-#[pulp::with_simd(sum = pulp::Arch::new())]
+#[pulp::with_simd(sum = crate::vectors::widest())]
 #[inline(always)]
 fn sum_on<'a, S: pulp::Simd>(_: S, rows: &'a [Row; SUPPORT_PLACES], sums: &'a mut [i32]) {
     let own = &rows[SUPPORT_PLACES / 2].disparities[SUPPORT_REACH..];

@@ -176,7 +176,7 @@ fn own_votes(maps: &MapSet, plan: &Plan, y: usize, out: &mut [u32], scratch: &mu
 }
 
 /// Votes for a disparity, in 1/256 px from the smallest label on.
-#[pulp::with_simd(vote_for = pulp::Arch::new())]
+#[pulp::with_simd(vote_for = crate::vectors::widest())]
 #[inline(always)]
 fn vote_for_on<S: pulp::Simd>(_: S, votes: &mut [u32], disparity: i32) {
     for (vote, label) in votes.iter_mut().zip(0..) {
@@ -186,7 +186,7 @@ fn vote_for_on<S: pulp::Simd>(_: S, votes: &mut [u32], disparity: i32) {
 }
 
 /// Votes against the labels that are at least as near as `hiding` says. The first is as near as `near[0]`, and each label adds `near[1]`.
-#[pulp::with_simd(vote_against_hiding = pulp::Arch::new())]
+#[pulp::with_simd(vote_against_hiding = crate::vectors::widest())]
 #[inline(always)]
 fn vote_against_hiding_on<'a, S: pulp::Simd>(_: S, votes: &'a mut [u32], hiding: &'a [i32], near: [i32; 2]) {
     for ((vote, &least), label) in votes.iter_mut().zip(hiding).zip(0..) {
@@ -196,7 +196,7 @@ fn vote_against_hiding_on<'a, S: pulp::Simd>(_: S, votes: &'a mut [u32], hiding:
 }
 
 /// Sums the own votes of a row along it.
-#[pulp::with_simd(sum_row = pulp::Arch::new())]
+#[pulp::with_simd(sum_row = crate::vectors::widest())]
 #[inline(always)]
 fn sum_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut [u32], stride: usize, scratch: &'a mut Scratch) {
     let Scratch { steps, here, carried, .. } = scratch;
@@ -224,7 +224,7 @@ fn sum_row_on<'a, S: pulp::Simd>(_: S, row: &'a mut [u32], stride: usize, scratc
 }
 
 /// The sums at `at`, and what comes along the column by the `steps` from above and below, the farthest first.
-#[pulp::with_simd(sum_column = pulp::Arch::new())]
+#[pulp::with_simd(sum_column = crate::vectors::widest())]
 #[inline(always)]
 fn sum_column_on<'a, S: pulp::Simd>(
     _: S,
@@ -269,7 +269,7 @@ fn winner(sums: &[u32]) -> Option<i32> {
 }
 
 /// The smallest and the largest of these sums.
-#[pulp::with_simd(extremes = pulp::Arch::new())]
+#[pulp::with_simd(extremes = crate::vectors::widest())]
 #[inline(always)]
 fn extremes_on<S: pulp::Simd>(_: S, sums: &[u32]) -> (u32, u32) {
     sums.iter().fold((u32::MAX, 0), |(least, most), &sum| (least.min(sum), most.max(sum)))

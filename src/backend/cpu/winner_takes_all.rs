@@ -15,7 +15,7 @@ pub(super) fn rows<U: Units>(v: &mut Volumes<U>, rows: Range<usize>) {
     optima.zip(rows).for_each(|(optima, y)| optimum_row(windows, y, windows.row_of(belief, y), optima));
 }
 
-#[pulp::with_simd(optimum_row = pulp::Arch::new())]
+#[pulp::with_simd(optimum_row = crate::vectors::widest())]
 #[inline(always)]
 fn optimum_row_on<'a, S: pulp::Simd, U: Units>(
     _: S,

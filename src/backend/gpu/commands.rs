@@ -8,6 +8,7 @@ use super::shader::{Shader, WORKGROUP, binding_number};
 use super::uniform::{self, Band, Header, LevelParams};
 use crate::error::{DeviceError, Result};
 use crate::plan::{LevelPlan, Plan};
+use bytemuck::bytes_of;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
@@ -47,17 +48,22 @@ pub(super) struct Pipeline {
 pub(super) type Pipelines = HashMap<Shader, Pipeline>;
 
 /// What a dispatch does at a level.
-struct Section<U> {
+struct Section {
     level: LevelParams,
     rows: Range<u32>,
     /// Invocations in each of so many rows.
     size: (u32, u32),
     /// Where volumes and dependency messages begin in what is bound, in quads.
     at: (u32, u32),
-    own: U,
+    /// The bytes of the stage's own uniform.
+    own: Vec<u8>,
 }
 
-/// Collects the commands of a stage at a level.
+/// What is bound for a range of rows.
+type Bind<'a> = dyn Fn(&Range<u32>) -> Vec<Binding> + 'a;
+
+/// Collects the commands of a stage at a level. What it does is compiled once, and not for each kernel: only the first lines of what
+/// stages call know which one it is.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a mut Device,
     pub(super) pipelines: &'a mut Pipelines,
@@ -101,7 +107,7 @@ impl<'a> Recorder<'a> {
         threads: u32,
         bind: impl Fn(&Range<u32>) -> B,
     ) -> Result<()> {
-        self.each_band(kernel, own, |height| (threads, height), bind)
+        self.each_band(&kernel.any(), bytes_of(own), &|height| (threads, height), &|rows| bind(rows).all())
     }
 
     /// The same with one invocation per row.
@@ -111,19 +117,19 @@ impl<'a> Recorder<'a> {
         own: &B::Uniform,
         bind: impl Fn(&Range<u32>) -> B,
     ) -> Result<()> {
-        self.each_band(kernel, own, |height| (height, 1), bind)
+        self.each_band(&kernel.any(), bytes_of(own), &|height| (height, 1), &|rows| bind(rows).all())
     }
 
-    fn each_band<B: Bindings>(
+    fn each_band(
         &mut self,
-        kernel: &Kernel<B>,
-        own: &B::Uniform,
-        size: impl Fn(u32) -> (u32, u32),
-        bind: impl Fn(&Range<u32>) -> B,
+        kernel: &Kernel,
+        own: &[u8],
+        size: &dyn Fn(u32) -> (u32, u32),
+        bind: &Bind,
     ) -> Result<()> {
-        for rows in self.bands(&self.cuts(), |rows| bind(rows).all())? {
+        for rows in self.bands(&self.cuts(), bind)? {
             let (size, bindings) = (size(rows.end - rows.start), bind(&rows));
-            self.dispatch(kernel, own, rows, size, bindings)?;
+            self.band(kernel, own.to_vec(), rows, size, &bindings)?;
         }
         Ok(())
     }
@@ -179,12 +185,12 @@ impl<'a> Recorder<'a> {
 
     /// Bands of all rows, as few as possible, such that no binding exceeds the device's largest. For bindings
     /// that hold no volumes.
-    pub(super) fn map_bands(&self, bind: impl Fn(&Range<u32>) -> Vec<Binding>) -> Result<Vec<Range<u32>>> {
+    pub(super) fn map_bands(&self, bind: &Bind) -> Result<Vec<Range<u32>>> {
         self.bands(&[0, self.params().height], bind)
     }
 
     /// The same between given `cuts`.
-    fn bands(&self, cuts: &[u32], bind: impl Fn(&Range<u32>) -> Vec<Binding>) -> Result<Vec<Range<u32>>> {
+    fn bands(&self, cuts: &[u32], bind: &Bind) -> Result<Vec<Range<u32>>> {
         let largest = |rows: &Range<u32>| bind(rows).iter().map(Binding::size).max().unwrap_or(0);
         let mut bands = Vec::new();
         for part in cuts.windows(2).map(|ends| ends[0]..ends[1]) {
@@ -215,7 +221,18 @@ impl<'a> Recorder<'a> {
         size: (u32, u32),
         bindings: B,
     ) -> Result<()> {
-        let section = Section { level: self.params(), rows, size, at: (0, 0), own: *own };
+        self.band(&kernel.any(), bytes_of(own).to_vec(), rows, size, &bindings.all())
+    }
+
+    fn band(
+        &mut self,
+        kernel: &Kernel,
+        own: Vec<u8>,
+        rows: Range<u32>,
+        size: (u32, u32),
+        bindings: &[Binding],
+    ) -> Result<()> {
+        let section = Section { level: self.params(), rows, size, at: (0, 0), own };
         self.dispatch_sections(kernel, &[section], bindings)
     }
 
@@ -230,21 +247,21 @@ impl<'a> Recorder<'a> {
         let sections = levels.map(|z| {
             let (here, (own, threads)) = (&self.buffers.levels[z], own(z));
             let (level, at) = here.shared_params(self.plan);
+            let own = bytes_of(&own).to_vec();
             Section { level, rows: 0..level.height, size: (threads, level.height), at, own }
         });
-        self.dispatch_sections(kernel, &sections.collect::<Vec<_>>(), bindings)
+        self.dispatch_sections(&kernel.any(), &sections.collect::<Vec<_>>(), &bindings.all())
     }
 
-    fn dispatch_sections<B: Bindings>(
+    fn dispatch_sections(
         &mut self,
-        kernel: &Kernel<B>,
-        sections: &[Section<B::Uniform>],
-        bindings: B,
+        kernel: &Kernel,
+        sections: &[Section],
+        bindings: &[Binding],
     ) -> Result<()> {
         let pipeline = self.pipeline(kernel)?;
-        let row_groups = |section: &Section<B::Uniform>| section.size.0.div_ceil(WORKGROUP).max(1);
-        let groups =
-            |section: &Section<B::Uniform>| u64::from(row_groups(section)) * u64::from(section.size.1);
+        let row_groups = |section: &Section| section.size.0.div_ceil(WORKGROUP).max(1);
+        let groups = |section: &Section| u64::from(row_groups(section)) * u64::from(section.size.1);
         let total: u64 = sections.iter().map(groups).sum();
         let grid = total.min(u64::from(self.device.max_groups)).max(1) as u32;
         let (mut bytes, mut first_group) = (Vec::new(), 0);
@@ -270,9 +287,9 @@ impl<'a> Recorder<'a> {
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let uniform = self.device.buffer("uniform", bytes.len() as u64, usage)?;
         let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }];
-        let bindings = bindings.all();
-        entries.extend(pipeline.numbers.iter().zip(&bindings).map(|(number, binding)| {
-            wgpu::BindGroupEntry { binding: *number, resource: binding.resource() }
+        entries.extend(pipeline.numbers.iter().zip(bindings).map(|(number, binding)| wgpu::BindGroupEntry {
+            binding: *number,
+            resource: binding.resource(),
         }));
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
@@ -298,7 +315,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// The pipeline of `kernel`, compiled on first use.
-    fn pipeline<B>(&mut self, kernel: &Kernel<B>) -> Result<Pipeline> {
+    fn pipeline(&mut self, kernel: &Kernel) -> Result<Pipeline> {
         let Kernel { shader, loops, names, .. } = kernel;
         if *loops > MAX_LOOP_ITERATIONS {
             let LevelPlan { width, height, labels, .. } = self.plan.levels[0];

@@ -92,7 +92,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         disparity: b.disparity.bind(rows),
         patches: p.patches.bind(&patches_of(rows)),
     };
-    for rows in r.map_bands(|rows| bind(rows).all())? {
+    for rows in r.map_bands(&|rows| bind(rows).all())? {
         let own = Uniform { first_bound: patches_of(&rows).start, ..own };
         let (size, bindings) = ((l.width, rows.end - rows.start), bind(&rows));
         r.dispatch(&take(plan, 0), &own, rows, size, bindings)?;

@@ -26,7 +26,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let tables = Sources { is_known, source_of: source_of.clone() };
     r.dispatch(&sources(r.plan, 0), &none, 0..l.height, (l.height, 1), tables)?;
     // A row may take its values from any other: every band from every band.
-    for source in r.map_bands(|rows| vec![b.flags.bind(rows)])? {
+    for source in r.map_bands(&|rows| vec![b.flags.bind(rows)])? {
         let own = Uniform {
             source_first_row: source.start,
             source_rows: source.end - source.start,

@@ -123,8 +123,9 @@ impl<B: Bindings> Kernel<B> {
     }
 
     /// The same among others.
-    pub(super) fn any(self) -> Kernel {
-        let Self { shader, loops, uniform, names, sections, .. } = self;
+    pub(super) fn any(&self) -> Kernel {
+        let &Self { ref shader, loops, ref uniform, names, sections, .. } = self;
+        let (shader, uniform) = (shader.clone(), uniform.clone());
         Kernel { shader, loops, uniform, names, sections, bindings: PhantomData }
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
     let base = Uniform { halo: size, blocks, size, ..Uniform::default() };
     // What is found in a band goes to the first rows of the scratch maps.
     let found = |what: &Rows, seen: &Range<u32>| what.bind(&(0..seen.end - seen.start));
-    let bands = r.map_bands(|rows| {
+    let bands = r.map_bands(&|rows| {
         let seen = with_halo(rows, size, l.height);
         vec![b.optima.bind(&seen), b.flags.bind(&seen), found(&b.speckle_parents, &seen)]
     })?;

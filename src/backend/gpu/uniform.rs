@@ -120,9 +120,9 @@ impl UniformLayout {
     }
 }
 
-/// The bytes of a uniform.
-pub(super) fn bytes<U: Layout>(header: &Header, own: &U) -> Vec<u8> {
-    let mut bytes = [bytemuck::bytes_of(header), bytemuck::bytes_of(own)].concat();
+/// The bytes of a uniform, of which the stage's `own` are these.
+pub(super) fn bytes(header: &Header, own: &[u8]) -> Vec<u8> {
+    let mut bytes = [bytemuck::bytes_of(header), own].concat();
     bytes.resize(bytes.len().next_multiple_of(16), 0);
     bytes
 }

@@ -119,7 +119,7 @@ pub(super) fn record(r: &mut Recorder) -> Result<()> {
         colours: v.colours.bind(&voted(rows)),
         votes: v.elected.bind(&voted(rows)),
     };
-    for rows in r.map_bands(|rows| bind(rows).all())? {
+    for rows in r.map_bands(&|rows| bind(rows).all())? {
         let own = Uniform { first_voted: voted(&rows).start, ..own };
         let (size, bindings) = ((l.width, rows.end - rows.start), bind(&rows));
         r.dispatch(&take(plan, 0), &own, rows, size, bindings)?;

@@ -12,7 +12,7 @@ pub(super) fn narrow_words(image: &Image, pitch: u32, words: &mut [u32]) -> bool
     rows.all(|(y, row)| narrow_row(image.pixels.row(y), image.masked.row(y), row))
 }
 
-#[pulp::with_simd(narrow_row = pulp::Arch::new())]
+#[pulp::with_simd(narrow_row = crate::vectors::widest())]
 #[inline(always)]
 fn narrow_row_on<S: pulp::Simd>(_: S, pixels: &[Pixel], masked: &[bool], words: &mut [u32]) -> bool {
     let mut missed = 0;

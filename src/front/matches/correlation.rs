@@ -26,7 +26,7 @@ pub(super) fn correlation(
 
 /// The scores of windows with these products, by the sum and the norm of the one and of each of the others. All but the last division is
 /// exact, since nothing reaches 2^53.
-#[pulp::with_simd(scores_along = pulp::Arch::new())]
+#[pulp::with_simd(scores_along = crate::vectors::widest())]
 #[inline(always)]
 fn scores_along_on<'a, S: pulp::Simd>(
     _: S,
@@ -44,7 +44,7 @@ fn scores_along_on<'a, S: pulp::Simd>(
 }
 
 /// The sum of the products of `template` with the window that begins at each position of `lines`.
-#[pulp::with_simd(products_along = pulp::Arch::new())]
+#[pulp::with_simd(products_along = crate::vectors::widest())]
 #[inline(always)]
 fn products_along_on<'a, S: pulp::Simd>(
     _: S,

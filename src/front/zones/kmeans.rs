@@ -98,7 +98,7 @@ impl Centroids {
 
 /// Replaces each guess by the index of the centroid nearest to the point, the first one on a tie. Returns the sum of squared
 /// distances.
-#[pulp::with_simd(assign = pulp::Arch::new())]
+#[pulp::with_simd(assign = crate::vectors::widest())]
 #[inline(always)]
 pub(super) fn assign_on<'a, S: pulp::Simd>(
     _: S,
@@ -151,7 +151,7 @@ fn starts(points: &[i16], dimensions: usize, count: usize, random: &mut Random) 
 }
 
 /// Lowers the distance of each point to the one from `centroid`.
-#[pulp::with_simd(approach = pulp::Arch::new())]
+#[pulp::with_simd(approach = crate::vectors::widest())]
 #[inline(always)]
 fn approach_on<'a, S: pulp::Simd>(_: S, points: &'a [i16], centroid: &'a [i16], distances: &'a mut [u32]) {
     for (distance, point) in distances.iter_mut().zip(points.chunks_exact(centroid.len())) {

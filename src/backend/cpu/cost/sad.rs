@@ -43,7 +43,7 @@ pub(super) fn costs(plan: &Plan, pair: &Pair, out: &mut [u8]) {
 }
 
 /// A row enters the window, another one leaves it, and the costs of the one between them follow.
-#[pulp::with_simd(step = pulp::Arch::new())]
+#[pulp::with_simd(step = crate::vectors::widest())]
 #[inline(always)]
 fn step_on<'a, S: pulp::Simd>(
     _: S,
