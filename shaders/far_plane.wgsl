@@ -18,7 +18,7 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> left: array<vec4<u32>>;
-@group(0) @binding(2) var<storage, read> flags: array<u32>;
+@group(0) @binding(2) var<storage, read_write> flags: array<u32>;
 @group(0) @binding(3) var<storage, read_write> disparity: array<i32>;
 // By row of patches: their own moments, number by number, and their colours; what has reached them along their row, and then from above,
 // too; what reaches them from the right, and then from below, and at last their planes.
@@ -348,7 +348,8 @@ fn fit(m: Moments) -> Plane {
     return Plane(state, m.disparity - up.x - up.y, tilt);
 }
 
-// Filled pixels take the value of the plane of their patch. One invocation per pixel.
+// Filled pixels take the value of the plane of their patch, and so do measured ones in doubt that are far from it. One invocation per
+// pixel.
 @compute @workgroup_size(GROUP)
 fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let id = place(group, lane);
@@ -358,9 +359,16 @@ fn take(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let at = id.y * params.level.pixel_pitch + id.x;
     let pixel = vec2(id.x, params.band.first_row + id.y);
     let plane = plane_of(pixel / PATCH);
-    if (flags[at] & FILLED) != 0u && plane.state == TRUSTED {
+    let in_doubt = is_valid(flags[at]) && ((flags[at] >> 8u) & 0xffu) < DOUBT;
+    if plane.state == TRUSTED {
         let low = params.level.low;
         let range = FRACTION * vec2(low, low + i32(params.level.labels) - 1);
-        disparity[at] = clamp(value_at(plane, pixel), range.x, range.y);
+        let value = clamp(value_at(plane, pixel), range.x, range.y);
+        if (flags[at] & FILLED) != 0u {
+            disparity[at] = value;
+        } else if in_doubt && abs(value - disparity[at]) > OUTVOTES {
+            disparity[at] = value;
+            flags[at] = OUTVOTED | FILLED;
+        }
     }
 }

@@ -67,8 +67,8 @@ fn twin_maps(maps: &mut Finest, plan: &Plan, pair: &Pair) {
     }
     let last = if plan.method.refinement.plane { twin::plane::plane } else { twin::median::median };
     last(plan, pair, maps);
-    twin::far_plane::far_plane(plan, pair, maps);
     twin::support::support(plan, maps);
+    twin::far_plane::far_plane(plan, pair, maps);
 }
 
 /// Where the maps of two matches differ.

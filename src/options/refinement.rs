@@ -25,7 +25,8 @@ words! {
         /// distance and at edges. Disparities that would hide what the right view sees get votes against
         /// them. Valid pixels of little confidence may be outvoted. Then planes are fitted through wide
         /// surroundings of what is filled. At last, planes of measured pixels, however far away, extend to
-        /// the filled pixels that they fit. This last step takes `plane`, and is left out at half the size.
+        /// the filled pixels that they fit, and outvote valid ones of little confidence. This last step takes
+        /// `plane`, and is left out at half the size.
         Votes = "votes",
     }
 }

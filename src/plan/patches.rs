@@ -36,6 +36,10 @@ pub const PATCH_LEAST: u32 = 240;
 pub const PATCH_RESIDUAL: i32 = 128;
 /// Or below the variance of the disparities, shifted by so many bits: an eighth of it.
 pub const PATCH_SHARE_BITS: u32 = 3;
+/// A measured pixel with less confidence than this, in eighths of a nat, may be outvoted by a trusted plane.
+pub const PATCH_DOUBT: u32 = 24;
+/// It is outvoted by a plane that is further from its disparity than this, in 1/256 px: half a pixel.
+pub const PATCH_OUTVOTES: i32 = 128;
 
 /// (width, height) of the patches of a match.
 #[must_use]

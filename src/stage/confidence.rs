@@ -5,8 +5,8 @@
 //!              0                                     for pixels with a flag of INVALID
 //! ```
 //!
-//! It counts half units of belief, which are eighths of a nat. Votes and planes weight pixels by it, and at last
-//! [`support`](super::support) makes it that of its surroundings.
+//! It counts half units of belief, which are eighths of a nat. Votes weight pixels by it, and then
+//! [`support`](super::support) makes it that of its surroundings, by which [`far_plane`](super::far_plane) weights them.
 
 use super::{Descriptor, Map, maps};
 

@@ -1,5 +1,5 @@
-//! Extends planes of measured pixels, however far away, to the filled pixels that they fit: a wall or a road goes on where nothing can be
-//! matched.
+//! Extends planes of measured pixels, however far away, to the filled pixels that they fit, and to measured ones in doubt: a wall or a
+//! road goes on where nothing can be matched.
 //!
 //! Constants are those of [`patches`](crate::plan::patches). Patch (X, Y) stands for the pixels (4 X, 4 Y) to (4 X + 3, 4 Y + 3) that are
 //! inside. `>>` rounds down, / towards 0, and \[f\] is the sum of f over the pixels of a patch. What follows happens twice; the second
@@ -74,8 +74,14 @@
 //!    Q = (value + ((slope of x x) >> 4) + ((slope of y y) >> 4) + 2) >> 2
 //!    ```
 //!
-//! After the second time, pixels with [`FILLED`](crate::maps::flag::FILLED) take the Q of a trusted plane, clamped to the range of the
-//! disparities.
+//! After the second time, with Q of a trusted plane, clamped to the range of the disparities:
+//!
+//! - Pixels with [`FILLED`](crate::maps::flag::FILLED) take it, and keep their flags.
+//! - Other valid pixels with a confidence below `PATCH_DOUBT` and |D - Q| > `PATCH_OUTVOTES` take it, too. Their flags become
+//!   [`OUTVOTED`](crate::maps::flag::OUTVOTED) and `FILLED` alone, and their confidence 0.
+//!
+//! (The confidence is what the surroundings [support](super::support). So patches of wrong matches count little against the
+//! plane around them.)
 //!
 //! (Moments and not sums: however far they come, they fit in 32 bits.)
 
@@ -84,7 +90,7 @@ use crate::options::{Fill, MatchSize};
 
 pub(super) const ROW: Descriptor = Descriptor {
     reads: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
-    writes: |_| maps(&[Map::Disparity]),
+    writes: |_| maps(&[Map::Disparity, Map::Validity, Map::Confidence]),
     // At half size a patch would see too much at once.
     taken: |method| {
         let refinement = &method.refinement;

@@ -28,7 +28,7 @@ macro_rules! for_every_stage {
             finest_rows { WinnerTakesAll winner_takes_all; RightView right_view; SubPixel sub_pixel; }
             maps {
                 LeftRightCheck left_right_check; SpeckleFilter speckle_filter; Confidence confidence; Fill fill;
-                VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane; FarPlane far_plane; Support support;
+                VoteFill vote_fill; FillPlane fill_plane; Median median; Plane plane; Support support; FarPlane far_plane;
                 Enlarge enlarge;
             }
         }

@@ -1,4 +1,5 @@
-//! The final [`Confidence`](crate::backend::Map::Confidence) of each pixel: what the pixels around it support.
+//! The final [`Confidence`](crate::backend::Map::Confidence) of each measured pixel: what the pixels around it support. (Those that
+//! [`far_plane`](super::far_plane) outvotes by it are then no longer measured.)
 //!
 //! A margin between labels knows nothing of its surroundings. Beside an edge, or within a patch of wrong matches, a pixel may lead by
 //! far. So with C the confidence and D the disparity before the stage, a valid pixel p gets the mean

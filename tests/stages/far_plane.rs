@@ -1,5 +1,6 @@
 //! Planes from far away.
 
+use crate::common::compare::compare_finest;
 use crate::common::devices::backends;
 use crate::common::random::{self, Random};
 use crate::common::twin::{self, Finest};
@@ -58,8 +59,8 @@ fn run(plan: &Plan, pair: &Pair, maps: &Finest) -> Vec<(String, Plane<i32>)> {
         backend.prepare(plan, Prepared::new(pair)).unwrap();
         maps.write(backend);
         backend.run(Stage::FarPlane).unwrap();
+        compare_finest(backend, &expected).unwrap_or_else(|e| panic!("{name}: {e}"));
         let disparity = pollster::block_on(backend.map(Map::Disparity)).unwrap();
-        assert_eq!(disparity.data(), expected.disparity.data(), "{name}");
         (name, disparity)
     });
     results.collect()
@@ -90,6 +91,45 @@ fn a_plane_goes_on_where_nothing_is_measured() {
     }
 }
 
+/// Maps of a measured wall with a patch of 6 x 6 pixels that is off by 3 px, of `confidence`, and a pixel that is hardly off.
+fn patched(confidence: i32) -> Finest {
+    let mut maps = Finest::zero(SIZE);
+    maps.disparity = Plane::from_fn(SIZE.0, SIZE.1, slant);
+    maps.confidence = Plane::filled(SIZE.0, SIZE.1, 60);
+    for at in (50..56).flat_map(|y| (80..86).map(move |x| (x, y))) {
+        maps.disparity[at] += 3 * 256;
+        maps.confidence[at] = confidence;
+    }
+    maps.disparity[(30, 30)] += 50;
+    maps.confidence[(30, 30)] = confidence;
+    maps
+}
+
+/// A patch in doubt takes the plane around it, one that is sure does not, and neither does a pixel that is near the plane.
+#[test]
+fn a_plane_outvotes_what_is_in_doubt() {
+    let plan = random::plan(SIZE, 0, 64, &Method::default());
+    let plain = Image::from_rgb8(&Plane::filled(SIZE.0, SIZE.1, [90; 3]));
+    let pair = Pair::new(plain.clone(), plain).unwrap();
+    for (confidence, outvoted) in [(0, true), (23, true), (24, false), (60, false)] {
+        let maps = patched(confidence);
+        let mut expected = maps.clone();
+        twin::far_plane::far_plane(&plan, &pair, &mut expected);
+        for (name, disparity) in run(&plan, &pair, &maps) {
+            let away = (disparity[(82, 52)] - slant(82, 52)).abs();
+            assert!(
+                if outvoted { away <= 128 } else { away == 3 * 256 },
+                "{name}: {away} / 256 px, {confidence}"
+            );
+            assert_eq!(disparity[(30, 30)], maps.disparity[(30, 30)], "{name}");
+        }
+        let state = |at: (usize, usize)| (expected.validity[at], expected.confidence[at]);
+        let taken = (i32::from(flag::OUTVOTED | flag::FILLED), 0);
+        assert_eq!(state((82, 52)), if outvoted { taken } else { (0, confidence) });
+        assert_eq!(state((30, 30)), (0, confidence));
+    }
+}
+
 /// Negative control: one pixel less, or one that is a little off, is found.
 #[test]
 fn one_pixel_is_found() {
@@ -110,7 +150,12 @@ fn one_pixel_is_found() {
     };
     let less = changed(|maps| maps.validity[(12, 5)] = i32::from(flag::OCCLUDED));
     let off = changed(|maps| maps.disparity[(12, 5)] += 300);
+    let doubted = changed(|maps| {
+        maps.disparity[(12, 5)] += 300;
+        maps.confidence[(12, 5)] = 23;
+    });
     for (name, disparity) in run(&plan, &pair, &maps) {
+        assert!(disparity[(12, 5)] + 300 == off[(12, 5)] && doubted[(12, 5)] != off[(12, 5)], "{name}");
         for other in [&less, &off] {
             let beyond = |x: usize, y: usize| disparity[(x, y)] != other[(x, y)];
             assert!((0..size.1).any(|y| (16..size.0).any(|x| beyond(x, y))), "{name}");

@@ -83,9 +83,9 @@ fn nothing_valid() {
                     Stage::FillPlane,
                     Stage::Median,
                     Stage::Plane,
-                    Stage::FarPlane,
                     Stage::Confidence,
                     Stage::Support,
+                    Stage::FarPlane,
                 ] {
                     backend.run(stage).unwrap();
                 }

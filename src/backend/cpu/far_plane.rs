@@ -6,9 +6,9 @@ use crate::image::{Pair, Plane};
 use crate::maps::flag;
 use crate::plan::Plan;
 use crate::plan::patches::{
-    PATCH, PATCH_APART, PATCH_AWAY, PATCH_FAR_BITS, PATCH_LEAST, PATCH_MOMENT, PATCH_REACH, PATCH_RESIDUAL,
-    PATCH_RIDGE, PATCH_ROUNDS, PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST, PATCH_STEP, PATCH_STEP_BITS,
-    PATCH_WEIGHT_BITS, patches,
+    PATCH, PATCH_APART, PATCH_AWAY, PATCH_DOUBT, PATCH_FAR_BITS, PATCH_LEAST, PATCH_MOMENT, PATCH_OUTVOTES,
+    PATCH_REACH, PATCH_RESIDUAL, PATCH_RIDGE, PATCH_ROUNDS, PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST,
+    PATCH_STEP, PATCH_STEP_BITS, PATCH_WEIGHT_BITS, patches,
 };
 use crate::stage::{MapSet, Stage};
 use crate::weights::patch_weights;
@@ -27,13 +27,19 @@ pub(super) fn run(maps: &mut MapSet, plan: &Plan, pair: &Pair) {
         fits = fit(&own, &colours, &shares);
     }
     let (low, high) = limits(plan);
-    let MapSet { disparity, validity, .. } = maps;
+    let MapSet { disparity, validity, confidence, .. } = maps;
     let width = disparity.width();
-    disparity.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        let pixels = row.iter_mut().zip(validity.row(y)).enumerate();
-        for (x, (out, _)) in pixels.filter(|(_, (_, flags))| **flags & flag::FILLED != 0) {
-            if let Some(fit) = fits[(x / PATCH, y / PATCH)].filter(|fit| fit.trusted) {
-                *out = fit.at(x % PATCH, y % PATCH).clamp(low, high);
+    let rows = disparity.data_mut().par_chunks_mut(width).zip(validity.data_mut().par_chunks_mut(width));
+    let rows = rows.zip(confidence.data_mut().par_chunks_mut(width)).enumerate();
+    rows.for_each(|(y, ((disparity, flags), confidence))| {
+        for (x, ((out, flags), confidence)) in disparity.iter_mut().zip(flags).zip(confidence).enumerate() {
+            let Some(fit) = fits[(x / PATCH, y / PATCH)].filter(|fit| fit.trusted) else { continue };
+            let value = fit.at(x % PATCH, y % PATCH).clamp(low, high);
+            let in_doubt = *flags & flag::INVALID == 0 && u32::from(*confidence) < PATCH_DOUBT;
+            if *flags & flag::FILLED != 0 {
+                *out = value;
+            } else if in_doubt && (value - *out).abs() > PATCH_OUTVOTES {
+                (*out, *flags, *confidence) = (value, flag::OUTVOTED | flag::FILLED, 0);
             }
         }
     });
@@ -200,7 +206,7 @@ fn product(slope: i32, moment: i32) -> i32 {
 /// A plane.
 #[derive(Clone, Copy)]
 struct Fit {
-    /// Whether filled pixels take it.
+    /// Whether filled pixels, and those in doubt, take it.
     trusted: bool,
     /// In the middle of the patch, in 1/1024 px.
     value: i32,

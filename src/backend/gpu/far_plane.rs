@@ -5,9 +5,9 @@ use super::kernel::{Bindings, Kernel, shader};
 use super::rows::{Binding, with_halo};
 use crate::error::Result;
 use crate::plan::patches::{
-    PATCH, PATCH_APART, PATCH_AWAY, PATCH_FAR_BITS, PATCH_LEAST, PATCH_MOMENT, PATCH_REACH, PATCH_RESIDUAL,
-    PATCH_RIDGE, PATCH_ROUNDS, PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST, PATCH_STEP, PATCH_STEP_BITS,
-    PATCH_WEIGHT_BITS, patches,
+    PATCH, PATCH_APART, PATCH_AWAY, PATCH_DOUBT, PATCH_FAR_BITS, PATCH_LEAST, PATCH_MOMENT, PATCH_OUTVOTES,
+    PATCH_REACH, PATCH_RESIDUAL, PATCH_RIDGE, PATCH_ROUNDS, PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST,
+    PATCH_STEP, PATCH_STEP_BITS, PATCH_WEIGHT_BITS, patches,
 };
 use crate::weights::PATCH_DIFFERENCES;
 use std::ops::Range;
@@ -44,6 +44,8 @@ fn kernel<B: Bindings>(loops: usize) -> Kernel<B> {
         .with("LEAST", PATCH_LEAST)
         .with("RESIDUAL", PATCH_RESIDUAL)
         .with("SHARE_BITS", PATCH_SHARE_BITS)
+        .with("DOUBT", PATCH_DOUBT)
+        .with("OUTVOTES", PATCH_OUTVOTES)
         .with("LAST_SHARE", PATCH_DIFFERENCES as u32)
 }
 

@@ -3,8 +3,8 @@ use super::fill::invalid;
 use mrfgs::image::Pair;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::plan::patches::{
-    PATCH_APART, PATCH_AWAY, PATCH_LEAST, PATCH_MOMENT, PATCH_REACH, PATCH_RESIDUAL, PATCH_RIDGE,
-    PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST, PATCH_STEP, PATCH_STEP_BITS,
+    PATCH_APART, PATCH_AWAY, PATCH_DOUBT, PATCH_LEAST, PATCH_MOMENT, PATCH_OUTVOTES, PATCH_REACH,
+    PATCH_RESIDUAL, PATCH_RIDGE, PATCH_SHARE_BITS, PATCH_SPREAD, PATCH_STEEPEST, PATCH_STEP, PATCH_STEP_BITS,
 };
 use mrfgs::low_level::weights::patch_weights;
 use mrfgs::maps::flag;
@@ -24,7 +24,7 @@ struct Moments {
 /// A plane through them: its value, its slopes, and whether it is trusted.
 type Fit = Option<(i64, [i64; 2], bool)>;
 
-/// Filled pixels take planes through what is measured.
+/// Filled pixels take planes through what is measured, and so do measured ones of little confidence far from them.
 pub fn far_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     let refinement = &plan.method.refinement;
     let half = plan.method.schedule.match_size == MatchSize::Half;
@@ -54,10 +54,14 @@ pub fn far_plane(plan: &Plan, pair: &Pair, maps: &mut Finest) {
     }
     let [low, high] = [plan.range.min, plan.range.max].map(|d| 256 * i64::from(d));
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        if maps.validity[(x, y)] & i32::from(flag::FILLED) != 0
-            && let Some(plane @ (_, _, true)) = fits[y / 4 * across + x / 4]
-        {
-            maps.disparity[(x, y)] = value(plane, x, y).clamp(low, high) as i32;
+        let Some(plane @ (_, _, true)) = fits[y / 4 * across + x / 4] else { continue };
+        let (at, value) = ((x, y), value(plane, x, y).clamp(low, high) as i32);
+        let far = (maps.disparity[at] - value).abs() > PATCH_OUTVOTES;
+        if maps.validity[at] & i32::from(flag::FILLED) != 0 {
+            maps.disparity[at] = value;
+        } else if !invalid(maps.validity[at]) && maps.confidence[at] < PATCH_DOUBT as i32 && far {
+            maps.disparity[at] = value;
+            (maps.validity[at], maps.confidence[at]) = (i32::from(flag::OUTVOTED | flag::FILLED), 0);
         }
     }
 }
