@@ -111,7 +111,7 @@ const sized = (file) => [file, statSync(join(site, file)).size, gzipSync(readFil
 const total = (name, rows) => [name, ...[1, 2].map((column) => rows.reduce((sum, row) => sum + row[column], 0))];
 const sizes = files(site).filter((file) => !later(file) && !/licen[cs]e/i.test(file)).map(sized).sort((a, b) => b[2] - a[2]);
 sizes.push(
-    total('the first map', sizes.filter(([file]) => !/^(cloud|service-worker)/.test(file))),
+    total('the first map', sizes.filter(([file]) => !/^(cloud|mesh|service-worker)|small\.png$/.test(file))),
     total('points in 3-D, when looked at', sizes.filter(([file]) => file.startsWith('cloud'))),
     total('other scenes, when opened', files(site).filter(later).map(sized)),
 );

@@ -1,5 +1,6 @@
 // The page's side of the worker: calls as promises, and a new worker in place of one that broke or does not stop.
 
+import { words } from './dom';
 import type { Calls, Facts, Name, Reply, Request } from './protocol';
 
 /** The user stopped what ran. */
@@ -7,6 +8,14 @@ export class Interrupted extends Error {}
 
 /** The worker is gone, and with it the pair and the maps that it held. There is a new one. */
 export class Broken extends Error {}
+
+/** What went wrong, in words. */
+export function explained(error: unknown): string {
+    const memory = /memory|allocation|unreachable|out of bounds/i.test(words(error));
+    return error instanceof Broken
+        ? `The engine ended (${words(error)}) and was started again. ${memory ? 'It ran out of memory, most likely: try smaller views or a smaller range.' : ''}`.trim()
+        : words(error);
+}
 
 /** The longest that a worker may take to stop, in milliseconds. */
 const PATIENCE = 2500;

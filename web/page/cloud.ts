@@ -14,6 +14,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { step } from './dom';
 import type { Cameras, Cloud } from './protocol';
+import { calm } from './visitor';
 
 // A point is as large as its pixel is at its depth, so that a surface seen from the front has no holes.
 const VERTEX = `
@@ -55,10 +56,13 @@ export class CloudView {
     private rig: { cameras: Cameras; width: number; height: number } | undefined;
     private due = 0;
     /** Where nobody has taken hold of the points yet. */
-    private swings = !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    private swings = !calm();
 
-    /** Throws where the browser has no WebGL. */
-    constructor(private readonly canvas: HTMLCanvasElement) {
+    /** `swinging` is told when the points begin and end to swing. Throws where the browser has no WebGL. */
+    constructor(
+        private readonly canvas: HTMLCanvasElement,
+        private readonly swinging: (swings: boolean) => void,
+    ) {
         const context = canvas.getContext('webgl2', { antialias: false, powerPreference: 'high-performance' });
         if (!context) {
             throw new Error('this browser offers no WebGL 2 here. Is hardware acceleration switched off in its settings?');
@@ -67,7 +71,7 @@ export class CloudView {
         this.renderer.setClearColor(0x14161a);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.addEventListener('change', () => this.ask());
-        this.controls.addEventListener('start', () => (this.swings = false));
+        this.controls.addEventListener('start', () => this.hold());
         canvas.addEventListener('keydown', (event) => this.press(event));
         new ResizeObserver(() => this.resize()).observe(canvas);
     }
@@ -97,10 +101,15 @@ export class CloudView {
     private swing(begun: number): void {
         const points = this.points;
         const start = new Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
+        this.swinging(true);
         const frame = (now: number) => {
             const part = (now - begun) / SWING.milliseconds;
             this.swings &&= part < 1;
-            if (!this.swings || points !== this.points || this.canvas.clientWidth === 0) {
+            if (points !== this.points) {
+                return;
+            }
+            if (!this.swings || this.canvas.clientWidth === 0) {
+                this.swinging(false);
                 return;
             }
             const theta = start.theta + SWING.radians * Math.sin(2 * Math.PI * SWING.times * Math.max(0, part));
@@ -108,6 +117,11 @@ export class CloudView {
             requestAnimationFrame(frame);
         };
         requestAnimationFrame(frame);
+    }
+
+    /** Lets the points stand still from now on. */
+    private hold(): void {
+        this.swings = false;
     }
 
     /** Looks at the target from there. */
@@ -136,7 +150,7 @@ export class CloudView {
 
     /** The first view again, at rest. */
     rest(): void {
-        this.swings = false;
+        this.hold();
         this.reset();
     }
 
@@ -192,7 +206,7 @@ export class CloudView {
     }
 
     private press(event: KeyboardEvent): void {
-        this.swings = false;
+        this.hold();
         const { target } = this.controls;
         const offset = this.camera.position.clone().sub(target);
         const keys = step(event);

@@ -8,8 +8,11 @@ export type Cut = 'beside' | 'above';
 /** The longer side of the small pictures of the halves that are compared. */
 const SMALL = 48;
 
-/** From this correlation on, the halves of an image count as two views of one scene. */
+/** From this correlation on, the halves of an image of a fitting shape count as two views of one scene. */
 const ALIKE = 0.6;
+
+/** From this one on, an upper and a lower half do in any shape: those of 50 single photographs reach 0.84. */
+const SURE = 0.9;
 
 function canvas(width: number, height: number): { canvas: OffscreenCanvas; context: OffscreenCanvasRenderingContext2D } {
     const canvas = new OffscreenCanvas(width, height);
@@ -72,7 +75,7 @@ export async function guess(file: Blob): Promise<Cut | undefined> {
     if (beside > ALIKE && beside > above && width > 1.9 * height) {
         return 'beside';
     }
-    return above > ALIKE && above > beside && height > 1.05 * width ? 'above' : undefined;
+    return above > beside && (above > SURE || (above > ALIKE && height > 1.05 * width)) ? 'above' : undefined;
 }
 
 /** The best correlation of two small pictures, of which the second may be moved along its rows. */

@@ -1,6 +1,7 @@
 // The page: what follows what.
 
-import { Broken, Client, Interrupted } from './client';
+import { followed } from './bar';
+import { Client, Interrupted, explained } from './client';
 import { by, count, duration, say, words } from './dom';
 import * as legend from './legend';
 import { type Pixel, MapView } from './map-view';
@@ -8,11 +9,11 @@ import { tooLarge } from './memory';
 import { keepOffline } from './offline';
 import { painted } from './paint';
 import { PointsTab } from './points';
+import { told } from './readout';
 import { lit } from './relief';
-import { left as timeLeft, phase } from './stages';
 import type { Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Range, Result, Size, Warning } from './protocol';
 import { Remarks } from './remarks';
-import { Ruler, inUnit, place } from './ruler';
+import { Ruler } from './ruler';
 import { stem } from './save';
 import { type File, saveFile } from './saving';
 import { Settings } from './settings';
@@ -20,6 +21,7 @@ import { offerCamera } from './shots';
 import { type Scene, Slots, type View as Opened } from './slots';
 import { Wiggle, aligned, anaglyph } from './stereo';
 import { tabs } from './tabs';
+import { calm, onlyLooks } from './visitor';
 import { withoutWebGpu } from './webgpu';
 
 /** Filled in by the build: the worker beside this file, and the scenes. */
@@ -28,6 +30,9 @@ declare const SCENES: Scene[];
 
 /** How the first scene is matched: at once, on any machine. */
 const FIRST = { device: 'cpu', preset: 'fast' } as const;
+
+/** How long the first map is on screen before its points are, in milliseconds. */
+const LOOK = 1500;
 
 type View = Map | 'left' | 'stereo' | 'points';
 
@@ -121,6 +126,8 @@ async function start(): Promise<void> {
         await slots.open(first.name);
         await busy;
     }
+    slots.illustrate();
+    void keepOffline();
     try {
         say('engine', `GPU: ${await client.call('open', 'gpu')}`);
         gpu = true;
@@ -132,6 +139,15 @@ async function start(): Promise<void> {
     document.documentElement.dataset['gpu'] = gpu ? 'yes' : 'no';
     if (app.dataset['state'] === 'starting') {
         be(idle());
+    }
+    await showDepth();
+}
+
+/** To somebody who has only looked so far, the first result also shows its depth. */
+async function showDepth(): Promise<void> {
+    await new Promise((resolve) => setTimeout(resolve, LOOK));
+    if (onlyLooks() && result && (await points.prepare()) && onlyLooks() && result) {
+        list.select(by('tab-points'));
     }
 }
 
@@ -213,13 +229,6 @@ function refuse(error: unknown, left: string, right: string): void {
     } else {
         say('pair-problem', text);
     }
-}
-
-function explained(error: unknown): string {
-    const memory = /memory|allocation|unreachable|out of bounds/i.test(words(error));
-    return error instanceof Broken
-        ? `The engine ended (${words(error)}) and was started again. ${memory ? 'It ran out of memory, most likely: try smaller views or a smaller range.' : ''}`.trim()
-        : words(error);
 }
 
 /** Has the engine read the pair, and rectify it where that is wanted. */
@@ -323,27 +332,8 @@ const MATCHES = 'sparse matches';
 /** Runs a match with its bar; undefined when it was stopped or failed, which is said. */
 async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefined> {
     const mine = turn;
-    const bar = by<HTMLProgressElement>('progress');
-    let said = 0;
-    let last = 0;
-    let since = performance.now();
-    bar.value = 0;
-    say('stage', 'Getting ready');
     say('problem', undefined);
-    client.onProgress = (stage, done) => {
-        if (done < last) {
-            // A second match, over a wider range.
-            [since, said] = [performance.now(), 0];
-        }
-        [last, bar.value] = [done, done];
-        const parts = [phase(stage), `${Math.floor(100 * done)} %`, timeLeft(done, performance.now() - since)].filter(Boolean);
-        bar.setAttribute('aria-valuetext', parts.join(', '));
-        say('stage', parts.join(' · '));
-        if (done >= said + 0.25) {
-            said = Math.floor(4 * done) / 4;
-            say('announce', `${100 * said} percent`);
-        }
-    };
+    client.onProgress = followed();
     // The button that was pressed gives way to another one. A match that nobody has pressed takes no focus.
     const pressed = document.activeElement === by(state === 'comparing' ? 'compare' : 'match');
     be(state);
@@ -414,8 +404,7 @@ async function match({ device, preset, size }: { device: Device; preset: string;
         await present();
         // On a narrow page the result is above the form.
         if (gpu !== undefined) {
-            const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-            by('result').scrollIntoView({ block: 'nearest', behavior: calm ? 'instant' : 'smooth' });
+            by('result').scrollIntoView({ block: 'nearest', behavior: calm() ? 'instant' : 'smooth' });
         }
     }
     be(idle());
@@ -580,21 +569,7 @@ function readOut(pixel: Pixel | undefined): void {
         say('readout', pair && hint);
         return;
     }
-    const at = pixel.y * result.width + pixel.x;
-    const [disparity, confidence, validity] = [result.disparity[at] ?? Infinity, result.confidence[at] ?? 0, result.validity[at] ?? 0];
-    const measured = Number.isFinite(disparity);
-    const parts = [
-        `x ${pixel.x}, y ${pixel.y}`,
-        measured ? `disparity ${disparity.toFixed(2)} px` : 'no disparity',
-        `confidence ${confidence}`,
-        legend.named(facts.reasons, validity).map(({ name }) => name).join(', '),
-    ];
-    const cameras = points.known;
-    const at3 = cameras && place(pixel, disparity, cameras);
-    if (at3) {
-        parts.push(`depth ${inUnit(at3[2], cameras.unit)}`);
-    }
-    say('readout', parts.join(' · '));
+    say('readout', told(pixel, result, facts, points.known));
 }
 
 /** Matches by the other path too. */
@@ -666,4 +641,3 @@ offerCamera((views) => {
 });
 list.select(by('tab-disparity'));
 void start();
-void keepOffline();

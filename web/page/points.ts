@@ -101,6 +101,24 @@ export class PointsTab {
         }
     }
 
+    /** Gets the viewer, so that points appear at once. Answers with whether there are any to show. */
+    async prepare(): Promise<boolean> {
+        try {
+            await this.viewer();
+            return this.cameras !== undefined;
+        } catch {
+            return false;
+        }
+    }
+
+    private async viewer(): Promise<CloudView> {
+        const { CloudView } = await import('./cloud');
+        this.view ??= new CloudView(by<HTMLCanvasElement>('cloud'), (swings) => {
+            by('reset-view').textContent = swings ? 'Stop' : 'Reset view';
+        });
+        return this.view;
+    }
+
     private renew(): void {
         this.fresh = false;
         this.note();
@@ -125,11 +143,10 @@ export class PointsTab {
         try {
             if (!this.view) {
                 say('cloud-note', 'Loading the viewer …');
-                const { CloudView } = await import('./cloud');
-                this.view ??= new CloudView(by<HTMLCanvasElement>('cloud'));
             }
+            const view = await this.viewer();
             const cloud = await this.points(cameras);
-            this.view.show(cloud, cameras, this.size.width, this.size.height);
+            view.show(cloud, cameras, this.size.width, this.size.height);
             this.tally(cloud.confidences);
             this.reach();
             this.filter();

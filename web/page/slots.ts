@@ -243,12 +243,19 @@ export class Slots {
     }
 
     private button({ name, title }: Scene): HTMLButtonElement {
-        const picture = make('img', { src: `scenes/${name}/small.png`, alt: '', width: 96, height: 72 });
+        const picture = make('img', { alt: '', width: 96, height: 72 });
         const button = make('button', { type: 'button' }, picture, title);
         button.dataset['scene'] = name;
         button.setAttribute('aria-pressed', 'false');
         button.addEventListener('click', () => void this.open(name));
         return button;
+    }
+
+    /** Loads the pictures of the scenes, for which the first map does not wait. */
+    illustrate(): void {
+        for (const button of by('scenes').querySelectorAll('button')) {
+            (button.querySelector('img') as HTMLImageElement).src = `scenes/${button.dataset['scene']}/small.png`;
+        }
     }
 
     /** Opens a scene, and has it matched. */

@@ -7,6 +7,7 @@ import { PNG } from 'pngjs';
 import { levels } from '../png.mjs';
 import { native } from './lib/native.mjs';
 import { scene } from './lib/paths.mjs';
+import { disparities } from './lib/pfm.mjs';
 import { BROWSER, Visit } from './lib/visit.mjs';
 
 const [WIDTH, HEIGHT] = [320, 240];
@@ -17,8 +18,7 @@ const [F, CX, CY, BASELINE] = [240, 159.5, 119.5, 0.18604166666666666];
 describe('looks', () => {
     let visit;
     const expected = native(...VIEWS, [], ['validity']);
-    const pixels = expected.pfm.subarray(expected.pfm.length - 4 * WIDTH * HEIGHT);
-    const disparity = (x, y) => pixels.readFloatLE(4 * ((HEIGHT - 1 - y) * WIDTH + x));
+    const { at: disparity } = disparities(expected.pfm);
     const trusted = levels(expected.validity).levels.map((value) => (value === 0 ? 1 : 0));
     const place = ([x, y]) => {
         const z = (F * BASELINE) / disparity(x, y);
@@ -194,11 +194,21 @@ describe('looks', () => {
             await other.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: motion }]);
             await other.goto(visit.url);
             await other.waitForSelector('html[data-gpu]');
-            await other.click('#tab-points');
+            if (motion === 'reduce') {
+                await other.click('#tab-points');
+            }
             await other.waitForFunction(() => Number(document.getElementById('cloud').dataset.drawn) > 0);
             await moment();
         };
         await shown('no-preference');
+        // By itself, for somebody who only looks.
+        assert.equal(await other.$eval('#tab-points', (tab) => tab.getAttribute('aria-selected')), 'true');
+        assert.equal(await other.$eval('#reset-view', (button) => button.textContent), 'Stop');
+        const shift = await other.evaluate(() => new Promise((resolve) => {
+            new PerformanceObserver((list) => resolve(list.getEntries().reduce((sum, entry) => sum + entry.value, 0))).observe({ type: 'layout-shift', buffered: true });
+            setTimeout(() => resolve(0), 500);
+        }));
+        assert.ok(shift < 0.1, `layout shift ${shift}`);
         const first = await drawn();
         await other.waitForFunction((first) => Number(document.getElementById('cloud').dataset.drawn) > first + 3, {}, first);
         await other.focus('#cloud');
@@ -207,10 +217,18 @@ describe('looks', () => {
         const held = await drawn();
         await moment();
         assert.equal(await drawn(), held);
+        assert.equal(await other.$eval('#reset-view', (button) => button.textContent), 'Reset view');
         await shown('reduce');
         const still = await drawn();
         await moment();
         assert.equal(await drawn(), still);
+        // Under somebody's hand, the map stays.
+        await other.emulateMediaFeatures([{ name: 'prefers-reduced-motion', value: 'no-preference' }]);
+        await other.goto(visit.url);
+        await other.waitForSelector('#outcome:not([hidden])');
+        await other.keyboard.press('Tab');
+        await new Promise((resolve) => setTimeout(resolve, 4000));
+        assert.equal(await other.$eval('#tab-disparity', (tab) => tab.getAttribute('aria-selected')), 'true');
         await other.close();
         await visit.tab.bringToFront();
     });

@@ -1,13 +1,43 @@
 // A match that is stopped, a browser without WebGPU, and a page without a network.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
+import { gzipSync } from 'node:zlib';
 import { difference, native } from './lib/native.mjs';
-import { scene } from './lib/paths.mjs';
+import { SITE, scene } from './lib/paths.mjs';
 import { BROWSER, Visit } from './lib/visit.mjs';
 
 const views = (name) => ['im0.png', 'im1.png'].map((file) => join(scene(name), file));
 const CALIBRATION = join(scene('mixed'), 'calib.txt');
+
+describe('the first map', () => {
+    it('takes 1.5 MB at most, by gzip', async () => {
+        const asked = [];
+        const visit = await Visit.open({
+            before: async ({ tab, host }) => {
+                const push = host.asked.push.bind(host.asked);
+                host.asked.push = (path) => asked.push([path, Date.now()]) && push(path);
+                await tab.evaluateOnNewDocument(() => {
+                    new MutationObserver(() => {
+                        if (document.querySelector('#outcome:not([hidden])')) {
+                            window.firstMap ??= Date.now();
+                        }
+                    }).observe(document, { subtree: true, childList: true, attributes: true });
+                });
+            },
+        });
+        const firstMap = await visit.tab.evaluate(() => window.firstMap);
+        await visit.close();
+        const loaded = new Set(asked.filter(([, when]) => when < firstMap).map(([path]) => path.replace('/some/folder/', '') || 'index.html'));
+        const files = [...loaded].filter((file) => file !== '/favicon.ico');
+        assert.ok(files.some((file) => file.endsWith('.wasm')) && files.includes('scenes/mixed/im1.png'), files.join(', '));
+        assert.ok(asked.length > files.length, 'the rest comes later');
+        const packed = files.map((file) => gzipSync(readFileSync(join(SITE, file)), { level: 9 }).length);
+        const sum = packed.reduce((sum, bytes) => sum + bytes, 0);
+        assert.ok(sum < 1_500_000, `${sum} bytes in ${files.join(', ')}`);
+    });
+});
 
 describe('a match', () => {
     let visit;

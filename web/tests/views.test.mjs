@@ -8,17 +8,11 @@ import { after, before, describe, it } from 'node:test';
 import { levels } from '../png.mjs';
 import { native } from './lib/native.mjs';
 import { scene } from './lib/paths.mjs';
+import { disparities } from './lib/pfm.mjs';
 import { BROWSER, Visit } from './lib/visit.mjs';
 
 const VIEWS = ['disparity', 'confidence', 'validity', 'left'];
 const views = ['im0.png', 'im1.png'].map((file) => join(scene('mixed'), file));
-
-/** Disparities of a PFM file, from the top row down. */
-function disparities(file) {
-    const [, width, height] = file.toString('latin1', 0, 40).match(/^Pf\n(\d+) (\d+)\n-1(?:\.0)?\n/).map(Number);
-    const start = file.length - 4 * width * height;
-    return { width, at: (x, y) => file.readFloatLE(start + 4 * ((height - 1 - y) * width + x)) };
-}
 
 describe('views', () => {
     let visit;

@@ -1,0 +1,28 @@
+// The bar of a match that runs, and what is said beside it.
+
+import { by, say } from './dom';
+import { left, phase } from './stages';
+
+/** Begins at nothing. What it answers with is told of each stage that begins, and of the share of the match that is done. */
+export function followed(): (stage: string, done: number) => void {
+    const bar = by<HTMLProgressElement>('progress');
+    let said = 0;
+    let last = 0;
+    let since = performance.now();
+    bar.value = 0;
+    say('stage', 'Getting ready');
+    return (stage, done) => {
+        if (done < last) {
+            // A second match, over a wider range.
+            [since, said] = [performance.now(), 0];
+        }
+        [last, bar.value] = [done, done];
+        const parts = [phase(stage), `${Math.floor(100 * done)} %`, left(done, performance.now() - since)].filter(Boolean);
+        bar.setAttribute('aria-valuetext', parts.join(', '));
+        say('stage', parts.join(' · '));
+        if (done >= said + 0.25) {
+            said = Math.floor(4 * done) / 4;
+            say('announce', `${100 * said} percent`);
+        }
+    };
+}

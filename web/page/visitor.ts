@@ -1,0 +1,16 @@
+// Whether a visitor has done anything yet: what moves by itself must not move away under somebody's hand.
+
+let touched = false;
+for (const kind of ['pointerdown', 'keydown', 'wheel', 'dragenter', 'paste']) {
+    addEventListener(kind, () => (touched = true), { capture: true, passive: true, once: true });
+}
+
+/** Whether the visitor looks at the page, has done nothing so far, and may be shown motion. */
+export function onlyLooks(): boolean {
+    return !touched && !calm() && document.visibilityState === 'visible' && scrollY === 0;
+}
+
+/** Whether the visitor wants no motion. */
+export function calm(): boolean {
+    return matchMedia('(prefers-reduced-motion: reduce)').matches;
+}
