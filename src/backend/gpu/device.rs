@@ -1,6 +1,7 @@
 //! A device, open on an adapter: it takes commands, gives back what they leave, and reports its failures.
 
 use super::adapters::{adapters_of, api, driver, select};
+use super::pace::Pace;
 use crate::backend::Traffic;
 use crate::error::{DeviceError, Error, MemoryError, Result};
 use futures_channel::oneshot;
@@ -36,14 +37,6 @@ pub struct FaultInjection {
 /// software driver shares a processor with everything else that runs there.
 const PATIENCE: Duration = Duration::from_secs(60);
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(600);
-/// Iterations of all loops of all invocations that are submitted at once, about: short enough for drivers that stop long jobs,
-/// and on a processor for a bar that moves.
-const WORK_PER_SUBMIT: u64 = 1 << 32;
-const SOFTWARE_WORK_PER_SUBMIT: u64 = 1 << 30;
-/// The same in a browser at first, which does not say whether its device is a driver in software. It doubles whenever a full
-/// submission is waited for no longer than [`SHORT`].
-const BROWSER_WORK_PER_SUBMIT: u64 = 1 << 24;
-const SHORT: Duration = Duration::from_millis(30);
 /// Largest number of submissions in flight: more keep no device busier, and a hang would be noticed late. In a browser one is enough, and
 /// what the bar shows as done is done.
 const SUBMISSIONS: usize = if cfg!(target_arch = "wasm32") { 1 } else { 4 };
@@ -65,11 +58,12 @@ pub(super) struct Device {
     pub(super) memory: Option<u64>,
     /// Nanoseconds per tick of its timestamps, where it has them.
     pub(super) tick: Option<f64>,
-    /// Loop iterations that are submitted at once, about.
-    pub(super) work_per_submit: u64,
+    pub(super) pace: Pace,
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<Submission>,
+    /// When the last of those that have ended was waited for.
+    last_end: Instant,
     /// Submissions so far, including those in flight.
     submitted: u64,
     failure: Arc<Mutex<Option<Error>>>,
@@ -144,14 +138,11 @@ impl Device {
             max_groups: limits.max_compute_workgroups_per_dimension,
             memory: faults.memory,
             tick: (!features.is_empty()).then(|| queue.get_timestamp_period().into()),
-            work_per_submit: match software {
-                _ if cfg!(target_arch = "wasm32") => BROWSER_WORK_PER_SUBMIT,
-                true => SOFTWARE_WORK_PER_SUBMIT,
-                false => WORK_PER_SUBMIT,
-            },
+            pace: if cfg!(target_arch = "wasm32") { Pace::in_browser() } else { Pace::new(software) },
             patience: faults.patience.unwrap_or(if software { SOFTWARE_PATIENCE } else { PATIENCE }),
             lost_after: faults.lost_after,
             under_way: VecDeque::new(),
+            last_end: Instant::now(),
             submitted: 0,
             failure,
             traffic: Traffic::default(),
@@ -204,7 +195,7 @@ impl Device {
         Ok(())
     }
 
-    /// Submits what is recorded; whether that `is_full` tells whether more is worth trying.
+    /// Submits what is recorded; one that `is_full` tells how long such submissions take.
     pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder, is_full: bool) -> Result<()> {
         let queue = self.queue()?;
         let index = queue.submit([encoder.finish()]);
@@ -215,7 +206,7 @@ impl Device {
                 let _ = sender.send(());
             });
         }
-        self.under_way.push_back(Submission { index, done, is_full });
+        self.under_way.push_back(Submission { index, done, begun: Instant::now(), is_full });
         self.submitted += 1;
         self.traffic.submissions += 1;
         self.check()
@@ -239,13 +230,15 @@ impl Device {
     }
 
     async fn wait_for_one(&mut self) -> Result<()> {
-        let Some(Submission { index, done, is_full }) = self.under_way.pop_front() else { return Ok(()) };
+        let Some(Submission { index, done, begun, is_full }) = self.under_way.pop_front() else {
+            return Ok(());
+        };
         if cfg!(target_arch = "wasm32") {
             // The browser ends work that takes too long. The device is lost then.
-            let clock = Instant::now();
             done.await.map_err(|e| failed(&self.name, &e))?;
-            if is_full && clock.elapsed() < SHORT {
-                self.work_per_submit = (2 * self.work_per_submit).min(WORK_PER_SUBMIT);
+            let last = std::mem::replace(&mut self.last_end, Instant::now());
+            if is_full {
+                self.pace.end(self.last_end - last.max(begun));
             }
             return self.check();
         }
@@ -346,6 +339,7 @@ struct Submission {
     index: wgpu::SubmissionIndex,
     /// In a browser, where there is nothing to poll, says when they are done.
     done: oneshot::Receiver<()>,
+    begun: Instant,
     /// Whether as much was submitted as may be.
     is_full: bool,
 }

@@ -18,6 +18,7 @@ mod fit;
 mod full_buffers;
 mod kernel;
 mod levels;
+mod pace;
 mod patch_buffers;
 mod probe;
 mod queue;

@@ -33,7 +33,7 @@ impl Gpu {
                 Command::Dispatch(_) => {
                     let mut timer = self.timer.take();
                     let writes = timer.as_mut().and_then(Timer::pass);
-                    let (mut work, most) = (self.work, self.device.work_per_submit);
+                    let (mut work, most) = (self.work, self.device.pace.work());
                     let groups = self.state.as_ref().map(|state| state.buffers.groups.clone());
                     {
                         let mut pass = self.encoder()?.begin_compute_pass(&wgpu::ComputePassDescriptor {
@@ -66,7 +66,7 @@ impl Gpu {
             }
             rest = &rest[recorded..];
             let timed = self.timer.is_some() && self.passes >= PASSES_PER_SUBMIT;
-            if timed || self.work >= self.device.work_per_submit {
+            if timed || self.work >= self.device.pace.work() {
                 self.submit()?;
             }
         }
@@ -75,7 +75,7 @@ impl Gpu {
 
     /// Submits everything.
     pub(super) fn submit(&mut self) -> Result<()> {
-        let is_full = self.work >= self.device.work_per_submit;
+        let is_full = self.work >= self.device.pace.work();
         (self.passes, self.work) = (0, 0);
         if let Some(mut encoder) = self.encoder.take() {
             if let Some(timer) = &mut self.timer {
