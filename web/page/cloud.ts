@@ -40,6 +40,8 @@ const FRAGMENT = `
 const TURN = 5;
 /** How long new points swing, how often in that time, and how far to each side. */
 const SWING = { milliseconds: 16_000, times: 2, radians: 0.24 };
+/** Where so many frames take longer than this, the points stand still: the page has other things to do. */
+const SLOW = { milliseconds: 100, frames: 10 };
 
 export class CloudView {
     private readonly renderer: WebGLRenderer;
@@ -102,9 +104,12 @@ export class CloudView {
         const points = this.points;
         const start = new Spherical().setFromVector3(this.camera.position.clone().sub(this.controls.target));
         this.swinging(true);
+        let [last, slow] = [begun, 0];
         const frame = (now: number) => {
             const part = (now - begun) / SWING.milliseconds;
-            this.swings &&= part < 1;
+            slow += now - last > SLOW.milliseconds ? 1 : 0;
+            last = now;
+            this.swings &&= part < 1 && slow < SLOW.frames;
             if (points !== this.points) {
                 return;
             }

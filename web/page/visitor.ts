@@ -5,9 +5,10 @@ for (const kind of ['pointerdown', 'keydown', 'wheel', 'dragenter', 'paste']) {
     addEventListener(kind, () => (touched = true), { capture: true, passive: true, once: true });
 }
 
-/** Whether the visitor looks at the page, has done nothing so far, and may be shown motion. */
+/** Whether the visitor looks at the page, has done nothing so far, and may be shown motion. On a narrow page the rest would move, too. */
 export function onlyLooks(): boolean {
-    return !touched && !calm() && document.visibilityState === 'visible' && scrollY === 0;
+    const wide = matchMedia('(min-width: 561px)').matches;
+    return wide && !touched && !calm() && document.visibilityState === 'visible' && scrollY === 0;
 }
 
 /** Whether the visitor wants no motion. */
