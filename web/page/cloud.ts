@@ -41,7 +41,7 @@ const TURN = 5;
 /** How long new points swing, how often in that time, and how far to each side. */
 const SWING = { milliseconds: 16_000, times: 2, radians: 0.24 };
 /** Where so many frames take longer than this, the points stand still: the page has other things to do. */
-const SLOW = { milliseconds: 100, frames: 10 };
+const SLOW = { milliseconds: 100, frames: 30 };
 
 export class CloudView {
     private readonly renderer: WebGLRenderer;
