@@ -112,7 +112,7 @@ const total = (name, rows) => [name, ...[1, 2].map((column) => rows.reduce((sum,
 const sizes = files(site).filter((file) => !later(file) && !/licen[cs]e/i.test(file)).map(sized).sort((a, b) => b[2] - a[2]);
 sizes.push(
     total('the first map', sizes.filter(([file]) => !/^(cloud|mesh|service-worker)|small\.png$/.test(file))),
-    total('points in 3-D, when looked at', sizes.filter(([file]) => file.startsWith('cloud'))),
+    total('points in 3-D, after the first map', sizes.filter(([file]) => file.startsWith('cloud'))),
     total('other scenes, when opened', files(site).filter(later).map(sized)),
 );
 console.log(`${'file'.padEnd(36)}${'bytes'.padStart(11)}${'gzip -9'.padStart(11)}`);

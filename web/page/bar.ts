@@ -3,7 +3,7 @@
 import { by, say } from './dom';
 import { left, phase } from './stages';
 
-/** Begins at nothing. What it answers with is told of each stage that begins, and of the share of the match that is done. */
+/** Empties the bar. Call what it returns with each stage that begins and with the share of the match that is done, 0 to 1. */
 export function followed(): (stage: string, done: number) => void {
     const bar = by<HTMLProgressElement>('progress');
     let said = 0;

@@ -40,7 +40,7 @@ const FRAGMENT = `
 const TURN = 5;
 /** How long new points swing, how often in that time, and how far to each side. */
 const SWING = { milliseconds: 16_000, times: 2, radians: 0.24 };
-/** Where so many frames take longer than this, the points stand still: the page has other things to do. */
+/** After so many frames that take longer than this, the points stand still, so that the page has time for other things. */
 const SLOW = { milliseconds: 100, frames: 30 };
 
 export class CloudView {

@@ -11,7 +11,7 @@ const SMALL = 48;
 /** From this correlation on, the halves of an image of a fitting shape count as two views of one scene. */
 const ALIKE = 0.6;
 
-/** From this one on, an upper and a lower half do in any shape: those of 50 single photographs reach 0.84. */
+/** From this correlation on, an upper and a lower half count as two views in any shape. Those of 50 single photographs reach 0.84. */
 const SURE = 0.9;
 
 function canvas(width: number, height: number): { canvas: OffscreenCanvas; context: OffscreenCanvasRenderingContext2D } {

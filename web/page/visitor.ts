@@ -5,7 +5,7 @@ for (const kind of ['pointerdown', 'keydown', 'wheel', 'dragenter', 'paste']) {
     addEventListener(kind, () => (touched = true), { capture: true, passive: true, once: true });
 }
 
-/** Whether the visitor looks at the page, has done nothing so far, and may be shown motion. On a narrow page the rest would move, too. */
+/** Whether the visitor has only looked so far and does not mind motion, on a page wide enough (see style.css) that nothing else moves. */
 export function onlyLooks(): boolean {
     const wide = matchMedia('(min-width: 561px)').matches;
     return wide && !touched && !calm() && document.visibilityState === 'visible' && scrollY === 0;

@@ -1,4 +1,4 @@
-// A match that is stopped, a browser without WebGPU, and a page without a network.
+// How much the first map loads, a match that is stopped, a browser without WebGPU, and a page without a network.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';

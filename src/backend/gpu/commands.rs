@@ -62,8 +62,7 @@ struct Section {
 /// What is bound for a range of rows.
 type Bind<'a> = dyn Fn(&Range<u32>) -> Vec<Binding> + 'a;
 
-/// Collects the commands of a stage at a level. What it does is compiled once, and not for each kernel: only the first lines of what
-/// stages call know which one it is.
+/// Collects the commands of a stage at a level. Only its entry points are generic over kernels, so that the rest is compiled once.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a mut Device,
     pub(super) pipelines: &'a mut Pipelines,

@@ -58,11 +58,12 @@ pub(super) struct Device {
     pub(super) memory: Option<u64>,
     /// Nanoseconds per tick of its timestamps, where it has them.
     pub(super) tick: Option<f64>,
+    /// How much is submitted at once.
     pub(super) pace: Pace,
     patience: Duration,
     lost_after: Option<usize>,
     under_way: VecDeque<Submission>,
-    /// When the last of those that have ended was waited for.
+    /// When the last submission that ended was seen to end.
     last_end: Instant,
     /// Submissions so far, including those in flight.
     submitted: u64,
@@ -195,7 +196,7 @@ impl Device {
         Ok(())
     }
 
-    /// Submits what is recorded; one that `is_full` tells how long such submissions take.
+    /// Submits what is recorded. `is_full` says that it is as much as may be submitted at once.
     pub(super) fn submit(&mut self, encoder: wgpu::CommandEncoder, is_full: bool) -> Result<()> {
         let queue = self.queue()?;
         let index = queue.submit([encoder.finish()]);
@@ -339,6 +340,7 @@ struct Submission {
     index: wgpu::SubmissionIndex,
     /// In a browser, where there is nothing to poll, says when they are done.
     done: oneshot::Receiver<()>,
+    /// When it was submitted.
     begun: Instant,
     /// Whether as much was submitted as may be.
     is_full: bool,

@@ -8,23 +8,24 @@ const WORK: u64 = 1 << 32;
 const SOFTWARE_WORK: u64 = 1 << 30;
 /// The same in a browser at first.
 const BROWSER_WORK: u64 = 1 << 24;
-/// What may take no longer than this may as well be twice as much.
+/// Submissions that take less than this double.
 const SHORT: Duration = Duration::from_millis(30);
-/// What takes longer than this is too much: nothing is told meanwhile, and the page is not drawn.
+/// Submissions that take longer than this shrink: meanwhile there is no progress, and software drivers draw no page.
 const LONG: Duration = Duration::from_millis(200);
-/// Number of submissions of which the time is a mean. Browsers may tell of two at once.
+/// Over so many submissions times are averaged. Browsers may tell of the end of two at once.
 const ROUND: u32 = 2;
 
-/// How much is submitted at once. A browser does not say whether its device is a driver in software, so what is submitted there grows from
-/// little: as long as it takes a short time, or hardly longer than half as much did. Then most of its time is the browser's, which looks
-/// now and then for what has ended. What took too long shrinks it: some of the work is an estimate, and idle iterations are none.
+/// How much is submitted at once. A browser does not say whether its device is a driver in software. So submissions there begin small and
+/// double, as long as they are short, or take hardly longer than those of half the size: then most of the time is the browser's, which
+/// looks only now and then for what has ended. One that takes too long makes the next ones smaller. That happens because the work is
+/// partly an estimate, and iterations after messages have settled take no time.
 #[derive(Debug)]
 pub(super) struct Pace {
     work: u64,
     grows: bool,
-    /// The mean time of what was half as much.
+    /// The mean time of submissions of half the size, once there were any.
     half: Option<Duration>,
-    /// How many full submissions have ended since it grew, and their time together.
+    /// How many full submissions of this size have ended, and their time together.
     ended: (u32, Duration),
 }
 
@@ -45,7 +46,7 @@ impl Pace {
         self.work
     }
 
-    /// A full submission has ended, so long after the one before or after it began.
+    /// A full submission has ended. `took` counts from when it was submitted, or from the end of the one before it if that was later.
     pub(super) fn end(&mut self, took: Duration) {
         if !self.grows {
             return;
