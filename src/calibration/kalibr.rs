@@ -2,8 +2,9 @@
 
 use super::cameras::{Pose, StereoCalibration, ThirdCamera};
 use super::lens::{Distortion, Lens, RadialTangential};
+use super::matrix::{degrees, length, product, transposed};
 use super::models::Model;
-use super::node::Entries;
+use super::node::{Entries, Entry};
 use super::opencv;
 use super::posed::apart;
 use crate::error::{Error, Result};
@@ -11,7 +12,7 @@ use crate::image::calib::Unit;
 
 /// Whether these entries are a chain of cameras.
 pub(super) fn is(entries: &Entries) -> bool {
-    entries.find("cam0").is_some()
+    entries.find("cam0").is_some_and(|entry| entry.group().is_ok())
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
@@ -25,8 +26,7 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         );
         return Err(Error::read(entries.path(), reason));
     }
-    let entry = right.require("tcncnm1", "T_cn_cnm1", "a matrix of 4 x 4 from cam0 to cam1")?;
-    let pose = entry.pose()?;
+    let (entry, pose) = step(&left, &right, 1)?;
     apart(&entry, &pose)?;
     Ok(StereoCalibration {
         lenses: Some(lenses),
@@ -35,6 +35,43 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
         unit: Unit::Metre,
         ..StereoCalibration::default()
     })
+}
+
+/// From a camera of the chain to the next one, which is the `n`th, and the entry that says so.
+fn step<'a>(from: &Entries<'a>, to: &Entries<'a>, n: usize) -> Result<(Entry<'a>, Pose)> {
+    // What differs by less is a matter of digits.
+    const DEGREES: f64 = 0.1;
+    const PART: f64 = 0.01;
+    let stated = to.find("tcncnm1").map(|entry| Ok::<_, Error>((entry.pose()?, entry))).transpose()?;
+    let in_body = body(from)?.zip(body(to)?);
+    let by_body = in_body.map(|((from, _), (to, entry))| (Pose::between(&from, &to), entry));
+    match (stated, by_body) {
+        (Some((pose, entry)), None) | (None, Some((pose, entry))) => Ok((entry, pose)),
+        (Some((pose, entry)), Some((other, by))) => {
+            let turn = degrees(&product(&other.rotation, &transposed(&pose.rotation)));
+            let moved = length(std::array::from_fn(|i| other.translation[i] - pose.translation[i]));
+            if turn <= DEGREES && moved <= PART * length(pose.translation) {
+                return Ok((entry, pose));
+            }
+            Err(entry.error(format_args!(
+                "contradicts {} of both cameras by {turn:.2} degrees and {moved:.4} m; keep what is right",
+                by.name().rsplit('.').next().unwrap_or_default()
+            )))
+        }
+        (None, None) => {
+            let expected =
+                format!("a matrix of 4 x 4 from cam{} to cam{n}, or T_cam_imu in both cameras", n - 1);
+            Err(to.require("tcncnm1", "T_cn_cnm1", &expected).map_or_else(|error| error, |entry| entry.wrong(&expected)))
+        }
+    }
+}
+
+/// How a camera stands to the inertial sensor: from that to the camera.
+fn body<'a>(camera: &Entries<'a>) -> Result<Option<(Pose, Entry<'a>)>> {
+    if let Some(entry) = camera.find("tcamimu") {
+        return Ok(Some((entry.pose()?, entry)));
+    }
+    camera.find("timucam").map(|entry| Ok((entry.pose()?.inverse(), entry))).transpose()
 }
 
 /// The last camera of a chain that begins with the left one.
@@ -49,8 +86,8 @@ pub(super) fn last(entries: &Entries) -> Result<ThirdCamera> {
     };
     let mut pose = Pose::IN_PLACE;
     for n in 1..=last {
-        let expected = format!("a matrix of 4 x 4 from cam{} to cam{n}", n - 1);
-        pose = pose.then(&camera(n)?.require("tcncnm1", "T_cn_cnm1", &expected)?.pose()?);
+        let from = entries.require(&format!("cam{}", n - 1), "", "the camera before it")?.group()?;
+        pose = pose.then(&step(&from, &camera(n)?, n)?.1);
     }
     let camera = camera(last)?;
     Ok(ThirdCamera { lens: lens(&camera)?, pose, size: size(&camera)?, unit: Unit::Metre })

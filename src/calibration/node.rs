@@ -88,6 +88,11 @@ impl Node {
     }
 }
 
+/// A name in lower case, without what separates words.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| !['_', '-', ' '].contains(c)).collect::<String>().to_lowercase()
+}
+
 fn unpacked<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Option<Vec<f64>> {
     let numbers = data.chunks(N).map(|bytes| bytes.try_into().ok().map(&number).filter(|v| v.is_finite()));
     numbers.collect()
@@ -119,15 +124,44 @@ impl<'a> Entries<'a> {
 
     /// The first entry that has one of `names`: words in lower case, without `_` and `-`.
     pub(super) fn find(&self, names: &str) -> Option<Entry<'a>> {
-        let plain = |name: &str| {
-            name.chars().filter(|c| !['_', '-', ' '].contains(c)).collect::<String>().to_lowercase()
-        };
-        self.files.iter().find_map(|(path, node)| {
-            let Node::Map(entries) = node else { return None };
-            let is_one = |name: String| names.split(' ').any(|known| known == name);
-            let (name, node) = entries.iter().find(|(name, _)| is_one(plain(name)))?;
-            Some(Entry { path, name: format!("{}{name}", self.group), node })
+        self.find_all(names).next()
+    }
+
+    /// All entries that have one of `names`; see [`Entries::find`].
+    pub(super) fn find_all(&self, names: &str) -> impl Iterator<Item = Entry<'a>> {
+        let is_one = move |name: &str| names.split(' ').any(|known| known == plain(name));
+        self.each().filter(move |(_, name, _)| is_one(name)).map(|(path, name, node)| Entry {
+            path,
+            name: format!("{}{name}", self.group),
+            node,
         })
+    }
+
+    /// The names of all entries, in lower case, without `_` and `-`.
+    pub(super) fn names(&self) -> impl Iterator<Item = String> {
+        self.each().map(|(_, name, _)| plain(name))
+    }
+
+    fn each(&self) -> impl Iterator<Item = (&'a Path, &'a str, &'a Node)> {
+        self.files.iter().flat_map(|&(path, node)| {
+            let entries = if let Node::Map(entries) = node { entries.as_slice() } else { &[] };
+            entries.iter().map(move |(name, node)| (path, name.as_str(), node))
+        })
+    }
+
+    /// An error where entries of one meaning, which has these `names`, say different things.
+    pub(super) fn agree(&self, names: &str) -> Result<()> {
+        let mut all = self.find_all(names);
+        let Some(first) = all.next() else { return Ok(()) };
+        match all.find(|other| !first.says(other)) {
+            None => Ok(()),
+            Some(other) => {
+                let place =
+                    if first.path == other.path { String::new() } else { format!(" in {}", first.path.display()) };
+                let reason = format_args!("contradicts {}{place}; keep the one that is right", first.name);
+                Err(other.error(reason))
+            }
+        }
     }
 
     /// As [`Entries::find`]; the error says that it is missing and what was `expected`, calling it `called`.
@@ -173,6 +207,19 @@ impl<'a> Entry<'a> {
     /// Its name, as the file spells it.
     pub(super) fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Whether another entry says the same, as far as both say it in as many numbers.
+    fn says(&self, other: &Self) -> bool {
+        match (self.node.numbers(), other.node.numbers()) {
+            (Some(one), Some(two)) => one.len() != two.len() || one == two,
+            _ => self.node == other.node,
+        }
+    }
+
+    /// How many numbers it has; `None` where it has anything else.
+    pub(super) fn count_of_numbers(&self) -> Option<usize> {
+        self.node.numbers().map(|numbers| numbers.len())
     }
 
     /// The entries in it.

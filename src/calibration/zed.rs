@@ -9,7 +9,9 @@ use crate::error::{Error, Result};
 use crate::image::calib::Unit;
 
 /// Names of sizes.
-const SIZES: [(&str, (usize, usize)); 6] = [
+const SIZES: [(&str, (usize, usize)); 8] = [
+    ("4k", (3840, 2160)),
+    ("qhdplus", (3200, 1800)),
     ("2k", (2208, 1242)),
     ("fhd", (1920, 1080)),
     ("fhd1200", (1920, 1200)),
@@ -18,10 +20,14 @@ const SIZES: [(&str, (usize, usize)); 6] = [
     ("vga", (672, 376)),
 ];
 
-/// Whether these entries are such a file's.
+/// Whether these entries are such a file's, or that of one such camera.
 pub(super) fn is(entries: &Entries) -> bool {
-    entries.find("stereo").is_some()
-        && SIZES.iter().any(|(name, _)| entries.find(&section("left", name)).is_some())
+    let lens = |name: &str| ["leftcam", "rightcam", "cam"].iter().any(|stem| name.starts_with(stem));
+    let stereo = entries.find("stereo").and_then(|entry| entry.group().ok());
+    match stereo {
+        Some(stereo) => stereo.find("baseline").is_some(),
+        None => entries.find("leftdisto rightdisto disto").is_some() && entries.names().any(|name| lens(&name)),
+    }
 }
 
 fn section(side: &str, size: &str) -> String {
@@ -31,8 +37,14 @@ fn section(side: &str, size: &str) -> String {
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let there = SIZES.iter().filter(|(name, _)| entries.find(&section("left", name)).is_some());
     let sizes = there.map(|(name, size)| of_size(entries, name, *size)).collect::<Result<Vec<_>>>()?;
-    StereoCalibration::of_sizes(sizes)
-        .ok_or_else(|| Error::read(entries.path(), "has no size of images that is known"))
+    let known = || SIZES.map(|(name, _)| name.to_uppercase()).join(", ");
+    StereoCalibration::of_sizes(sizes).ok_or_else(|| {
+        let reason = format!(
+            "has no lenses of a pair: expected LEFT_CAM_ and RIGHT_CAM_ with {} behind it; give the file of both cameras",
+            known()
+        );
+        Error::read(entries.path(), reason)
+    })
 }
 
 /// The calibration for images of `size`, which sections call `name`.
@@ -42,14 +54,9 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
         let entry = entries.require(&section(side, name), &called, "the numbers of a lens")?;
         let numbers = entry.group()?;
         let number = |name: &str| numbers.number(name, name);
-        let k = |name: &str| numbers.number_or_zero(name);
-        let all = [k("k1")?, k("k2")?, k("p1")?, k("p2")?, k("k3")?, k("k4")?, k("k5")?, k("k6")?];
-        if numbers.find("p1").is_none() && numbers.find("k4").is_some() {
-            return Err(entry.error(
-                "k4 without p1 is of a fisheye, which is not read; give an OpenCV file with fisheye: 1",
-            ));
-        }
-        let distortion = Distortion::RadialTangential(RadialTangential::polynomials(all));
+        // Newer files have one model for all sizes, which counts where an older one is there too.
+        let of_all = entries.find(&format!("{side}disto")).map(|entry| entry.group()).transpose()?;
+        let distortion = distortion(of_all.as_ref().unwrap_or(&numbers))?;
         let wrong = |_| entry.error("has a focal length that is not above 0; calibrate again");
         Lens::new([number("fx")?, number("fy")?], [number("cx")?, number("cy")?], distortion).map_err(wrong)
     };
@@ -58,11 +65,11 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
     let of_this = |stem: &str| {
         stereo.number(&format!("{stem}{name}"), &format!("{}_{}", stem.to_uppercase(), name.to_uppercase()))
     };
-    // Older files have one for all sizes.
+    // Some files have one for all sizes.
     let moved = |stem: &str| stereo.number_or_zero(&format!("{stem}{name} {stem}"));
     let turn = [of_this("rx")?, of_this("cv")?, of_this("rz")?];
-    // The vector from the left to the right camera, which stereoRectify takes with either sign.
-    let translation = [-stereo.number("baseline", "Baseline")?, -moved("ty")?, -moved("tz")?];
+    // The maker's calibration tools write T of OpenCV so: its first number with the other sign, and the others as they are.
+    let translation = [-stereo.number("baseline", "Baseline")?, moved("ty")?, moved("tz")?];
     let pose = Pose { rotation: rotation(turn), translation };
     apart(&entry, &pose)?;
     Ok(StereoCalibration {
@@ -72,4 +79,16 @@ fn of_size(entries: &Entries, name: &str, size: (usize, usize)) -> Result<Stereo
         unit: Unit::Millimetre,
         ..StereoCalibration::default()
     })
+}
+
+/// That of a section. Fisheyes have k1 to k4; what else they have is 0.
+fn distortion(section: &Entries) -> Result<Distortion> {
+    let c = |name: &str| section.number_or_zero(name);
+    let [k1, k2, k3, k4] = [c("k1")?, c("k2")?, c("k3")?, c("k4")?];
+    let others = [c("p1")?, c("p2")?, c("k5")?, c("k6")?];
+    if k4 != 0.0 && others == [0.0; 4] {
+        return Ok(Distortion::Equidistant([k1, k2, k3, k4]));
+    }
+    let [p1, p2, k5, k6] = others;
+    Ok(Distortion::RadialTangential(RadialTangential::polynomials([k1, k2, p1, p2, k3, k4, k5, k6])))
 }
