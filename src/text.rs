@@ -41,3 +41,18 @@ pub fn quoted(text: &str) -> String {
     let more = if characters.next().is_some() { "..." } else { "" };
     format!("`{shown}{more}`")
 }
+
+/// Whether two words differ by a slip of the pen: by capitals, or by at most two letters.
+pub(crate) fn is_near(one: &str, other: &str) -> bool {
+    let (one, other) = (one.to_lowercase(), other.to_lowercase());
+    let mut row: Vec<usize> = (0..=other.chars().count()).collect();
+    for (i, a) in one.chars().enumerate() {
+        let mut before = std::mem::replace(&mut row[0], i + 1);
+        for (j, b) in other.chars().enumerate() {
+            let replaced = before + usize::from(a != b);
+            before = row[j + 1];
+            row[j + 1] = replaced.min(before + 1).min(row[j] + 1);
+        }
+    }
+    row.last().is_some_and(|letters| *letters <= 2)
+}

@@ -61,7 +61,9 @@ fn step<'a>(from: &Entries<'a>, to: &Entries<'a>, n: usize) -> Result<(Entry<'a>
         (None, None) => {
             let expected =
                 format!("a matrix of 4 x 4 from cam{} to cam{n}, or T_cam_imu in both cameras", n - 1);
-            Err(to.require("tcncnm1", "T_cn_cnm1", &expected).map_or_else(|error| error, |entry| entry.wrong(&expected)))
+            let entry = to.require("tcncnm1", "T_cn_cnm1", &expected)?;
+            let pose = entry.pose()?;
+            Ok((entry, pose))
         }
     }
 }

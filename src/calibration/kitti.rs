@@ -1,4 +1,5 @@
-//! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which has the lenses too.
+//! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which has the lenses too. Those of DrivingStereo have
+//! its entries, with cameras 101 and 103.
 
 use super::cameras::{Pose, StereoCalibration, Views};
 use super::lens::Lens;
@@ -11,15 +12,22 @@ use crate::image::calib::{Camera, Unit};
 /// Cameras 0 and 1 are grey, 2 and 3 in colour.
 const GREY: [usize; 2] = [0, 1];
 const COLOUR: [usize; 2] = [2, 3];
+/// Those of DrivingStereo, left and right.
+const DRIVING_STEREO: [usize; 2] = [101, 103];
 
 /// Whether these entries are KITTI's: whether a projection has a name that OpenCV's have not.
 pub(super) fn is(entries: &Entries) -> bool {
-    let own = "prect00 prect01 prect02 prect03 p0 p3";
-    entries.find(own).is_some() && !opencv::has_lens(entries)
+    let own = "prect00 prect01 prect02 prect03 prect101 prect103 p0 p3";
+    entries.find_all(own).any(|entry| entry.is_matrix()) && !opencv::has_lens(entries)
+}
+
+/// The name of an entry of a camera, with two digits or three.
+fn of_camera(stem: &str, camera: usize) -> String {
+    format!("{stem}{camera:02}")
 }
 
 fn projection_names(camera: usize) -> String {
-    format!("prect0{camera} p{camera}")
+    format!("{} p{camera}", of_camera("prect", camera))
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
@@ -33,12 +41,18 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let mut calibration = StereoCalibration { unit: Unit::Metre, ..StereoCalibration::default() };
     calibration.views = Some(Views { size, ..views(entries, cameras)? });
     let [left, right] = cameras;
-    if entries.find(&format!("k0{left}")).is_some() {
+    if entries.find(&of_camera("k", left)).is_some() {
         calibration.lenses = Some([lens(entries, left)?, lens(entries, right)?]);
         calibration.pose = Some(pose(entries, cameras)?);
         calibration.size = self::size(entries, "s", left)?;
         if self::size(entries, "s", right)? != calibration.size {
             return Err(differs(entries, "s", cameras));
+        }
+        // In files for images of half the size, the offsets are those of whole ones: twice the baseline.
+        if let (DRIVING_STEREO, Some(pose), Some(views)) =
+            (cameras, &calibration.pose, &mut calibration.views)
+        {
+            views.translation[0] = length(pose.translation).copysign(views.translation[0]);
         }
     } else {
         calibration.size = size;
@@ -48,6 +62,9 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
 
 /// The cameras of the pair: those in colour, unless they are not there or the file asks for the grey ones.
 fn pair(entries: &Entries) -> Result<[usize; 2]> {
+    if entries.find(&projection_names(DRIVING_STEREO[0])).is_some() {
+        return Ok(DRIVING_STEREO);
+    }
     let Some(entry) = entries.find("pair") else {
         let colour = COLOUR.iter().any(|camera| entries.find(&projection_names(*camera)).is_some());
         return Ok(if colour { COLOUR } else { GREY });
@@ -61,12 +78,12 @@ fn pair(entries: &Entries) -> Result<[usize; 2]> {
 
 /// The size of images, such as `S_rect_02: 1.242000e+03 3.750000e+02`.
 fn size(entries: &Entries, stem: &str, camera: usize) -> Result<Option<(usize, usize)>> {
-    entries.find(&format!("{stem}0{camera}")).map(|entry| entry.size()).transpose()
+    entries.find(&of_camera(stem, camera)).map(|entry| entry.size()).transpose()
 }
 
 fn differs(entries: &Entries, stem: &str, [left, right]: [usize; 2]) -> Error {
     let expected = format!("the size that camera {left} has");
-    match entries.find(&format!("{stem}0{right}")) {
+    match entries.find(&of_camera(stem, right)) {
         Some(entry) => entry.wrong(&expected),
         None => {
             Error::read(entries.path(), format!("the size of camera {right} is missing: expected {expected}"))
@@ -79,7 +96,7 @@ fn views(entries: &Entries, cameras: [usize; 2]) -> Result<Views> {
     let mut projections = Vec::new();
     for (rotation, camera) in rotations.iter_mut().zip(cameras) {
         // Images that are rectified already have none.
-        if let Some(entry) = entries.find(&format!("rrect0{camera}")) {
+        if let Some(entry) = entries.find(&of_camera("rrect", camera)) {
             *rotation = entry.rotation(&entry.matrix()?)?;
         }
         let names = projection_names(camera);
@@ -103,10 +120,10 @@ fn projection(entry: &Entry) -> Result<Projection> {
 
 fn lens(entries: &Entries, camera: usize) -> Result<Lens> {
     let expected = "the matrix [f 0 cx; 0 f cy; 0 0 1] of the camera";
-    let matrix = entries.require(&format!("k0{camera}"), &format!("K_0{camera}"), expected)?;
+    let matrix = entries.require(&of_camera("k", camera), &of_camera("K_", camera), expected)?;
     let (focal_length, principal_point) = opencv::camera(&matrix)?;
     let expected = "the 5 coefficients of the lens";
-    let entry = entries.require(&format!("d0{camera}"), &format!("D_0{camera}"), expected)?;
+    let entry = entries.require(&of_camera("d", camera), &of_camera("D_", camera), expected)?;
     let distortion = opencv::distortion(&entry, expected, false)?;
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
@@ -124,9 +141,9 @@ fn pose(entries: &Entries, [left, right]: [usize; 2]) -> Result<Pose> {
 /// From camera 0 to another one, and the entry of its translation.
 fn from_first<'a>(entries: &Entries<'a>, camera: usize) -> Result<(Pose, Entry<'a>)> {
     let expected = "the rotation from camera 0";
-    let entry = entries.require(&format!("r0{camera}"), &format!("R_0{camera}"), expected)?;
+    let entry = entries.require(&of_camera("r", camera), &of_camera("R_", camera), expected)?;
     let rotation = entry.rotation(&entry.matrix()?)?;
     let expected = "3 numbers, camera 0 in the frame of this one";
-    let entry = entries.require(&format!("t0{camera}"), &format!("T_0{camera}"), expected)?;
+    let entry = entries.require(&of_camera("t", camera), &of_camera("T_", camera), expected)?;
     Ok((Pose { rotation, translation: entry.numbers(expected)? }, entry))
 }

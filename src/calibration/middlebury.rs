@@ -8,15 +8,9 @@ use super::matrix::IDENTITY;
 use crate::error::Result;
 use crate::image::calib::{Calibration, Camera};
 
-/// Whether a text has lines `key=value`, and does not begin like YAML, JSON, XML or INI.
+/// Whether a text is meant as such a file.
 pub(super) fn is(text: &str) -> bool {
-    let mut lines = text.trim_start_matches('\u{feff}').lines().filter(|line| !line.trim().is_empty());
-    let first = lines.clone().next().unwrap_or_default();
-    let entry = |line: &str| {
-        line.split_once('=')
-            .is_some_and(|(key, _)| key.trim().chars().all(|c| c.is_alphanumeric() || c == '_'))
-    };
-    !first.starts_with(['<', '%', '{', '[']) && lines.any(entry)
+    Calibration::is_meant(text)
 }
 
 pub(super) fn of_text(path: &Path, text: &str) -> Result<StereoCalibration> {

@@ -156,8 +156,11 @@ impl<'a> Entries<'a> {
         match all.find(|other| !first.says(other)) {
             None => Ok(()),
             Some(other) => {
-                let place =
-                    if first.path == other.path { String::new() } else { format!(" in {}", first.path.display()) };
+                let place = if first.path == other.path {
+                    String::new()
+                } else {
+                    format!(" in {}", first.path.display())
+                };
                 let reason = format_args!("contradicts {}{place}; keep the one that is right", first.name);
                 Err(other.error(reason))
             }
@@ -217,9 +220,15 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// How many numbers it has; `None` where it has anything else.
-    pub(super) fn count_of_numbers(&self) -> Option<usize> {
-        self.node.numbers().map(|numbers| numbers.len())
+    /// Whether it looks like the matrix of a camera, damaged or not: like OpenCV's of any size, or 9 numbers or 12.
+    pub(super) fn is_matrix(&self) -> bool {
+        self.node.get("data").is_some()
+            || self.node.numbers().is_some_and(|numbers| matches!(numbers.len(), 9 | 12))
+    }
+
+    /// Whether a list or a group is in it.
+    pub(super) fn is_compound(&self) -> bool {
+        !matches!(self.node, Node::Scalar(_))
     }
 
     /// The entries in it.

@@ -10,17 +10,21 @@ use crate::image::calib::{Camera, Unit};
 
 // In lower case and without `_`, as `Entries::find` takes them.
 const CAMERA: [&str; 2] = [
-    "k1 m1 cameramatrix1 cameramatrixleft leftcameramatrix kleft kl leftk mleft cameramatrixl ml left.k",
-    "k2 m2 cameramatrix2 cameramatrixright rightcameramatrix kright kr rightk mright cameramatrixr mr right.k",
+    "k1 m1 cameramatrix1 cameramatrixleft leftcameramatrix kleft kl leftk mleft cameramatrixl ml mtxl mtx1 leftmtx mtxleft left.k",
+    "k2 m2 cameramatrix2 cameramatrixright rightcameramatrix kright kr rightk mright cameramatrixr mr mtxr mtx2 rightmtx mtxright right.k",
 ];
 const DISTORTION: [&str; 2] = [
-    "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl distcoeffsl distcoeffl distl left.d",
-    "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr distcoeffsr distcoeffr distr right.d",
+    "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl distcoeffsl distcoeffl distl distleft leftdist leftdistortion distortionleft left.d",
+    "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr distcoeffsr distcoeffr distr distright rightdist rightdistortion distortionright right.d",
 ];
-pub(super) const ROTATION: &str = "r rotation rotationmatrix stereor";
-pub(super) const TRANSLATION: &str = "t translation translationvector trans stereot";
-const RECTIFICATION: [&str; 2] = ["r1 rectification1 rleft rl left.r", "r2 rectification2 rright rr right.r"];
-const PROJECTION: [&str; 2] = ["p1 projection1 pleft pl left.p", "p2 projection2 pright pr right.p"];
+pub(super) const ROTATION: &str = "r rotation rotationmatrix stereor rot";
+pub(super) const TRANSLATION: &str = "t translation translationvector trans stereot trns";
+const RECTIFICATION: [&str; 2] =
+    ["r1 rectification1 rleft rl rectl left.r", "r2 rectification2 rright rr rectr right.r"];
+const PROJECTION: [&str; 2] = [
+    "p1 projection1 pleft pl projmatrixl projmatl left.p",
+    "p2 projection2 pright pr projmatrixr projmatr right.p",
+];
 const SIZE: &str = "imagesize size imgsize resolution";
 const NEW_SIZE: &str = "newimagesize newsize rectifiedsize rectifiedimagesize";
 const WIDTH: &str = "imagewidth width left.width";
@@ -36,12 +40,37 @@ pub(super) fn has_lens(entries: &Entries) -> bool {
     CAMERA.iter().any(|names| entries.find(names).is_some())
 }
 
-/// Whether these entries are OpenCV's: whether there is any camera.
+/// Whether these entries are OpenCV's: whether there is any camera. Short names are those of other things, too.
 pub(super) fn is(entries: &Entries) -> bool {
-    CAMERA.iter().chain(&PROJECTION).chain(&DISTORTION).any(|names| entries.find(names).is_some())
+    let mut all =
+        CAMERA.iter().chain(&PROJECTION).chain(&DISTORTION).flat_map(|names| entries.find_all(names));
+    all.any(|entry| entry.is_matrix() || entry.name().len() > 4 && entry.is_compound())
+}
+
+/// Whether there is R with T, as OpenCV's stereo calibration has them.
+pub(super) fn has_pose(entries: &Entries) -> bool {
+    entries.find(ROTATION).is_some() && entries.find(TRANSLATION).is_some()
+}
+
+/// All that is read, by its names.
+fn known() -> impl Iterator<Item = &'static str> {
+    let pairs = [CAMERA, DISTORTION, RECTIFICATION, PROJECTION, XI, MODEL];
+    let others = [ROTATION, TRANSLATION, SIZE, NEW_SIZE, WIDTH, HEIGHT, FISHEYE, Q, UNIT];
+    pairs.into_iter().flatten().chain(others)
+}
+
+/// Whether each of these files has what none of the others has.
+pub(super) fn needs_all(files: &[Entries]) -> bool {
+    let is_needed = |i: usize| {
+        known().any(|names| {
+            files.iter().enumerate().all(|(other, file)| file.find(names).is_some() == (other == i))
+        })
+    };
+    (0..files.len()).all(is_needed)
 }
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
+    known().try_for_each(|names| entries.agree(names))?;
     let (size, unit) = (size(entries)?, unit(entries)?);
     let mut calibration = StereoCalibration { size, unit, ..StereoCalibration::default() };
     let has = |names: &str| entries.find(names).is_some();
@@ -203,7 +232,8 @@ pub(super) fn rotation_to(entries: &Entries, other: &str) -> Result<Matrix> {
     }
 }
 
-fn pose(entries: &Entries) -> Result<Pose> {
+/// How the right camera stands to the left one.
+pub(super) fn pose(entries: &Entries) -> Result<Pose> {
     let rotation = rotation_to(entries, "the right one")?;
     let expected = "3 numbers, the left camera in the frame of the right one";
     let entry = entries.require(TRANSLATION, "T", expected)?;

@@ -1,6 +1,7 @@
 //! YAML, JSON, XML and INI, as calibration programs write them.
 
 use std::fmt;
+use std::path::Path;
 
 use roxmltree::{Document, ParsingOptions};
 use saphyr_parser::{Event, Parser};
@@ -10,14 +11,65 @@ use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use super::node::{MAX_DEPTH, MAX_ENTRIES, Node};
 use crate::text::{one_line, quoted};
 
-/// The first document of a YAML file. The error is one line.
+/// Whether a text is YAML for certain: by how it begins, by the name of its file, or by an entry that calibrations have.
+pub(super) fn is_yaml(path: &Path, text: &str) -> bool {
+    const STEMS: [&str; 13] = [
+        "K1",
+        "D1",
+        "M1",
+        "K_0",
+        "P0",
+        "P_rect",
+        "cam0",
+        "camera_matrix",
+        "image_width",
+        "image_size",
+        "imageSize",
+        "T_BS",
+        "Camera",
+    ];
+    let extension = path.extension().and_then(|end| end.to_str()).unwrap_or_default().to_lowercase();
+    let entry = |line: &str| line.contains(':') && STEMS.iter().any(|stem| line.starts_with(stem));
+    text.starts_with("%YAML")
+        || text.starts_with("---")
+        || ["yml", "yaml"].contains(&extension.as_str())
+        || text.lines().any(entry)
+}
+
+/// Whether a text begins like XML.
+pub(super) fn is_xml(text: &str) -> bool {
+    text[1..].starts_with(|c: char| c.is_alphabetic() || ['?', '!', '_'].contains(&c))
+}
+
+/// Whether a text begins like an object of JSON.
+pub(super) fn is_json(text: &str) -> bool {
+    text[1..].trim_start().starts_with(['"', '}'])
+}
+
+/// A YAML file of one document, or of several that say the same, as `rostopic echo` prints them. The error is one line.
 pub(super) fn yaml(text: &str) -> Result<Node, String> {
+    let mut all = documents(text)?.into_iter();
+    let Some(first) = all.next() else { return Err("is no YAML with entries; is it a calibration?".into()) };
+    // The header of a message has its time.
+    let entries = |node: &Node| match node {
+        Node::Map(entries) => entries.iter().filter(|(name, _)| name != "header").cloned().collect(),
+        other => vec![(String::new(), other.clone())],
+    };
+    let empty = |node: &Node| *node == Node::Scalar(String::new()) || *node == Node::Scalar("~".into());
+    if all.any(|other| !empty(&other) && entries(&other) != entries(&first)) {
+        return Err("has several documents (---) that differ; keep one".into());
+    }
+    Ok(first)
+}
+
+fn documents(text: &str) -> Result<Vec<Node>, String> {
     // OpenCV's own form of the directive, which is no YAML.
     let rest = text.strip_prefix("%YAML:1.0").unwrap_or(text);
     // OpenCV needs no blank before a list.
     let rest = &rest.replace(":[", ": [");
     // Groups that are open, each with the key that its next value has.
     let mut open: Vec<(Node, Option<String>)> = Vec::new();
+    let mut found: Vec<Node> = Vec::new();
     for event in Parser::new_from_str(rest) {
         let (event, span) = event.map_err(|e| format!("is no YAML: {}", one_line(&e.to_string())))?;
         let at = || format!("line {}", span.start.line());
@@ -54,13 +106,13 @@ pub(super) fn yaml(text: &str) -> Result<Node, String> {
             _ => continue,
         };
         match open.last_mut() {
-            None => return Ok(done),
+            None => found.push(done),
             Some((Node::List(nodes), _)) => nodes.push(done),
             Some((Node::Map(entries), key)) => entries.extend(key.take().map(|key| (key, done))),
             Some((Node::Scalar(_), _)) => {}
         }
     }
-    Err("is no YAML with entries; is it a calibration?".into())
+    Ok(found)
 }
 
 /// A JSON file. The error is one line.

@@ -26,7 +26,9 @@ pub(super) fn is(entries: &Entries) -> bool {
     let stereo = entries.find("stereo").and_then(|entry| entry.group().ok());
     match stereo {
         Some(stereo) => stereo.find("baseline").is_some(),
-        None => entries.find("leftdisto rightdisto disto").is_some() && entries.names().any(|name| lens(&name)),
+        None => {
+            entries.find("leftdisto rightdisto disto").is_some() && entries.names().any(|name| lens(&name))
+        }
     }
 }
 

@@ -133,40 +133,59 @@ impl Calibration {
         Self::parse(text).map_err(|reason| Error::read(name, reason))
     }
 
-    /// Parses `key=value` lines. Unknown keys, and lines without `=` that do not begin with a known key, are
-    /// skipped. The error names line and key.
+    /// Whether a text is meant as such a file: whether its first line is an entry, and any of its lines one of a key that is known,
+    /// rightly spelt or not.
+    pub(crate) fn is_meant(text: &str) -> bool {
+        let mut keys = lines(text).map(|(_, line)| line.split_once('=').map(|(key, _)| key.trim()));
+        let Some(Some(first)) = keys.next() else { return false };
+        let known = |key: &str| KEYS.contains(&key) || near(key).is_some();
+        !first.contains(|c: char| !c.is_alphanumeric() && c != '_')
+            && (known(first) || keys.flatten().any(known))
+    }
+
+    /// Parses `key=value` lines; those that begin with # are comments. The error names line and key.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut calibration = Self::default();
         let mut right = None;
-        for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-            let (key, value) = if let Some((key, value)) = line.split_once('=') {
-                (key.trim(), Ok(value.trim()))
-            } else {
-                let word = line.split([' ', '\t', ':']).find(|word| !word.is_empty());
-                (word.unwrap_or_default(), Err("expected key=value"))
-            };
+        let mut there: Vec<&str> = Vec::new();
+        for (line, entry) in lines(text) {
+            let (key, value) =
+                entry.split_once('=').map_or((entry, None), |(key, value)| (key.trim(), Some(value.trim())));
+            let word = key.split([' ', '\t', ':', ',']).next().unwrap_or_default();
             let mut put = || {
+                let value = match value {
+                    Some(value) if KEYS.contains(&key) => value,
+                    None if KEYS.contains(&word) => return Err("expected key=value".to_owned()),
+                    _ => return Err(unknown(key)),
+                };
+                if there.contains(&key) {
+                    return Err("is there twice; keep one".to_owned());
+                }
+                there.push(key);
                 match key {
-                    "ndisp" => calibration.ndisp = Some(count(value?)?),
-                    "width" => calibration.width = Some(count(value?)?),
-                    "height" => calibration.height = Some(count(value?)?),
-                    "doffs" => calibration.doffs = Some(number(value?)?),
-                    "baseline" => calibration.baseline = Some(number(value?)?),
-                    "vmin" => calibration.vmin = Some(number(value?)?),
-                    "vmax" => calibration.vmax = Some(number(value?)?),
-                    "cam0" => calibration.camera = Some(camera(value?)?),
-                    "cam1" => right = Some((i + 1, camera(value?)?)),
+                    "ndisp" => calibration.ndisp = Some(count(value)?),
+                    "width" => calibration.width = Some(count(value)?),
+                    "height" => calibration.height = Some(count(value)?),
+                    "doffs" => calibration.doffs = Some(number(value)?),
+                    "baseline" => calibration.baseline = Some(number(value)?),
+                    "vmin" => calibration.vmin = Some(number(value)?),
+                    "vmax" => calibration.vmax = Some(number(value)?),
+                    "cam0" => calibration.camera = Some(camera(value)?),
+                    "cam1" => right = Some((line, camera(value)?)),
                     "unit" => {
-                        // Middlebury's files have no such key, but may have such a word.
-                        let Ok(value) = value else { return Ok(()) };
                         let wrong = |expected| format!("expected {expected}, found {}", quoted(value));
                         calibration.unit = value.parse().map_err(wrong)?;
                     }
+                    // Of errors and of the ground truth.
                     _ => {}
                 }
                 Ok::<(), String>(())
             };
-            put().map_err(|reason| format!("line {}: {key}: {reason}", i + 1))?;
+            let called = if KEYS.contains(&word) { word.to_owned() } else { quoted(key) };
+            put().map_err(|reason| format!("line {line}: {called}: {reason}"))?;
+        }
+        if there.is_empty() {
+            return Err("is no calib.txt: expected lines such as ndisp=64".into());
         }
         if let Some((line, right)) = right {
             calibration.check_right(right).map_err(|reason| format!("line {line}: cam1: {reason}"))?;
@@ -209,6 +228,30 @@ impl Calibration {
         let (left, doffs, baseline) = (self.camera?, self.doffs?, self.baseline?);
         let [cx, cy] = left.principal_point;
         Some(([left, Camera { principal_point: [cx + doffs, cy], ..left }], baseline))
+    }
+}
+
+/// The keys of Middlebury's files and of others that are made like them, and `unit`, which those have not.
+const KEYS: [&str; 15] = [
+    "cam0", "cam1", "doffs", "baseline", "width", "height", "ndisp", "vmin", "vmax", "unit", "isint",
+    "dyavg", "dymax", "dmin", "dmax",
+];
+
+/// The lines that are no comments, each with its number.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.trim_start_matches('\u{feff}').lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// The key that is meant by one that is not known.
+fn near(key: &str) -> Option<&'static str> {
+    KEYS.into_iter().find(|known| key.len() >= 4 && text::is_near(key, known))
+}
+
+fn unknown(key: &str) -> String {
+    match near(key) {
+        Some(known) => format!("is no entry of a calib.txt; {known} may be meant"),
+        None => "is no entry of a calib.txt; leave it out, or put # in front of it".into(),
     }
 }
 
@@ -277,10 +320,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_is_skipped() {
-        let text = "P0: 7.2e2 0 6e2\nsome words\nndisp=64\nrig=\u{fffd}\n\n";
+    fn comments_and_keys_of_other_sets_are_skipped() {
+        let text = "# of a rig \u{fffd}\n\nndisp=64\ndmin=-3\n  # width=5\nisint=0\n";
         assert_eq!(Calibration::parse(text).unwrap(), Calibration { ndisp: Some(64), ..Default::default() });
-        assert_eq!(Calibration::parse("").unwrap(), Calibration::default());
+    }
+
+    #[test]
+    fn a_file_is_meant_as_a_calibration_by_its_keys() {
+        for text in ["ndisp=64", "# of a rig\n\nndips=48", "name=a\nwidth = 3", "NDISP=3"] {
+            assert!(Calibration::is_meant(text), "{text}");
+        }
+        for text in ["", "abc=1", "let width = 3;", "width: 3", "<a b=\"1\">", "a\nwidth=3", "[a]\nwidth=3"] {
+            assert!(!Calibration::is_meant(text), "{text}");
+        }
     }
 
     #[test]
@@ -290,7 +342,16 @@ mod tests {
             ("ndisp=-3", ["line 1", "ndisp"]),
             ("ndisp=0", ["line 1", "ndisp"]),
             ("ndisp=99999999999", ["line 1", "ndisp"]),
-            ("ndisp 64", ["line 1", "ndisp"]),
+            ("ndisp 64", ["line 1: ndisp", "expected key=value"]),
+            ("width=3\nndips=64", ["line 2: `ndips`", "ndisp may be meant"]),
+            ("Width=3", ["line 1: `Width`", "width may be meant"]),
+            ("width=3\nfocal=4", ["line 2: `focal`: is no entry of a calib.txt", "put # in front of it"]),
+            ("width=3\nsome words", ["line 2: `some words`", "is no entry of a calib.txt"]),
+            ("P0: 7.2e2 0 6e2", ["line 1: `P0: 7.2e2 0 6e2`", "is no entry of a calib.txt"]),
+            ("ndisp=64\nwidth=3\nndisp=64", ["line 3: ndisp", "is there twice; keep one"]),
+            ("isint=0\nisint=0", ["line 2: isint", "is there twice; keep one"]),
+            ("", ["is no calib.txt", "ndisp=64"]),
+            ("# only a comment", ["is no calib.txt", "ndisp=64"]),
             ("\nheight=", ["line 2", "height"]),
             ("vmin=NaN", ["line 1", "vmin"]),
             ("doffs=inf", ["line 1", "doffs"]),

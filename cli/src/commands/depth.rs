@@ -12,7 +12,6 @@ use crate::args::{CameraArgs, ReadingArgs, Sign};
 use crate::console;
 use crate::failure::{Failure, Result};
 use crate::outputs::{AlsoArgs, Outcome, Written, files};
-use crate::pairs::folder::CALIBRATION;
 use crate::pairs::input;
 
 const EXAMPLES: &str = "\
@@ -139,8 +138,8 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
     if let Some(first) = args.calib.first() {
         return Ok((Some(first.clone()), input::of_rectified_images(&args.calib, size)?));
     }
-    if let Some(calibration) = Calibration::beside(&args.map)? {
-        return Ok((Some(args.map.with_file_name(CALIBRATION)), calibration));
+    if let Some(files) = input::beside(&args.map) {
+        return Ok((files.first().cloned(), input::of_rectified_images(&files, size)?));
     }
     let reason = format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());
     Err(Failure::usage("--calib", reason))

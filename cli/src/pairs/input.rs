@@ -178,8 +178,9 @@ impl Input {
         } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
             Some(Known { files, calibration })
         } else if let Some(left) = beside {
-            let files = vec![left.with_file_name(CALIBRATION)];
-            Calibration::beside(left)?.map(|calibration| Known { files, calibration })
+            let files = beside(left);
+            let calibration = files.as_ref().map(|files| of_rectified_images(files, pair.size())).transpose()?;
+            files.zip(calibration).map(|(files, calibration)| Known { files, calibration })
         } else {
             None
         };
@@ -321,6 +322,12 @@ pub(crate) fn unit(unit: Unit, file: Option<&Path>) -> String {
         (unit, Some(file)) => format!("{}, by {}", unit.name(), file.display()),
         (unit, None) => unit.name().into(),
     }
+}
+
+/// The calibration beside an image, where there is one: it counts as one that is given.
+pub(crate) fn beside(image: &Path) -> Option<Vec<PathBuf>> {
+    let path = image.with_file_name(CALIBRATION);
+    path.exists().then(|| vec![path])
 }
 
 /// What the calibration in `files` says of images that are rectified and of this `size`.

@@ -496,16 +496,16 @@ fn files_that_are_no_calibration_are_told() {
     let (keys, elements) = ((0..2000).map(|n| format!("k{n}: 1\n")), (0..2000).map(|n| format!("<k{n}/>")));
     let (deep, lists) = (("<b>".repeat(2000), "</b>".repeat(2000)), ("[".repeat(40), "]".repeat(40)));
     let wrong = [
-        ("empty", "".into(), "is no YAML with entries"),
+        ("empty", "".into(), "is empty"),
         ("words", "some words\n".into(), "expected the entries of OpenCV"),
         ("list", "- 1\n- 2\n".into(), "expected the entries of OpenCV"),
-        ("lists", "[".repeat(100_000).into_bytes(), "is no YAML"),
-        ("nested", format!("{}1{}", lists.0, lists.1).into_bytes(), "too many levels"),
+        ("lists", "[".repeat(100_000).into_bytes(), "is no calibration of a known form"),
+        ("nested", format!("---\n{}1{}", lists.0, lists.1).into_bytes(), "too many levels"),
         ("groups", format!("<a>{}", "<b>".repeat(20_000)).into_bytes(), "is no XML"),
         ("deep", format!("<a>{}{}</a>", deep.0, deep.1).into_bytes(), "too many levels"),
-        ("keys", keys.collect::<String>().into_bytes(), "too many entries"),
+        ("keys", format!("---\n{}", keys.collect::<String>()).into_bytes(), "too many entries"),
         ("elements", format!("<a>{}</a>", elements.collect::<String>()).into_bytes(), "too many entries"),
-        ("bytes", vec![0, 159, 146, 150, 10], "bytes"),
+        ("bytes", vec![0, 159, 146, 150, 10], "bytes that are no text"),
         ("large", vec![b' '; (1 << 20) + 1], "larger than any calibration file"),
         ("half", "cam0=[100 0 30; 0 100 20; 0 0 1]\n".into(), "K1, D1, K2 and D2"),
         ("left", ros("0").into_bytes(), "of one camera & the other one too"),
@@ -519,7 +519,7 @@ fn files_that_are_no_calibration_are_told() {
         ("none", "none & no such file"),
         ("left left", "left & expected focal length times baseline"),
         ("left words", "words & does not belong"),
-        ("opencv opencv opencv", "opencv & does not belong to the other files"),
+        ("opencv opencv opencv", "opencv & is not needed: opencv is a whole calibration (read as OpenCV's)"),
         ("opencv opencv opencv opencv", "opencv & one too many"),
     ];
     let wrong = wrong.map(|(name, _, words)| (name, format!("{name} & {words}")));

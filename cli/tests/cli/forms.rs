@@ -180,8 +180,8 @@ impl Rig {
         for size in ["HD", "VGA"] {
             text += &(lens("LEFT", 0, size) + &lens("RIGHT", 1, size));
         }
-        let ([x, y, z], [tx, ty, tz]) = (rotation_vector(&self.r), self.t.map(|v| -1000.0 * v));
-        text += &format!("[STEREO]\nBaseline={tx}\nTY={ty}\nTZ={tz}\n");
+        let ([x, y, z], [tx, ty, tz]) = (rotation_vector(&self.r), self.t.map(|v| 1000.0 * v));
+        text += &format!("[STEREO]\nBaseline={}\nTY={ty}\nTZ={tz}\n", -tx);
         for size in ["HD", "VGA"] {
             text += &format!("CV_{size}={y}\nRX_{size}={x}\nRZ_{size}={z}\n");
         }
