@@ -17,6 +17,9 @@ const DISTORTION: [&str; 2] = [
     "d1 distcoeffs1 distortioncoefficients1 dist1 distcoeffsleft leftdistcoeffs dleft dl distcoeffsl distcoeffl distl distleft leftdist leftdistortion distortionleft left.d",
     "d2 distcoeffs2 distortioncoefficients2 dist2 distcoeffsright rightdistcoeffs dright dr distcoeffsr distcoeffr distr distright rightdist rightdistortion distortionright right.d",
 ];
+// Of one camera, without a number.
+const ALONE: &str = "k cameramatrix m intrinsicmatrix mtx";
+const DISTORTION_ALONE: &str = "d distortioncoefficients distcoeffs dist";
 pub(super) const ROTATION: &str = "r rotation rotationmatrix stereor rot";
 pub(super) const TRANSLATION: &str = "t translation translationvector trans stereot trns";
 const RECTIFICATION: [&str; 2] =
@@ -160,6 +163,23 @@ fn lens(entries: &Entries, view: usize) -> Result<Lens> {
         Some(xi) => Distortion::Unified { xi: xi.number()?, then: radial_tangential(&entry, expected)? },
         None => distortion(&entry, expected, fisheye)?,
     };
+    Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
+}
+
+/// Whether there is the lens of one camera, which has no number.
+pub(super) fn has_lens_alone(entries: &Entries) -> bool {
+    entries.find_all(ALONE).any(|entry| entry.is_matrix())
+}
+
+/// The lens of one camera, without the number that it has in a pair.
+pub(super) fn lens_alone(entries: &Entries) -> Result<Lens> {
+    let expected =
+        "the matrix [f 0 cx; 0 f cy; 0 0 1] of one camera; or give Kalibr's chain, or the file of an OAK";
+    let matrix = entries.require(ALONE, "K", expected)?;
+    let (focal_length, principal_point) = camera(&matrix)?;
+    let expected = "the distortion of the lens, 0 0 0 0 for none";
+    let entry = entries.require(DISTORTION_ALONE, "D", expected)?;
+    let distortion = distortion(&entry, expected, is_fisheye(entries)?)?;
     Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 

@@ -4,15 +4,14 @@ use super::cameras::{Pose, StereoCalibration};
 use super::node::Entries;
 use super::opencv;
 use super::posed::{Posed, pair};
-use super::third;
 use crate::error::{Error, Result};
 
 /// What these files say together; `None` where none of them has a lens of one camera, or a pose alone.
 pub(super) fn read(files: &[Entries]) -> Option<Result<StereoCalibration>> {
-    let lenses: Vec<&Entries> = files.iter().filter(|file| third::has_lens(file)).collect();
+    let lenses: Vec<&Entries> = files.iter().filter(|file| opencv::has_lens_alone(file)).collect();
     let poses: Vec<&Entries> = files.iter().filter(|file| opencv::has_pose(file)).collect();
     let wrong = |file: &Entries, reason: &str| Some(Err(Error::read(file.path(), reason)));
-    let alone = files.iter().find(|file| !third::has_lens(file) && !opencv::has_pose(file));
+    let alone = files.iter().find(|file| !opencv::has_lens_alone(file) && !opencv::has_pose(file));
     match (&lenses[..], &poses[..]) {
         ([], []) => None,
         ([], [pose, ..]) => wrong(
@@ -45,7 +44,7 @@ pub(super) fn read(files: &[Entries]) -> Option<Result<StereoCalibration>> {
 fn of_parts(left: &Entries, right: &Entries, stand: &Entries) -> Result<StereoCalibration> {
     let posed = |camera: &Entries, pose: Pose| -> Result<Posed> {
         let entry = stand.require(opencv::TRANSLATION, "T", "that from the left camera to the right one")?;
-        Ok(Posed { lens: third::lens(camera)?, size: opencv::size(camera)?, pose, entry })
+        Ok(Posed { lens: opencv::lens_alone(camera)?, size: opencv::size(camera)?, pose, entry })
     };
     let unit = opencv::unit(stand)?;
     pair(&posed(left, Pose::IN_PLACE)?, &posed(right, opencv::pose(stand)?)?, unit)

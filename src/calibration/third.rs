@@ -3,20 +3,10 @@
 use std::path::Path;
 
 use super::cameras::{Pose, ThirdCamera};
-use super::lens::Lens;
 use super::node::Entries;
 use super::{depthai, in_form, kalibr, opencv, root, text};
 use crate::error::{Error, Result};
 use crate::image::read::MAX_PIXELS;
-
-// In lower case and without `_`, as `Entries::find` takes them.
-const CAMERA: &str = "k cameramatrix m intrinsicmatrix mtx";
-const DISTORTION: &str = "d distortioncoefficients distcoeffs dist";
-
-/// Whether there is the lens of one camera.
-pub(super) fn has_lens(entries: &Entries) -> bool {
-    entries.find_all(CAMERA).any(|entry| entry.is_matrix())
-}
 
 /// Reads a third camera from a file: one camera by OpenCV's names (K, D, R, T and `image_size`, or those of ROS's `camera_info`), the last
 /// camera of Kalibr's chain, or the camera of an OAK's calibration that is not one of its pair.
@@ -51,23 +41,11 @@ pub fn of_text(name: &Path, text: &str) -> Result<ThirdCamera> {
 
 /// By OpenCV's names, without the number that they have in a pair.
 fn one(entries: &Entries) -> Result<ThirdCamera> {
-    let lens = lens(entries)?;
+    let lens = opencv::lens_alone(entries)?;
     let size = opencv::size(entries)?.ok_or_else(|| {
         Error::read(entries.path(), "image_size is missing: expected width and height of its images")
     })?;
     Ok(ThirdCamera { lens, pose: pose(entries)?, size, unit: opencv::unit(entries)? })
-}
-
-/// The lens of one camera, without the number that it has in a pair.
-pub(super) fn lens(entries: &Entries) -> Result<Lens> {
-    let expected =
-        "the matrix [f 0 cx; 0 f cy; 0 0 1] of one camera; or give Kalibr's chain, or the file of an OAK";
-    let matrix = entries.require(CAMERA, "K", expected)?;
-    let (focal_length, principal_point) = opencv::camera(&matrix)?;
-    let expected = "the distortion of the lens, 0 0 0 0 for none";
-    let entry = entries.require(DISTORTION, "D", expected)?;
-    let distortion = opencv::distortion(&entry, expected, opencv::is_fisheye(entries)?)?;
-    Lens::new(focal_length, principal_point, distortion).map_err(|_| matrix.wrong("a camera with its lens"))
 }
 
 /// From the left camera. The third one may stand in its place.
