@@ -42,8 +42,8 @@ pub fn quoted(text: &str) -> String {
     format!("`{shown}{more}`")
 }
 
-/// Whether two words differ by a slip of the pen: by capitals, or by at most two letters.
-pub(crate) fn is_near(one: &str, other: &str) -> bool {
+/// How many letters of a word are to be put in, left out or replaced to make it another one, whatever their case.
+pub(crate) fn letters_apart(one: &str, other: &str) -> usize {
     let (one, other) = (one.to_lowercase(), other.to_lowercase());
     let mut row: Vec<usize> = (0..=other.chars().count()).collect();
     for (i, a) in one.chars().enumerate() {
@@ -54,5 +54,24 @@ pub(crate) fn is_near(one: &str, other: &str) -> bool {
             row[j + 1] = replaced.min(before + 1).min(row[j] + 1);
         }
     }
-    row.last().is_some_and(|letters| *letters <= 2)
+    row.last().copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_between_words_are_counted() {
+        for (one, other, letters) in [
+            ("ndisp", "ndisp", 0),
+            ("NDISP", "ndisp", 0),
+            ("ndips", "ndisp", 2),
+            ("doff", "doffs", 1),
+            ("", "abc", 3),
+            ("abc", "", 3),
+        ] {
+            assert_eq!(letters_apart(one, other), letters, "{one} {other}");
+        }
+    }
 }

@@ -79,13 +79,17 @@ fn image<'a>(entry: Entry<'a>, cameras: &Entry) -> Result<Posed<'a>> {
     let numbers = numbers.iter().map(Entry::number).collect::<Result<Vec<_>>>()?;
     let [w, x, y, z, tx, ty, tz, id] = numbers[..] else { return Err(entry.wrong(expected)) };
     let pose = Pose { rotation: entry.quaternion([w, x, y, z])?, translation: [tx, ty, tz] };
+    let mut found = None;
     for camera in cameras.items()? {
-        if camera.items()?.first().map(Entry::number).transpose()? == Some(id) {
-            let (lens, size) = self::camera(&camera)?;
-            return Ok(Posed { lens, size: Some(size), pose, entry });
+        if camera.items()?.first().map(Entry::number).transpose()? == Some(id)
+            && found.replace(self::camera(&camera)?).is_some()
+        {
+            return Err(camera.error(format_args!("is camera {id} again; keep one")));
         }
     }
-    Err(entry.error(format_args!("is of camera {id}, which {CAMERAS} has not")))
+    let (lens, size) =
+        found.ok_or_else(|| entry.error(format_args!("is of camera {id}, which {CAMERAS} has not")))?;
+    Ok(Posed { lens, size: Some(size), pose, entry })
 }
 
 /// A line of `cameras.txt`: its number, its model, width, height and the parameters.

@@ -52,7 +52,8 @@ pub(super) fn is(entries: &Entries) -> bool {
 
 /// Whether there is R with T, as OpenCV's stereo calibration has them.
 pub(super) fn has_pose(entries: &Entries) -> bool {
-    entries.find(ROTATION).is_some() && entries.find(TRANSLATION).is_some()
+    let has = |names: &str| entries.find(names).is_some_and(|entry| entry.is_compound());
+    has(ROTATION) && has(TRANSLATION)
 }
 
 /// All that is read, by its names.

@@ -11,12 +11,21 @@ pub(super) fn read(files: &[Entries]) -> Option<Result<StereoCalibration>> {
     let lenses: Vec<&Entries> = files.iter().filter(|file| opencv::has_lens_alone(file)).collect();
     let poses: Vec<&Entries> = files.iter().filter(|file| opencv::has_pose(file)).collect();
     let wrong = |file: &Entries, reason: &str| Some(Err(Error::read(file.path(), reason)));
-    let alone = files.iter().find(|file| !opencv::has_lens_alone(file) && !opencv::has_pose(file));
+    if let Some(other) = files.iter().find(|file| !opencv::has_lens_alone(file) && !opencv::has_pose(file))
+        && !lenses.is_empty()
+    {
+        return wrong(
+            other,
+            "does not belong to the other files: it has neither a lens nor R and T; leave it out",
+        );
+    }
     match (&lenses[..], &poses[..]) {
+        ([], _) if files.iter().any(opencv::is) => None,
         ([], []) => None,
         ([], [pose, ..]) => wrong(
             pose,
-            "says how the cameras stand, and there is no file of their lenses (K1, D1, K2, D2, or a file for each camera); give these too",
+            "says how the cameras stand, and there is no file of their lenses (K1, D1, K2, D2, or a file for each camera); give \
+             these too",
         ),
         ([lens], []) => wrong(
             lens,
@@ -28,10 +37,7 @@ pub(super) fn read(files: &[Entries]) -> Option<Result<StereoCalibration>> {
             "is the second of two lenses, and no file says how the cameras stand; give a third one with R and T, from the left \
              camera to the right one",
         ),
-        ([left, right], [pose]) => match alone {
-            Some(other) => wrong(other, "is not needed: it has neither a lens nor R and T; leave it out"),
-            None => Some(of_parts(left, right, pose)),
-        },
+        ([left, right], [pose]) => Some(of_parts(left, right, pose)),
         ([_, _], [_, pose, ..]) => {
             wrong(pose, "has R and T, and so has another file; keep those that are right")
         }

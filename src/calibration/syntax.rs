@@ -209,7 +209,7 @@ pub(super) fn ini(text: &str) -> Result<Node, String> {
                 return wrong("expected a section such as [STEREO]");
             };
             if entries.iter().any(|(other, _)| other == name.trim()) {
-                return wrong(&format!("{} is there twice; keep one", quoted(name)));
+                return wrong(&format!("{} is there twice; keep one", quoted(name.trim())));
             }
             entries.push((name.trim().into(), Node::Scalar(value.trim().into())));
         }

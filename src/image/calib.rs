@@ -138,9 +138,10 @@ impl Calibration {
     pub(crate) fn is_meant(text: &str) -> bool {
         let mut keys = lines(text).map(|(_, line)| line.split_once('=').map(|(key, _)| key.trim()));
         let Some(Some(first)) = keys.next() else { return false };
+        let has_sections = lines(text).any(|(_, line)| line.starts_with('['));
         let known = |key: &str| KEYS.contains(&key) || near(key).is_some();
-        !first.contains(|c: char| !c.is_alphanumeric() && c != '_')
-            && (known(first) || keys.flatten().any(known))
+        let is_word = first.chars().all(|c| c.is_alphanumeric() || c == '_');
+        is_word && !has_sections && (known(first) || keys.flatten().any(known))
     }
 
     /// Parses `key=value` lines; those that begin with # are comments. The error names line and key.
@@ -245,7 +246,12 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// The key that is meant by one that is not known.
 fn near(key: &str) -> Option<&'static str> {
-    KEYS.into_iter().find(|known| key.len() >= 4 && text::is_near(key, known))
+    let most = match key.len() {
+        0..=3 => return None,
+        4 => 1,
+        _ => 2,
+    };
+    KEYS.into_iter().find(|known| text::letters_apart(key, known) <= most)
 }
 
 fn unknown(key: &str) -> String {

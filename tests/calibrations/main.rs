@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it stands")]
 #![allow(clippy::format_push_string, reason = "texts of many lines read best so")]
 
-mod forms;
 mod foreign;
+mod forms;
 
 use mrfgs::calibration::{self, cameras::StereoCalibration};
 use std::path::PathBuf;

@@ -179,7 +179,8 @@ impl Input {
             Some(Known { files, calibration })
         } else if let Some(left) = beside {
             let files = beside(left);
-            let calibration = files.as_ref().map(|files| of_rectified_images(files, pair.size())).transpose()?;
+            let calibration =
+                files.as_ref().map(|files| of_rectified_images(files, pair.size())).transpose()?;
             files.zip(calibration).map(|(files, calibration)| Known { files, calibration })
         } else {
             None
