@@ -966,7 +966,7 @@ class Rectification(Folder):
             (ValueError, "Calibration.of_texts", lambda: mrfgs.Rectification(text)),
             (TypeError, "calibration: give the path", lambda: mrfgs.Rectification(7)),
             (TypeError, "calibration: give the path", lambda: mrfgs.Rectification([7])),
-            (ValueError, "does not belong to the other files", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS)),
+            (ValueError, "is not needed", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS)),
             (ValueError, "one too many", lambda: mrfgs.Calibration(CAMERAS, CAMERAS, CAMERAS, CAMERAS)),
             (ValueError, "the text: K1", lambda: of_texts(text.replace("214.0, 0.0, 121.4", "wide, 0.0, 121.4"))),
             (ValueError, "the text: R is missing", lambda: mrfgs.Rectification(of_texts(text.split("R: ")[0]), (240, 180))),

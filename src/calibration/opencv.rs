@@ -7,6 +7,7 @@ use super::models::Model;
 use super::node::{Entries, Entry};
 use crate::error::Result;
 use crate::image::calib::{Camera, Unit};
+use crate::text::letters_apart;
 
 // In lower case and without `_`, as `Entries::find` takes them.
 const CAMERA: [&str; 2] = [
@@ -37,6 +38,8 @@ const FISHEYE: &str = "fisheye fisheyemodel usefisheye";
 const MODEL: [&str; 2] = ["distortionmodel distortiontype lensmodel", "cameramodel"];
 const Q: &str = "q disparitytodepth disptodepth";
 const UNIT: &str = "unit units";
+/// What is not required, so that a slip in its name would go unseen.
+const OPTIONAL: [&str; 5] = ["fisheye", "unit", "imagesize", "newimagesize", "distortionmodel"];
 
 /// Whether there is a lens by its names.
 pub(super) fn has_lens(entries: &Entries) -> bool {
@@ -75,6 +78,7 @@ pub(super) fn needs_all(files: &[Entries]) -> bool {
 
 pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     known().try_for_each(|names| entries.agree(names))?;
+    rightly_spelt(entries)?;
     let (size, unit) = (size(entries)?, unit(entries)?);
     let mut calibration = StereoCalibration { size, unit, ..StereoCalibration::default() };
     let has = |names: &str| entries.find(names).is_some();
@@ -90,6 +94,24 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     }
     check_baseline(entries, &calibration)?;
     Ok(calibration)
+}
+
+/// An error where a name is nearly that of an entry that changes what is read. Others, and what only adds to a name, are left alone.
+fn rightly_spelt(entries: &Entries) -> Result<()> {
+    let is_known = |name: &str| known().any(|names| names.split(' ').any(|known| known == name));
+    let is_near = |name: &str, known: &str| {
+        let most = if known.len() > 4 { 2 } else { 1 };
+        !name.starts_with(known) && !name.ends_with(known) && letters_apart(name, known) <= most
+    };
+    for name in entries.names().filter(|name| !is_known(name)) {
+        if let Some(meant) = OPTIONAL.into_iter().find(|known| is_near(&name, known)) {
+            let entry = entries.require(&name, &name, "")?;
+            return Err(entry.error(format_args!(
+                "is no entry that is known; {meant} may be meant: correct it, or leave it out"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// T, P2 and Q each say the distance of the cameras; an error where they differ.

@@ -352,6 +352,22 @@ fn damaged() -> Vec<File> {
         file("twice-10.yaml", format!("{chain}cam1:\n  a: 1\n"), "`cam1` is there twice"),
         file("twice-11.txt", driving_stereo() + "K_101: 1 0 0 0 1 0 0 0 1\n", "`K_101` is there twice"),
         file("twice-12.txt", ost("/left", "0.0") + "projection\n1 2 3\n", "`projection` is there twice"),
+        file(
+            "typo-1.yml",
+            format!("{cv}fishey: 1\n"),
+            "fishey: is no entry that is known; fisheye may be meant",
+        ),
+        file(
+            "typo-2.yml",
+            changed(&cv, "imageSize", "imgaeSize"),
+            "imgaeSize: is no entry & imagesize may be meant",
+        ),
+        file("typo-3.yml", format!("{cv}uni: mm\n"), "uni: is no entry & unit may be meant"),
+        file(
+            "typo-4.yml",
+            format!("{cv}distorsion_model: equidistant\n"),
+            "distorsion_model & distortionmodel may be meant",
+        ),
         file("no-rotation.yml", changed(&cv, "R: ", "X: "), "R is missing"),
         file("no-lens.yml", changed(&cv, "K2: ", "X: "), "K2 is missing"),
         file("in-place.yml", changed(&cv, "-0.12, 0, 0", "0, 0, 0"), "the two cameras apart"),
@@ -458,6 +474,11 @@ fn calibrations_beside_those_are_read() {
         ("opencv.yml", cv.clone().into_bytes()),
         ("no-extension", cv.clone().into_bytes()),
         ("other-entries.yml", format!("{cv}rms: 0.3\nflags: 0\nnote: \"words: more\"\n").into_bytes()),
+        (
+            "near-names.yml",
+            format!("{cv}image_size_l: [1, 1]\nfisheye_flags: 3\ncamera_name: a\nimage_mean: 3\n")
+                .into_bytes(),
+        ),
         ("same-twice.yml", format!("{cv}cameraMatrix1: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n").into_bytes()),
         ("end-of-document.yml", format!("{cv}...\n").into_bytes()),
         ("opencv.gz", gzip(cv.as_bytes())),

@@ -529,6 +529,79 @@ fn files_that_are_no_calibration_are_told() {
     }
 }
 
+/// What is none is refused by every command that takes a calibration; `tests/calibrations` of the library goes through many more.
+#[test]
+fn no_command_takes_what_is_no_calibration() {
+    let folder = Folder::new();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).unwrap();
+    write("readme.md", b"# Stereo\n\nIt matches.\n");
+    write("words.txt", b"hello world\n");
+    write("key_value.txt", b"abc=1\n");
+    write("typo.txt", b"ndips=48\n");
+    write("twice.txt", b"ndisp=48\nndisp=64\n");
+    write("K1.npy", b"\x93NUMPY\x01\0");
+    write("d.pfm", b"Pf\n240 180\n-1.0\n");
+    fs::create_dir(folder.join("folder")).unwrap();
+    let before = listing(&folder);
+    let (raw, end) = ("@raw/left.png @raw/right.png", "--max-disparity 31");
+    for (files, words) in [
+        ("@raw/left.png", "left.png: is a PNG image, and no calibration"),
+        ("readme.md", "readme.md: is no calibration of a known form"),
+        ("words.txt", "words.txt: is no calibration of a known form"),
+        ("key_value.txt", "key_value.txt: is no calibration of a known form"),
+        ("typo.txt", "typo.txt: line 1: `ndips`: is no entry of a calib.txt; ndisp may be meant"),
+        ("twice.txt", "twice.txt: line 2: ndisp: is there twice; keep one"),
+        ("K1.npy", "K1.npy: is one array of numpy & np.savez"),
+        ("folder", "folder & directory"),
+        ("@raw/cameras.yml words.txt", "words.txt: is not needed & cameras.yml is a whole calibration"),
+        ("words.txt @raw/cameras.yml", "words.txt: is not needed & cameras.yml is a whole calibration"),
+        (
+            "@raw/cameras.yml @mixed/calib.txt",
+            "cameras.yml: is not needed & calib.txt is a whole calibration",
+        ),
+    ] {
+        let calib = calib(files);
+        for line in [
+            format!("match {raw} d.pfm {end}{calib}"),
+            format!("match {raw} d.pfm {end} --rectify{calib}"),
+            format!("rectify {raw} out{calib}"),
+            format!("inspect {raw} out {end}{calib}"),
+        ] {
+            let run = run(&folder, &line);
+            run.failed(1, words);
+            assert!(listing(&folder) == before, "{line}: nothing is left");
+        }
+    }
+    // Control: the calibration by itself.
+    run(&folder, &format!("rectify {raw} out{}", calib("@raw/cameras.yml"))).succeeded();
+}
+
+/// A calib.txt beside the left image counts as one that is given, in whatever form.
+#[test]
+fn a_calibration_beside_the_images_may_have_any_form() {
+    let folder = Folder::new();
+    for view in ["im0.png", "im1.png"] {
+        fs::copy(scene("slanted").join(view), folder.join(view)).unwrap();
+    }
+    let line = "match im0.png im1.png d.pfm --max-disparity 31 --also depth-mm";
+    let depths = |text: &str| {
+        fs::write(folder.join("calib.txt"), text).unwrap();
+        run(&folder, line).succeeded();
+        fs::read(folder.join("d.depth-mm.png")).unwrap()
+    };
+    let middlebury = depths("cam0=[215.5 0 118.5; 0 215.5 89.5; 0 0 1]\ndoffs=0\nbaseline=160\n");
+    let row =
+        |n: usize, tx: &str| format!("P{n}: 2.155e+02 0 1.185e+02 {tx} 0 2.155e+02 8.95e+01 0 0 0 1 0\n");
+    assert!(depths(&(row(0, "0") + &row(1, "-34.48"))) == middlebury);
+    // Control: another baseline.
+    assert!(depths(&(row(0, "0") + &row(1, "-30"))) != middlebury);
+    for (text, words) in [("some words\n", "is no calibration of a known form"), ("", "is empty")] {
+        fs::write(folder.join("calib.txt"), text).unwrap();
+        run(&folder, line).failed(1, &format!("calib.txt & {words}"));
+        run(&folder, "depth d.pfm e.pfm --also depth").failed(1, &format!("calib.txt & {words}"));
+    }
+}
+
 /// A focal length and a baseline are a calibration.
 #[test]
 fn numbers_take_the_place_of_a_calibration() {
