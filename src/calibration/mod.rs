@@ -140,10 +140,13 @@ pub fn read(files: &[PathBuf]) -> Result<StereoCalibration> {
 /// # Errors
 /// [`Error::Read`] when it cannot be read, is larger than any calibration, or is of a kind that is none, such as an image.
 pub fn text(file: &Path) -> Result<String> {
+    let wrong = |reason: String| Error::read(file, reason);
+    if file.is_dir() {
+        return Err(wrong("is a folder; give the calibration that is in it".into()));
+    }
     let mut head = Vec::new();
     let read = File::open(file).and_then(|file| file.take(512).read_to_end(&mut head));
     read.map_err(|e| Error::opening(file, e))?;
-    let wrong = |reason| Error::read(file, reason);
     if numpy::is_archive(&head) {
         let bytes = text::read(file, MAX_ARCHIVE, "calibration file")?;
         if numpy::is(&bytes) {

@@ -481,6 +481,7 @@ fn calibrations_beside_those_are_read() {
         ),
         ("same-twice.yml", format!("{cv}cameraMatrix1: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n").into_bytes()),
         ("end-of-document.yml", format!("{cv}...\n").into_bytes()),
+        ("size-of-images.xml", b"<opencv_storage><imageSize>640 480</imageSize><P1>500 0 320 0 0 500 240 0 0 0 1 0</P1><P2>500 0 320 -60 0 500 240 0 0 0 1 0</P2></opencv_storage>".to_vec()),
         ("opencv.gz", gzip(cv.as_bytes())),
         ("of-windows.yml", utf16(&cv)),
         ("latin.yml", [cv.as_bytes(), b"# caf\xe9\n"].concat()),
@@ -557,7 +558,7 @@ fn a_file_too_many_is_told() {
     }
     // Control: what belongs together.
     assert!(read(&[("lenses.yml", &lenses), ("pose.yml", &pose)]).is_ok());
-    let (paths, folder) = (vec![std::env::temp_dir()], "directory");
+    let (paths, folder) = (vec![std::env::temp_dir()], "is a folder; give the calibration that is in it");
     let told = calibration::read(&paths).unwrap_err().to_string();
     assert!(told.lines().count() == 1 && told.contains(folder), "{told}");
 }

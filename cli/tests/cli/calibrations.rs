@@ -540,7 +540,6 @@ fn no_command_takes_what_is_no_calibration() {
     write("typo.txt", b"ndips=48\n");
     write("twice.txt", b"ndisp=48\nndisp=64\n");
     write("K1.npy", b"\x93NUMPY\x01\0");
-    write("d.pfm", b"Pf\n240 180\n-1.0\n");
     fs::create_dir(folder.join("folder")).unwrap();
     let before = listing(&folder);
     let (raw, end) = ("@raw/left.png @raw/right.png", "--max-disparity 31");
@@ -552,7 +551,7 @@ fn no_command_takes_what_is_no_calibration() {
         ("typo.txt", "typo.txt: line 1: `ndips`: is no entry of a calib.txt; ndisp may be meant"),
         ("twice.txt", "twice.txt: line 2: ndisp: is there twice; keep one"),
         ("K1.npy", "K1.npy: is one array of numpy & np.savez"),
-        ("folder", "folder & directory"),
+        ("folder", "folder: is a folder"),
         ("@raw/cameras.yml words.txt", "words.txt: is not needed & cameras.yml is a whole calibration"),
         ("words.txt @raw/cameras.yml", "words.txt: is not needed & cameras.yml is a whole calibration"),
         (
