@@ -34,7 +34,7 @@ Examples:
 /// orientation; with --calib they are not, because a calibration is of the pixels as they are stored.
 ///
 /// CALIB is OpenCV's YAML, XML or JSON (K1, D1, K2, D2, R, T, or R1, R2, P1, P2 too), ROS's `camera_info` of both cameras, Kalibr's
-/// camera chain (cam0 is the left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK or COLMAP, or
+/// camera chain (cam0 is the left camera), a file of EuRoC, KITTI, ORB-SLAM3, VINS-Fusion, Basalt, ZED, OAK, COLMAP, mrcal or OKVIS, or
 /// Middlebury's calib.txt. They are recognised by their content. Lenses are pinholes with radial and tangential distortion,
 /// fisheyes (equidistant; OpenCV's files say `fisheye: 1`), omni, double sphere, extended unified or field of view; the guide
 /// has a table.
