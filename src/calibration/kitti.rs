@@ -1,4 +1,4 @@
-//! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which has the lenses too. Those of DrivingStereo have
+//! KITTI's calibrations: `P0` to `P3` of its odometry, and `calib_cam_to_cam.txt`, which has the lenses too. Those of `DrivingStereo` have
 //! its entries, with cameras 101 and 103.
 
 use super::cameras::{Pose, StereoCalibration, Views};
@@ -12,7 +12,7 @@ use crate::image::calib::{Camera, Unit};
 /// Cameras 0 and 1 are grey, 2 and 3 in colour.
 const GREY: [usize; 2] = [0, 1];
 const COLOUR: [usize; 2] = [2, 3];
-/// Those of DrivingStereo, left and right.
+/// Those of `DrivingStereo`, left and right.
 const DRIVING_STEREO: [usize; 2] = [101, 103];
 
 /// Whether these entries are KITTI's: whether a projection has a name that OpenCV's have not.

@@ -31,12 +31,11 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
 
 fn camera<'a>(item: &Entry<'a>) -> Result<Posed<'a>> {
     let entries = item.group()?;
-    let (pose, entry) = match entries.find(BACK) {
-        Some(entry) => (entry.pose()?, entry),
-        None => {
-            let entry = entries.require(POSES, "T_SC", "a matrix of 4 x 4 from the camera to the body")?;
-            (entry.pose()?.inverse(), entry)
-        }
+    let (pose, entry) = if let Some(entry) = entries.find(BACK) {
+        (entry.pose()?, entry)
+    } else {
+        let entry = entries.require(POSES, "T_SC", "a matrix of 4 x 4 from the camera to the body")?;
+        (entry.pose()?.inverse(), entry)
     };
     let (lens, size) = match entries.find("camera") {
         Some(camera) => of_maplab(&camera.group()?)?,

@@ -18,7 +18,8 @@ pub(super) fn is_archive(bytes: &[u8]) -> bool {
 
 /// Whether an archive holds arrays.
 pub(super) fn is(bytes: &[u8]) -> bool {
-    is_archive(bytes) && members(bytes).is_some_and(|all| all.iter().any(|(name, ..)| name.ends_with(".npy")))
+    is_archive(bytes)
+        && members(bytes).is_some_and(|all| all.iter().any(|(name, ..)| name.strip_suffix(".npy").is_some()))
 }
 
 /// The small arrays of an archive, one a line: `R: [1.0, 0.0, ...]`. The error is one line.

@@ -88,7 +88,7 @@ fn distortion(section: &Entries) -> Result<Distortion> {
     let c = |name: &str| section.number_or_zero(name);
     let [k1, k2, k3, k4] = [c("k1")?, c("k2")?, c("k3")?, c("k4")?];
     let others = [c("p1")?, c("p2")?, c("k5")?, c("k6")?];
-    if k4 != 0.0 && others == [0.0; 4] {
+    if k4 != 0.0 && others.iter().all(|v| *v == 0.0) {
         return Ok(Distortion::Equidistant([k1, k2, k3, k4]));
     }
     let [p1, p2, k5, k6] = others;

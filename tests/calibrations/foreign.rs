@@ -6,6 +6,7 @@ use super::forms::{
 use super::*;
 use std::collections::BTreeSet;
 use std::io::Write;
+use std::path::Path;
 
 /// Name and bytes of a file, and what the line must say.
 struct File {
@@ -425,15 +426,13 @@ fn damaged() -> Vec<File> {
 fn speaks_of_another(file: &File, told: &str) -> Option<&'static str> {
     let text = String::from_utf8_lossy(&file.bytes);
     let start = text.trim_start_matches('\u{feff}').trim_start();
-    let yaml = start.starts_with("%YAML")
-        || start.starts_with("---")
-        || file.name.ends_with(".yml")
-        || file.name.ends_with(".yaml");
+    let extension = Path::new(&file.name).extension().and_then(|end| end.to_str()).unwrap_or_default();
+    let yaml = start.starts_with("%YAML") || start.starts_with("---") || ["yml", "yaml"].contains(&extension);
     let formats = [
         (" YAML", yaml),
         (" JSON", start.starts_with('{')),
         (" XML", start.starts_with('<')),
-        ("calib.txt", file.name.ends_with(".txt") && text.contains('=')),
+        ("calib.txt", extension == "txt" && text.contains('=')),
     ];
     let said = told.replace(&file.name, "");
     formats.into_iter().find(|(word, may)| said.contains(word) && !may).map(|(word, _)| word)
@@ -449,7 +448,7 @@ fn files_that_are_no_calibrations_are_refused() {
         match read(&[(&one.name, &one.bytes)]) {
             Ok(found) => wrong.push(format!("{} is read as {found:?}", one.name)),
             Err(told) if !says(&told, &one.name, one.words) => {
-                wrong.push(format!("{}: {told}: without {}", one.name, one.words))
+                wrong.push(format!("{}: {told}: without {}", one.name, one.words));
             }
             Err(told) => wrong
                 .extend(speaks_of_another(one, &told).map(|word| format!("{}: {told}: of{word}", one.name))),
@@ -495,6 +494,9 @@ fn calibrations_beside_those_are_read() {
     }
 }
 
+/// Names and texts of files, the one that the line names, and its words.
+type TooMany<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
+
 /// A file that is not needed.
 #[test]
 fn a_file_too_many_is_told() {
@@ -503,7 +505,7 @@ fn a_file_too_many_is_told() {
     let lenses = cv.split("R: ").next().unwrap().to_owned();
     let left = lens("");
     let words = "hello world\n".to_owned();
-    let rows: &[(&[(&str, &str)], &str, &str)] = &[
+    let rows: &[TooMany] = &[
         (
             &[("ok.yml", &cv), ("words.txt", &words)],
             "words.txt",
