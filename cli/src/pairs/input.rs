@@ -178,7 +178,7 @@ impl Input {
         } else if let Some(calibration) = numbers.and_then(|numbers| numbers.calibration(pair.size())) {
             Some(Known { files, calibration })
         } else if let Some(left) = beside {
-            let files = beside(left);
+            let files = self::beside(left);
             let calibration =
                 files.as_ref().map(|files| of_rectified_images(files, pair.size())).transpose()?;
             files.zip(calibration).map(|(files, calibration)| Known { files, calibration })
