@@ -1,6 +1,6 @@
 // Images that the engine does not read and the browser does, and images that hold both views.
 
-import { swapped } from './order';
+import { inOrder } from './order';
 
 /** A way to cut an image into two views. */
 export type Cut = 'beside' | 'above';
@@ -108,7 +108,7 @@ const LAYOUTS = [
 
 const stem = (name: string) => name.replace(/^.*[\\/]/, '').replace(/\.[^.]*$/, '').toLowerCase();
 
-/** The two views among the images of a folder; all where nothing tells. */
+/** The two views among some images, the left one first; all where nothing tells. */
 export function views<T extends { name: string }>(images: T[]): T[] {
     if (images.length > 2) {
         for (const layout of LAYOUTS) {
@@ -118,5 +118,6 @@ export function views<T extends { name: string }>(images: T[]): T[] {
             }
         }
     }
-    return [...images].sort((a, b) => (swapped(a.name, b.name) ? 1 : -1));
+    const [one, other] = images;
+    return one && other && images.length === 2 ? inOrder(one, other) : images;
 }

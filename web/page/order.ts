@@ -7,24 +7,28 @@ function parts(name: string): string[] {
     return (stem.match(/\d+|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[A-Z]/g) ?? []).map((part) => part.toLowerCase());
 }
 
-/** Whether `b` is the left view of the two; false where the names do not tell. */
-export function swapped(a: string, b: string): boolean {
-    const [first, second] = [parts(a), parts(b)];
-    const length = Math.max(first.length, second.length);
-    for (let i = 0; i < length; i += 1) {
-        const [one, other] = [first[i] ?? '', second[i] ?? ''];
-        if (one === other) {
-            continue;
-        }
-        if (/^\d+$/.test(one) && /^\d+$/.test(other)) {
-            return Number(one) > Number(other);
-        }
-        if (['left', 'l'].includes(other) || ['right', 'r'].includes(one)) {
-            return true;
-        }
-        if (['left', 'l'].includes(one) || ['right', 'r'].includes(other)) {
-            return false;
-        }
+/** -1 for a word that names the left view, 1 for one that names the right view. */
+const side = (part: string): number => (['left', 'l'].includes(part) ? -1 : ['right', 'r'].includes(part) ? 1 : 0);
+
+/** Which of two numbers is the smaller one, of any length; none comes before any. 0 for words. */
+function lower(one: string, other: string): number {
+    if (!/^\d*$/.test(one) || !/^\d*$/.test(other)) {
+        return 0;
     }
-    return false;
+    const [a, b] = [one, other].map((part) => (part === '' ? -1n : BigInt(part))) as [bigint, bigint];
+    return a < b ? -1 : a > b ? 1 : 0;
+}
+
+/** Below 0 where `a` is the left view of the two, above 0 where `b` is, and 0 where the names do not tell. */
+function compared(a: string, b: string): number {
+    const [first, second] = [parts(a), parts(b)];
+    const both = Array.from({ length: Math.max(first.length, second.length) }, (_, i) => [first[i] ?? '', second[i] ?? ''] as const);
+    // Words tell more than numbers: the right view may have been taken first.
+    const words = both.map(([one, other]) => side(one) - side(other));
+    return [...words, ...both.map(([one, other]) => lower(one, other))].find((order) => order !== 0) ?? 0;
+}
+
+/** Two views, the left one first; as they came where their names do not tell. */
+export function inOrder<T extends { name: string }>(a: T, b: T): [T, T] {
+    return compared(a.name, b.name) > 0 ? [b, a] : [a, b];
 }
