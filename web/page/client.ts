@@ -21,6 +21,7 @@ export function explained(error: unknown): string {
 const PATIENCE = 2500;
 
 interface Waiting {
+    name: Name;
     resolve(value: never): void;
     reject(error: Error): void;
 }
@@ -36,7 +37,8 @@ export class Client {
     private started = false;
     private waiting = new Map<number, Waiting>();
     private last = 0;
-    private settled: () => void = () => {};
+    /** Called once a call has ended. */
+    private ended: (() => void)[] = [];
 
     constructor(private readonly script: URL) {
         this.facts = this.hire();
@@ -48,16 +50,30 @@ export class Client {
         return this.send(name, ...args);
     }
 
-    /** Ends all calls: by asking, and after a while by ending the worker. */
+    /** Asks on behalf of what `signal` ends: nothing is asked after that, and no answer counts. */
+    within(signal: AbortSignal): Client['call'] {
+        return async (name, ...args) => {
+            signal.throwIfAborted();
+            await this.facts;
+            signal.throwIfAborted();
+            try {
+                return await this.send(name, ...args);
+            } finally {
+                signal.throwIfAborted();
+            }
+        };
+    }
+
+    /** Ends all calls but those that open a device: by asking, and after a while by ending the worker. */
     async cancel(): Promise<void> {
-        const calls = [...this.waiting.keys()];
+        const calls = [...this.waiting].filter(([, { name }]) => name !== 'open').map(([id]) => id);
         if (!this.started || calls.length === 0) {
             return;
         }
         this.worker.postMessage({ cancel: true } satisfies Request);
         const patience = setTimeout(() => this.replace(new Interrupted('interrupted')), PATIENCE);
         while (calls.some((id) => this.waiting.has(id))) {
-            await new Promise<void>((resolve) => (this.settled = resolve));
+            await new Promise<void>((resolve) => this.ended.push(resolve));
         }
         clearTimeout(patience);
     }
@@ -65,7 +81,7 @@ export class Client {
     private send<N extends Name>(name: N, ...args: Parameters<Calls[N]>): Promise<ReturnType<Calls[N]>> {
         const id = ++this.last;
         return new Promise((resolve, reject) => {
-            this.waiting.set(id, { resolve, reject });
+            this.waiting.set(id, { name, resolve, reject });
             this.worker.postMessage({ id, call: name, args } as Request);
         });
     }
@@ -107,7 +123,7 @@ export class Client {
             } else {
                 waiting?.reject(reply.why === 'interrupted' ? new Interrupted(reply.error) : new Error(reply.error));
             }
-            this.settled();
+            this.tell();
         }
     }
 
@@ -123,6 +139,10 @@ export class Client {
         for (const { reject } of waiting) {
             reject(reason);
         }
-        this.settled();
+        this.tell();
+    }
+
+    private tell(): void {
+        this.ended.splice(0).forEach((resume) => resume());
     }
 }

@@ -1,34 +1,41 @@
-// What is dropped on the page: files, and the files of a folder.
+// What is dropped on the page: files, and the files of folders.
 
 export interface Named {
     file: Blob;
     name: string;
 }
 
-/** The files of a drop, and the name of the folder that they are from. */
+/** What a folder holds besides its files: notes that systems leave there. */
+const HIDDEN = /^(\.|desktop\.ini$|thumbs\.db$)/i;
+
+/** The files of a drop, and the name of the folder that they are from, where it is one. */
 export async function dropped(transfer: DataTransfer): Promise<{ files: Named[]; folder: string | undefined }> {
-    // To be asked for before anything is awaited: the list is empty afterwards.
-    const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.() ?? undefined);
-    const folders = entries.filter((entry) => entry?.isDirectory) as FileSystemDirectoryEntry[];
-    if (folders.length !== 1 || entries.length !== 1) {
-        return { files: [...transfer.files].map(named), folder: undefined };
+    // To be asked for before anything is awaited: the lists are empty afterwards.
+    const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter((entry) => entry !== null && entry !== undefined);
+    const plain = [...transfer.files];
+    if (!entries.some((entry) => entry.isDirectory)) {
+        return { files: plain.map(named), folder: undefined };
     }
-    const [folder] = folders as [FileSystemDirectoryEntry];
-    const found = (await listed(folder)).filter((entry): entry is FileSystemFileEntry => entry.isFile);
-    const files = await Promise.all(found.map((entry) => new Promise<File>((resolve, reject) => entry.file(resolve, reject))));
-    return { files: files.map(named), folder: folder.name };
+    const files = await Promise.all(entries.map((entry) => (entry.isDirectory ? listed(entry as FileSystemDirectoryEntry) : opened([entry]))));
+    return { files: files.flat().map(named), folder: entries.length === 1 ? entries[0]?.name : undefined };
 }
 
 export const named = (file: File): Named => ({ file, name: file.name || 'pasted image' });
 
-/** What a folder holds; a reader gives some at a time. */
-async function listed(folder: FileSystemDirectoryEntry): Promise<FileSystemEntry[]> {
+const opened = (entries: FileSystemEntry[]): Promise<File[]> =>
+    Promise.all(entries.filter((entry): entry is FileSystemFileEntry => entry.isFile).map((entry) => new Promise<File>((resolve, reject) => entry.file(resolve, reject))));
+
+const { compare } = new Intl.Collator('en', { numeric: true });
+
+/** The files of a folder, by their names; a reader gives some at a time, in any order. */
+async function listed(folder: FileSystemDirectoryEntry): Promise<File[]> {
     const reader = folder.createReader();
     const all: FileSystemEntry[] = [];
     for (;;) {
         const some = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject));
         if (some.length === 0) {
-            return all;
+            const files = await opened(all);
+            return files.filter(({ name }) => !HIDDEN.test(name)).sort((a, b) => compare(a.name, b.name));
         }
         all.push(...some);
     }

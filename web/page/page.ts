@@ -1,7 +1,7 @@
 // The page: what follows what.
 
 import { followed } from './bar';
-import { Client, Interrupted, explained } from './client';
+import { Broken, Client, Interrupted, explained } from './client';
 import { by, count, duration, say, words } from './dom';
 import * as legend from './legend';
 import { type Pixel, MapView } from './map-view';
@@ -11,7 +11,7 @@ import { painted } from './paint';
 import { PointsTab } from './points';
 import { told } from './readout';
 import { lit } from './relief';
-import type { Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Range, Result, Size, Warning } from './protocol';
+import type { Cameras, Colours, Comparison, Device, Facts, Known, Map, Pair, Picture, Range, Result, Size, Warning } from './protocol';
 import { Remarks } from './remarks';
 import { Ruler } from './ruler';
 import { stem } from './save';
@@ -21,6 +21,7 @@ import { offerCamera } from './shots';
 import { type Scene, Slots, type View as Opened } from './slots';
 import { Wiggle, aligned, anaglyph } from './stereo';
 import { tabs } from './tabs';
+import { Turns } from './turns';
 import { calm, onlyLooks } from './visitor';
 import { withoutWebGpu } from './webgpu';
 
@@ -39,14 +40,31 @@ type View = Map | 'left' | 'stereo' | 'points';
 /** What a pair is rectified by. */
 type Rectifier = 'calibration' | 'matches';
 
+/** A pair as the engine has read it, and rectified it where that was wanted. */
+interface Read extends Pair {
+    by: Rectifier | undefined;
+    /** How it was rectified. */
+    notes: string[];
+    /** That of the files, before it is rectified. */
+    size: { width: number; height: number };
+    /** What a calibration tells, and the names of its files. */
+    cameras: Cameras | undefined;
+    range: Range | undefined;
+    files: string;
+    /** The worker that holds it. */
+    generation: number;
+}
+
 /** What the page is at; tests wait for it too. */
 type State = 'starting' | 'empty' | 'loading' | 'ready' | 'matching' | 'comparing' | 'done' | 'failed';
 
 const app = by('app');
 const client = new Client(new URL(WORKER, document.baseURI));
 const settings = new Settings(() => void checkRange());
-const slots = new Slots(SCENES, (match) => {
-    rectify = undefined;
+const slots = new Slots(SCENES, ({ match, rectify: by, swapped }) => {
+    if (!swapped) {
+        rectify = by;
+    }
     void load(match);
 });
 const map = new MapView((pixel) => readOut(pixel), (pixel) => ruler.pick(pixel));
@@ -61,15 +79,16 @@ const ruler = new Ruler(
 );
 const wiggle = new Wiggle();
 const remarks = new Remarks({
-    swap: () => slots.swap(true),
+    swap: () => void slots.swap(true, turns.signal),
     rectify: () => rectifyBy('matches'),
     widen: (range) => {
+        const { signal } = turns;
         settings.give(range);
-        void checkRange().then(() => match());
+        void checkRange().then(() => (signal.aborted ? undefined : match()));
     },
     asTheyAre: () => rectifyBy('nothing'),
     atFullSize: () => {
-        settings.size = 'full';
+        settings.atFullSize();
         void match();
     },
 });
@@ -79,9 +98,10 @@ let facts: Facts | undefined;
 /** Undefined until it was looked for. */
 let gpu: boolean | undefined;
 let view: View = 'disparity';
-let pair: (Pair & { generation: number; by: Rectifier | undefined; notes: string[] }) | undefined;
-/** What the user wants to rectify by, or not to; undefined leaves it to the calibration. */
-let rectify: Rectifier | 'nothing' | undefined;
+/** What files of it are called begins with `name`. */
+let pair: (Read & { name: string }) | undefined;
+/** What the user wants to rectify by, or not to; undefined leaves it to the calibration. `failed` where its matches do not rectify it. */
+let rectify: Rectifier | 'nothing' | 'failed' | undefined;
 /** What is probably wrong with the pair and the range, before a match. */
 let suspicions: Warning[] = [];
 /** The range that `automatic` stands for, and where it comes from. */
@@ -89,8 +109,12 @@ let found: { range: Range; by: string } | undefined;
 let result: (Result & { generation: number; pictures: Partial<Record<Map, Picture>>; on: Device; preset: string; suspicions: Warning[] }) | undefined;
 /** The map before this one, of the same pair. */
 let before: { disparity: Float32Array; preset: string } | undefined;
-/** Grows when the pair changes: what was asked for an earlier one is not wanted any more. */
-let turn = 0;
+/** The pair, and all that is done with it. */
+const turns = new Turns();
+/** A check of the range. */
+const checks = new Turns();
+/** What the user can stop. */
+const stops = new Turns();
 
 function be(state: State): void {
     app.dataset['state'] = state;
@@ -104,7 +128,7 @@ function be(state: State): void {
 }
 
 /** The state between calls. */
-const idle = (): State => (result ? 'done' : pair ? 'ready' : 'empty');
+const idle = (): State => (result ? 'done' : pair ? 'ready' : facts ? 'empty' : 'starting');
 
 async function start(): Promise<void> {
     be('starting');
@@ -122,25 +146,36 @@ async function start(): Promise<void> {
     const linked = new URLSearchParams(location.hash.slice(1));
     const first = SCENES.find(({ name }) => name === linked.get('scene')) ?? SCENES[0];
     settings.take(linked);
-    if (first && slots.missing === 'left') {
+    if (first && slots.untouched) {
         await slots.open(first.name);
         await busy;
     }
     slots.illustrate();
     void keepOffline();
-    try {
-        say('engine', `GPU: ${await client.call('open', 'gpu')}`);
-        gpu = true;
-    } catch {
-        gpu = false;
+    const device = await openGpu();
+    gpu = device !== undefined;
+    if (!gpu) {
         settings.withoutGpu(withoutWebGpu());
-        say('engine', 'No WebGPU: the CPU path');
     }
+    say('engine', gpu ? `GPU: ${device}` : 'No WebGPU: the CPU path');
     document.documentElement.dataset['gpu'] = gpu ? 'yes' : 'no';
     if (app.dataset['state'] === 'starting') {
         be(idle());
     }
     await showDepth();
+}
+
+/** The name of the GPU; undefined where there is none. A worker that takes the place of one that was ended meanwhile is asked again. */
+async function openGpu(): Promise<string | undefined> {
+    for (;;) {
+        try {
+            return await client.call('open', 'gpu');
+        } catch (error) {
+            if (!(error instanceof Interrupted)) {
+                return undefined;
+            }
+        }
+    }
 }
 
 /** To somebody who has only looked so far, the first result also shows its depth. */
@@ -161,62 +196,54 @@ function load(match = false): Promise<void> {
 
 /** Reads the pair that the slots hold, as far as they do. */
 async function read(matched: boolean): Promise<void> {
-    const mine = ++turn;
-    const current = () => mine === turn;
-    app.dataset['turn'] = String(turn);
+    const signal = turns.next();
+    app.dataset['turn'] = String(Number(app.dataset['turn'] ?? 0) + 1);
     be('loading');
-    await client.cancel();
-    if (!current()) {
-        return;
-    }
-    pair = found = undefined;
     forget();
-    say('problem', undefined);
-    say('range-found', undefined);
-    say('range-problem', undefined);
-    suspicions = [];
-    remarks.clear();
-    by('intro').hidden = slots.scene === undefined;
-    const { left, right } = slots.views;
-    if (!left || !right) {
-        be(facts ? 'empty' : 'starting');
-        return;
-    }
+    say('pair-problem', undefined);
     for (const side of ['left', 'right'] as const) {
         slots.problem(side, undefined);
     }
+    by('intro').hidden = slots.scene === undefined;
+    address();
+    const { left, right } = slots.views;
     try {
-        const [a, b] = [left.header.size, right.header.size];
-        const huge = a && tooLarge(a.width, a.height, left.file.size + right.file.size);
-        if (huge) {
-            throw new Error(huge);
-        }
-        if (a && b && (a.width !== b.width || a.height !== b.height)) {
-            const [one, other] = [a, b].map(({ width, height }) => `${width} × ${height}`);
-            throw new Error(`The left view has ${one} pixels and the right one ${other}. The views of a pair have one size.`);
-        }
-        const opened = await open(left, right);
-        if (!current()) {
-            return;
-        }
-        pair = { ...opened, generation: client.generation };
-        slots.show('left', pair.left);
-        slots.show('right', pair.right);
-        void showView();
-        await findRange(current);
-        if (current()) {
-            be('ready');
+        await client.cancel();
+        signal.throwIfAborted();
+        if (left && right) {
+            fits(left, right);
+            pair = { ...(await open(signal, left, right)), name: slots.name ?? left.name };
+            points.pair(pair.left.width, pair.left.height, pair.cameras, pair.files);
+            settings.pair(pair.size.width, pair.size.height);
+            slots.show('left', pair.left);
+            slots.show('right', pair.right);
+            void showView();
+            await findRange(signal);
             remarks.note(pair.notes, pair.by !== undefined);
-            if (matched) {
-                await match(gpu === undefined ? { ...FIRST, preset: settings.chosen ?? FIRST.preset } : settings);
-            }
         }
     } catch (error) {
-        if (current()) {
-            pair = undefined;
-            refuse(error, left.name, right.name);
-            be(facts ? 'empty' : 'starting');
+        if (signal.aborted) {
+            return;
         }
+        forget();
+        refuse(error, left?.name ?? '', right?.name ?? '');
+    }
+    be(idle());
+    if (matched && pair) {
+        await match(gpu === undefined ? { ...FIRST, preset: settings.chosen ?? FIRST.preset } : settings);
+    }
+}
+
+/** Refuses views that make no pair, or one that is too large, before they are read. */
+function fits(left: Opened, right: Opened): void {
+    const [a, b] = [left.header.size, right.header.size];
+    const huge = a && tooLarge(a.width, a.height, left.file.size + right.file.size);
+    if (huge) {
+        throw new Error(huge);
+    }
+    if (a && b && (a.width !== b.width || a.height !== b.height)) {
+        const [one, other] = [a, b].map(({ width, height }) => `${width} × ${height}`);
+        throw new Error(`The left view has ${one} pixels and the right one ${other}. The views of a pair have one size.`);
     }
 }
 
@@ -232,35 +259,46 @@ function refuse(error: unknown, left: string, right: string): void {
 }
 
 /** Has the engine read the pair, and rectify it where that is wanted. */
-async function open(left: Opened, right: Opened): Promise<Pair & { by: Rectifier | undefined; notes: string[] }> {
-    const raw = await client.call('pair', left.file, left.name, right.file, right.name);
+async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<Read> {
+    const call = client.within(signal);
+    const { generation } = client;
+    const raw = await call('pair', left.file, left.name, right.file, right.name);
     const { width, height } = raw.left;
-    const names = slots.calibration.map(({ name }) => name).join(', ');
-    let known: Known | undefined;
-    try {
-        known = slots.calibration.length > 0 ? await client.call('calibration', slots.calibration, width, height) : undefined;
-        const { size } = known ?? {};
-        if (size && (size.width !== width || size.height !== height)) {
-            known = undefined;
-            throw new Error(`${names} is for images of ${size.width} × ${size.height}, and these are ${width} × ${height}: it is not used.`);
-        }
-    } catch (error) {
-        say('pair-problem', words(error));
-    }
-    found = known?.range && { range: known.range, by: names };
-    const wanted = rectify ?? (known && !known.rectified ? 'calibration' : 'nothing');
-    if (wanted !== 'nothing') {
+    const { calibration } = slots;
+    const files = calibration.map(({ name }) => name).join(', ');
+    const problems: string[] = [];
+    // What cannot be used is told, and the pair is taken without it.
+    const tried = async <T>(act: () => Promise<T>): Promise<T | undefined> => {
         try {
-            const { cameras, notes, ...views } = await client.call('rectify', wanted === 'calibration' ? slots.calibration : undefined);
-            points.pair(views.left.width, views.left.height, cameras, names);
-            found = undefined;
-            return { ...views, by: wanted, notes };
+            return await act();
         } catch (error) {
-            say('pair-problem', words(error));
+            signal.throwIfAborted();
+            if (error instanceof Broken) {
+                throw error;
+            }
+            problems.push(words(error));
+            return undefined;
         }
+    };
+    const known = calibration.length === 0 ? undefined : await tried<Known>(async () => {
+        const found = await call('calibration', calibration, width, height);
+        const { size } = found;
+        if (size && (size.width !== width || size.height !== height)) {
+            throw new Error(`${files} is for images of ${size.width} × ${size.height}, and these are ${width} × ${height}: it is not used.`);
+        }
+        return found;
+    });
+    const wanted = rectify ?? (known && !known.rectified ? 'calibration' : 'nothing');
+    const by = wanted === 'calibration' || wanted === 'matches' ? wanted : undefined;
+    const rectified = by && (await tried(() => call('rectify', by === 'calibration' ? calibration : undefined)));
+    if (by === 'matches' && !rectified) {
+        rectify = 'failed';
     }
-    points.pair(width, height, known?.cameras, names);
-    return { ...raw, by: undefined, notes: [] };
+    say('pair-problem', problems.join(' '));
+    const read = { files, size: { width, height }, generation };
+    return rectified
+        ? { ...rectified, ...read, by, range: undefined }
+        : { ...raw, ...read, by: undefined, notes: [], cameras: known?.cameras, range: known?.range };
 }
 
 /** Does another thing about the rectification of the pair, and matches it. */
@@ -269,22 +307,21 @@ function rectifyBy(by: Rectifier | 'nothing'): void {
     void load(true);
 }
 
-async function findRange(current: () => boolean): Promise<void> {
-    if (!found) {
+/** Finds the range that `automatic` stands for. */
+async function findRange(signal: AbortSignal): Promise<void> {
+    if (pair?.range) {
+        found = { range: pair.range, by: pair.files };
+    } else {
         say('range-found', 'Looking for the range …');
-        const range = await client.call('range');
+        const range = await client.within(signal)('range');
         found = range && { range, by: MATCHES };
     }
-    if (current()) {
-        if (found && settings.automatic) {
-            settings.suggest(found.range);
-        }
-        await checkRange();
+    if (found && settings.automatic) {
+        settings.suggest(found.range);
     }
+    await checkRange();
+    signal.throwIfAborted();
 }
-
-/** Grows with each check of the range: an answer to an earlier one counts no more. */
-let check = 0;
 
 /** The range to search, which is said beside its choice. */
 function range(): Range | undefined {
@@ -295,43 +332,60 @@ function range(): Range | undefined {
 async function checkRange(): Promise<void> {
     const wanted = range();
     const { automatic } = settings;
-    const mine = ++check;
+    const signal = checks.next(turns.signal);
     say('range-found', pair && found && automatic ? `${found.range.min} to ${found.range.max} px, by ${found.by}` : undefined);
+    const unfound = pair !== undefined && automatic && !wanted;
+    by('no-range').hidden = !unfound || pair?.by !== undefined || rectify === 'failed';
     if (!automatic && !wanted) {
         say('range-problem', 'Give two whole numbers, the smaller one first.');
         return;
     }
-    say('range-problem', pair && !wanted ? 'Sparse matches find no range. Give one.' : undefined);
-    if (!pair) {
+    say('range-problem', unfound ? 'Sparse matches find no range. Give one.' : undefined);
+    // A new worker holds no pair before the next match.
+    if (!pair || pair.generation !== client.generation) {
         return;
     }
-    let said: Warning[] = [];
-    let problem: string | undefined;
     try {
         // A range that sparse matches found does not show what the user knows.
-        said = await client.call('warnings', automatic && found?.by === MATCHES ? undefined : wanted);
+        suspicions = await client.within(signal)('warnings', automatic && found?.by === MATCHES ? undefined : wanted);
     } catch (error) {
-        problem = words(error);
-    }
-    if (mine !== check) {
-        return;
-    }
-    suspicions = said;
-    if (problem !== undefined) {
-        say('range-problem', problem);
+        if (signal.aborted) {
+            return;
+        }
+        suspicions = [];
+        say('range-problem', words(error));
     }
     // What is said of a result stays with it.
     if (!result) {
-        remarks.warn(said);
+        warn(suspicions);
     }
+}
+
+/** Says what is probably wrong. What did not help is not offered again. */
+function warn(warnings: Warning[]): void {
+    remarks.warn(warnings.map((warning) => (rectify === 'failed' && warning.remedy === 'rectify' ? { ...warning, remedy: undefined } : warning)));
 }
 
 /** Where a range comes from that no file gives. */
 const MATCHES = 'sparse matches';
 
+/** Ends when no match runs. */
+let running: Promise<void> | undefined;
+
+/** Runs what matches, alone: what runs before it ends. */
+async function alone(signal: AbortSignal, act: () => Promise<void>): Promise<void> {
+    while (running) {
+        void client.cancel();
+        await running;
+    }
+    if (!signal.aborted) {
+        running = act().finally(() => (running = undefined));
+        await running;
+    }
+}
+
 /** Runs a match with its bar; undefined when it was stopped or failed, which is said. */
-async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefined> {
-    const mine = turn;
+async function run<T>(signal: AbortSignal, state: State, match: () => Promise<T>): Promise<T | undefined> {
     say('problem', undefined);
     client.onProgress = followed();
     // The button that was pressed gives way to another one. A match that nobody has pressed takes no focus.
@@ -347,7 +401,7 @@ async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefi
         say('announce', undefined);
         return value;
     } catch (error) {
-        if (mine === turn) {
+        if (!signal.aborted) {
             say('problem', error instanceof Interrupted ? 'Stopped.' : explained(error));
         }
         return undefined;
@@ -359,12 +413,10 @@ async function run<T>(state: State, match: () => Promise<T>): Promise<T | undefi
 }
 
 /** The worker's pair, read again where the worker is a new one. */
-async function ensurePair(): Promise<void> {
+async function ensurePair(signal: AbortSignal): Promise<void> {
     const { left, right } = slots.views;
     if (pair && left && right && pair.generation !== client.generation) {
-        const generation = client.generation;
-        await open(left, right);
-        pair.generation = generation;
+        pair = { ...pair, ...(await open(signal, left, right)) };
     }
 }
 
@@ -379,35 +431,45 @@ async function match({ device, preset, size }: { device: Device; preset: string;
         by(`${missing}-file`).focus();
         return;
     }
+    if (!pair) {
+        // It could not be read; perhaps it can be now.
+        void load(true);
+        return;
+    }
     const wanted = range();
-    if (!pair || !wanted) {
-        if (pair) {
-            await checkRange();
-            by(settings.automatic ? 'preset' : 'min').focus();
+    if (!wanted) {
+        await checkRange();
+        by(!settings.automatic ? 'min' : by('no-range').hidden ? 'preset' : 'rectify').focus();
+        return;
+    }
+    const { signal } = turns;
+    await alone(signal, async () => {
+        const was = suspicions;
+        const wide = settings.automatic && found?.by === MATCHES;
+        const matched = await run(signal, 'matching', async () => {
+            const stop = stops.next();
+            await ensurePair(signal);
+            await client.facts;
+            if (stop.aborted) {
+                throw new Interrupted('interrupted');
+            }
+            return client.within(signal)('match', device, preset, wanted, wide, size ?? 'automatic', colours());
+        });
+        if (matched) {
+            const pictures = { disparity: matched.picture };
+            before = result && { disparity: result.disparity, preset: result.preset };
+            result = { ...matched, generation: client.generation, pictures, on: device, preset, suspicions: was };
+            await present();
         }
-        return;
-    }
-    const mine = turn;
-    const was = suspicions;
-    const wide = settings.automatic && found?.by === MATCHES;
-    const matched = await run('matching', async () => {
-        await ensurePair();
-        return client.call('match', device, preset, wanted, wide, size ?? 'automatic', colours());
-    });
-    if (mine !== turn) {
-        return;
-    }
-    if (matched) {
-        const pictures = { disparity: matched.picture };
-        before = result && { disparity: result.disparity, preset: result.preset };
-        result = { ...matched, generation: client.generation, pictures, on: device, preset, suspicions: was };
-        await present();
+        if (signal.aborted) {
+            return;
+        }
         // On a narrow page the result is above the form.
-        if (gpu !== undefined) {
+        if (matched && gpu !== undefined) {
             by('result').scrollIntoView({ block: 'nearest', behavior: calm() ? 'instant' : 'smooth' });
         }
-    }
-    be(idle());
+        be(idle());
+    });
 }
 
 /** The address holds the scene and the settings, so that it can be passed on. */
@@ -426,12 +488,13 @@ async function present(): Promise<void> {
     const { width, height, warnings, device, iterations, took, preset, corrected, tiles, half, short } = result;
     const { min, max } = result.range;
     const failed = result.note === undefined ? [] : [{ text: result.note, remedy: undefined }];
-    remarks.warn([...failed, ...result.suspicions, ...warnings]);
+    warn([...failed, ...result.suspicions, ...warnings]);
     const notes = [...(pair?.notes ?? []), ...(corrected ? [corrected] : []), ...(tiles > 1 ? [`matched in ${tiles} tiles`] : [])];
     remarks.note(notes, pair?.by !== undefined, short);
     by('outcome').hidden = false;
     address();
     say('comparison', undefined);
+    say('save-problem', undefined);
     const facts = [`${width} × ${height} pixels`, ...(half ? ['at half size'] : []), `range ${min} to ${max}`, preset, `${iterations} iterations`, device, duration(took)];
     say('facts', facts.join(' · '));
     by('compare').title = gpu ? 'Matches by the other path too and counts the pixels that differ' : 'There is no GPU to compare with';
@@ -461,22 +524,23 @@ function behind(left: Picture): Picture {
     return painted(result.width, result.height, before.disparity, facts.scales[colours()], result.spread);
 }
 
-/** A pair that changes takes its result along. */
+/** A pair that changes takes along all that was said and made of it. */
 function forget(): void {
-    result = before = undefined;
-    if (!pair) {
-        map.clear();
-    }
+    pair = found = result = before = undefined;
+    suspicions = [];
+    map.clear();
+    wiggle.stop();
+    remarks.clear();
+    by('no-range').hidden = true;
     offerBefore();
     ruler.clear();
     legend.none();
     points.result(false);
     by('outcome').hidden = true;
-    for (const id of ['facts', 'comparison', 'readout', 'save-problem', 'stage']) {
+    for (const id of ['facts', 'comparison', 'readout', 'problem', 'range-found', 'range-problem', 'save-problem', 'stage']) {
         say(id, undefined);
     }
     by('map').dataset['shown'] = '';
-    void showView();
 }
 
 const colours = (): Colours => by<HTMLSelectElement>('colours').value as Colours;
@@ -520,7 +584,9 @@ async function showView(): Promise<void> {
             map.show(relief ? lit(seen, mine.disparity, mine.spread) : seen, shown === 'left' ? seen : behind(pair.left));
         }
     } catch (error) {
-        say('readout', words(error));
+        if (mine === result) {
+            say('readout', words(error));
+        }
         return;
     }
     if (shown === 'disparity' && facts) {
@@ -574,40 +640,43 @@ function readOut(pixel: Pixel | undefined): void {
 
 /** Matches by the other path too. */
 async function compare(): Promise<void> {
-    const mine = result;
-    if (!mine) {
-        return;
-    }
-    const path = mine.on === 'gpu' ? 'cpu' : 'gpu';
-    say('comparison', undefined);
-    const comparison = await run<Comparison>('comparing', async () => {
-        if (!held()) {
-            throw new Error('The engine was started again since this match. Match once more to compare.');
+    const { signal } = turns;
+    await alone(signal, async () => {
+        const mine = result;
+        if (!mine) {
+            return;
         }
-        return client.call('compare', path);
+        say('comparison', undefined);
+        const comparison = await run<Comparison>(signal, 'comparing', async () => {
+            if (!held()) {
+                throw new Error('The engine was started again since this match. Match once more to compare.');
+            }
+            return client.within(signal)('compare', mine.on === 'gpu' ? 'cpu' : 'gpu');
+        });
+        if (signal.aborted) {
+            return;
+        }
+        if (comparison) {
+            const failed = mine.note ?? comparison.note;
+            const differ = `${count(comparison.differing)} of ${count(mine.width * mine.height)} pixels differ`;
+            say('comparison', failed ? `No comparison: the GPU did not do it. ${failed}` : `${differ} (${comparison.device}: ${duration(comparison.took)})`);
+        }
+        be(idle());
     });
-    if (mine !== result) {
-        return;
-    }
-    if (comparison) {
-        const failed = mine.note ?? comparison.note;
-        const differ = `${count(comparison.differing)} of ${count(mine.width * mine.height)} pixels differ`;
-        say('comparison', failed ? `No comparison: the GPU did not do it. ${failed}` : `${differ} (${comparison.device}: ${duration(comparison.took)})`);
-    }
-    be(idle());
 }
 
 async function download(file: File): Promise<void> {
-    const [mine, left] = [result, pair?.left];
-    const name = stem(slots.name ?? slots.views.left?.name ?? 'pair');
+    const [mine, of] = [result, pair];
     say('save-problem', undefined);
     try {
-        if (!held() || !mine || !left) {
+        if (!held() || !mine || !of) {
             throw new Error('The engine was started again since this match. Match once more to save.');
         }
-        await saveFile(client, file, name, mine, left, points.cameras, points.leastConfidence);
+        await saveFile(client, file, stem(of.name), mine, of.left, points.cameras, points.leastConfidence);
     } catch (error) {
-        say('save-problem', explained(error));
+        if (mine === result) {
+            say('save-problem', explained(error));
+        }
     }
 }
 
@@ -618,8 +687,10 @@ by('form').addEventListener('submit', (event) => {
 });
 by('cancel').addEventListener('click', () => {
     say('stage', 'stopping');
+    stops.next();
     void client.cancel();
 });
+by('rectify').addEventListener('click', () => rectifyBy('matches'));
 by('compare').addEventListener('click', () => void compare());
 by('downloads').addEventListener('click', ({ target }) => {
     const file = (target as HTMLElement).dataset['output'] as File | undefined;
@@ -637,7 +708,7 @@ for (const id of ['relief', 'stereo', 'behind']) {
     by(id).addEventListener('change', () => void showView());
 }
 offerCamera((views) => {
-    void slots.take(views, undefined, 'camera').then(() => rectifyBy('matches'));
+    void slots.take(views, { name: 'camera', wish: { match: true, rectify: 'matches' } });
 });
 list.select(by('tab-disparity'));
 void start();

@@ -3,6 +3,7 @@
 import type { CloudView } from './cloud';
 import { by, count, say, words } from './dom';
 import type { Cameras, Cloud } from './protocol';
+import { Turns } from './turns';
 
 const FIELDS = { focalLength: 'focal-length', cx: 'cx', cy: 'cy', doffs: 'doffs', baseline: 'baseline' } as const;
 type Field = keyof typeof FIELDS;
@@ -28,6 +29,8 @@ export class PointsTab {
     /** How many points have at least this confidence. */
     private atLeast = new Uint32Array(257);
     private open = false;
+    /** The points that are asked for. */
+    private readonly turns = new Turns();
 
     /** `points` asks the engine; `changed` is called when the cameras change. */
     constructor(
@@ -82,6 +85,7 @@ export class PointsTab {
 
     /** There is a result, or none any more. The points of an earlier one go. */
     result(there: boolean): void {
+        this.turns.next();
         this.view?.clear();
         this.fresh = false;
         by('points').dataset['points'] = '';
@@ -120,6 +124,7 @@ export class PointsTab {
     }
 
     private renew(): void {
+        this.turns.next();
         this.fresh = false;
         this.note();
         this.changed();
@@ -139,18 +144,24 @@ export class PointsTab {
         if (!cameras || this.size.width === 0) {
             return;
         }
+        const signal = this.turns.next();
         this.fresh = true;
         try {
             if (!this.view) {
                 say('cloud-note', 'Loading the viewer …');
             }
             const view = await this.viewer();
+            signal.throwIfAborted();
             const cloud = await this.points(cameras);
+            signal.throwIfAborted();
             view.show(cloud, cameras, this.size.width, this.size.height);
             this.tally(cloud.confidences);
             this.reach();
             this.filter();
         } catch (error) {
+            if (signal.aborted) {
+                return;
+            }
             this.fresh = false;
             say('cloud-note', `The points cannot be shown: ${words(error)}`);
         }

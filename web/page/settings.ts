@@ -9,6 +9,12 @@ export class Settings {
     private presets: Preset[] = [];
     /** The preset that somebody has chosen. */
     chosen: string | undefined;
+    /** Whether somebody has typed in the range; the page may have, too. */
+    private typed = false;
+    /** Whether somebody has chosen the size. */
+    private sized = false;
+    /** That of the pair. */
+    private pixels = { width: 0, height: 0 };
 
     /** `ranged` is called when the range changes. */
     constructor(ranged: () => void) {
@@ -19,12 +25,17 @@ export class Settings {
         for (const input of document.querySelectorAll('input[name="range"]')) {
             input.addEventListener('change', () => {
                 by('ends').hidden = this.automatic;
+                this.typed = true;
                 ranged();
             });
         }
         for (const id of ['min', 'max']) {
-            by(id).addEventListener('change', ranged);
+            by(id).addEventListener('change', () => {
+                this.typed = true;
+                ranged();
+            });
         }
+        by('size').addEventListener('change', () => (this.sized = true));
     }
 
     get preset(): string {
@@ -39,8 +50,24 @@ export class Settings {
         return by<HTMLSelectElement>('size').value as Size;
     }
 
-    set size(size: Size) {
-        by<HTMLSelectElement>('size').value = size;
+    /** Matches this pair at full size. */
+    atFullSize(): void {
+        by<HTMLSelectElement>('size').value = 'full';
+        this.sized = false;
+    }
+
+    /** A pair comes. What the page has set for an earlier one does not hold for it, and a range that was typed in only where it has the same size. */
+    pair(width: number, height: number): void {
+        const same = this.pixels.width === width && this.pixels.height === height;
+        const first = this.pixels.width === 0;
+        this.pixels = { width, height };
+        if (!this.sized) {
+            by<HTMLSelectElement>('size').value = 'automatic';
+        }
+        if (!this.automatic && !(this.typed && (same || first))) {
+            (document.querySelector('input[name="range"][value="automatic"]') as HTMLInputElement).checked = true;
+            by('ends').hidden = true;
+        }
     }
 
     get automatic(): boolean {
@@ -63,6 +90,7 @@ export class Settings {
         const [min, max] = (link.get('range') ?? '').split(',').map((end) => (end === '' ? NaN : Number(end)));
         if (min !== undefined && max !== undefined && Number.isInteger(min) && Number.isInteger(max) && min <= max) {
             this.give({ min, max });
+            this.typed = true;
         }
     }
 
@@ -96,6 +124,7 @@ export class Settings {
     give(range: Range): void {
         (document.querySelector('input[name="range"][value="given"]') as HTMLInputElement).checked = true;
         by('ends').hidden = false;
+        this.typed = false;
         this.suggest(range);
     }
 

@@ -2,6 +2,7 @@
 
 import { by, say, words } from './dom';
 import type { Named } from './dropped';
+import { Turns } from './turns';
 
 /** What the dialog says before each shot. */
 const SHOTS = [
@@ -24,6 +25,10 @@ class Shots {
     private readonly video = by('camera').querySelector('video') as HTMLVideoElement;
     private stream: MediaStream | undefined;
     private views: Named[] = [];
+    /** Whether a shot is being taken. */
+    private busy = false;
+    /** The dialog, from its opening to its end. */
+    private readonly turns = new Turns();
 
     constructor(
         private readonly devices: MediaDevices,
@@ -36,6 +41,7 @@ class Shots {
     }
 
     async open(): Promise<void> {
+        const signal = this.turns.next();
         this.views = [];
         this.ask();
         say('camera-problem', undefined);
@@ -44,15 +50,19 @@ class Shots {
         try {
             const video = { facingMode: 'environment', width: { ideal: 1280 }, height: { ideal: 960 } };
             const stream = await this.devices.getUserMedia({ video });
-            if (!this.dialog.open) {
+            if (signal.aborted) {
                 stream.getTracks().forEach((track) => track.stop());
                 return;
             }
             this.stream = stream;
             this.video.srcObject = stream;
             await this.video.play();
+            signal.throwIfAborted();
             by<HTMLButtonElement>('shoot').disabled = false;
         } catch (error) {
+            if (signal.aborted) {
+                return;
+            }
             say('camera-problem', `The camera cannot be used: ${words(error)}. Does this page have the permission, and does another program hold it?`);
         }
     }
@@ -67,10 +77,18 @@ class Shots {
     }
 
     private async shoot(): Promise<void> {
+        if (this.busy) {
+            return;
+        }
+        const { signal } = this.turns;
         const { videoWidth, videoHeight } = this.video;
         const canvas = new OffscreenCanvas(videoWidth, videoHeight);
         canvas.getContext('2d')?.drawImage(this.video, 0, 0);
-        const file = await canvas.convertToBlob({ type: 'image/png' });
+        this.busy = true;
+        const file = await canvas.convertToBlob({ type: 'image/png' }).finally(() => (this.busy = false));
+        if (signal.aborted) {
+            return;
+        }
         this.views.push({ file, name: `camera ${SHOTS[this.views.length]?.which}.png` });
         if (this.views.length < SHOTS.length) {
             this.ask();
@@ -82,6 +100,7 @@ class Shots {
     }
 
     private stop(): void {
+        this.turns.next();
         this.stream?.getTracks().forEach((track) => track.stop());
         this.stream = undefined;
         this.video.srcObject = null;

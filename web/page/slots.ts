@@ -4,15 +4,26 @@ import { type Cut, cut, decoded, guess, views } from './decode';
 import { by, count, make, say, words } from './dom';
 import { type Named, dropped, named } from './dropped';
 import { type Header, header } from './header';
+import { inOrder } from './order';
 import type { Picture, Text } from './protocol';
+import { Turns } from './turns';
 
 export type Side = 'left' | 'right';
+const SIDES = ['left', 'right'] as const;
 
 export interface View {
     file: Blob;
     name: string;
     header: Header;
+    /** What its slot shows of it, hidden until it is drawn. */
+    thumb: HTMLCanvasElement;
+    /** Whether somebody has said which view it is. */
+    placed: boolean;
+    /** That which came with its pair. */
+    calibration: Text[];
 }
+
+type Views = Partial<Record<Side, View>>;
 
 /** A rendered scene of the project, as the build finds it. */
 export interface Scene {
@@ -20,7 +31,29 @@ export interface Scene {
     title: string;
 }
 
+/** What is wanted of a pair that has changed. */
+export interface Wish {
+    /** To be matched at once. */
+    match?: boolean;
+    /** To be rectified by its matches. */
+    rectify?: 'matches';
+    /** It is the same pair, with its views swapped. */
+    swapped?: boolean;
+}
+
+/** Where files come from. */
+interface Source {
+    /** The slot that they are for. */
+    side?: Side | undefined;
+    /** What their pair is called, where that is more than the names of the files. */
+    name?: string | undefined;
+    /** The scene that they are of. */
+    scene?: string;
+    wish?: Wish;
+}
+
 const other = (side: Side): Side => (side === 'left' ? 'right' : 'left');
+const listed = (files: { name: string }[]): string => files.map(({ name }) => name).join(', ');
 const READS = 'PNG, JPEG, WebP, AVIF, GIF, PNM, TIFF or PFM';
 /** Files that hold a calibration, or a list that is not for us. */
 const TEXT = /\.(txt|ya?ml|json|xml|ini|conf|cfg|calib|toml)$/i;
@@ -28,116 +61,199 @@ const TEXT = /\.(txt|ya?ml|json|xml|ini|conf|cfg|calib|toml)$/i;
 const OTHER = /^(disp|mask|readme|license|\.)|GT\b|\.(pfm|py|md)$/i;
 
 export class Slots {
-    views: Partial<Record<Side, View>> = {};
-    calibration: Text[] = [];
+    /** They change together with all else that is said of the pair, once new files are read. */
+    views: Views = {};
     /** The scene that the views are of. */
     scene: string | undefined;
     /** What the pair is called, where that is more than the names of its files. */
     name: string | undefined;
+    /** Whether nobody has given or asked for anything yet. */
+    untouched = true;
     /** The image that came last, alone. */
     private last: View | undefined;
-    /** Whether the calibration came before its pair. */
-    private waiting = false;
-    /** Grows with every change, so that a slow answer to an earlier one is recognised. */
-    private turn = 0;
+    /** A calibration that came before its pair. */
+    private kept: Text[] = [];
+    /** Ends when all is taken in that has come. */
+    private queue: Promise<void> = Promise.resolve();
+    /** The scene that is fetched. */
+    private readonly fetches = new Turns();
 
-    /** `changed` is called after every change of a view or of the calibration, and told whether the pair is to be matched at once. */
-    constructor(scenes: Scene[], private readonly changed: (match: boolean) => void) {
-        for (const side of ['left', 'right'] as const) {
+    /** `changed` is called after every change of a view or of the calibration. */
+    constructor(scenes: Scene[], private readonly changed: (wish: Wish) => void) {
+        for (const side of SIDES) {
             const input = by<HTMLInputElement>(`${side}-file`);
             input.addEventListener('change', () => {
-                void this.take([...(input.files ?? [])].map(named), side);
+                void this.take([...(input.files ?? [])].map(named), { side });
             });
             // The same file can be chosen again.
             input.addEventListener('click', () => (input.value = ''));
+            input.addEventListener('cancel', () => this.hold(side));
         }
-        by('swap').addEventListener('click', () => this.swap());
+        by('swap').addEventListener('click', () => void this.swap());
         for (const how of ['beside', 'above'] as const) {
-            by(`cut-${how}`).addEventListener('click', () => void this.cut(how));
+            by(`cut-${how}`).addEventListener('click', () => void this.inTurn(() => this.cut(this.whole(this.views), how)));
         }
         by('scenes').append(...scenes.map((scene) => this.button(scene)));
         this.listen();
     }
 
-    /** Files from anywhere: one for a slot, or two that are told apart by their names, and a calibration; from a `folder`, where it has a name. */
-    async take(files: Named[], side?: Side, folder?: string, scene?: string): Promise<void> {
-        const turn = ++this.turn;
+    /** The files of the calibration. */
+    get calibration(): Text[] {
+        return SIDES.map((side) => this.views[side]?.calibration ?? []).find((files) => files.length > 0) ?? [];
+    }
+
+    /** One thing after the other, in the order in which they come: each finds what the one before has left. */
+    private inTurn(act: () => Promise<void>): Promise<void> {
+        this.untouched = false;
+        this.queue = this.queue.then(act).catch((error) => say('pair-problem', words(error)));
+        return this.queue;
+    }
+
+    /** Files from anywhere: one for a slot, or two that are told apart by their names, and a calibration. */
+    take(files: Named[], source: Source = {}): Promise<void> {
+        return files.length > 0 ? this.inTurn(() => this.add(files, source)) : Promise.resolve();
+    }
+
+    /** Takes files, or says why not; then all stays as it is. */
+    private async add(files: Named[], source: Source): Promise<void> {
+        this.quiet();
+        const { side } = source;
         const texts = files.filter(({ name }) => TEXT.test(name) && !OTHER.test(name));
         const others = files.filter(({ name }) => !TEXT.test(name));
-        const images = views(others.length > 2 ? others.filter(({ name }) => !OTHER.test(name)) : others);
-        if (files.length === 0) {
-            return;
-        }
+        const likely = others.filter(({ name }) => !OTHER.test(name));
+        const images = views((others.length > 2 || source.name !== undefined) && likely.length > 0 ? likely : others);
         if (images.length > 2 || texts.length > 3) {
-            say('pair-problem', `These are ${count(files.length)} files. Take two views, and a calibration if you have one.`);
-            return;
+            throw new Error(`These are ${count(files.length)} files. Take two views, and a calibration if you have one.`);
         }
-        say('pair-problem', undefined);
-        say('pair-note', undefined);
-        if (this.scene !== undefined && images.length > 0) {
-            // One view of one's own does not go with one of a scene.
-            this.views = {};
-            (['left', 'right'] as const).forEach((side) => this.empty(side));
-            this.calibration = this.waiting ? this.calibration : [];
+        if (images.length + texts.length === 0) {
+            throw new Error(`There is no view and no calibration in ${source.name ?? (listed(files) || 'what was dropped')}.`);
         }
-        const complete = () => !this.missing && this.scene === undefined;
-        if (texts.length > 0) {
-            this.calibration = await Promise.all(texts.map(async ({ file, name }) => ({ name, text: await file.text() })));
-            this.waiting = images.length < 2 && !complete();
-        } else if (images.length === 2) {
-            // That of another pair, unless it came before this one.
-            this.calibration = this.waiting ? this.calibration : [];
-            this.waiting = false;
-        }
-        if (images.length > 0) {
-            [this.scene, this.name] = [scene, scene ?? folder];
-        } else if (this.waiting) {
-            say('pair-note', `${texts.map(({ name }) => name).join(', ')} is kept for your pair.`);
-            return;
-        }
-        if (images.length === 2) {
-            this.last = undefined;
-            this.views = {};
-            await Promise.all([this.fill('left', images[0] as Named), this.fill('right', images[1] as Named)]);
-        } else if (images[0]) {
-            const place = side ?? (this.views.left && !this.views.right ? 'right' : 'left');
-            await this.fill(place, images[0]);
-            this.last = this.views[place];
-            const how = this.whole ? await guess(this.whole.file) : undefined;
-            if (how && turn === this.turn) {
-                await this.cut(how);
-                return;
+        let read: View[];
+        try {
+            read = await Promise.all(images.map((image) => this.read(image, side !== undefined)));
+        } catch (error) {
+            if (!side || images.length > 1) {
+                throw error;
             }
-            this.waiting &&= this.missing !== undefined;
+            this.problem(side, words(error));
+            return;
         }
-        // Not where a later choice has overtaken this one.
-        if (turn === this.turn) {
-            this.press();
-            by('cut').hidden = !this.whole;
-            this.changed(scene !== undefined);
+        const calibration = await Promise.all(texts.map(async ({ file, name }) => ({ name, text: await file.text() })));
+        const [one, two] = read;
+        if (one && two) {
+            this.put({ left: one, right: two }, source, calibration);
+            if (others.length > 2) {
+                say('pair-note', `Of ${count(files.length)} files ${one.name} and ${two.name} are the views.`);
+            }
+        } else if (one) {
+            await this.addOne(one, source, calibration);
+        } else {
+            this.calibrate(calibration);
         }
+    }
+
+    /** Takes one image, which may hold both views. */
+    private async addOne(view: View, source: Source, calibration: Text[]): Promise<void> {
+        const { side } = source;
+        const before = this.scene === undefined ? this.views : {};
+        const pair = before.left !== undefined && before.right !== undefined;
+        const views = this.joined(before, view, side);
+        const how = this.whole(views, view) && (await guess(view.file));
+        let problem: string | undefined;
+        if (how) {
+            try {
+                await this.cut(view, how, calibration);
+                return;
+            } catch (error) {
+                problem = words(error);
+            }
+        }
+        const beside = side && pair ? views[other(side)] : undefined;
+        // Not where both views change, one after the other.
+        const stays = beside !== this.last ? beside : undefined;
+        this.put(views, source, calibration, view);
+        say('pair-problem', problem);
+        if (side && stays) {
+            const files = listed(this.calibration);
+            say('pair-note', `${stays.name} is still the ${other(side)} view${files && `, and ${files} the calibration`}.`);
+        } else if (pair && !side) {
+            say('pair-note', `${view.name} begins a new pair. Give its other view, too.`);
+        }
+    }
+
+    /** A calibration without views. */
+    private calibrate(files: Text[]): void {
+        const { left, right } = this.views;
+        if (left && right && this.scene === undefined) {
+            this.put({ left, right }, { name: this.name }, files, this.last);
+        } else {
+            this.kept = files;
+            say('pair-note', `${listed(files)} is kept for your pair.`);
+        }
+    }
+
+    /** Views with one more: in its slot, or where there is room. Where there is none it begins a new pair. */
+    private joined(views: Views, view: View, side: Side | undefined): Views {
+        if (side) {
+            return { ...views, [side]: view };
+        }
+        const { left, right } = views;
+        const held = left ?? right;
+        if (!held || (left && right)) {
+            return { left: view };
+        }
+        const [one, two] = held.placed ? (left ? [left, view] : [view, held]) : inOrder(held, view);
+        return { left: one, right: two };
+    }
+
+    /** These are the views from now on, of which one may have come `alone`. */
+    private put(views: Views, { scene, name = scene, wish = {} }: Source, calibration: Text[] = [], alone?: View): void {
+        const { left, right } = views;
+        if (scene === undefined) {
+            // What somebody gives takes the place of a scene that is still on its way.
+            this.fetches.next();
+        }
+        [this.views, this.scene, this.name, this.last] = [views, scene, name, alone];
+        if (left && right) {
+            const before = scene === undefined && this.calibration.length === 0 ? this.kept : [];
+            const given = calibration.length > 0 ? calibration : before;
+            if (given.length > 0) {
+                left.calibration = right.calibration = given;
+            }
+            if (scene === undefined) {
+                this.kept = [];
+            }
+        } else if (calibration.length > 0) {
+            this.kept = calibration;
+        }
+        this.quiet();
+        this.render();
+        this.changed(wish);
     }
 
     /** The image that came last, where it has no other one of its size: it may hold both views. */
-    private get whole(): View | undefined {
-        const sizes = Object.values(this.views).map(({ header: { size } }) => `${size?.width} ${size?.height}`);
-        return sizes.length === 2 && sizes[0] === sizes[1] ? undefined : this.last;
+    private whole(views: Views, last = this.last): View | undefined {
+        const sizes = Object.values(views).map(({ header: { size } }) => `${size?.width} ${size?.height}`);
+        return sizes.length === 2 && sizes[0] === sizes[1] ? undefined : last;
     }
 
-    /** Cuts that image into both views. */
-    private async cut(how: Cut): Promise<void> {
-        const one = this.whole;
+    /** Cuts an image into both views. */
+    private async cut(one: View | undefined, how: Cut, calibration: Text[] = []): Promise<void> {
         if (!one) {
             return;
         }
         try {
-            const [left, right] = await cut(one.file, how);
-            const stem = one.name.replace(/\.[^.]*$/, '');
-            await this.take([{ file: left, name: `${stem} left.png` }, { file: right, name: `${stem} right.png` }], undefined, stem);
-            say('pair-note', how === 'beside' ? 'Cut into its left and right half.' : 'Cut into its upper half, as the left view, and its lower half.');
+            const name = one.name.replace(/\.[^.]*$/, '');
+            const files = await cut(one.file, how);
+            const [left, right] = await Promise.all([
+                this.read({ file: files[0], name: `${name} left.png` }),
+                this.read({ file: files[1], name: `${name} right.png` }),
+            ]);
+            this.put({ left, right }, { name }, calibration);
         } catch (error) {
-            say('pair-problem', `${one.name} cannot be cut: ${words(error)}`);
+            throw new Error(`${one.name} cannot be cut: ${words(error)}`);
         }
+        say('pair-note', how === 'beside' ? 'Cut into its left and right half.' : 'Cut into its upper half, as the left view, and its lower half.');
     }
 
     /** What is wrong with a view, at its slot. */
@@ -146,35 +262,53 @@ export class Slots {
         by<HTMLInputElement>(`${side}-file`).setAttribute('aria-invalid', String(Boolean(text)));
     }
 
+    /** Takes back what was said of the pair. */
+    private quiet(): void {
+        SIDES.forEach((side) => this.problem(side, undefined));
+        say('pair-problem', undefined);
+        say('pair-note', undefined);
+    }
+
     /** The engine's picture of a view, which also shows what the browser cannot decode. */
     show(side: Side, picture: Picture): void {
         const whole = new OffscreenCanvas(picture.width, picture.height);
         whole.getContext('2d')?.putImageData(new ImageData(picture.pixels, picture.width, picture.height), 0, 0);
-        this.thumb(side, whole);
+        const view = this.views[side];
+        if (view) {
+            draw(view.thumb, whole);
+        }
     }
 
-    private async fill(side: Side, { file, name }: Named): Promise<void> {
-        delete this.views[side];
-        this.label(side, name);
-        try {
-            const known = await header(file);
-            // What the engine does not read, the browser may.
-            const read = known ? file : await decoded(file);
-            const found = known ?? (read && (await header(read)));
-            if (!read || !found) {
-                throw new Error(`${name} is not an image that this browser reads: take ${READS}.`);
-            }
-            this.problem(side, undefined);
-            this.views[side] = { file: read, name, header: found };
+    private async read({ file, name }: Named, placed = false): Promise<View> {
+        const known = await header(file).catch((error) => {
+            throw new Error(`${name} cannot be read: ${words(error)}`);
+        });
+        // What the engine does not read, the browser may.
+        const read = known ? file : await decoded(file);
+        const found = known ?? (read && (await header(read)));
+        if (!read || !found) {
+            throw new Error(`${name} is not an image that this browser reads: take ${READS}.`);
+        }
+        return { file: read, name, header: found, thumb: make('canvas', { hidden: true }), placed, calibration: [] };
+    }
+
+    /** The slots say what they hold. */
+    private render(): void {
+        for (const side of SIDES) {
+            const [slot, view] = [by(side), this.views[side]];
+            const label = slot.querySelector('.name') as HTMLElement;
+            label.textContent = label.title = view?.name ?? 'choose a file';
+            slot.classList.toggle('filled', view !== undefined);
+            slot.querySelector('.thumb')?.replaceChildren(...(view ? [view.thumb] : []));
             this.hold(side);
-        } catch (error) {
-            this.problem(side, words(error));
+            if (view) {
+                void preview(view);
+            }
         }
-        if (this.views[side]) {
-            const bitmap = await createImageBitmap(file).catch(() => undefined);
-            this.thumb(side, bitmap);
-            bitmap?.close();
+        for (const button of by('scenes').querySelectorAll('button')) {
+            button.setAttribute('aria-pressed', String(button.dataset['scene'] === this.scene));
         }
+        by('cut').hidden = !this.whole(this.views);
     }
 
     /** The input holds the file of its view, for those who are read what it holds. */
@@ -187,59 +321,21 @@ export class Slots {
         by<HTMLInputElement>(`${side}-file`).files = transfer.files;
     }
 
-    private empty(side: Side): void {
-        this.label(side, 'choose a file');
-        by(side).classList.remove('filled');
-        this.problem(side, undefined);
-        this.hold(side);
-    }
-
-    private label(side: Side, name: string): void {
-        const label = by(side).querySelector('.name') as HTMLElement;
-        label.textContent = name;
-        label.title = name;
-        by(side).classList.toggle('filled', true);
-        this.thumb(side, undefined);
-    }
-
-    private thumb(side: Side, image: (CanvasImageSource & { width: number; height: number }) | undefined): void {
-        const canvas = by(side).querySelector('canvas') as HTMLCanvasElement;
-        canvas.hidden = !image;
-        if (image) {
-            const scale = Math.min(1, 320 / Math.max(image.width, image.height));
-            [canvas.width, canvas.height] = [image.width, image.height].map((s) => Math.max(1, Math.round(s * scale))) as [number, number];
-            const context = canvas.getContext('2d');
-            if (context) {
-                context.imageSmoothingQuality = 'high';
-                context.drawImage(image, 0, 0, canvas.width, canvas.height);
+    /** Each view takes the place of the other one; the pair is to be matched at once where that is asked. Not after `signal` has ended it. */
+    swap(match = false, signal?: AbortSignal): Promise<void> {
+        return this.inTurn(async () => {
+            const { left, right } = this.views;
+            if (signal?.aborted || (!left && !right)) {
+                return;
             }
-        }
-    }
-
-    /** Each view takes the place of the other one; the pair is to be matched at once where that is asked. */
-    swap(match = false): void {
-        this.turn += 1;
-        const { left, right } = this.views;
-        this.views = { ...(right && { left: right }), ...(left && { right: left }) };
-        const [a, b] = [by('left'), by('right')];
-        const [first, second] = [a, b].map((slot) => slot.querySelector('label') as HTMLElement) as [HTMLElement, HTMLElement];
-        // The labels change places, but for the word that says which view it is.
-        for (const part of ['.thumb', '.name']) {
-            const [one, two] = [first.querySelector(part) as HTMLElement, second.querySelector(part) as HTMLElement];
-            const place = document.createComment('');
-            one.replaceWith(place);
-            two.replaceWith(one);
-            place.replaceWith(two);
-        }
-        const [filled, other] = [a.classList.contains('filled'), b.classList.contains('filled')];
-        a.classList.toggle('filled', other);
-        b.classList.toggle('filled', filled);
-        const [one, two] = (['left', 'right'] as const).map((side) => by(`${side}-problem`).textContent ?? '');
-        this.problem('left', two);
-        this.problem('right', one);
-        say('pair-problem', undefined);
-        (['left', 'right'] as const).forEach((side) => this.hold(side));
-        this.changed(match);
+            for (const view of Object.values(this.views)) {
+                view.placed = true;
+            }
+            this.views = { ...(right && { left: right }), ...(left && { right: left }) };
+            this.quiet();
+            this.render();
+            this.changed({ match, swapped: true });
+        });
     }
 
     private button({ name, title }: Scene): HTMLButtonElement {
@@ -260,9 +356,10 @@ export class Slots {
 
     /** Opens a scene, and has it matched. */
     async open(name: string): Promise<void> {
-        const turn = ++this.turn;
+        this.untouched = false;
+        const signal = this.fetches.next();
         const get = async (file: string) => {
-            const answer = await fetch(`scenes/${name}/${file}`);
+            const answer = await fetch(`scenes/${name}/${file}`, { signal });
             if (!answer.ok) {
                 throw new Error(`${answer.status} ${answer.statusText}`);
             }
@@ -270,18 +367,15 @@ export class Slots {
         };
         try {
             const files = await Promise.all([get('im0.png'), get('im1.png'), get('calib.txt')]);
-            if (turn !== this.turn) {
-                return;
-            }
-            await this.take(files, undefined, undefined, name);
+            await this.inTurn(async () => {
+                if (!signal.aborted) {
+                    await this.add(files, { scene: name, wish: { match: true } });
+                }
+            });
         } catch (error) {
-            say('pair-problem', `The scene could not be loaded (${words(error)}). Offline, only scenes that were opened before are at hand.`);
-        }
-    }
-
-    private press(): void {
-        for (const button of by('scenes').querySelectorAll('button')) {
-            button.setAttribute('aria-pressed', String(button.dataset['scene'] === this.scene));
+            if (!signal.aborted) {
+                say('pair-problem', `The scene could not be loaded (${words(error)}). Offline, only scenes that were opened before are at hand.`);
+            }
         }
     }
 
@@ -301,21 +395,28 @@ export class Slots {
             drop.hidden = true;
             if (files(event)) {
                 event.preventDefault();
-                const slot = (event.target as Element | null)?.closest?.('.slot')?.id as Side | undefined;
+                const side = (event.target as Element | null)?.closest?.('.slot')?.id as Side | undefined;
                 if (event.dataTransfer) {
-                    void dropped(event.dataTransfer).then(({ files, folder }) => this.take(files, slot, folder));
+                    const found = dropped(event.dataTransfer).catch((error) => new Error(`What was dropped cannot be read: ${words(error)}`));
+                    void this.inTurn(async () => {
+                        const drop = await found;
+                        if (drop instanceof Error) {
+                            throw drop;
+                        }
+                        await this.add(drop.files, { side, name: drop.folder });
+                    });
                 }
             }
         });
         document.addEventListener('paste', (event) => {
-            const slot = document.activeElement?.closest('.slot')?.id as Side | undefined;
-            void this.take([...(event.clipboardData?.files ?? [])].map(named), slot);
+            const side = document.activeElement?.closest('.slot')?.id as Side | undefined;
+            void this.take([...(event.clipboardData?.files ?? [])].map(named), { side });
         });
     }
 
     /** The first view that is missing. */
     get missing(): Side | undefined {
-        return (['left', 'right'] as const).find((side) => !this.views[side]);
+        return SIDES.find((side) => !this.views[side]);
     }
 
     /** Says at the empty slot that its view is missing. */
@@ -326,4 +427,25 @@ export class Slots {
         }
         by(`${side}-file`).focus();
     }
+}
+
+/** What the browser makes of a view, until the engine has its own picture. */
+async function preview({ file, thumb }: View): Promise<void> {
+    const bitmap = thumb.hidden ? await createImageBitmap(file).catch(() => undefined) : undefined;
+    if (bitmap && thumb.hidden) {
+        draw(thumb, bitmap);
+    }
+    bitmap?.close();
+}
+
+/** Draws a small picture. */
+function draw(canvas: HTMLCanvasElement, image: CanvasImageSource & { width: number; height: number }): void {
+    const scale = Math.min(1, 320 / Math.max(image.width, image.height));
+    [canvas.width, canvas.height] = [image.width, image.height].map((s) => Math.max(1, Math.round(s * scale))) as [number, number];
+    const context = canvas.getContext('2d');
+    if (context) {
+        context.imageSmoothingQuality = 'high';
+        context.drawImage(image, 0, 0, canvas.width, canvas.height);
+    }
+    canvas.hidden = false;
 }

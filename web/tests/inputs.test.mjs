@@ -46,21 +46,143 @@ describe('inputs', () => {
             ['imgL.png', 'imgR.png'],
             ['leftImage.png', 'rightImage.png'],
             ['000010_0.png', '000010_1.png'],
+            // Numbers of any length, and words before numbers: the right view may have been taken first.
+            ['1403636579763555583.png', '1403636579763555584.png'],
+            ['cam 2 left.png', 'cam 1 right.png'],
+            ['photo.jpg', 'photo2.jpg'],
+            ['im01_l.png', 'im1_r.png'],
         ];
         for (const [left, right] of names) {
             copyFileSync(LEFT, at(left));
             copyFileSync(RIGHT, at(right));
             for (const order of [[left, right], [right, left]]) {
                 assert.equal(await visit.changed(() => visit.choose('left', ...order.map(at))), 'ready');
-                assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], [left, right]);
+                assert.deepEqual(await visit.names(), [left, right]);
             }
         }
+    });
+
+    it('keeps the order of files whose names do not tell', async () => {
+        const names = [['pear.png', 'apple.png'], ['view.png', 'view.PNG'], ['01.png', '1.png']];
+        for (const pair of names) {
+            for (const order of [pair, pair.toReversed()]) {
+                // Both files are the same, so that no pair is better than the other.
+                const files = order.map((name) => ({ name, path: LEFT }));
+                assert.equal(await visit.changed(() => visit.give('dropped', files)), 'ready');
+                assert.deepEqual(await visit.names(), order);
+            }
+        }
+    });
+
+    it('begins a new pair with one new image, and tells views that come one by one from each other', async () => {
+        await works();
+        for (const way of ['dropped', 'pasted']) {
+            await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
+            assert.equal(await visit.changed(() => visit.give(way, [{ name: 'my right.png', path: RIGHT }])), 'empty');
+            assert.deepEqual(await visit.names(), ['my right.png', 'choose a file']);
+            assert.match(await visit.text('#pair-note'), /my right\.png begins a new pair/);
+            assert.equal(await visit.changed(() => visit.give(way, [{ name: 'my left.png', path: LEFT }])), 'ready');
+            assert.deepEqual(await visit.names(), ['my left.png', 'my right.png']);
+            assert.equal(await visit.text('#pair-note'), '');
+            // The calibration was that of the pair before.
+            await visit.says('#range-found', /by sparse matches$/);
+        }
+        await visit.match({ preset: 'fast', device: 'cpu', range: [0, 31] });
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+        await works();
+    });
+
+    it('says which view stays where the other one is chosen anew, and keeps their calibration no longer than one of them', async () => {
+        await visit.set({ range: 'automatic' });
+        await visit.pair(scene('thin'), join(scene('thin'), 'calib.txt'));
+        copyFileSync(LEFT, at('new left.png'));
+        copyFileSync(RIGHT, at('new right.png'));
+        assert.equal(await visit.changed(() => visit.choose('left', at('new left.png'))), 'ready');
+        assert.equal(await visit.text('#pair-note'), 'im1.png is still the right view, and calib.txt the calibration.');
+        assert.match(await visit.text('#range-found'), /by calib\.txt$/);
+        assert.equal(await visit.changed(() => visit.choose('right', at('new right.png'))), 'ready');
+        assert.equal(await visit.text('#pair-note'), '');
+        assert.match(await visit.text('#range-found'), /by sparse matches$/);
+        // A slot is obeyed, whatever the names say.
+        await visit.changed(() => visit.give('dropped', [{ name: 'my right.png', path: LEFT }], 'left'));
+        assert.deepEqual(await visit.names(), ['my right.png', 'new right.png']);
+        await visit.changed(() => visit.give('dropped', [{ name: 'my left.png', path: RIGHT }], 'right'));
+        assert.deepEqual(await visit.names(), ['my right.png', 'my left.png']);
+        await works();
+    });
+
+    it('leaves all as it is where it takes nothing', async () => {
+        await works();
+        const [left, right] = [LEFT, RIGHT].map((path, i) => ({ name: `view ${i}.png`, path }));
+        writeFileSync(at('notes'), 'These are no pixels.');
+        const notes = { name: 'notes', path: at('notes') };
+        const refused = [
+            ['dropped', [left, right, { ...right, name: 'third.png' }], /3 files/],
+            ['pasted', [left, right, { ...right, name: 'third.png' }], /3 files/],
+            ['dropped', [notes], /notes is not an image/],
+            ['pasted', [notes], /notes is not an image/],
+            ['dropped', [left, notes], /notes is not an image/],
+            ['dropped', [{ ...notes, name: 'README.txt' }], /no view and no calibration in README\.txt/],
+            ['dropped', [{ folder: 'none', files: [] }], /no view and no calibration in none/],
+            ['dropped', [{ folder: 'nothing', files: [{ ...notes, name: '.DS_Store' }, { ...notes, name: 'desktop.ini' }] }], /no view and no calibration in nothing/],
+            ['dropped', [{ folder: 'one', files: [] }, { folder: 'other', files: [] }], /no view and no calibration in what was dropped/],
+            ['dropped', [{ folder: 'lost', files: [left, { name: 'im1.png' }] }], /What was dropped cannot be read: it is gone/],
+            ['pasted', [], /^$/],
+        ];
+        const turn = () => visit.tab.$eval('#app', (app) => app.dataset.turn);
+        const before = await turn();
+        for (const [way, files, words] of refused) {
+            await visit.tab.evaluate(() => (document.getElementById('pair-problem').textContent = ''));
+            await visit.give(way, files);
+            if (files.length > 0) {
+                await visit.says('#pair-problem', words);
+            }
+            assert.deepEqual([await visit.names(), await turn()], [['im0.png', 'im1.png'], before], `${words}`);
+        }
+        // At its slot, where it has one.
+        await visit.give('dropped', [notes], 'right');
+        await visit.says('#right-problem', /notes is not an image/);
+        assert.equal(await visit.tab.$eval('#app', (app) => app.dataset.state), 'done');
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+        await works();
+    });
+
+    it('takes the views of folders', async () => {
+        await visit.set({ range: 'automatic' });
+        const [left, right, calib] = [[LEFT, 'b10.png'], [RIGHT, 'b9.png'], [join(scene('thin'), 'calib.txt'), 'calib.txt']].map(([path, name]) => ({ path, name }));
+        // In any order of a folder, with what systems leave there.
+        const files = [{ name: 'Thumbs.db', path: LEFT }, right, calib, { name: '.hidden.png', path: LEFT }, left];
+        assert.equal(await visit.changed(() => visit.give('dropped', [{ folder: 'Some', files }])), 'ready');
+        assert.deepEqual(await visit.names(), ['b9.png', 'b10.png']);
+        await visit.says('#range-found', /by calib\.txt$/);
+        // Each view in a folder of its own, of one name.
+        const two = [LEFT, RIGHT].map((path, i) => ({ folder: `image_${i}`, files: [{ name: '000010.png', path }] }));
+        assert.equal(await visit.changed(() => visit.give('dropped', two)), 'ready');
+        await visit.match({ preset: 'fast', device: 'cpu', range: [0, 31] });
+        const map = await visit.save('pfm');
+        assert.equal(map.name, '000010-disparity.pfm');
+        assert.equal(difference(map.bytes, expected.pfm), undefined);
+        await works();
+    });
+
+    it('keeps no range of another pair, but one that was typed in for its size', async () => {
+        const given = () => visit.tab.$eval('input[value=given]', (input) => input.checked);
+        await visit.set({ range: 'automatic' });
+        await visit.pair(scene('thin'));
+        await visit.set({ range: [0, 19] });
+        await visit.changed(() => visit.tab.click('#swap'));
+        assert.equal(await given(), true);
+        await visit.pair(scene('thin'));
+        assert.equal(await given(), true);
+        await visit.pair(scene('mixed'));
+        assert.equal(await given(), false);
+        await works();
     });
 
     it('swaps the views', async () => {
         await visit.pair(scene('thin'));
         assert.equal(await visit.changed(() => visit.tab.click('#swap')), 'ready');
-        assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im1.png', 'im0.png']);
+        assert.deepEqual(await visit.names(), ['im1.png', 'im0.png']);
         await visit.match({ preset: 'fast', device: 'cpu', range: [-31, 0] });
         const swapped = native(RIGHT, LEFT, ['--method', 'fast', '--min-disparity', '-31', '--max-disparity', '0']);
         assert.equal(difference((await visit.save('pfm')).bytes, swapped.pfm), undefined);
@@ -72,21 +194,9 @@ describe('inputs', () => {
 
     for (const way of ['dropped', 'pasted']) {
         it(`takes ${way} files`, async () => {
-            const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, content: readFileSync(path, 'base64') }));
-            const give = () => visit.tab.evaluate((files, way) => {
-                const transfer = new DataTransfer();
-                for (const { name, content } of files) {
-                    transfer.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name, { type: 'image/png' }));
-                }
-                const properties = { bubbles: true, cancelable: true };
-                const events = way === 'dropped'
-                    ? ['dragover', 'drop'].map((type) => new DragEvent(type, { dataTransfer: transfer, ...properties }))
-                    // Firefox lets no script make an event with files in it.
-                    : [Object.defineProperty(new Event('paste', properties), 'clipboardData', { value: transfer })];
-                events.forEach((event) => document.body.dispatchEvent(event));
-            }, files, way);
-            assert.equal(await visit.changed(give), 'ready');
-            assert.deepEqual([await visit.text('#left .name'), await visit.text('#right .name')], ['im0.png', 'im1.png']);
+            const files = [RIGHT, LEFT].map((path, i) => ({ name: `im${1 - i}.png`, path }));
+            assert.equal(await visit.changed(() => visit.give(way, files)), 'ready');
+            assert.deepEqual(await visit.names(), ['im0.png', 'im1.png']);
             await works();
         });
     }

@@ -173,19 +173,11 @@ describe('photos', () => {
 
     it('takes a folder of a benchmark, and calls the files after it', async () => {
         const names = ['im0.png', 'im1.png', 'calib.txt', 'disp0GT.pfm', 'mask0nocc.png'];
-        const files = names.map((name) => ({ name, content: readFileSync(join(scene('thin'), name), 'base64') }));
-        const drop = () => visit.tab.evaluate((files) => {
-            const entries = files.map(({ name, content }) => ({
-                isFile: true,
-                file: (take) => take(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name)),
-            }));
-            const directory = { isDirectory: true, name: 'Motorcycle', createReader: () => ({ readEntries: (take) => take(entries.splice(0, 3)) }) };
-            const transfer = { types: ['Files'], files: [], items: [{ webkitGetAsEntry: () => directory }] };
-            const event = new Event('drop', { bubbles: true, cancelable: true });
-            document.body.dispatchEvent(Object.defineProperty(event, 'dataTransfer', { value: transfer }));
-        }, files);
+        const files = names.map((name) => ({ name, path: join(scene('thin'), name) }));
+        const drop = () => visit.give('dropped', [{ folder: 'Motorcycle', files }]);
         await visit.set({ range: 'automatic' });
         assert.equal(await visit.changed(drop), 'ready');
+        assert.equal(await visit.text('#pair-note'), 'Of 5 files im0.png and im1.png are the views.');
         await visit.says('#range-found', /^0 to 31 px, by calib\.txt$/);
         await visit.match({ preset: 'fast', device: 'cpu', range: 'automatic' });
         assert.equal((await visit.save('pfm')).name, 'Motorcycle-disparity.pfm');

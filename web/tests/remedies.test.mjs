@@ -1,13 +1,15 @@
 // What the page says of a result, and what helps: it stays with the result, and a button does it.
 import assert from 'node:assert/strict';
-import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
+import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { difference, native } from './lib/native.mjs';
-import { scene } from './lib/paths.mjs';
+import { ROOT, scene } from './lib/paths.mjs';
 import { BROWSER, Visit } from './lib/visit.mjs';
 
+const { PNG } = createRequire(join(ROOT, 'web/package.json'))('pngjs');
 const views = (name) => ['im0.png', 'im1.png'].map((file) => join(scene(name), file));
 const RAW = ['left.png', 'right.png'].map((file) => join(scene('raw'), file));
 const CAMERAS = join(scene('raw'), 'cameras.yml');
@@ -99,6 +101,68 @@ describe('remedies', () => {
         await visit.says('#warnings', /not rectified/);
     });
 
+    it('rectifies a pair without a range where it says so, and swaps it as it is', async () => {
+        await visit.set({ range: 'automatic' });
+        const [left, right] = views('mixed');
+        const from = PNG.sync.read(readFileSync(right));
+        // As if the camera had been turned down between the views.
+        const to = new PNG({ width: from.width, height: from.height });
+        PNG.bitblt(from, to, 0, 60, from.width, from.height - 60, 0, 0);
+        const [one, other] = ['by hand left.png', 'by hand right.png'].map((name) => join(folder, name));
+        copyFileSync(left, one);
+        writeFileSync(other, PNG.sync.write(to));
+        assert.equal(await visit.changed(() => visit.choose('left', one, other)), 'ready');
+        await visit.says('#range-problem', /^Sparse matches find no range/);
+        await visit.says('#no-range', /by hand/);
+        // Who presses Match is led there.
+        await visit.tab.click('#match');
+        await visit.tab.waitForFunction(() => document.activeElement.id === 'rectify');
+        await again(() => visit.tab.click('#rectify'));
+        assert.match(await visit.text('#notes'), /Rectified by its own matches/);
+        assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
+        assert.equal(await visit.text('#range-problem'), '');
+        assert.equal(difference((await visit.save('pfm')).bytes, native(one, other, [...FAST, '--rectify']).pfm), undefined);
+        // The same pair stays rectified.
+        await visit.changed(() => visit.tab.click('#swap'));
+        assert.match(await visit.text('#notes'), /Rectified by its own matches/);
+        // Another pair is not.
+        await visit.pair(scene('mixed'));
+        assert.equal(await visit.text('#notes'), '');
+    });
+
+    it('offers no rectification that has failed', async () => {
+        await visit.set({ range: 'automatic' });
+        const [one, other] = [views('thin')[0], views('steep')[1]];
+        assert.equal(await visit.changed(() => visit.give('dropped', [one, other].map((path, i) => ({ name: `im${i}.png`, path })))), 'ready');
+        await visit.says('#no-range', /by hand/);
+        assert.equal(await visit.changed(() => visit.tab.click('#rectify')), 'ready');
+        await visit.says('#pair-problem', /cannot be rectified by its matches/);
+        assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
+        await visit.match({ range: [0, 31] });
+        const offered = () => visit.tab.$$eval('#warnings button, #notes button', (buttons) => buttons.map((button) => button.textContent));
+        assert.ok(!(await offered()).includes('Rectify'), await visit.text('#warnings'));
+        await visit.set({ range: 'automatic' });
+        await visit.says('#range-problem', /find no range/);
+        assert.equal(await visit.tab.$eval('#no-range', (offer) => offer.checkVisibility()), false);
+        // It was about that pair.
+        assert.equal(await visit.changed(() => visit.choose('left', ...RAW)), 'ready');
+        assert.equal(await visit.text('#pair-problem'), '');
+        assert.ok((await offered()).includes('Rectify'));
+        // Where the range is known, too. The engine is given what it cannot rectify by.
+        await visit.set({ range: [0, 31] });
+        await visit.tab.evaluate(() => {
+            const real = Worker.prototype.postMessage;
+            Worker.prototype.postMessage = function (message, ...rest) {
+                real.call(this, message.call === 'rectify' ? { ...message, args: [[{ name: 'none.yml', text: '?' }]] } : message, ...rest);
+                Worker.prototype.postMessage = message.call === 'rectify' ? real : Worker.prototype.postMessage;
+            };
+        });
+        await again(() => click('#warnings', 'Rectify'));
+        assert.match(await visit.text('#pair-problem'), /\w/);
+        assert.match(await visit.text('#warnings'), /not rectified/);
+        assert.ok(!(await offered()).includes('Rectify'));
+    });
+
     it('rectifies by a calibration of OpenCV, also one that comes before its pair', async () => {
         await visit.scene('mixed');
         await visit.choose('left', CAMERAS);
@@ -115,6 +179,8 @@ describe('remedies', () => {
         assert.equal(await visit.scene('mixed'), 'done');
         await visit.choose('left', join(scene('thin'), 'calib.txt'));
         await visit.says('#pair-note', /calib\.txt is kept/);
+        // A scene has its own.
+        assert.equal(await visit.scene('slanted'), 'done');
         await visit.pair(scene('thin'));
         await visit.says('#range-found', /^0 to 31 px, by calib\.txt$/);
         // It is of that pair, and not of the next one.
@@ -128,6 +194,18 @@ describe('remedies', () => {
         await visit.says('#warnings', /cuts off part of the scene/);
         await again(() => click('#warnings', 'Widen the range'));
         assert.match(await visit.text('#facts'), /range 0 to 29/);
+        // Also while another match runs, which ends. The range holds for this pair.
+        await visit.match({ range: [0, 19] });
+        await visit.set({ preset: 'paper' });
+        await visit.begin();
+        await visit.set({ preset: 'fast' });
+        await click('#warnings', 'Widen the range');
+        await visit.tab.waitForFunction(() => /range 0 to 29/.test(document.getElementById('facts').textContent));
+        assert.equal(await visit.state('done'), 'done');
+        assert.equal(await visit.text('#problem'), '');
+        assert.match(await visit.text('#facts'), /fast/);
+        await visit.pair(scene('mixed'));
+        assert.equal(await visit.tab.$eval('input[value=automatic]', (input) => input.checked), true);
     });
 
     it('says that both images are the same, as long as the map is there', async () => {

@@ -106,6 +106,109 @@ export class Visit {
         await (await this.tab.$(`#${side}-file`)).uploadFile(...paths);
     }
 
+    /**
+     * Drops or pastes files, `{ name, path }`, anywhere or on a slot. What is pasted without files is text. `{ folder, files }` is dropped as a
+     * folder; of its files, one without a path cannot be read.
+     */
+    give(way, files, slot) {
+        const packed = ({ name, path, folder, files }) => (files ? { folder, files: files.map(packed) } : { name, content: path && readFileSync(path, 'base64') });
+        return this.tab.evaluate((files, way, slot) => {
+            const made = ({ name, content }) => new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name);
+            const gone = new DOMException('it is gone', 'NotFoundError');
+            const entry = ({ folder, name, content, files }) => {
+                const inside = files?.map(entry);
+                const directory = { isDirectory: true, name: folder, createReader: () => ({ readEntries: (take) => take(inside.splice(0, 3)) }) };
+                return folder ? directory : { isFile: true, name, file: (take, refuse) => (content === undefined ? refuse(gone) : take(made({ name, content }))) };
+            };
+            const transfer = new DataTransfer();
+            const properties = { bubbles: true, cancelable: true };
+            let events;
+            if (way === 'pasted') {
+                files.forEach((file) => transfer.items.add(made(file)));
+                if (files.length === 0) {
+                    transfer.setData('text/plain', 'words');
+                }
+                // Firefox lets no script make an event with files in it.
+                events = [Object.defineProperty(new Event('paste', properties), 'clipboardData', { value: transfer })];
+            } else if (files.some(({ folder }) => folder)) {
+                const items = files.map((file) => ({ webkitGetAsEntry: () => entry(file) }));
+                const dataTransfer = { types: ['Files'], files: [], items };
+                events = [Object.defineProperty(new Event('drop', properties), 'dataTransfer', { value: dataTransfer })];
+            } else {
+                files.forEach((file) => transfer.items.add(made(file)));
+                events = ['dragover', 'drop'].map((type) => new DragEvent(type, { dataTransfer: transfer, ...properties }));
+            }
+            const at = slot ? document.getElementById(slot) : document.body;
+            events.forEach((event) => at.dispatchEvent(event));
+        }, files.map(packed), way, slot);
+    }
+
+    /** Lets no file be read in the page until `release`; with `first` the file that comes next alone. */
+    holdFiles(first = false) {
+        return this.tab.evaluate((first) => {
+            const real = Blob.prototype.arrayBuffer;
+            const back = () => (Blob.prototype.arrayBuffer = real);
+            const held = new Promise((resolve) => (window.release = () => resolve(back())));
+            Blob.prototype.arrayBuffer = async function () {
+                if (first) {
+                    back();
+                }
+                await held;
+                return real.call(this);
+            };
+        }, first);
+    }
+
+    /** Lets no call of this name reach the worker until `release`. */
+    holdCalls(name) {
+        return this.tab.evaluate((name) => {
+            const real = Worker.prototype.postMessage;
+            const held = [];
+            window.release = () => {
+                Worker.prototype.postMessage = real;
+                held.forEach((send) => send());
+            };
+            Worker.prototype.postMessage = function (...message) {
+                const send = () => real.apply(this, message);
+                if (message[0].call === name) {
+                    held.push(send);
+                    window.held = name;
+                } else {
+                    send();
+                }
+            };
+        }, name);
+    }
+
+    /** Waits until a call of this name is held. */
+    async holds(name) {
+        await this.tab.waitForFunction((name) => window.held === name, {}, name);
+    }
+
+    release() {
+        return this.tab.evaluate(() => window.release());
+    }
+
+    /** Counts from now on how many workers are started. */
+    async countWorkers() {
+        await this.tab.evaluate(() => {
+            const Real = Worker;
+            window.workers = 0;
+            window.Worker = class extends Real {
+                constructor(...options) {
+                    super(...options);
+                    window.workers += 1;
+                }
+            };
+        });
+        return () => this.tab.evaluate(() => window.workers);
+    }
+
+    /** The names in both slots. */
+    names() {
+        return Promise.all(['#left .name', '#right .name'].map((selector) => this.text(selector)));
+    }
+
     /** Does what changes the pair, and waits until the page has taken it up; answers with the state. */
     async changed(action) {
         const before = await this.tab.$eval('#app', (app) => Number(app.dataset.turn ?? 0));
