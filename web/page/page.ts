@@ -211,7 +211,7 @@ async function read(matched: boolean): Promise<void> {
         await client.cancel();
         signal.throwIfAborted();
         if (left && right) {
-            fits(left, right);
+            mustFit(left, right);
             pair = { ...(await open(signal, left, right)), name: slots.name ?? left.name };
             points.pair(pair.left.width, pair.left.height, pair.cameras, pair.files);
             settings.pair(pair.size.width, pair.size.height);
@@ -235,7 +235,7 @@ async function read(matched: boolean): Promise<void> {
 }
 
 /** Refuses views that make no pair, or one that is too large, before they are read. */
-function fits(left: Opened, right: Opened): void {
+function mustFit(left: Opened, right: Opened): void {
     const [a, b] = [left.header.size, right.header.size];
     const huge = a && tooLarge(a.width, a.height, left.file.size + right.file.size);
     if (huge) {
@@ -273,7 +273,7 @@ async function open(signal: AbortSignal, left: Opened, right: Opened): Promise<R
             return await act();
         } catch (error) {
             signal.throwIfAborted();
-            if (error instanceof Broken) {
+            if (error instanceof Broken || error instanceof Interrupted) {
                 throw error;
             }
             problems.push(words(error));

@@ -54,6 +54,7 @@ interface Source {
 
 const other = (side: Side): Side => (side === 'left' ? 'right' : 'left');
 const listed = (files: { name: string }[]): string => files.map(({ name }) => name).join(', ');
+const keeping = (files: Text[]): string => `${listed(files)} is kept for your pair.`;
 const READS = 'PNG, JPEG, WebP, AVIF, GIF, PNM, TIFF or PFM';
 /** Files that hold a calibration, or a list that is not for us. */
 const TEXT = /\.(txt|ya?ml|json|xml|ini|conf|cfg|calib|toml)$/i;
@@ -176,8 +177,9 @@ export class Slots {
         if (side && stays) {
             const files = listed(this.calibration);
             say('pair-note', `${stays.name} is still the ${other(side)} view${files && `, and ${files} the calibration`}.`);
-        } else if (pair && !side) {
-            say('pair-note', `${view.name} begins a new pair. Give its other view, too.`);
+        } else if (this.missing) {
+            const begins = pair ? `${view.name} begins a new pair. Give its other view, too. ` : '';
+            say('pair-note', `${begins}${calibration.length > 0 ? keeping(calibration) : ''}`.trim());
         }
     }
 
@@ -188,7 +190,7 @@ export class Slots {
             this.put({ left, right }, { name: this.name }, files, this.last);
         } else {
             this.kept = files;
-            say('pair-note', `${listed(files)} is kept for your pair.`);
+            say('pair-note', keeping(files));
         }
     }
 

@@ -324,5 +324,21 @@ describe('inputs', () => {
         await visit.tab.click('#match');
         await visit.says('#problem', /The engine ended .* started again/);
         await works();
+        // In the middle of a pair: who presses Match has it read again.
+        await visit.tab.evaluate(() => {
+            const post = Worker.prototype.postMessage;
+            Worker.prototype.postMessage = function (message) {
+                Worker.prototype.postMessage = post;
+                post.call(this, message.call === 'pair' ? null : message);
+            };
+        });
+        assert.equal(await visit.changed(() => visit.choose('left', LEFT, RIGHT)), 'empty');
+        await visit.says('#pair-problem', /The engine ended .* started again/);
+        await visit.set({ preset: 'fast', range: [0, 31] });
+        await visit.tab.click('#match');
+        assert.equal(await visit.state('done'), 'done');
+        assert.equal(await visit.text('#pair-problem'), '');
+        assert.equal(difference((await visit.save('pfm')).bytes, expected.pfm), undefined);
+        await works();
     });
 });

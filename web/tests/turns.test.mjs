@@ -31,7 +31,10 @@ describe('turns', () => {
         assert.equal(difference(map.bytes, expected.pfm), undefined);
         await visit.set({ range: 'automatic' });
     }
-    before(async () => (visit = await Visit.open()));
+    before(async () => {
+        visit = await Visit.open();
+        await visit.set({ preset: 'fast', device: 'cpu' });
+    });
     after(() => visit.close());
 
     const meanwhile = [
@@ -154,28 +157,29 @@ describe('turns', () => {
         await visit.scene('mixed');
         await visit.holdCalls('points');
         await visit.tab.click('#tab-points');
-        // A browser without WebGL asks for none.
-        const asked = await visit.holds('points').then(() => true, () => false);
+        // A browser without WebGL asks for none, and says so.
+        await visit.tab.waitForFunction(() => window.held === 'points' || /no WebGL/.test(document.getElementById('cloud-note').textContent));
         await visit.changed(async () => {
             await drop(...THIN);
             await visit.release();
         });
         await idle(300);
-        assert.equal(await visit.tab.$eval('#points', ({ dataset }) => dataset.points), '', asked);
+        assert.equal(await visit.tab.$eval('#points', ({ dataset }) => dataset.points), '');
         await visit.says('#cloud-note', /next result/);
         await visit.tab.click('#tab-disparity');
     });
 
-    it('takes several changes of a pair that is matched, with the worker that it has', async () => {
+    it('takes several changes of a pair that is matched, by the worker that it has', async () => {
         const workers = await visit.countWorkers();
-        await visit.set({ preset: 'paper', device: 'cpu' });
         await visit.scene('mixed');
+        await visit.set({ preset: 'paper' });
         await visit.begin();
-        await visit.changed(async () => {
-            await drop(...RAW);
-            await drop(...THIN);
-            await drop(...THIN);
-        });
+        // Two changes at once, while the match is being ended.
+        await visit.changed(() => visit.tab.evaluate(() => {
+            document.getElementById('swap').click();
+            document.getElementById('swap').click();
+        }));
+        await visit.changed(() => drop(...THIN));
         await idle(PATIENCE);
         await visit.settled();
         assert.equal(await workers(), 0);
