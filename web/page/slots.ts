@@ -84,7 +84,8 @@ export class Slots {
         for (const side of SIDES) {
             const input = by<HTMLInputElement>(`${side}-file`);
             input.addEventListener('change', () => {
-                void this.take([...(input.files ?? [])].map(named), { side });
+                // What was not taken is not held.
+                void this.take([...(input.files ?? [])].map(named), { side }).then(() => this.hold(side));
             });
             // The same file can be chosen again.
             input.addEventListener('click', () => (input.value = ''));
