@@ -535,7 +535,7 @@ function forget(): void {
     offerBefore();
     ruler.clear();
     legend.none();
-    points.result(false);
+    points.forget();
     by('outcome').hidden = true;
     for (const id of ['facts', 'comparison', 'readout', 'problem', 'range-found', 'range-problem', 'save-problem', 'stage']) {
         say(id, undefined);

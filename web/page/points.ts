@@ -71,7 +71,7 @@ export class PointsTab {
         // What was typed in holds for the next pair of this size.
         const same = this.size.width === width && this.size.height === height;
         this.size = { width, height };
-        if (read || this.source !== 'given' || !same) {
+        if (read || this.source !== 'given' || !same || !this.cameras) {
             this.source = read ? 'calibration' : 'guess';
             const guess = { focalLength: width, cx: (width - 1) / 2, cy: (height - 1) / 2, doffs: 0, baseline: 1, unit: 'unknown' };
             const cameras = read ?? guess;
@@ -81,6 +81,20 @@ export class PointsTab {
             }
         }
         this.note();
+    }
+
+    /** The pair is gone, and with it all but what was typed in. */
+    forget(): void {
+        this.result(false);
+        if (this.source !== 'given') {
+            this.source = 'guess';
+            by<HTMLSelectElement>('unit').value = 'unknown';
+            for (const key of ALL) {
+                field(key).value = '';
+            }
+            say('cameras-note', undefined);
+            say('cameras-problem', undefined);
+        }
     }
 
     /** There is a result, or none any more. The points of an earlier one go. */

@@ -117,22 +117,50 @@ describe('turns', () => {
     });
 
     for (const call of ['pair', 'calibration', 'rectify', 'range', 'warnings']) {
-        it(`leaves nothing of a pair that gives way at the call ${call}`, async () => {
+        /** Gives a pair that is rectified by its calibration, and stays at the call. */
+        const hold = async () => {
             await visit.set({ range: 'automatic' });
             await visit.holdCalls(call);
-            // One that is rectified by its calibration.
             await drop(...RAW);
             await visit.holds(call);
-            const state = await visit.changed(async () => {
-                await drop(...THIN);
+        };
+        const silent = async () => {
+            assert.equal(await visit.text('#pair-problem'), '');
+            assert.doesNotMatch(await visit.tab.$eval('#cameras-note', (note) => note.textContent), /cameras\.yml/);
+        };
+
+        for (const end of ['answered late', 'never answered']) {
+            it(`leaves nothing of a pair that gives way to another, its call ${call} ${end}`, async () => {
+                await hold();
+                const state = await visit.changed(async () => {
+                    await drop(...THIN);
+                    await visit.tab.waitForFunction(() => document.querySelector('#left .name').textContent === 'my left.png');
+                    // The page ends a worker that it waits for in vain.
+                    await idle(end === 'never answered' ? PATIENCE : 0);
+                    await visit.release();
+                });
+                assert.equal(state, 'ready', await visit.text('#pair-problem'));
+                await visit.says('#range-found', /by sparse matches$/);
+                await silent();
+                await holds('my left.png', 'my right.png');
+            });
+        }
+
+        it(`leaves nothing of a pair that gives way to a single view at the call ${call}`, async () => {
+            await hold();
+            await visit.changed(async () => {
+                await drop(THIN[0]);
                 await visit.tab.waitForFunction(() => document.querySelector('#left .name').textContent === 'my left.png');
                 await visit.release();
             });
-            assert.equal(state, 'ready', await visit.text('#pair-problem'));
-            await visit.says('#range-found', /by sparse matches$/);
-            assert.equal(await visit.text('#pair-problem'), '');
-            assert.doesNotMatch(await visit.tab.$eval('#cameras-note', (note) => note.textContent), /cameras\.yml/);
-            await holds('my left.png', 'my right.png');
+            await idle(300);
+            await visit.state('empty');
+            assert.deepEqual(await visit.names(), ['my left.png', 'choose a file']);
+            for (const said of ['#range-found', '#range-problem', '#warnings', '#notes', '#readout']) {
+                assert.equal(await visit.text(said), '', said);
+            }
+            await silent();
+            assert.equal(await visit.tab.$eval('#map', (map) => map.classList.contains('shown')), false);
         });
     }
 
@@ -164,7 +192,9 @@ describe('turns', () => {
             await visit.release();
         });
         await idle(300);
-        assert.equal(await visit.tab.$eval('#points', ({ dataset }) => dataset.points), '');
+        // The slider would end where a cloud ends.
+        const shown = await visit.tab.evaluate(() => [document.getElementById('points').dataset.points, document.getElementById('least').max]);
+        assert.deepEqual(shown, ['', '255']);
         await visit.says('#cloud-note', /next result/);
         await visit.tab.click('#tab-disparity');
     });
