@@ -345,6 +345,11 @@ pub enum ExecutionError {
     /// The system does not start the threads.
     #[error("the threads cannot be started: {0}")]
     Threads(String),
+    /// What is to be used was in use when this process was forked, by a thread that the process does not have.
+    #[error(
+        "another thread was using this when the process was forked, so that it is lost here: make it anew"
+    )]
+    Forked,
 }
 
 /// For what the memory that a method grants to a match is too little; all sizes are in MiB.
@@ -386,6 +391,11 @@ pub enum DeviceError {
     #[cfg_attr(not(target_arch = "wasm32"), error("no Vulkan or Metal driver found"))]
     #[cfg_attr(target_arch = "wasm32", error("this browser shows no GPU"))]
     NoDriver,
+    /// The process was forked from one that has used drivers, which cannot be used any more then.
+    #[error(
+        "no device can be opened in this process, which was forked from one that has opened or looked for devices"
+    )]
+    Forked,
     /// The device gets a small test pair wrong.
     #[error("{name} disagrees with the CPU path on the self-test")]
     WrongMaps {

@@ -83,6 +83,7 @@
 //! - [`depth`] turns disparities into depths and points, where the cameras are known.
 //! - [`evaluation`] compares maps with ground truth.
 //! - [`image`] reads and writes images and maps.
+//! - [`threads`] says how many threads work where nobody says it, and bounds those that work beside matchers.
 //! - [`low_level`] has the parts of the engine, for those who build on it or study it.
 //!
 //! Beliefs, messages and evidence are costs in integers (see [`low_level::plan`]), so the CPU path and every GPU give the same
@@ -107,6 +108,7 @@ pub mod options;
 #[cfg_attr(target_arch = "wasm32", path = "pause_in_browser.rs")]
 mod pause;
 mod plan;
+mod process;
 mod program;
 pub mod rectification;
 pub mod region;
@@ -118,6 +120,7 @@ pub mod sigma;
 mod stage;
 pub mod steady;
 mod text;
+pub mod threads;
 mod vectors;
 mod watch;
 mod weights;
@@ -127,6 +130,8 @@ pub use front::check;
 pub use front::conditioning::Conditioning;
 pub use front::drift;
 pub use image::Pair;
+#[cfg(not(target_arch = "wasm32"))]
+pub use matcher::SharedMatcher;
 pub use matcher::{Answer, Builder, Found, Job, Matched, Matcher, Search, Timing};
 pub use options::Method;
 pub use watch::Progress;
@@ -152,6 +157,8 @@ pub mod low_level {
         plan;
         /// What the messages cost at least, to hold a machine against.
         roofline;
+        /// What belongs to one process, and what one that is forked takes along.
+        process;
         /// A match as a list of steps: the schedule, and how a pair is cut that is too large for its memory.
         program;
         /// The stages, exactly defined.

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{MemoryError, Purpose, Result};
+use crate::process::PerProcess;
 
 /// Bytes that can be had without swapping, where the system says so.
 #[cfg(not(target_arch = "wasm32"))]
@@ -39,7 +40,7 @@ pub(crate) fn check(bytes: u64, purpose: Purpose) -> Result<(), MemoryError> {
 }
 
 /// Bytes that have been claimed.
-static CLAIMED: AtomicU64 = AtomicU64::new(0);
+static CLAIMED: PerProcess<AtomicU64> = PerProcess::new();
 
 /// Memory that somebody takes, step by step, while this lives: other claims must do without it.
 pub(crate) struct Claim(u64);
@@ -53,7 +54,7 @@ impl Claim {
         // Alone first: what is too much in any case is told in the same way whatever others claim at this moment.
         check(bytes, Purpose::Image)?;
         let claim = Self(bytes);
-        let others = CLAIMED.fetch_add(bytes, Ordering::Relaxed);
+        let others = CLAIMED.get().fetch_add(bytes, Ordering::Relaxed);
         // Where it fails the claim is dropped.
         check(others.saturating_add(bytes), Purpose::Image).map(|()| claim)
     }
@@ -61,7 +62,7 @@ impl Claim {
 
 impl Drop for Claim {
     fn drop(&mut self) {
-        CLAIMED.fetch_sub(self.0, Ordering::Relaxed);
+        CLAIMED.get().fetch_sub(self.0, Ordering::Relaxed);
     }
 }
 
@@ -113,7 +114,7 @@ mod tests {
         assert!(Claim::new(share).is_err(), "both together are too much");
         assert!(Claim::new(u64::MAX).is_err());
         drop(first);
-        assert_eq!(CLAIMED.load(Ordering::Relaxed), 0);
+        assert_eq!(CLAIMED.get().load(Ordering::Relaxed), 0);
         drop(Claim::new(share).unwrap());
     }
 }

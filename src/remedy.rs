@@ -33,6 +33,8 @@ pub struct Words {
     pub cpu: &'static str,
     /// What to do where there is no driver, and where it computes nonsense.
     pub driver: [&'static str; 2],
+    /// How a process is begun that may open devices, though its parent has.
+    pub fork: &'static str,
     /// The number of threads.
     pub threads: &'static str,
     /// The memory that is granted to a match, and the unit that follows its number.
@@ -66,6 +68,7 @@ impl Words {
         devices: None,
         cpu: "",
         driver: ["install the driver of the GPU", "update its driver"],
+        fork: "open devices in such processes alone",
         threads: "threads",
         memory: None,
         steps: None,
@@ -165,6 +168,7 @@ impl Words {
             ExecutionError::NoSuchDevice { .. } => {
                 format!("{}: {cause}{}", self.device, and("; ", self.devices))
             }
+            ExecutionError::Forked => cause.to_string(),
             _ => format!("{}: {cause}", self.threads),
         }
     }
@@ -212,9 +216,10 @@ impl Words {
     }
 
     fn device(&self, cause: &DeviceError) -> String {
-        let Self { device, cpu, driver: [install, update], .. } = self;
+        let Self { device, cpu, driver: [install, update], fork, .. } = self;
         match cause {
             DeviceError::NoDriver => format!(": {install}, or {cpu}"),
+            DeviceError::Forked => format!(": {fork}, or {cpu}"),
             DeviceError::WrongMaps { .. } => format!(": {update}, or {cpu}"),
             DeviceError::TooLargeForShader { .. } => format!(": {cpu}"),
             DeviceError::Failed { .. } => format!("; use another {device}, or {cpu}"),

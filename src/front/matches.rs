@@ -18,6 +18,7 @@ use crate::image::{Pair, Plane};
 use crate::maps::FRACTION;
 use crate::memory;
 use crate::options::DisparityRange;
+use crate::threads;
 use corners::{SPACING, cell, corners};
 use correlation::correlation;
 use rayon::prelude::*;
@@ -99,7 +100,16 @@ pub(super) fn search(
     spacing: usize,
     rows: usize,
 ) -> Vec<Match> {
-    let spacing = spacing.max(SPACING);
+    threads::run(|| searched(pair, zones, range, spacing.max(SPACING), rows))
+}
+
+fn searched(
+    pair: &Pair,
+    zones: Option<(&Plane<u32>, usize)>,
+    range: Option<DisparityRange>,
+    spacing: usize,
+    rows: usize,
+) -> Vec<Match> {
     let reach = (pair.size().0 / REACH) as i32;
     let (min, max) = range.map_or((-reach, reach), |r| (r.min, r.max));
     let (left, right) = rayon::join(|| View::new(pair.left()), || View::new(pair.right()));

@@ -1,6 +1,7 @@
 //! Images at half their size.
 
 use super::{Image, Pixel, Plane};
+use crate::threads;
 use bytemuck::cast_slice;
 use rayon::prelude::*;
 
@@ -17,14 +18,16 @@ impl Image {
         let any_masked = self.any_masked();
         let masked = if any_masked { self.masked_children() } else { Plane::filled(w, h, false) };
         let mut pixels = vec![[0; 4]; w * h];
-        pixels.par_chunks_mut(w).enumerate().for_each_init(Vec::new, |room, (y, row)| {
+        let rows = pixels.par_chunks_mut(w).enumerate();
+        let of_row = |room: &mut Vec<[u32; 4]>, (y, row): (usize, &mut [Pixel])| {
             let rows = [0, 1, 2, 3, 4].map(|j| (2 * y + j).saturating_sub(2).min(height - 1));
             if any_masked {
                 self.low_pass_masked(rows, masked.row(y), row);
             } else {
                 low_pass(rows.map(|y| cast_slice(self.pixels.row(y))), room, row);
             }
-        });
+        };
+        threads::run(|| rows.for_each_init(Vec::new, of_row));
         Self { pixels: Plane::new(w, h, pixels), masked }
     }
 

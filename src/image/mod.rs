@@ -26,6 +26,7 @@ pub use georeference::Georeference;
 pub use orientation::Orientation;
 
 use crate::error::{Error, Result};
+use crate::threads;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
@@ -397,7 +398,7 @@ impl Pair {
 
     /// A pair of what `f` makes of each view, of one size.
     pub(crate) fn map(&self, f: impl Fn(&Image) -> Image + Sync) -> Self {
-        let (left, right) = rayon::join(|| f(&self.left), || f(&self.right));
+        let (left, right) = threads::join(|| f(&self.left), || f(&self.right));
         Self::without_georeference(left, right)
     }
 

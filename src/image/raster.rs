@@ -195,6 +195,12 @@ impl<'a> Raster<'a> {
         &self.samples
     }
 
+    /// Where its pixels hold no data, row by row: as its file says, or as it was [told](Self::masked_by).
+    #[must_use]
+    pub fn no_data(&self) -> Option<&[bool]> {
+        self.no_data.as_deref()
+    }
+
     /// What is inside `part`, without a georeference.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ use super::decode::{Kind, decode, load};
 use super::raster::{self, Raster, Sample, Samples, of_any};
 use super::{Pair, Plane, grey};
 use crate::error::{Error, ReadError, Result};
+use crate::threads;
 
 pub use super::decode::is_guarded;
 pub use super::file::MAX_PIXELS;
@@ -67,7 +68,7 @@ impl Reader {
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
-        let (first, second) = rayon::join(|| self.raster(left), || self.raster(right));
+        let (first, second) = threads::join(|| self.raster(left), || self.raster(right));
         let (mut first, second) = (first?, second?);
         if let Some(path) = mask {
             let ignored = self.mask(path)?;

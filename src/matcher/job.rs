@@ -128,7 +128,8 @@ impl<'a> Job<'a> {
     /// Those of `run`.
     pub async fn run_async(self) -> Result<Matched> {
         let Self { matcher, pair, find, found, method, region, cancel, mut listener, mut inspect } = self;
-        let range = matcher.threads.run(async || find(pair)).await?;
+        let (width, height) = pair.size();
+        let range = matcher.threads.run(width * height, async || find(pair)).await??;
         let own = matcher.method.clone();
         let mut observer = |progress| {
             let stopped = cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));

@@ -6,8 +6,9 @@ mod matched;
 mod search;
 mod sequence;
 #[cfg(not(target_arch = "wasm32"))]
+mod shared;
+#[cfg(not(target_arch = "wasm32"))]
 mod side_by_side;
-mod threads;
 
 use crate::backend::Backend;
 use crate::backend::cpu::Cpu;
@@ -20,13 +21,16 @@ use crate::plan::Plan;
 use crate::program::Program;
 use crate::program::tiles::Tiles;
 use crate::region::Region;
+use crate::threads::Threads;
 use crate::watch::Observer;
 use check::check;
 pub use job::{Answer, Job};
 use matched::summed;
 pub use matched::{Matched, Timing};
 pub use search::{Found, Search};
-use threads::Threads;
+#[cfg(not(target_arch = "wasm32"))]
+pub use shared::SharedMatcher;
+use std::sync::Arc;
 
 /// Chooses what a [`Matcher`] does, and where.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +53,7 @@ impl Builder {
         self
     }
 
-    /// Threads of the CPU path; one for each core where none are given.
+    /// Threads of the CPU path, at most; the [usual](crate::threads::usual) number where none are given.
     pub fn threads(mut self, threads: usize) -> Self {
         self.execution.threads = Some(threads);
         self
@@ -82,6 +86,12 @@ impl Builder {
     /// [`Error::Execution`] for what makes no sense and for a device that is not there, [`Error::Device`] where there is no
     /// driver or the device cannot be opened.
     pub async fn build_async(self) -> Result<Matcher> {
+        let threads = Arc::new(Threads::new(self.execution.threads)?);
+        self.build_on(threads).await
+    }
+
+    /// With threads that there are already.
+    async fn build_on(self, threads: Arc<Threads>) -> Result<Matcher> {
         let Self { method, execution } = self;
         let open = |wanted| Gpu::open_async(wanted, FaultInjection::default());
         let (gpu, falls_back) = match &execution.device {
@@ -91,14 +101,14 @@ impl Builder {
             DeviceChoice::Auto if gpu::has_automatic_async().await => (Some(open(None).await), true),
             DeviceChoice::Auto => (None, true),
         };
-        Matcher::build(method, gpu, falls_back, &execution)
+        Matcher::build(method, gpu, falls_back, threads, execution.timings)
     }
 }
 
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
     method: Method,
-    threads: Threads,
+    threads: Arc<Threads>,
     /// The CPU path, with what it keeps from match to match: one for each pair that was matched beside others.
     cpus: Vec<Cpu>,
     gpu: Option<Gpu>,
@@ -131,31 +141,23 @@ impl Matcher {
     /// # Errors
     /// [`Error::Execution`] for a number of threads that cannot be had, and the error of `gpu` unless it falls back.
     pub fn on(gpu: Result<Gpu>, falls_back: bool, execution: &Execution) -> Result<Self> {
-        Self::build(Method::default(), Some(gpu), falls_back, execution)
+        let threads = Arc::new(Threads::new(execution.threads)?);
+        Self::build(Method::default(), Some(gpu), falls_back, threads, execution.timings)
     }
 
     fn build(
         method: Method,
         gpu: Option<Result<Gpu>>,
         falls_back: bool,
-        execution: &Execution,
+        threads: Arc<Threads>,
+        timings: bool,
     ) -> Result<Self> {
-        let threads = Threads::new(execution.threads)?;
         let (gpu, given_up) = match gpu.transpose() {
             Ok(gpu) => (gpu, None),
             Err(e @ (Error::Device(_) | Error::Memory(_))) if falls_back => (None, Some(e)),
             Err(e) => return Err(e),
         };
-        Ok(Self {
-            method,
-            threads,
-            cpus: Vec::new(),
-            gpu,
-            checked: None,
-            falls_back,
-            given_up,
-            timings: execution.timings,
-        })
+        Ok(Self { method, threads, cpus: Vec::new(), gpu, checked: None, falls_back, given_up, timings })
     }
 
     /// Matches by `method` from now on.
@@ -209,7 +211,7 @@ impl Matcher {
                 let inspector = inspector.as_mut().map(|inspector| &mut **inspector as _);
                 timed(device, *timings, &tiles, pair, &mut *observer, inspector).await
             };
-            match threads.run(served).await {
+            match threads.run(width * height, served).await? {
                 Err(e) => note = Some(self.without_device(e)?),
                 served => return served,
             }
@@ -218,9 +220,9 @@ impl Matcher {
         let note = note.or_else(|| given_up.clone());
         let mut cpu = cpus.pop().unwrap_or_default();
         let served = async || timed(&mut cpu, *timings, &tiles, pair, observer, inspector).await;
-        let matched = threads.run(served).await;
+        let matched = threads.run(width * height, served).await;
         cpus.push(cpu);
-        let matched = matched?;
+        let matched = matched??;
         Ok(Matched { note, ..matched })
     }
 

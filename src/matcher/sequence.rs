@@ -118,7 +118,7 @@ impl Matcher {
             device.keep_time(false)?;
             engine::start(device, &program, pair, observer).await
         };
-        match threads.run(started).await {
+        match threads.run(width * height, started).await? {
             Ok(started) => Ok(Some((tiles, started))),
             Err(e) => self.without_device(e).map(|_| None),
         }
@@ -127,8 +127,10 @@ impl Matcher {
     /// Ends a match that was started on the device; where that has failed meanwhile, matches once more without it.
     async fn land(&mut self, flight: Flight, method: &Method, observer: Observer<'_>) -> Result<Matched> {
         let Flight { pair, range, tiles, started } = flight;
+        let (width, height) = pair.size();
         if let Some(device) = &mut self.gpu {
-            match self.threads.run(async || engine::finish(device, started, &pair).await).await {
+            let finished = async || engine::finish(device, started, &pair).await;
+            match self.threads.run(width * height, finished).await? {
                 Ok(solution) => return Ok(Matched::new(device, &tiles, solution, Vec::new())),
                 Err(e) => self.without_device(e)?,
             };

@@ -30,7 +30,8 @@ pub(super) fn side_by_side(
 ) -> Result<()> {
     let Matcher { method, threads, cpus, given_up, .. } = matcher;
     let (method, given_up) = (&*method, &*given_up);
-    let room = Room::new(threads.count(), u64::from(method.tiles.memory) << 20);
+    let pool = threads.pool(usize::MAX)?;
+    let room = Room::new(pool.current_num_threads(), u64::from(method.tiles.memory) << 20);
     let (cpus, stop) = (Mutex::new(cpus), AtomicBool::new(false));
     let matched = |pair: &Pair, tiles: &Tiles, bytes: u64| {
         let observer: Observer = &mut |_| goes_on([cancel, &stop]);
@@ -56,7 +57,7 @@ pub(super) fn side_by_side(
             ended
         });
         let taking = taking.map_err(|e| ExecutionError::Threads(e.to_string()))?;
-        threads.scope(|scope| {
+        pool.in_place_scope(|scope| {
             for (pair, range) in pairs {
                 let planned = planned(&pair, range, method);
                 let share = room.share(planned.as_ref().map_or(0, |(_, bytes)| *bytes));

@@ -1,5 +1,6 @@
 //! Where and how a match runs.
 
+use crate::threads;
 use std::convert::Infallible;
 use std::str::FromStr;
 
@@ -8,7 +9,9 @@ use std::str::FromStr;
 pub struct Execution {
     /// What runs the stages.
     pub device: DeviceChoice,
-    /// Threads of the CPU path, 1 to [`Execution::MOST_THREADS`]; `None` takes one for each core.
+    /// Threads of the CPU path, 1 to [`Execution::MOST_THREADS`]; `None` takes the [usual](threads::usual) number. There are
+    /// no more than four for each processor, and of more than eight no more than one for each 1024 pixels of a pair: others would only
+    /// wait.
     pub threads: Option<usize>,
     /// Whether to measure the time of every stage.
     pub timings: bool,
@@ -16,7 +19,7 @@ pub struct Execution {
 
 impl Execution {
     /// The largest number of threads: more than any match can share, and few enough for every system.
-    pub const MOST_THREADS: usize = 1024;
+    pub const MOST_THREADS: usize = threads::MOST;
 }
 
 /// What runs the stages of a match.

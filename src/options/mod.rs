@@ -35,4 +35,4 @@ pub use range::{DisparityRange, MAX_DISPARITY, MAX_LABELS};
 pub use refinement::{Fill, LeftRightCheck, Median, Nearer, RefinementOptions};
 pub use row::{Group, Key, Takes, Word};
 pub use schedule::{MatchSize, Order, ScheduleOptions};
-pub use tiles::{MAX_MEMORY, TileOptions};
+pub use tiles::{MAX_MEMORY, TileOptions, mebibytes};

@@ -5,6 +5,20 @@ use super::row::{options, whole};
 /// The most memory that a match may be given, in MiB: 16 TiB.
 pub const MAX_MEMORY: u32 = 1 << 24;
 
+/// A size of memory in MiB, such as that of "2GiB" or "512MiB".
+///
+/// # Errors
+/// What to give instead.
+pub fn mebibytes(text: &str) -> Result<u32, String> {
+    let units = [("MiB", 0), ("GiB", 10), ("TiB", 20)];
+    let size = units.into_iter().find_map(|(unit, shift)| {
+        let count: u64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
+        u32::try_from(count.checked_mul(1 << shift)?).ok()
+    });
+    let size = size.filter(|size| (1..=MAX_MEMORY).contains(size));
+    size.ok_or_else(|| "give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB".into())
+}
+
 options! {
     /// When a pair is cut into tiles.
     "tiles" TileOptions {

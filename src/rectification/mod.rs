@@ -42,6 +42,7 @@ use crate::error::{Error, Purpose, Result};
 use crate::image::calib::{Calibration, Camera, Unit};
 use crate::image::{Pair, Plane};
 use crate::memory;
+use crate::threads;
 use rayon::prelude::*;
 use sampling::{NOWHERE, Place};
 
@@ -195,9 +196,11 @@ impl Rectification {
         let (width, height) = self.size();
         let of_view = |view: usize| {
             let mut places = memory::filled(width * height, NOWHERE)?;
-            places.par_chunks_mut(width).enumerate().for_each(|(y, places)| {
+            let rows = places.par_chunks_mut(width).enumerate();
+            let of_row = |(y, places): (usize, &mut [Place])| {
                 places.iter_mut().enumerate().for_each(|(x, place)| *place = self.place(view, x, y));
-            });
+            };
+            threads::run(|| rows.for_each(of_row));
             Ok::<_, Error>(places)
         };
         self.places = Some([of_view(0)?, of_view(1)?]);

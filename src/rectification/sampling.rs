@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::image::cubic::{BITS, STEPS, WEIGHTS};
 use crate::image::{Image, Pixel, Plane, grey};
 use crate::memory;
+use crate::threads;
 
 /// A place in an image: x and y, in 1/[`STEPS`] px.
 pub(super) type Place = [i32; 2];
@@ -33,14 +34,15 @@ pub(super) fn resample(
     let mut pixels: Vec<Pixel> = memory::filled(width * height, [0; 4])?;
     let mut masked = memory::filled(width * height, true)?;
     let any_masked = image.any_masked();
-    let rows = pixels.par_chunks_mut(width).zip(masked.par_chunks_mut(width));
-    rows.enumerate().for_each_init(Vec::new, |colours, (y, (pixels, masked))| {
+    let rows = pixels.par_chunks_mut(width).zip(masked.par_chunks_mut(width)).enumerate();
+    let of_row = |colours: &mut Vec<Colour>, (y, (pixels, masked)): (usize, (&mut [Pixel], &mut [bool]))| {
         colours.clear();
         colours.resize(width, Colour::default());
         sample_row(image, any_masked, |x| source(x, y), (colours, masked));
         round_row(colours.as_flattened(), bytes, pixels.as_flattened_mut());
         grey_row(pixels);
-    });
+    };
+    threads::run(|| rows.for_each_init(Vec::new, of_row));
     Ok(Image { pixels: Plane::new(width, height, pixels), masked: Plane::new(width, height, masked) })
 }
 

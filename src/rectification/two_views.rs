@@ -17,6 +17,7 @@ use crate::calibration::matrix::{
     IDENTITY, Matrix, cross, dot, length, product, rotated, rotation, rotation_vector, scaled, transposed,
 };
 use crate::error::Result;
+use crate::threads;
 
 /// A point of the scene in both images: x and y in the left one and in the right one, in pixels.
 pub type Correspondence = [[f64; 2]; 2];
@@ -73,9 +74,12 @@ impl TwoViews {
             let direction = starts[(i / SAMPLES) as usize];
             Self { direction, ..Self::start(size) }.fitted(&few, STEPS[0], None)
         };
-        let all: Vec<Self> = (0..starts.len() as u64 * SAMPLES).into_par_iter().map(sampled).collect();
-        let errors: Vec<f64> =
-            all.par_iter().map(|views| views.truncated_error(matches, tolerance)).collect();
+        let (all, errors) = threads::run(|| {
+            let all: Vec<Self> = (0..starts.len() as u64 * SAMPLES).into_par_iter().map(sampled).collect();
+            let errors = all.par_iter().map(|views| views.truncated_error(matches, tolerance));
+            let errors: Vec<f64> = errors.collect();
+            (all, errors)
+        });
         let best = errors.iter().zip(&all).min_by(|a, b| a.0.total_cmp(b.0))?.1;
         // Twice, because the matches that agree with a sample are not yet all.
         let found = best.fitted(matches, STEPS[1], Some(tolerance));

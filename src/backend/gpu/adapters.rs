@@ -1,7 +1,9 @@
 //! Adapters: listing them, and choosing one.
 
 use crate::error::{DeviceError, ExecutionError, Result};
+use crate::process;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// An adapter, as `mrfgs devices` lists it.
 #[derive(Clone, Debug)]
@@ -27,8 +29,24 @@ pub struct DeviceInfo {
     pub automatic: bool,
 }
 
-async fn adapters() -> Vec<wgpu::Adapter> {
-    adapters_of(wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::BROWSER_WEBGPU).await
+/// The process that has asked the drivers first; 0 before. Drivers have threads, locks and connections, which no process that is forked
+/// takes along.
+static ASKED_BY: AtomicU32 = AtomicU32::new(0);
+
+/// Whether they have said that there is nothing for `auto`.
+static NONE_AUTOMATIC: AtomicBool = AtomicBool::new(false);
+
+async fn adapters() -> Result<Vec<wgpu::Adapter>> {
+    let (id, asked) =
+        (process::id(), ASKED_BY.compare_exchange(0, process::id(), Ordering::AcqRel, Ordering::Acquire));
+    if asked.is_err_and(|first| first != id) {
+        return Err(DeviceError::Forked.into());
+    }
+    let backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::BROWSER_WEBGPU;
+    let adapters = adapters_of(backends).await;
+    let any = adapters.iter().any(|adapter| is_automatic(&adapter.get_info()));
+    NONE_AUTOMATIC.store(!any, Ordering::Release);
+    Ok(adapters)
 }
 
 pub(super) async fn adapters_of(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
@@ -109,7 +127,7 @@ fn is_automatic(info: &wgpu::AdapterInfo) -> bool {
 #[cfg(not(target_arch = "wasm32"))]
 #[must_use]
 pub fn devices() -> Vec<DeviceInfo> {
-    let adapters = pollster::block_on(adapters());
+    let adapters = pollster::block_on(adapters()).unwrap_or_default();
     let preferred = preferred(&adapters);
     adapters
         .iter()
@@ -133,7 +151,7 @@ pub fn devices() -> Vec<DeviceInfo> {
 
 /// The adapter that `wanted` names by its index or a part of its name, or the preferred one.
 pub(super) async fn select(wanted: Option<&str>) -> Result<wgpu::Adapter> {
-    let mut adapters = adapters().await;
+    let mut adapters = adapters().await?;
     if adapters.is_empty() {
         return Err(DeviceError::NoDriver.into());
     }
@@ -179,5 +197,10 @@ pub fn has_automatic() -> bool {
 
 /// As `has_automatic`, for a browser.
 pub async fn has_automatic_async() -> bool {
-    may_have_gpu() && adapters().await.iter().any(|a| is_automatic(&a.get_info()))
+    if !may_have_gpu() {
+        return false;
+    }
+    // Where they cannot be asked once more, whoever opens the device is told why.
+    let _ = adapters().await;
+    !NONE_AUTOMATIC.load(Ordering::Acquire)
 }

@@ -11,6 +11,7 @@ use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, Sample
 
 use crate::image::Plane;
 use crate::image::georeference::Georeference;
+use crate::threads;
 
 /// Most pixels of a plain map. Few programs cannot read tiles and Deflate, and small maps need neither.
 const MAX_PLAIN: usize = 1 << 22;
@@ -113,10 +114,8 @@ where
 /// All tiles, row by row.
 fn packed_tiles(map: &Plane<f32>) -> io::Result<Vec<Vec<u8>>> {
     let (across, down) = (map.width().div_ceil(SIDE), map.height().div_ceil(SIDE));
-    (0..across * down)
-        .into_par_iter()
-        .map(|i| packed_tile(map, i % across * SIDE, i / across * SIDE))
-        .collect()
+    let tiles = (0..across * down).into_par_iter();
+    threads::run(|| tiles.map(|i| packed_tile(map, i % across * SIDE, i / across * SIDE)).collect())
 }
 
 /// A tile with the predictor of floats, in Deflate. Beyond the map it holds NaN.
