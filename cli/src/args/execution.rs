@@ -2,6 +2,7 @@
 
 use mrfgs::low_level::backend::gpu;
 use mrfgs::options::{DeviceChoice, Execution};
+use mrfgs::threads;
 
 use crate::process;
 
@@ -23,12 +24,20 @@ const MOST: i64 = Execution::MOST_THREADS as i64;
 /// How many threads the CPU path has.
 #[derive(clap::Args)]
 pub(crate) struct ThreadArgs {
-    /// Threads of the CPU path, 1 to 1024 [default: one a core]
+    /// Threads of the CPU path at most, 1 to 1024 [default: as many as processors that the process may use, by affinity and
+    /// cgroups, or fewer by RAYON_NUM_THREADS, OMP_NUM_THREADS or Slurm]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST))]
     pub(crate) threads: Option<u16>,
 }
 
 impl ThreadArgs {
+    /// Bounds what is done around a match, too: reading, and the search for what may be wrong.
+    pub(crate) fn limit(&self) {
+        threads::limit(self.threads.map_or(0, usize::from));
+        // Begun before anybody counts what memory is left, as the threads of a matcher are.
+        threads::run(|| ());
+    }
+
     /// How the library takes it with `device`; the time of stages is not taken.
     pub(crate) fn execution(&self, device: &DeviceChoice) -> Execution {
         Execution { device: device.clone(), threads: self.threads.map(usize::from), timings: false }
@@ -46,13 +55,7 @@ impl ExecutionArgs {
         if asks_drivers {
             process::quiet_loader();
         }
-        if let Some(threads) = self.threads.threads {
-            // It also bounds what is done around a match: reading, and the search for what may be wrong. A second call
-            // changes nothing.
-            let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-        }
-        // Begun before anybody counts what memory is left, as the threads of a matcher are.
-        rayon::broadcast(|_| ());
+        self.threads.limit();
         self.threads.execution(&self.device)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::options::{MAX_MEMORY, Method, PRESETS, Preset};
+use mrfgs::options::{Method, PRESETS, Preset, mebibytes};
 
 use crate::failure::{Failure, Result};
 
@@ -28,17 +28,6 @@ fn key_and_value(text: &str) -> std::result::Result<(String, String), String> {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().into(), value.trim().into())),
         _ => Err("give a key and its value, like levels=4".into()),
     }
-}
-
-/// A size of memory, in MiB: a whole number of a unit within [`MAX_MEMORY`].
-fn mebibytes(text: &str) -> Result<u32, String> {
-    let units = [("MiB", 0), ("GiB", 10), ("TiB", 20)];
-    let size = units.into_iter().find_map(|(unit, shift)| {
-        let count: u64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
-        u32::try_from(count.checked_mul(1 << shift)?).ok()
-    });
-    let size = size.filter(|size| (1..=MAX_MEMORY).contains(size));
-    size.ok_or_else(|| "give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB".into())
 }
 
 /// The preset that `--method` names, if it names one.

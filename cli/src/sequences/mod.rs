@@ -15,7 +15,7 @@ use clap::ValueEnum;
 use mrfgs::image::raster::Raster;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Plane, Rect};
-use mrfgs::{Error, Result};
+use mrfgs::{Error, Result, threads};
 use mrfgs_ros::messages::Header;
 
 pub(crate) use pairing::Pairing;
@@ -252,7 +252,7 @@ impl Frames {
             }
             Views::Sources { left, right: Some(right), .. } => (left, right),
         };
-        let (l, r) = rayon::join(|| left.next(), || right.next());
+        let (l, r) = threads::join(|| left.next(), || right.next());
         let ended = |which: usize| {
             let (one, other) = (&self.names[which], &self.names[1 - which]);
             Error::Mismatch(format!("{one} ends here and {other} goes on"))

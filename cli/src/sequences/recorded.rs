@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use mrfgs::image::raster::Raster;
 use mrfgs::image::read::Reader;
-use mrfgs::{Error, Result};
+use mrfgs::{Error, Result, threads};
 use mrfgs_ros::messages::{CameraInfo, Header, Stamp};
 use mrfgs_ros::pairing::{Pairing, Tally};
 use mrfgs_ros::recording::{Message, Recording};
@@ -150,7 +150,7 @@ impl Recorded {
             if let Some([(_, left), (_, right)]) = pair {
                 self.count += 1;
                 let images = &self.images;
-                let (l, r) = rayon::join(|| images.view(&left), || images.view(&right));
+                let (l, r) = threads::join(|| images.view(&left), || images.view(&right));
                 let header = header(&left).map_err(|reason| images.at(&left, reason));
                 return Some(header.and_then(|header| Ok((header, [l?, r?]))));
             }

@@ -440,3 +440,30 @@ fn without_a_driver_auto_takes_the_cpu_path() {
     let told = run_with(&folder, "devices", NO_DRIVER).succeeded();
     assert_eq!(told.stdout, "no Vulkan or Metal driver found: `auto` takes the CPU path\n");
 }
+
+/// Without `--threads` the environment may ask for fewer than there are processors; with it there are no more than the work takes.
+#[test]
+fn threads_follow_the_environment_and_the_work() {
+    let folder = Folder::new();
+    let line = "match @slanted/im0.png @slanted/im1.png out.pfm --device cpu --max-disparity 31";
+    let map = || fs::read(folder.join("out.pfm")).unwrap();
+    let names = ["RAYON_NUM_THREADS", "OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE"];
+    let run = |more: &str, one: Option<&str>| {
+        let environment = names.map(|name| (name, if one == Some(name) { "1" } else { "" }));
+        run_with(&folder, &format!("{line} {more}"), &environment).succeeded()
+    };
+    for name in names {
+        run("", Some(name)).says(" on the CPU path, 1 thread\n");
+    }
+    let expected = map();
+    // What is said counts more.
+    run("--threads 3", Some("OMP_NUM_THREADS")).says(" on the CPU path, 3 threads\n");
+    assert!(map() == expected);
+    let start = Instant::now();
+    let told = run("--threads 1024", None).stderr;
+    assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
+    assert!(map() == expected);
+    let count = told.split("CPU path, ").nth(1).unwrap().split(' ').next().unwrap();
+    let most = 4 * std::thread::available_parallelism().unwrap().get();
+    assert!((3..=most).contains(&count.parse().unwrap()), "{told}");
+}

@@ -2,12 +2,9 @@
 
 use std::path::PathBuf;
 
-use mrfgs::Error;
-use mrfgs::error::ExecutionError;
 use mrfgs::options::DeviceChoice;
 
 use crate::args::{MethodArgs, ReadingArgs, ThreadArgs};
-use crate::failure::Result;
 
 use super::synthetic::{LARGE, SMALL, Synthetic};
 
@@ -81,12 +78,5 @@ impl Args {
     /// The pair where no folder is given.
     pub(super) fn made_up(&self) -> Synthetic {
         if self.large { LARGE } else { SMALL }
-    }
-
-    /// The threads of the CPU path.
-    pub(super) fn pool(&self) -> Result<rayon::ThreadPool> {
-        let threads = self.threads.threads.map_or(0, usize::from);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        Ok(pool.map_err(|e| Error::from(ExecutionError::Threads(e.to_string())))?)
     }
 }

@@ -14,7 +14,7 @@ use mrfgs::low_level::backend::gpu::Gpu;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::low_level::roofline;
 use mrfgs::options::{DeviceChoice, DisparityRange};
-use mrfgs::{Error, Matched, Matcher, Timing};
+use mrfgs::{Error, Matched, Matcher, Timing, threads};
 
 use crate::console;
 use crate::failure::{Failure, Result};
@@ -144,7 +144,7 @@ impl Case<'_> {
         let peak_bytes = peak_memory();
         drop(matcher);
         let copy_gb_per_s = giga(match self.device {
-            DeviceChoice::Cpu => self.args.pool()?.install(Cpu::copy_rate),
+            DeviceChoice::Cpu => threads::run(Cpu::copy_rate),
             device => Gpu::new(name(device))?.copy_rate()?,
         });
         let message_time = |timings: &Vec<Timing>| ms(messages(&plan, timings).map(|(_, t)| t.time).sum());

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use mrfgs::low_level::backend::gpu::{self, Gpu};
 use mrfgs::options::DeviceChoice;
+use mrfgs::threads;
 
 use crate::failure::Result;
 use crate::outputs::files;
@@ -21,6 +22,7 @@ use findings::Findings;
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     process::quiet_loader();
+    args.threads.limit();
     let inputs = folder::inputs_of(&args.dirs).chain(args.method.files().map(Path::to_owned));
     files::check_json(args.json.as_deref(), inputs)?;
     // What is missing in the last folder is said before the first is matched.
@@ -58,7 +60,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let findings = Findings {
         version: env!("CARGO_PKG_VERSION").into(),
-        threads: args.pool()?.current_num_threads(),
+        threads: threads::count(),
         repeats: args.repeats,
         methods,
         pairs,

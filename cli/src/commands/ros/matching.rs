@@ -11,6 +11,7 @@ use mrfgs::options::{DisparityRange, Execution};
 use mrfgs::rectification::Rectification;
 use mrfgs::sigma::Sigma;
 use mrfgs::steady::Steady;
+use mrfgs::threads;
 use mrfgs_ros::messages::{CameraInfo, Encoding, Header};
 
 use crate::args::Sign;
@@ -144,7 +145,7 @@ impl<'a> Matching<'a> {
             let name = self.cameras.named(side, stamp);
             ros::view(self.cameras.kind(side), bytes, Encoding::Cdr, Reader::default(), &name)
         };
-        let (left, right) = rayon::join(|| view(0, left), || view(1, right));
+        let (left, right) = threads::join(|| view(0, left), || view(1, right));
         Ok(Pair::of_frames(left?, right?)?)
     }
 
