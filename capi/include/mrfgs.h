@@ -306,7 +306,7 @@ const char *mrfgs_last_device(void);
 // Why that is not the device that was hoped for; "" where it is.
 const char *mrfgs_last_note(void);
 
-// The preset "default", on a GPU where there is one and else on the CPU, with a thread for each core.
+// The preset "default", on a GPU where there is one and else on the CPU, with the usual number of threads.
 struct mrfgs_options *mrfgs_options_new(void);
 
 // Frees options; they may be null.
@@ -331,7 +331,8 @@ enum mrfgs_status mrfgs_options_load(struct mrfgs_options *options, const char *
 enum mrfgs_status mrfgs_options_device(struct mrfgs_options *options,
                                        const char *name);
 
-// The threads of a match on the CPU, up to 1024; 0 takes one for each core.
+// The threads of a match on the CPU at most, up to 1024; 0 takes as many as processors that the process may use, by affinity and cgroups, or
+// fewer where RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK or SLURM_CPUS_ON_NODE is a smaller number.
 enum mrfgs_status mrfgs_options_threads(struct mrfgs_options *options, uint32_t threads);
 
 // The rectification of images of so many pixels (0 and 0: those of the calibration), as OpenCV's stereoRectify chooses it. Alpha is from

@@ -1,9 +1,10 @@
 //! Rigs that drift, and how they are put right.
 
 use std::ptr;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::MutexGuard;
 
 use mrfgs::drift;
+use mrfgs::low_level::process::Turns;
 
 use crate::argument;
 use crate::frame::{self, Image};
@@ -14,12 +15,12 @@ use crate::status::{Failure, Status, call};
 /// What the frames of a rig show of how its right camera has turned since it was calibrated.
 pub struct Drift {
     calibrated: mrfgs::rectification::Rectification,
-    inner: Mutex<drift::Drift>,
+    inner: Turns<drift::Drift>,
 }
 
 impl Drift {
-    fn inner(&self) -> MutexGuard<'_, drift::Drift> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    fn inner(&self) -> Result<MutexGuard<'_, drift::Drift>, Failure> {
+        Ok(self.inner.turn()?)
     }
 }
 
@@ -48,7 +49,7 @@ pub unsafe extern "C" fn mrfgs_drift_new(
     let make = || {
         // SAFETY: the caller promises that the pointer is null or good.
         let calibrated = unsafe { argument::thing("rectification", rectification) }?.by.clone();
-        let inner = Mutex::new(drift::Drift::of(&calibrated)?);
+        let inner = Turns::new(drift::Drift::of(&calibrated)?);
         Ok(Drift { calibrated, inner })
     };
     // SAFETY: the caller promises that a pointer can be written there.
@@ -75,7 +76,7 @@ pub unsafe extern "C" fn mrfgs_drift_follow(
         // SAFETY: the caller promises that the pointer is null or good.
         let range = unsafe { Range::searched(range) }?;
         let range = range.ok_or_else(|| Failure::argument("the range is null"))?;
-        drift.inner().follow(&pair, range)?;
+        drift.inner()?.follow(&pair, range)?;
         Ok(())
     })
 }
@@ -89,7 +90,7 @@ pub unsafe extern "C" fn mrfgs_drift_turn(drift: *const Drift, turn: *mut Turn) 
         if turn.is_null() {
             return Err(Failure::argument("the place for the turn is null"));
         }
-        let found = drift.inner().turn();
+        let found = drift.inner()?.turn();
         let told = found.map(|found| Turn {
             degrees: found.degrees(),
             errors: found.errors.map(f64::to_degrees),
@@ -118,7 +119,7 @@ pub unsafe extern "C" fn mrfgs_drift_correct(
         unsafe { rectification.write(ptr::null_mut()) };
         // SAFETY: the caller promises that the pointer is null or good.
         let drift = unsafe { argument::thing("drift", drift) }?;
-        let corrected = drift.inner().correct(&drift.calibrated)?;
+        let corrected = drift.inner()?.correct(&drift.calibrated)?;
         if let Some(by) = corrected {
             let made = Box::new(Rectification::of(by));
             // SAFETY: as above.

@@ -3,8 +3,8 @@
 use std::ffi::c_char;
 use std::ptr;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 
+use mrfgs::SharedMatcher;
 use mrfgs::image::Rect;
 use mrfgs::options::Method;
 
@@ -20,7 +20,7 @@ use crate::words;
 
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 pub struct Matcher {
-    inner: Mutex<mrfgs::Matcher>,
+    inner: SharedMatcher,
     /// Its method, and the same with the map of the right view.
     methods: [Method; 2],
     stop: AtomicBool,
@@ -41,9 +41,9 @@ pub unsafe extern "C" fn mrfgs_matcher_new(options: *const Options, matcher: *mu
             .map_or_else(Default::default, |options| (options.method.clone(), options.execution.clone()));
         let mut with_right = method.clone();
         with_right.set("right-map", "true")?;
-        let matcher = mrfgs::Matcher::builder().execution(execution).build()?;
+        let inner = SharedMatcher::new(mrfgs::Matcher::builder().execution(execution))?;
         let methods = [method, with_right];
-        Ok(Matcher { inner: Mutex::new(matcher), methods, stop: AtomicBool::new(false) })
+        Ok(Matcher { inner, methods, stop: AtomicBool::new(false) })
     };
     // SAFETY: the caller promises that a pointer can be written there.
     unsafe { argument::make("matcher", matcher, open) }
@@ -121,20 +121,20 @@ pub unsafe extern "C" fn mrfgs_match_region(
         let maps = unsafe { Maps::given(maps) }?;
         maps.check(part.as_ref().map_or(pair.size(), Rect::size))?;
         let method = &matcher.methods[usize::from(!maps.right.is_null())];
-        let mut matching = matcher.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        let job = match range {
-            Some(range) => matching.job(&pair, range),
-            None => matching.job(&pair, ..),
-        };
-        let job = match part {
-            Some(part) => job.region(part),
-            None => job,
-        };
-        let matched = job.method(method).cancel(&matcher.stop).run();
-        // While the lock is held: the next match is not meant any more.
-        matcher.stop.store(false, Ordering::Relaxed);
-        drop(matching);
-        let matched = matched?;
+        let matched = matcher.inner.turn(|matching| {
+            let job = match range {
+                Some(range) => matching.job(&pair, range),
+                None => matching.job(&pair, ..),
+            };
+            let job = match part {
+                Some(part) => job.region(part),
+                None => job,
+            };
+            let matched = job.method(method).cancel(&matcher.stop).run();
+            // Before the turn ends: the next match is not meant any more.
+            matcher.stop.store(false, Ordering::Relaxed);
+            matched
+        })?;
         // SAFETY: they were checked for this size, and the caller promises that they are as large as their fields say.
         unsafe { maps.write(&matched) };
         warnings::say(matched.warnings().iter().map(words::warning));

@@ -29,7 +29,7 @@ unsafe fn change(options: *mut Options, change: impl FnOnce(&mut Options) -> Res
     })
 }
 
-/// The preset "default", on a GPU where there is one and else on the CPU, with a thread for each core.
+/// The preset "default", on a GPU where there is one and else on the CPU, with the usual number of threads.
 #[unsafe(no_mangle)]
 pub extern "C" fn mrfgs_options_new() -> *mut Options {
     Box::into_raw(Box::default())
@@ -105,14 +105,15 @@ pub unsafe extern "C" fn mrfgs_options_device(options: *mut Options, name: *cons
     unsafe { change(options, set) }
 }
 
-/// The threads of a match on the CPU, up to 1024; 0 takes one for each core.
+/// The threads of a match on the CPU at most, up to 1024; 0 takes as many as processors that the process may use, by affinity and cgroups, or
+/// fewer where RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK or SLURM_CPUS_ON_NODE is a smaller number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_options_threads(options: *mut Options, threads: u32) -> Status {
     let set = |options: &mut Options| {
         if threads as usize > Execution::MOST_THREADS {
             let most = Execution::MOST_THREADS;
             return Err(Failure::argument(format!(
-                "threads are {threads}: give 1 to {most}, or 0 for one each core"
+                "threads are {threads}: give 1 to {most}, or 0 for the usual number"
             )));
         }
         options.execution.threads = (threads > 0).then_some(threads as usize);

@@ -1,8 +1,8 @@
 //! Video that holds still where the scene does.
 
 use std::ptr;
-use std::sync::{Mutex, PoisonError};
 
+use mrfgs::low_level::process::Turns;
 use mrfgs::maps;
 use mrfgs::steady;
 
@@ -12,13 +12,13 @@ use crate::maps::{Maps, put, read};
 use crate::status::{Failure, Status, call};
 
 /// A filter for the maps of a sequence: where the left image does not change, the disparity follows that of the frames before.
-pub struct Steady(Mutex<steady::Steady>);
+pub struct Steady(Turns<steady::Steady>);
 
 /// A filter that has seen no frame yet.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mrfgs_steady_new(steady: *mut *mut Steady) -> Status {
     // SAFETY: the caller promises that a pointer can be written there.
-    unsafe { argument::make("steady", steady, || Ok(Steady(Mutex::default()))) }
+    unsafe { argument::make("steady", steady, || Ok(Steady(Turns::default()))) }
 }
 
 /// Lets the disparities of the next frame follow those of the frames before, weighted by confidence, where the left image has not changed.
@@ -56,7 +56,7 @@ pub unsafe extern "C" fn mrfgs_steady_follow(
         // SAFETY: the same.
         let validity = unsafe { read(given.validity.cast_const(), given.validity_stride, size) };
         let mut found = maps::Maps::from_pixels(&disparity, confidence, validity);
-        steady.0.lock().unwrap_or_else(PoisonError::into_inner).follow(pair.left(), &mut found);
+        steady.0.turn()?.follow(pair.left(), &mut found);
         // SAFETY: the same.
         unsafe { put(&found.final_map(), given.disparity, given.disparity_stride) };
         Ok(())

@@ -9,6 +9,7 @@ const WORDS: Words = Words {
     min: "range.min",
     max: "range.max",
     range: Some("range"),
+    fork: "make no matcher with a device before the fork",
     cpu: "set mrfgs_options_device(options, \"cpu\")",
     memory: Some(["option \"memory\"", ""]),
     mask: Some("give alpha 0 to what is no image"),
