@@ -1,7 +1,8 @@
 """Stereo disparity by a multi-resolution factor graph, with the same bits on every device.
 
-Give `match` a rectified pair as arrays; it returns a `Matched`:
+Give `match` a rectified pair as arrays, of which `read_image` makes some of files; it returns a `Matched`:
 
+>>> left, right = mrfgs.read_image("left.png"), mrfgs.read_image("right.png")
 >>> matched = mrfgs.match(left, right, max_disparity=63)
 >>> matched.disparity                      # float32, pixels; +inf where there is none
 
@@ -39,6 +40,7 @@ from ._mrfgs import (
     options,
     presets,
     read_disparity,
+    read_image,
 )
 
 __all__ = [
@@ -59,4 +61,5 @@ __all__ = [
     "options",
     "presets",
     "read_disparity",
+    "read_image",
 ]

@@ -7,13 +7,34 @@ from typing import Any, Iterable, Iterator, Mapping, Sequence, TypedDict, final
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "Calibration",
+    "Drift",
+    "Matched",
+    "MatchedSequence",
+    "Matcher",
+    "MatchWarning",
+    "Points",
+    "Rectification",
+    "Rig",
+    "Steady",
+    "ThirdCamera",
+    "__version__",
+    "evaluate",
+    "match",
+    "options",
+    "presets",
+    "read_disparity",
+    "read_image",
+]
+
 __version__: str
 
-# Whatever numpy makes an array of: uint8, uint16, float32, float64, or other whole numbers with the values of the first two; of shape
+# Whatever numpy makes an array of, or what has __dlpack__: uint8, uint16, float16, float32, float64, or other whole numbers with the values of the first two; of shape
 # (height, width) or (height, width, channels).
 _Image = npt.ArrayLike
 
-# The path of a calibration file.
+# The path of a file.
 _Path = str | os.PathLike[str]
 
 class MatchWarning(UserWarning):
@@ -84,7 +105,7 @@ class Matched:
 class Matcher:
     """Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between."""
 
-    def __new__(cls, *, device: str = "auto", threads: int | None = None) -> Matcher: ...
+    def __new__(cls, *, device: str | int | None = None, threads: int | None = None) -> Matcher: ...
     def match(
         self,
         left: _Image,
@@ -95,8 +116,9 @@ class Matcher:
         mask: npt.ArrayLike | None = None,
         no_data: float | None = None,
         roi: Sequence[int] | None = None,
-        preset: str = "default",
+        method: _Path | None = None,
         options: Mapping[str, Any] | None = None,
+        memory: str | None = None,
         warn: bool = True,
     ) -> Matched:
         """Matches a rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
@@ -107,8 +129,9 @@ class Matcher:
         *,
         min_disparity: float | None = None,
         no_data: float | None = None,
-        preset: str = "default",
+        method: _Path | None = None,
         options: Mapping[str, Any] | None = None,
+        memory: str | None = None,
         warn: bool = True,
     ) -> MatchedSequence:
         """Matches pair after pair, and returns an iterator over their results, in order. At most three pairs are taken ahead of the
@@ -325,10 +348,11 @@ def match(
     mask: npt.ArrayLike | None = None,
     no_data: float | None = None,
     roi: Sequence[int] | None = None,
-    preset: str = "default",
+    method: _Path | None = None,
     options: Mapping[str, Any] | None = None,
+    memory: str | None = None,
     warn: bool = True,
-    device: str = "auto",
+    device: str | int | None = None,
     threads: int | None = None,
 ) -> Matched:
     """Matches one rectified pair, and returns its maps; help(mrfgs.Matcher) explains every argument."""
@@ -375,6 +399,10 @@ class _Report(TypedDict):
 
 def read_disparity(path: _Path, /) -> npt.NDArray[np.float32]:
     """Reads a disparity map in pixels from a PFM, a float TIFF or a 16-bit PNG as KITTI has it; +inf where there is none."""
+
+def read_image(path: _Path, /, *, orient: bool = False) -> npt.NDArray[Any]:
+    """Reads an image as `match` takes it, from PNG, JPEG, PNM, TIFF or PFM: uint8, uint16, float32 or float64, of shape (height, width) or
+    (height, width, channels), RGB; a masked array where the file says that pixels hold no data."""
 
 def evaluate(disparity: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> _Report:
     """Compares a disparity map with the truth, as `mrfgs evaluate map` does: errors in pixels and shares in percent, over all pixels

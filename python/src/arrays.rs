@@ -7,22 +7,33 @@ use mrfgs::image::raster::{Raster, Samples};
 use mrfgs::image::{self, Pair, Plane};
 use numpy::{
     Element, IntoPyArray, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
-    PyUntypedArray, PyUntypedArrayMethods,
+    PyUntypedArray, PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
 
 use crate::exceptions::{self, exception};
 
 /// What is given for `name` as an array, in the byte order of this machine and aligned; copied where it is not. A masked array
 /// stays one.
 fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let py = given.py();
+    let (py, numpy) = (given.py(), given.py().import("numpy")?);
+    if is_path(given)? {
+        return Err(PyTypeError::new_err(format!(
+            "{name}: give a numpy array, not the path of a file; mrfgs.read_image reads an image, and mrfgs.read_disparity a map"
+        )));
+    }
     let wrong = || PyTypeError::new_err(format!("{name}: give a numpy array"));
-    let array = py.import("numpy")?.call_method1("asanyarray", (given,));
+    // Other libraries may offer their arrays by this protocol alone.
+    let by_dlpack = given.hasattr("__dlpack__")? && !given.hasattr("__array__")?;
+    let array = numpy.call_method1(if by_dlpack { "from_dlpack" } else { "asanyarray" }, (given,));
     let array = array.map_err(|error| exceptions::instead(py, error, wrong()))?;
-    let array = array.cast_into::<PyUntypedArray>().map_err(|_| wrong())?;
+    let mut array = array.cast_into::<PyUntypedArray>().map_err(|_| wrong())?;
+    // What has half the bits is held exactly.
+    if (array.dtype().kind(), array.dtype().itemsize()) == (b'f', 2) {
+        array = array.call_method1("astype", ("float32",))?.cast_into()?;
+    }
     let aligned: bool = array.getattr("flags")?.getattr("aligned")?.extract()?;
     let native = array.dtype().is_native_byteorder() != Some(false);
     if aligned && native {
@@ -30,6 +41,13 @@ fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUn
     }
     let dtype = array.dtype().call_method1("newbyteorder", ("=",))?;
     Ok(array.call_method1("astype", (dtype,))?.cast_into()?)
+}
+
+/// Whether a path is given in the place of an array.
+fn is_path(given: &Bound<PyAny>) -> PyResult<bool> {
+    Ok(given.is_instance_of::<PyString>()
+        || given.is_instance_of::<PyBytes>()
+        || given.hasattr("__fspath__")?)
 }
 
 /// The values of an array, row by row: borrowed where they lie so, else copied.
@@ -75,7 +93,7 @@ impl<'py> Pixels<'py> {
         if !"iu".contains(kind) {
             let kind = array.dtype().to_string();
             return Err(PyTypeError::new_err(format!(
-                "{name}: give an array of whole numbers, float32 or float64, not {kind}; astype converts it"
+                "{name}: give an array of whole numbers, float16, float32 or float64, not {kind}; astype converts it"
             )));
         }
         // What is masked may be anything.
@@ -157,11 +175,19 @@ impl<'py> Image<'py> {
         };
         let (height, width, channels) = match *shape {
             [height, width] => (height, width, 1),
+            [1..=4, height, width] if width > 4 => {
+                return Err(PyValueError::new_err(format!(
+                    "{name}: has the shape {}, with the channels first: give (height, width, channels), such as \
+                     numpy.moveaxis({name}, 0, -1), which has {height} rows of {width} pixels",
+                    shown(shape)
+                )));
+            }
             [height, width, channels] => (height, width, channels),
             _ => {
-                let reason =
-                    format!("{name}: give an array of shape (height, width) or (height, width, channels)");
-                return Err(PyValueError::new_err(reason));
+                return Err(PyValueError::new_err(format!(
+                    "{name}: give an array of shape (height, width) or (height, width, channels), not {}",
+                    shown(shape)
+                )));
             }
         };
         let raster = Raster::new(width, height, channels, samples);
@@ -250,6 +276,22 @@ fn masked_array<'py, T: Element>(
     py.import("numpy")?.getattr("ma")?.call_method1("masked_array", (values, masked))
 }
 
+/// An image as its file stores it: of shape (height, width) or (height, width, channels), and masked where it holds no data.
+pub(crate) fn stored<'py>(py: Python<'py>, raster: &Raster) -> PyResult<Bound<'py, PyAny>> {
+    let ((width, height), channels) = (raster.size(), raster.channels());
+    let shape = if channels == 1 { vec![height, width] } else { vec![height, width, channels] };
+    let values = match raster.samples() {
+        Samples::Byte(v) => v.to_pyarray(py).reshape(shape.clone())?.into_any(),
+        Samples::Word(v) => v.to_pyarray(py).reshape(shape.clone())?.into_any(),
+        Samples::Float(v) => v.to_pyarray(py).reshape(shape.clone())?.into_any(),
+        Samples::Double(v) => v.to_pyarray(py).reshape(shape.clone())?.into_any(),
+    };
+    let Some(no_data) = raster.no_data() else { return Ok(values) };
+    let masked: Vec<bool> = no_data.iter().flat_map(|v| std::iter::repeat_n(*v, channels)).collect();
+    let masked = masked.into_pyarray(py).reshape(shape)?;
+    py.import("numpy")?.getattr("ma")?.call_method1("masked_array", (values, masked))
+}
+
 /// A map as an array of shape (height, width).
 pub(crate) fn map<T: Element>(py: Python, plane: Plane<T>) -> PyResult<Bound<PyArray2<T>>> {
     let shape = [plane.height(), plane.width()];
@@ -276,7 +318,7 @@ pub(crate) fn disparities(name: &str, given: &Bound<PyAny>) -> PyResult<Plane<f3
     } else {
         let kind = array.dtype().to_string();
         return Err(PyTypeError::new_err(format!(
-            "{name}: give an array of float32 or float64, in pixels, not {kind}; divide whole numbers by their scale"
+            "{name}: give an array of float16, float32 or float64, in pixels, not {kind}; divide whole numbers by their scale"
         )));
     };
     let Some(masked) = masked else { return Ok(plane) };
@@ -364,15 +406,29 @@ fn flags(name: &str, mask: &Bound<PyAny>) -> PyResult<Plane<bool>> {
 fn plane<T: Element + Copy>(name: &str, array: &PyReadonlyArrayDyn<T>) -> PyResult<Plane<T>> {
     match *array.shape() {
         [height, width] => Ok(Plane::new(width, height, values(name, array)?.into_owned())),
-        _ => Err(PyValueError::new_err(format!("{name}: give an array of shape (height, width)"))),
+        ref shape => {
+            let squeezed = shape.iter().filter(|count| **count != 1).count() == 2;
+            let remedy = if squeezed { format!("; numpy.squeeze({name}) has it") } else { String::new() };
+            let shape = shown(shape);
+            let reason = format!("{name}: give an array of shape (height, width), not {shape}{remedy}");
+            Err(PyValueError::new_err(reason))
+        }
     }
+}
+
+/// A shape as numpy shows it.
+fn shown(shape: &[usize]) -> String {
+    let counts: Vec<_> = shape.iter().map(ToString::to_string).collect();
+    format!("({}{})", counts.join(", "), if counts.len() == 1 { "," } else { "" })
 }
 
 /// Width and height, given as `size`.
 pub(crate) fn size(given: &Bound<PyAny>) -> PyResult<(usize, usize)> {
-    let [width, height]: [i64; 2] = given
-        .extract()
-        .map_err(|_| PyTypeError::new_err("size: give (width, height), two whole numbers of pixels"))?;
+    let wrong = |error| {
+        let reason = PyTypeError::new_err("size: give (width, height), two whole numbers of pixels");
+        exceptions::instead(given.py(), error, reason)
+    };
+    let [width, height]: [i64; 2] = given.extract().map_err(wrong)?;
     let pixels = |count: i64| usize::try_from(count).ok().filter(|count| *count > 0);
     let both = pixels(width).zip(pixels(height));
     both.ok_or_else(|| PyValueError::new_err("size: give (width, height), both above 0"))

@@ -1,8 +1,7 @@
 //! Rigs that drift, and how they are put right.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use mrfgs::drift::Drift;
+use mrfgs::low_level::process::Turns;
 use mrfgs::options::DisparityRange;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -21,13 +20,7 @@ use crate::rectification::PyRectification;
 #[pyclass(name = "Drift", frozen, module = "mrfgs")]
 pub(crate) struct PyDrift {
     calibrated: Py<PyRectification>,
-    drift: Mutex<Drift>,
-}
-
-impl PyDrift {
-    fn drift(&self) -> MutexGuard<'_, Drift> {
-        self.drift.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+    drift: Turns<Drift>,
 }
 
 #[pymethods]
@@ -35,7 +28,7 @@ impl PyDrift {
     #[new]
     fn new(rectification: Py<PyRectification>) -> PyResult<Self> {
         let drift = Drift::of(rectification.get().by()).map_err(exception)?;
-        Ok(Self { calibrated: rectification, drift: Mutex::new(drift) })
+        Ok(Self { calibrated: rectification, drift: Turns::new(drift) })
     }
 
     /// Takes the next frame. It looks at the first, the fourth, the sixteenth, and then at every 64th; of these the last 16 count.
@@ -56,7 +49,7 @@ impl PyDrift {
         let range = DisparityRange::new(min?.unwrap_or(0), max?.unwrap_or(0)).map_err(exception)?;
         let [left, right] = Image::both(left, right)?;
         let pair = arrays::pair(&left, &right, None, None)?;
-        py.detach(|| self.drift().follow(&pair, range)).map_err(exception)
+        py.detach(|| self.drift.turn()?.follow(&pair, range)).map_err(exception)
     }
 
     /// How the right camera has turned since the calibration, as far as the last frames show it; None where they have too few matches. A
@@ -65,7 +58,7 @@ impl PyDrift {
     /// is no chance.
     #[getter]
     fn turn<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let turn = py.detach(|| self.drift().turn());
+        let turn = py.detach(|| Ok(self.drift.turn()?.turn())).map_err(exception)?;
         let Some(turn) = turn else { return Ok(None) };
         let all = PyDict::new(py);
         all.set_item("degrees", PyTuple::new(py, turn.degrees())?)?;
@@ -81,7 +74,7 @@ impl PyDrift {
     fn correct(&self, py: Python) -> PyResult<Option<PyRectification>> {
         let calibrated = self.calibrated.get();
         let axis = py.detach(|| {
-            let mut drift = self.drift();
+            let mut drift = self.drift.turn()?;
             let corrected = drift.correct(calibrated.by())?;
             Ok(corrected.and(drift.turn()).map(|turn| turn.axis))
         });

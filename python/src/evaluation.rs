@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mrfgs::evaluation::{self, GroundTruth, Metrics};
-use mrfgs::image::read::read_disparity as read;
+use mrfgs::image::read::{Reader, read_disparity as read};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -23,6 +23,21 @@ use crate::exceptions::exception;
 pub(crate) fn read_disparity(py: Python, path: PathBuf) -> PyResult<Bound<PyArray2<f32>>> {
     let map = py.detach(|| read(&path)).map_err(exception)?;
     arrays::map(py, map)
+}
+
+/// Reads an image as `match` takes it: PNG, JPEG, PNM, TIFF or PFM, as the program reads it.
+///
+/// path: the file.
+/// orient: whether to turn it upright that is stored turned, as the tag of EXIF or TIFF says; a rectified pair is as it is stored.
+///
+/// Returns an array of shape (height, width), or (height, width, channels) of grey and alpha, RGB, or RGB and alpha: uint8 for up to 8 bits,
+/// uint16 for 9 to 16, float32 and float64 for floats, and float64 for wider or signed whole numbers. Where a TIFF file says that a pixel
+/// holds no data, it is a masked array. Raises FileNotFoundError where there is no such file, and ValueError where it is no image.
+#[pyfunction]
+#[pyo3(signature = (path, /, *, orient=false))]
+pub(crate) fn read_image(py: Python, path: PathBuf, orient: bool) -> PyResult<Bound<PyAny>> {
+    let raster = py.detach(|| Reader { orient, ..Reader::default() }.raster(&path)).map_err(exception)?;
+    arrays::stored(py, &raster)
 }
 
 /// Compares a disparity map with the truth, as `mrfgs evaluate map` does.

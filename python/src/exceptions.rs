@@ -6,7 +6,7 @@ use std::io;
 
 use mrfgs::Error;
 use mrfgs::check::Warning;
-use mrfgs::error::ReadError;
+use mrfgs::error::{ExecutionError, ReadError};
 use pyo3::exceptions::{
     PyException, PyFileNotFoundError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError,
     PyUserWarning, PyValueError,
@@ -27,7 +27,7 @@ pub(crate) fn exception(error: Error) -> PyErr {
     let text = words::error(&error);
     match error {
         Error::Memory(_) => PyMemoryError::new_err(text),
-        Error::Device(_) => PyRuntimeError::new_err(text),
+        Error::Device(_) | Error::Execution(ExecutionError::Forked) => PyRuntimeError::new_err(text),
         Error::Read { cause: ReadError::Other(reason), .. } if is_missing(reason.source()) => {
             PyFileNotFoundError::new_err(text)
         }
@@ -37,9 +37,13 @@ pub(crate) fn exception(error: Error) -> PyErr {
     }
 }
 
-/// `instead` of an exception, but not of Ctrl-C and the like, which may come while Python runs anything.
+/// `instead` of an exception, which becomes its cause; but not of Ctrl-C and the like, which may come while Python runs anything.
 pub(crate) fn instead(py: Python, error: PyErr, instead: PyErr) -> PyErr {
-    if error.is_instance_of::<PyException>(py) { instead } else { error }
+    if !error.is_instance_of::<PyException>(py) {
+        return error;
+    }
+    instead.set_cause(py, Some(error));
+    instead
 }
 
 /// Whether the system says that there is no such file.

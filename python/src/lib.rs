@@ -32,6 +32,7 @@ fn _mrfgs(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(options::presets, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::read_disparity, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::read_image, module)?)?;
     module.add_class::<calibration::PyCalibration>()?;
     module.add_class::<drift::PyDrift>()?;
     module.add_class::<matched::PyMatched>()?;

@@ -1,17 +1,16 @@
 //! The matcher.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use mrfgs::image::Rect;
-use mrfgs::options::{DisparityRange, Execution};
+use mrfgs::options::DisparityRange;
 use mrfgs::region::Region;
-use mrfgs::{Found, Matched, Matcher, Pair, check};
+use mrfgs::{Found, Matched, Matcher, Pair, SharedMatcher, check};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::arrays::{self, Image};
 use crate::exceptions::{self, exception};
@@ -21,24 +20,28 @@ use crate::{options, range};
 
 /// Matches pair after pair, and keeps the device, its compiled shaders and its buffers in between.
 ///
-/// device: "auto" takes a GPU where there is one, else the CPU; "cpu" takes the CPU; "gpu" takes a GPU or any Vulkan or Metal
-///     driver, and raises RuntimeError where there is none; anything else is the index of a device, such as "0", or a part of its
-///     name, as `mrfgs devices` lists them. The maps are the same, bit for bit.
-/// threads: those of the CPU path; None takes one a core.
+/// device: "auto", which None stands for, takes a GPU where there is one, else the CPU; "cpu" takes the CPU; "gpu" takes a GPU or any
+///     Vulkan or Metal driver, and raises RuntimeError where there is none; anything else is the index of a device, such as 0, or a
+///     part of its name, as `mrfgs devices` lists them. The maps are the same, bit for bit.
+/// threads: the most threads that a match and its checks take on the CPU, 1 to 1024. None takes as many as processors that the process
+///     may use, by affinity and cgroups, or fewer where RAYON_NUM_THREADS, OMP_NUM_THREADS, SLURM_CPUS_PER_TASK or SLURM_CPUS_ON_NODE
+///     is a smaller number.
+///
+/// Threads may share a Matcher: their matches take turns. A process that is forked may use those of its parent on the CPU. Devices do not
+/// come along: there "auto" takes the CPU, as Matched.note says, and "gpu" raises RuntimeError; start processes by "spawn" or "forkserver".
 #[pyclass(name = "Matcher", frozen, module = "mrfgs")]
 pub(crate) struct PyMatcher(Shared);
 
 #[pymethods]
 impl PyMatcher {
     #[new]
-    #[pyo3(signature = (*, device="auto", threads=None))]
-    fn new(py: Python, device: &str, threads: Option<usize>) -> PyResult<Self> {
-        let execution = Execution { device: device.into(), threads, ..Execution::default() };
-        let matcher = py.detach(|| Matcher::builder().execution(execution).build()).map_err(exception)?;
+    #[pyo3(signature = (*, device=None, threads=None))]
+    fn new(py: Python, device: Option<&Bound<PyAny>>, threads: Option<&Bound<PyAny>>) -> PyResult<Self> {
+        let builder = Matcher::builder().execution(options::execution(device, threads)?);
+        let matcher = py.detach(|| SharedMatcher::new(builder)).map_err(exception)?;
         // To open a device takes a while.
         py.check_signals()?;
-        let matcher = Arc::new(Mutex::new(matcher));
-        Ok(Self(Shared { matcher, taken: Arc::new(AtomicBool::new(false)) }))
+        Ok(Self(Shared { matcher: Arc::new(matcher), taken: Arc::new(AtomicU32::new(0)) }))
     }
 
     /// Matches a rectified pair, and returns its maps as a Matched.
@@ -55,9 +58,12 @@ impl PyMatcher {
     /// no_data: a value that stands for no data: pixels with it in every channel are ignored, in both images.
     /// roi: (x, y, width, height) of a part of the left image in pixels, which alone is matched, in the time of that part; the maps have
     ///     its size. Rig.of_part gives its depths and points.
-    /// preset: the name of a preset; mrfgs.presets() lists them, and tells what each is for.
-    /// options: options that replace the preset's, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
+    /// method: the name of a preset, which mrfgs.presets() lists with what each is for, or the path of a TOML file whose keys replace those
+    ///     of the preset "default"; None takes that preset.
+    /// options: options that replace those of the method, such as {"fill": "none", "memory": 2048}; mrfgs.options() describes all. A
     ///     key may have its group in front, "refinement.fill", and a group may be a dict, {"refinement": {"fill": "none"}}.
+    /// memory: the memory that a match may take, such as "2GiB" or "512MiB"; a pair that needs more is matched in tiles. None takes that
+    ///     of the method.
     /// warn: whether to look for what is probably wrong (views swapped, turned, not rectified or of two scenes, a range that cuts off
     ///     part of the scene), and to tell it as a MatchWarning. It takes a part of the time of a match.
     ///
@@ -65,8 +71,8 @@ impl PyMatcher {
     /// RuntimeError where the wanted device fails, and MemoryError where it does not fit.
     #[pyo3(
         name = "match",
-        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, preset="default",
-                     options=None, warn=true)
+        signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, method=None,
+                     options=None, memory=None, warn=true)
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn run(
@@ -79,34 +85,38 @@ impl PyMatcher {
         mask: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
         roi: Option<&Bound<PyAny>>,
-        preset: &str,
-        options: Option<&Bound<PyDict>>,
+        method: Option<&Bound<PyAny>>,
+        options: Option<&Bound<PyAny>>,
+        memory: Option<&Bound<PyAny>>,
         warn: bool,
     ) -> PyResult<PyMatched> {
         self.0.check()?;
-        let method = options::method(preset, options)?;
+        let method = options::method(method, options, memory)?;
         let [left, right] = Image::both(left, right)?;
         let pair = arrays::pair(&left, &right, mask, no_data)?;
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let given = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
-        let range = range::searched(py, &pair, given, min_disparity)?;
+        let matcher = &self.0.matcher;
+        let range = range::searched(py, matcher, &pair, given, min_disparity)?;
         let part = roi.map(|roi| region(roi, &pair, range)).transpose()?;
         if warn {
             let seen = part.as_ref().map_or_else(|| pair.clone(), |part| part.window_of(&pair));
-            exceptions::warn(py, py.detach(|| check::warnings(&seen, given)))?;
+            let checked = py.detach(|| matcher.share(&seen, || check::warnings(&seen, given)));
+            exceptions::warn(py, checked.map_err(exception)?)?;
         }
         let matched = py.detach(|| {
             interruptible(|stop| {
-                let mut matcher = self.0.matcher.lock().unwrap_or_else(PoisonError::into_inner);
-                let job = match given {
-                    Some(range) => matcher.job(&pair, range),
-                    None => matcher.job(&pair, Found(range)),
-                };
-                let job = match &part {
-                    Some(part) => job.region(part.part().clone()),
-                    None => job,
-                };
-                job.method(&method).cancel(stop).run()
+                matcher.turn(|matcher| {
+                    let job = match given {
+                        Some(range) => matcher.job(&pair, range),
+                        None => matcher.job(&pair, Found(range)),
+                    };
+                    let job = match &part {
+                        Some(part) => job.region(part.part().clone()),
+                        None => job,
+                    };
+                    job.method(&method).cancel(stop).run()
+                })
             })
         })?;
         if warn {
@@ -126,7 +136,7 @@ impl PyMatcher {
     /// exceptions raised, in the thread that asks for results. An exception of `pairs`, or of a pair that makes no sense, comes after the
     /// results of the pairs before it; messages count pairs from 0. Ctrl-C ends the sequence. So does `close()` of the iterator, which
     /// happens by itself when nothing refers to it any more. Until its end, the Matcher raises RuntimeError for other matches.
-    #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, preset="default", options=None, warn=true))]
+    #[pyo3(signature = (pairs, max_disparity=None, *, min_disparity=None, no_data=None, method=None, options=None, memory=None, warn=true))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn match_all(
         &self,
@@ -134,11 +144,12 @@ impl PyMatcher {
         max_disparity: Option<&Bound<PyAny>>,
         min_disparity: Option<&Bound<PyAny>>,
         no_data: Option<f64>,
-        preset: &str,
-        options: Option<&Bound<PyDict>>,
+        method: Option<&Bound<PyAny>>,
+        options: Option<&Bound<PyAny>>,
+        memory: Option<&Bound<PyAny>>,
         warn: bool,
     ) -> PyResult<PyMatchedSequence> {
-        let method = options::method(preset, options)?;
+        let method = options::method(method, options, memory)?;
         let min_disparity = range::pixels("min_disparity", min_disparity)?;
         let range = range::given(range::pixels("max_disparity", max_disparity)?, min_disparity)?;
         let pairs = pairs.try_iter().map_err(|_| {
@@ -156,8 +167,8 @@ impl PyMatcher {
 #[pyfunction]
 #[pyo3(
     name = "match",
-    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, preset="default",
-                 options=None, warn=true, device="auto", threads=None)
+    signature = (left, right, max_disparity=None, *, min_disparity=None, mask=None, no_data=None, roi=None, method=None,
+                 options=None, memory=None, warn=true, device=None, threads=None)
 )]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn match_(
@@ -169,14 +180,28 @@ pub(crate) fn match_(
     mask: Option<&Bound<PyAny>>,
     no_data: Option<f64>,
     roi: Option<&Bound<PyAny>>,
-    preset: &str,
-    options: Option<&Bound<PyDict>>,
+    method: Option<&Bound<PyAny>>,
+    options: Option<&Bound<PyAny>>,
+    memory: Option<&Bound<PyAny>>,
     warn: bool,
-    device: &str,
-    threads: Option<usize>,
+    device: Option<&Bound<PyAny>>,
+    threads: Option<&Bound<PyAny>>,
 ) -> PyResult<PyMatched> {
     let matcher = PyMatcher::new(py, device, threads)?;
-    matcher.run(py, left, right, max_disparity, min_disparity, mask, no_data, roi, preset, options, warn)
+    matcher.run(
+        py,
+        left,
+        right,
+        max_disparity,
+        min_disparity,
+        mask,
+        no_data,
+        roi,
+        method,
+        options,
+        memory,
+        warn,
+    )
 }
 
 /// The region (x, y, width, height) of the left view of `pair`.

@@ -1,20 +1,23 @@
 //! The disparities to search.
 
-use mrfgs::check;
 use mrfgs::image::Pair;
 use mrfgs::options::{DisparityRange, MAX_DISPARITY};
+use mrfgs::{SharedMatcher, check};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::exceptions::exception;
+use crate::exceptions::{self, exception};
 
 /// What is given for the disparity `name`: a whole number of pixels, of any type that holds one.
 pub(crate) fn pixels(name: &str, given: Option<&Bound<PyAny>>) -> PyResult<Option<i32>> {
     let Some(given) = given else { return Ok(None) };
     let expected = format!("{name}: give a whole number of pixels within {MAX_DISPARITY} of 0");
-    let Ok(number) = given.extract::<f64>() else {
-        return Err(PyTypeError::new_err(format!("{expected}, not {}", given.get_type().name()?)));
+    let kind = given.get_type().name()?;
+    let wrong = |error| {
+        let reason = PyTypeError::new_err(format!("{expected}, not {kind}"));
+        exceptions::instead(given.py(), error, reason)
     };
+    let number: f64 = given.extract().map_err(wrong)?;
     // What is no number has no whole part.
     if number.trunc() == number && number.abs() <= f64::from(MAX_DISPARITY) {
         Ok(Some(number as i32))
@@ -31,15 +34,16 @@ pub(crate) fn given(max: Option<i32>, min: Option<i32>) -> PyResult<Option<Dispa
 /// The range to search: the one that is given, or that of sparse matches.
 pub(crate) fn searched(
     py: Python,
+    matcher: &SharedMatcher,
     pair: &Pair,
     given: Option<DisparityRange>,
     min: Option<i32>,
 ) -> PyResult<DisparityRange> {
-    given.map_or_else(|| py.detach(|| found(pair, min)), Ok)
+    given.map_or_else(|| py.detach(|| found(matcher, pair, min)), Ok)
 }
 
 /// The range that sparse matches find, from `min` on where that is given.
-fn found(pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
-    let found = check::range(pair).map_err(exception)?;
+fn found(matcher: &SharedMatcher, pair: &Pair, min: Option<i32>) -> PyResult<DisparityRange> {
+    let found = matcher.share(pair, || check::range(pair)).and_then(|found| found).map_err(exception)?;
     DisparityRange::new(min.unwrap_or(found.min), found.max).map_err(exception)
 }

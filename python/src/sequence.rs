@@ -1,14 +1,16 @@
 //! Pairs in sequence: an iterator of pairs in, one of results out, and a device that is kept busy in between.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::process;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use mrfgs::image::Pair;
+use mrfgs::low_level::process::Own;
 use mrfgs::options::{DisparityRange, Method};
-use mrfgs::{Error, Matched, Matcher, check};
+use mrfgs::{Error, Matched, SharedMatcher, check};
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
@@ -27,14 +29,15 @@ const AHEAD: usize = 3;
 /// The matcher that an iterator takes, and whether one has it.
 #[derive(Clone)]
 pub(crate) struct Shared {
-    pub(crate) matcher: Arc<Mutex<Matcher>>,
-    pub(crate) taken: Arc<AtomicBool>,
+    pub(crate) matcher: Arc<SharedMatcher>,
+    /// The process in which one has it; 0 where none does.
+    pub(crate) taken: Arc<AtomicU32>,
 }
 
 impl Shared {
     /// Refuses a matcher that is in the middle of a sequence: it would wait for pairs that nobody gives.
     pub(crate) fn check(&self) -> PyResult<()> {
-        if self.taken.load(Ordering::Acquire) {
+        if self.taken.load(Ordering::Acquire) == process::id() {
             let reason = "this Matcher is in the middle of match_all; finish or close that iterator, or use another Matcher";
             return Err(PyRuntimeError::new_err(reason));
         }
@@ -65,7 +68,7 @@ struct State {
     /// Pairs that went in, and results that came out.
     counts: [usize; 2],
     /// From the first pair to the last result.
-    worker: Option<Worker>,
+    worker: Option<Own<Worker>>,
     ended: bool,
 }
 
@@ -102,6 +105,12 @@ impl PyMatchedSequence {
     }
 }
 
+fn of_parent() -> PyErr {
+    PyRuntimeError::new_err(
+        "this iterator was begun before the process was forked, and ends with that; call match_all here",
+    )
+}
+
 fn in_use() -> PyErr {
     PyValueError::new_err("this iterator is in use already, by another thread or by its own pairs")
 }
@@ -113,14 +122,15 @@ impl State {
         }
         if self.worker.is_none() {
             self.shared.check()?;
-            self.worker = Some(Worker::new(&self.shared, &self.settings.method));
+            self.worker = Some(Own::new(Worker::new(&self.shared, &self.settings.method)));
         }
+        self.worker()?;
         while self.pairs.is_some() && self.counts[0] - self.counts[1] < AHEAD {
             match self.take(py) {
                 Ok(Some(job)) => {
                     self.counts[0] += 1;
                     // A worker that has ended says why below.
-                    if !self.worker.as_ref().is_some_and(|worker| worker.send(job)) {
+                    if !self.worker()?.send(job) {
                         self.pairs = None;
                     }
                 }
@@ -133,8 +143,9 @@ impl State {
                 Err(error) => return Err(error),
             }
         }
-        let Some(worker) = &mut self.worker else { return Ok(None) };
-        if self.pairs.is_none() {
+        let no_more = self.pairs.is_none();
+        let worker = self.worker.as_mut().and_then(Own::get_mut).ok_or_else(of_parent)?;
+        if no_more {
             worker.pairs = None;
         }
         loop {
@@ -155,6 +166,11 @@ impl State {
         self.failure.take().map_or(Ok(None), Err)
     }
 
+    /// Who matches the pairs, in the process that asked for the first.
+    fn worker(&self) -> PyResult<&Worker> {
+        self.worker.as_ref().and_then(Own::get).ok_or_else(of_parent)
+    }
+
     /// The next pair, and where to search it.
     fn take(&mut self, py: Python) -> PyResult<Option<(Pair, DisparityRange)>> {
         let Some(item) = self.pairs.as_ref().and_then(|pairs| pairs.bind(py).clone().next()) else {
@@ -173,9 +189,11 @@ impl State {
         };
         let [left, right] = Image::both(&left, &right)?;
         let pair = arrays::pair(&left, &right, None, no_data)?;
-        let found = range::searched(py, &pair, given, min_disparity)?;
+        let matcher = &self.shared.matcher;
+        let found = range::searched(py, matcher, &pair, given, min_disparity)?;
         if warn {
-            exceptions::warn(py, py.detach(|| check::warnings(&pair, given)))?;
+            let checked = py.detach(|| matcher.share(&pair, || check::warnings(&pair, given)));
+            exceptions::warn(py, checked.map_err(exception)?)?;
         }
         Ok((pair, found))
     }
@@ -200,7 +218,9 @@ fn numbered(py: Python, index: usize, error: PyErr) -> PyErr {
     if !ours.iter().any(|ours| kind.is(ours)) {
         return error;
     }
-    PyErr::from_type(kind, format!("pair {index}: {}", error.value(py)))
+    let numbered = PyErr::from_type(kind, format!("pair {index}: {}", error.value(py)));
+    numbered.set_cause(py, error.cause(py));
+    numbered
 }
 
 /// A thread that matches what it gets.
@@ -209,7 +229,7 @@ struct Worker {
     results: Receiver<Matched>,
     thread: Option<JoinHandle<mrfgs::Result<()>>>,
     stop: Arc<AtomicBool>,
-    taken: Arc<AtomicBool>,
+    taken: Arc<AtomicU32>,
 }
 
 impl Worker {
@@ -217,14 +237,15 @@ impl Worker {
         let (pairs, asked) = mpsc::sync_channel(AHEAD);
         let (found, results) = mpsc::channel();
         let (stop, taken) = (Arc::new(AtomicBool::new(false)), Arc::clone(&shared.taken));
-        taken.store(true, Ordering::Release);
+        taken.store(process::id(), Ordering::Release);
         let (matcher, method, told) = (Arc::clone(&shared.matcher), method.clone(), Arc::clone(&stop));
         let thread = thread::spawn(move || {
-            let mut matcher = matcher.lock().unwrap_or_else(PoisonError::into_inner);
-            matcher.set_method(method);
-            matcher.run_all_until(asked, &told, |matched| match found.send(matched) {
-                Ok(()) => std::ops::ControlFlow::Continue(()),
-                Err(_) => std::ops::ControlFlow::Break(()),
+            matcher.turn(|matcher| {
+                matcher.set_method(method);
+                matcher.run_all_until(asked, &told, |matched| match found.send(matched) {
+                    Ok(()) => std::ops::ControlFlow::Continue(()),
+                    Err(_) => std::ops::ControlFlow::Break(()),
+                })
             })
         });
         Self { pairs: Some(pairs), results, thread: Some(thread), stop, taken }
@@ -251,6 +272,6 @@ impl Drop for Worker {
         self.stop.store(true, Ordering::Relaxed);
         self.pairs = None;
         let _ = self.thread.take().map(JoinHandle::join);
-        self.taken.store(false, Ordering::Release);
+        self.taken.store(0, Ordering::Release);
     }
 }

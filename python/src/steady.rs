@@ -1,8 +1,7 @@
 //! Video that holds still where the scene does.
 
-use std::sync::{Mutex, PoisonError};
-
 use mrfgs::image::Pair;
+use mrfgs::low_level::process::Turns;
 use mrfgs::steady::Steady;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -15,7 +14,7 @@ use crate::matched::PyMatched;
 /// confidence, so that still surfaces flicker less. Where something moves, it is that of the frame alone.
 #[pyclass(name = "Steady", frozen, module = "mrfgs")]
 #[derive(Default)]
-pub(crate) struct PySteady(Mutex<Steady>);
+pub(crate) struct PySteady(Turns<Steady>);
 
 #[pymethods]
 impl PySteady {
@@ -40,7 +39,11 @@ impl PySteady {
                 "left: is {w} x {h} and the maps are {width} x {height}; give the image that was matched"
             )));
         }
-        py.detach(|| self.0.lock().unwrap_or_else(PoisonError::into_inner).follow(pair.left(), &mut maps));
+        py.detach(|| {
+            self.0.turn()?.follow(pair.left(), &mut maps);
+            Ok(())
+        })
+        .map_err(exception)?;
         matched.with_disparity(py, maps.final_map())
     }
 

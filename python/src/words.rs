@@ -9,7 +9,8 @@ const WORDS: Words = Words {
     min: "min_disparity",
     max: "max_disparity",
     cpu: "use device=\"cpu\"",
-    memory: Some(["options[\"memory\"]", ""]),
+    fork: "start it by multiprocessing.get_context(\"spawn\") or \"forkserver\", or make no Matcher with a device before the fork",
+    memory: Some(["memory", "MiB"]),
     mask: Some("give a mask of what is no image"),
     ..Words::PLAIN
 };

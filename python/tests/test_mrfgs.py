@@ -1,18 +1,22 @@
 """The Python package against the command line: the same pair gives the same bits. MRFGS is the program's path."""
 
+import ast
 import contextlib
 import copy
+import functools
 import gc
 import inspect
 import itertools
 import json
 import multiprocessing
+import multiprocessing.pool
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 import unittest
@@ -113,6 +117,16 @@ def parameters(thing):
 
 def raw_pair():
     return read_png(RAW / "left.png"), read_png(RAW / "right.png")
+
+
+@functools.lru_cache
+def has_device():
+    try:
+        mrfgs.Matcher(device="gpu")
+    except RuntimeError as error:
+        assert os.environ.get("MRFGS_REQUIRE_GPU", "0") in ("", "0"), error
+        return False
+    return True
 
 
 def ticks_during(call):
@@ -368,7 +382,7 @@ class Match(unittest.TestCase):
         grouped = {"cost": {"outside-cost": 20, "matching": "sad"}, "refinement.fill": "row"}
         flags = [flag for change in ("matching=sad", "outside-cost=20", "fill=row") for flag in ("--set", change)]
         self.same(left, right, *flags, options=grouped)
-        self.same(left, right, "--method", "fgs", preset="fgs")
+        self.same(left, right, "--method", "fgs", method="fgs")
         mask = np.zeros(left.shape[:2], bool)
         mask[:, :10] = True
         matched = mrfgs.match(left, right, 15, mask=mask, device="cpu")
@@ -443,8 +457,7 @@ class Match(unittest.TestCase):
              lambda: mrfgs.match(left.astype(np.int64) - 1 - left.min(), right, 15)),
             (ValueError, "right: is uint32 and holds 65536; whole", lambda: mrfgs.match(left, np.full((60, 80), 65536, np.uint32), 15)),
             (ValueError, "has pixels", lambda: mrfgs.match(left[:0].astype(int), right[:0].astype(int), 15)),
-            (TypeError, "left: give an array of whole numbers, float32 or float64, not bool; astype", lambda: mrfgs.match(left > 9, right, 15)),
-            (TypeError, "not float16", lambda: mrfgs.match(left.astype(np.float16), right, 15)),
+            (TypeError, "left: give an array of whole numbers, float16, float32 or float64, not bool; astype", lambda: mrfgs.match(left > 9, right, 15)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 63.5", lambda: mrfgs.match(left, right, 63.5)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not NaN", lambda: mrfgs.match(left, right, np.nan)),
             (ValueError, "max_disparity: give a whole number of pixels within 1048576 of 0, not 10000000000", lambda: mrfgs.match(left, right, 10**10)),
@@ -458,7 +471,7 @@ class Match(unittest.TestCase):
             (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((3, 3), np.uint8))),
             (ValueError, "mask", lambda: mrfgs.match(left, right, 15, mask=np.zeros((60, 80, 3), bool))),
             (ValueError, "disparity", lambda: mrfgs.match(left, right, -5)),
-            (ValueError, "no preset", lambda: mrfgs.match(left, right, 15, preset="best")),
+            (ValueError, "no preset", lambda: mrfgs.match(left, right, 15, method="best")),
             (ValueError, "no-such-key", lambda: mrfgs.match(left, right, 15, options={"no-such-key": 1})),
             (ValueError, "levels", lambda: mrfgs.match(left, right, 15, options={"levels": 0})),
             (ValueError, "levels", lambda: mrfgs.match(left, right, 15, options={"graph": {"levels": 0}})),
@@ -479,7 +492,189 @@ class Match(unittest.TestCase):
         self.assertIn("max_disparity: -5 is below the minimum disparity 0: raise it or lower min_disparity", str(raised.exception))
         with self.assertRaises(ValueError) as raised:
             mrfgs.match(left, right, 15, options={"memory": 1})
-        self.assertIn('options["memory"]: 1 MiB', str(raised.exception))
+        self.assertRegex(str(raised.exception), r"^memory: 1 MiB .*; give at least \d+MiB")
+
+    def test_floats_of_half_the_bits(self):
+        left, right = (image.astype(np.float16) / 256 for image in pair())
+        wide = [image.astype(np.float32) for image in (left, right)]
+        expected = mrfgs.match(*wide, 15, device="cpu").disparity
+        for one, two in ((left, right), (left, wide[1]), (left.astype(">f2"), right), (np.ma.masked_array(left), right)):
+            self.assertTrue(np.array_equal(mrfgs.match(one, two, 15, device="cpu").disparity, expected))
+        # Control: fewer bits are another image.
+        self.assertFalse(np.array_equal(mrfgs.match(*(image / 256 for image in pair()), 15, device="cpu").disparity, expected))
+        map_ = np.round(expected * 4).astype(np.float16) / 4
+        same = map_.astype(np.float32)
+        rig = mrfgs.Rig.of(100, 0.1, size=(80, 60))
+        self.assertTrue(np.array_equal(rig.depth(map_), rig.depth(same)))
+        self.assertEqual(mrfgs.evaluate(map_, same), mrfgs.evaluate(same, same))
+
+    def test_arrays_of_other_libraries(self):
+        class Exported:
+            """What has no other protocol than this."""
+
+            def __init__(self, array):
+                self.array = array
+
+            def __dlpack__(self, **keywords):
+                return self.array.__dlpack__(**keywords)
+
+            def __dlpack_device__(self):
+                return self.array.__dlpack_device__()
+
+        class Broken:
+            def __array__(self, dtype=None, copy=None):
+                raise LookupError("the frame is gone")
+
+        class OnDevice(Exported):
+            def __dlpack__(self, **keywords):
+                raise BufferError("it is on a device")
+
+        left, right = pair()
+        expected = mrfgs.match(left, right, 15, device="cpu").disparity
+        self.assertTrue(np.array_equal(mrfgs.match(Exported(left), Exported(right), 15, device="cpu").disparity, expected))
+        found = next(mrfgs.Matcher(device="cpu").match_all([(Exported(left), right)], 15))
+        self.assertTrue(np.array_equal(found.disparity, expected))
+        raw, by = raw_pair(), mrfgs.Rectification(CAMERAS)
+        self.assertTrue(np.array_equal(by.apply(*map(Exported, raw))[0].data, by.apply(*raw)[0].data))
+        self.assertEqual(mrfgs.evaluate(Exported(expected), expected), mrfgs.evaluate(expected, expected))
+        led = mrfgs.Steady().follow(found, Exported(left))
+        self.assertTrue(np.array_equal(led.disparity, expected))
+        # What goes wrong inside of them is the cause of what is raised.
+        sequence = mrfgs.Matcher(device="cpu").match_all([(left, Broken())], 15)
+        for cause, call in (
+            (LookupError, lambda: mrfgs.match(Broken(), right, 15)),
+            (LookupError, lambda: mrfgs.match(left, right, 15, mask=Broken())),
+            (LookupError, lambda: list(sequence)),
+            (LookupError, lambda: by.apply(raw[0], Broken())),
+            (LookupError, lambda: mrfgs.Rig.of(100, 0.1, size=(80, 60)).depth(Broken())),
+            (LookupError, lambda: mrfgs.evaluate(expected, Broken())),
+            (LookupError, lambda: mrfgs.Steady().follow(found, Broken())),
+            (BufferError, lambda: mrfgs.match(OnDevice(left), right, 15)),
+        ):
+            with self.assertRaisesRegex(TypeError, "give a numpy array") as raised:
+                call()
+            self.assertIs(type(raised.exception.__cause__), cause)
+
+    def test_the_words_of_arguments(self):
+        left, right = pair()
+        matcher = mrfgs.Matcher(device="cpu")
+        found = matcher.match(left, right, 15)
+        by, rig = mrfgs.Rectification(CAMERAS), mrfgs.Rig.of(100, 0.1, size=(80, 60))
+        raw, first = raw_pair(), np.moveaxis(left, -1, 0)
+        path, most = TESTDATA / "mixed" / "im0.png", "1 to 1024"
+        for error, words, call in (
+            # A path in the place of an array.
+            (TypeError, "left: give a numpy array, not the path of a file; mrfgs.read_image", lambda: matcher.match("left.png", right, 15)),
+            (TypeError, "right: give a numpy array, not the path of a file", lambda: matcher.match(left, path, 15)),
+            (TypeError, "mask: give a numpy array, not the path of a file", lambda: matcher.match(left, right, 15, mask=b"mask.png")),
+            (TypeError, "pair 0: left: give a numpy array, not the path", lambda: list(matcher.match_all([(str(path), right)], 15))),
+            (TypeError, "left: give a numpy array, not the path of a file", lambda: by.apply(path, path)),
+            (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Rectification.of_pair(path, path)),
+            (TypeError, "disparity: give a numpy array, not the path of a file", lambda: rig.depth("d.pfm")),
+            (TypeError, "sigma: give a numpy array, not the path of a file", lambda: rig.depth_sigma(found.disparity, "d.pfm")),
+            (TypeError, "truth: give a numpy array, not the path of a file; mrfgs.read_image reads an image, and mrfgs.read_disparity",
+             lambda: mrfgs.evaluate(found.disparity, Path("truth.pfm"))),
+            (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Steady().follow(found, path)),
+            (TypeError, "left: give a numpy array, not the path of a file", lambda: mrfgs.Drift(by).follow(path, path, 15)),
+            (TypeError, "left: give a numpy array, not the path of a file", lambda: rig.points(found, path)),
+            # Shapes of other libraries.
+            (ValueError, "left: has the shape (3, 60, 80), with the channels first: give (height, width, channels), such as "
+             "numpy.moveaxis(left, 0, -1), which has 60 rows of 80 pixels", lambda: matcher.match(first, first, 15)),
+            (ValueError, "right: has the shape (1, 60, 80), with the channels", lambda: matcher.match(left, first[:1], 15)),
+            (ValueError, "left: has the shape (3, 180, 240), with the channels", lambda: by.apply(*(np.moveaxis(r, -1, 0) for r in raw))),
+            (ValueError, "left: give an array of shape (height, width) or (height, width, channels), not (1, 60, 80, 3)",
+             lambda: matcher.match(left[None], right, 15)),
+            (ValueError, "disparity: give an array of shape (height, width), not (1, 60, 80); numpy.squeeze(disparity) has it",
+             lambda: rig.depth(found.disparity[None])),
+            (ValueError, "truth: give an array of shape (height, width), not (4800,)", lambda: mrfgs.evaluate(found.disparity, found.disparity.ravel())),
+            (ValueError, "mask: give an array of shape (height, width), not (60, 80, 1); numpy", lambda: matcher.match(left, right, 15, mask=left[..., :1])),
+            # Devices, threads, options and memory.
+            (ValueError, "no device is called `4711`", lambda: mrfgs.Matcher(device=4711)) if has_device() else
+            (RuntimeError, "no Vulkan or Metal driver", lambda: mrfgs.Matcher(device=4711)),
+            (TypeError, 'device: give "auto", "cpu", "gpu", or the index', lambda: mrfgs.Matcher(device=-1)),
+            (TypeError, 'device: give "auto", "cpu", "gpu", or the index of a device or a part of its name, not 0.5', lambda: mrfgs.Matcher(device=0.5)),
+            (TypeError, "not True", lambda: mrfgs.match(left, right, 15, device=True)),
+            (ValueError, f"threads: give a whole number, {most}, or None, not -1", lambda: mrfgs.Matcher(device="cpu", threads=-1)),
+            (TypeError, f"threads: give a whole number, {most}, or None, not '2'", lambda: mrfgs.match(left, right, 15, device="cpu", threads="2")),
+            (TypeError, "threads: give a whole number", lambda: mrfgs.Matcher(device="cpu", threads=1.5)),
+            (ValueError, f"threads: {2**63 - 1} threads cannot be had; give {most}", lambda: mrfgs.Matcher(device="cpu", threads=10**30)),
+            (TypeError, "options: the keys are names of options, which mrfgs.options() describes, such as \"fill\", not 3",
+             lambda: matcher.match(left, right, 15, options={3: 4})),
+            (TypeError, 'options["cost"]: the keys are names of options', lambda: matcher.match(left, right, 15, options={"cost": {None: 4}})),
+            (TypeError, 'options: give a dict, such as {"fill": "none"}, not str', lambda: matcher.match(left, right, 15, options="fill=none")),
+            (TypeError, "options: give a dict", lambda: matcher.match_all([], 15, options=[7])),
+            (ValueError, "method: there is no preset 'best', and no such file; give one of ", lambda: matcher.match(left, right, 15, method="best")),
+            (TypeError, "method: give the name of a preset, or the path of a TOML file", lambda: matcher.match_all([], 15, method=7)),
+            (ValueError, "none.toml: there is no such file", lambda: matcher.match(left, right, 15, method="none.toml")),
+            (ValueError, "memory: give a whole number of MiB, GiB or TiB, from 1MiB to 16TiB, like 2GiB", lambda: matcher.match(left, right, 15, memory="2GB")),
+            (TypeError, "memory: give a size, such as \"2GiB\", not 2048", lambda: matcher.match_all([], 15, memory=2048)),
+        ):
+            with self.subTest(words):
+                with self.assertRaises(error) as raised:
+                    call()
+                self.assertIs(type(raised.exception), error, raised.exception)
+                self.assertIn(words, str(raised.exception))
+                self.assertNotIn("\n", str(raised.exception))
+        # What makes sense.
+        for threads in (np.int64(1), 2):
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, device="cpu", threads=threads).disparity, found.disparity))
+        if has_device():
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, device=0).disparity, found.disparity))
+            self.assertTrue(np.array_equal(mrfgs.match(left, right, 15, device=np.int32(0)).disparity, found.disparity))
+        tiled = matcher.match(left, right, 15, memory="2MiB")
+        self.assertEqual(tiled.tiles, matcher.match(left, right, 15, options={"memory": 2}).tiles)
+        self.assertGreater(tiled.tiles, found.tiles)
+        next(matcher.match_all([(left, right)], 15, memory="2GiB"))
+
+    def test_a_method_is_a_preset_or_a_file(self):
+        left, right = pair()
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "mine.toml"
+            path.write_text('fill = "none"\n[cost]\nmatching = "sad"\n')
+            for given in (path, str(path)):
+                self.same(left, right, "--method", path, method=given)
+            self.same(left, right, "--method", path, "--set", "fill=row", method=path, options={"fill": "row"})
+
+    def test_images_are_read_as_the_program_reads_them(self):
+        random = np.random.default_rng(4)
+        with tempfile.TemporaryDirectory() as folder:
+            folder = Path(folder)
+            for dtype, most in ((np.uint8, 256), (np.uint16, 4096), (np.uint16, 65536)):
+                for shape in ((30, 40), (30, 40, 3)):
+                    image = random.integers(0, most, shape).astype(dtype)
+                    write_ppm(folder / "image.ppm", image)
+                    found = mrfgs.read_image(folder / "image.ppm")
+                    self.assertEqual(found.dtype, dtype)
+                    self.assertTrue(np.array_equal(found, image))
+                    self.assertNotIsInstance(found, np.ma.MaskedArray)
+            (folder / "image.pfm").write_bytes(b"Pf\n2 1\n-1\n" + np.array([1.5, np.nan], "<f4").tobytes())
+            found = mrfgs.read_image(str(folder / "image.pfm"))
+            self.assertEqual((found.dtype, found.shape, found[0, 0]), (np.float32, (1, 2), 1.5))
+            # RGB, and alpha that says where there is nothing.
+            views = [mrfgs.read_image(TESTDATA / "mixed" / f"im{i}.png") for i in (0, 1)]
+            for i, view in enumerate(views):
+                self.assertTrue(np.array_equal(view, read_png(TESTDATA / "mixed" / f"im{i}.png")))
+            program(folder, "match", TESTDATA / "mixed" / "im0.png", TESTDATA / "mixed" / "im1.png", "d.pfm", "--max-disparity", 47,
+                    "--device", "cpu", "--quiet")
+            self.assertTrue(np.array_equal(mrfgs.match(*views, max_disparity=47, device="cpu").disparity, read_pfm(folder / "d.pfm")))
+            # Stored turned, with a value for no data: both are tags of TIFF.
+            pixels = np.arange(6, dtype=np.uint8).reshape(2, 3)
+            tags = [(256, 3, 1, 3), (257, 3, 1, 2), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1), (273, 4, 1, 8), (274, 3, 1, 6),
+                    (277, 3, 1, 1), (278, 3, 1, 2), (279, 4, 1, 6), (42113, 2, 2, int.from_bytes(b"4\0", "little"))]
+            entries = b"".join(tag.to_bytes(2, "little") + kind.to_bytes(2, "little") + count.to_bytes(4, "little") + value.to_bytes(4, "little")
+                               for tag, kind, count, value in tags)
+            (folder / "turned.tif").write_bytes(b"II*\0" + (14).to_bytes(4, "little") + pixels.tobytes() + len(tags).to_bytes(2, "little")
+                                                + entries + bytes(4))
+            stored, upright = (mrfgs.read_image(folder / "turned.tif", orient=orient) for orient in (False, True))
+            self.assertIsInstance(stored, np.ma.MaskedArray)
+            self.assertTrue(np.array_equal(stored.data, pixels) and np.array_equal(stored.mask, pixels == 4))
+            self.assertTrue(np.array_equal(upright.data, np.rot90(pixels, -1)) and np.array_equal(upright.mask, np.rot90(pixels == 4, -1)))
+            (folder / "text.png").write_text("no image")
+            for error, name in ((FileNotFoundError, "nowhere.png"), (ValueError, "text.png")):
+                with self.assertRaisesRegex(error, name):
+                    mrfgs.read_image(folder / name)
+            with self.assertRaises(TypeError):
+                mrfgs.read_image(pixels)
 
     def test_other_threads_run_meanwhile(self):
         images = pair(400, 600)
@@ -538,11 +733,8 @@ except KeyboardInterrupt:
 
     @unittest.skipIf(sys.platform == "win32", "no signals there")
     def test_on_a_device(self):
-        try:
-            mrfgs.Matcher(device="gpu")
-        except RuntimeError as error:
-            self.assertIn(os.environ.get("MRFGS_REQUIRE_GPU", "0"), ("", "0"), error)
-            self.skipTest(f"there is no device: {error}")
+        if not has_device():
+            self.skipTest("there is no device")
         self.interrupted("gpu")
 
 
@@ -1217,8 +1409,8 @@ class Evaluation(Folder):
             (ValueError, "the mask is 5 x 3", lambda: mrfgs.evaluate(map_, map_, np.ones((3, 5), bool))),
             (ValueError, "mask: give an array of bool, or of uint8 that is 255", lambda: mrfgs.evaluate(map_, map_, np.ones((4, 5), np.uint8))),
             (TypeError, "mask: give an array of bool", lambda: mrfgs.evaluate(map_, map_, map_)),
-            (TypeError, "truth: give an array of float32 or float64", lambda: mrfgs.evaluate(map_, map_.astype(np.uint8))),
-            (TypeError, "disparity: give an array of float32", lambda: mrfgs.evaluate(map_ > 0, map_)),
+            (TypeError, "truth: give an array of float16, float32 or float64", lambda: mrfgs.evaluate(map_, map_.astype(np.uint8))),
+            (TypeError, "disparity: give an array of float16, float32", lambda: mrfgs.evaluate(map_ > 0, map_)),
             (ValueError, "truth: give an array of shape (height, width)", lambda: mrfgs.evaluate(map_, map_[None])),
         ):
             with self.subTest(words):
@@ -1243,10 +1435,10 @@ class Sequences(Folder):
                 self.assertTrue(np.array_equal(one.disparity, other))
         self.assertEqual(list(self.matcher.match_all([], 15)), [])
         # The arguments of `match`, and the range of each pair by itself.
-        found = list(self.matcher.match_all(pairs, 15, min_disparity=-2, preset="fast", options={"fill": "none"}, no_data=7))
+        found = list(self.matcher.match_all(pairs, 15, min_disparity=-2, method="fast", options={"fill": "none"}, no_data=7))
         for one, images in zip(found, pairs):
             self.assertTrue(np.array_equal(one.disparity, self.matcher.match(
-                *images, 15, min_disparity=-2, preset="fast", options={"fill": "none"}, no_data=7).disparity))
+                *images, 15, min_disparity=-2, method="fast", options={"fill": "none"}, no_data=7).disparity))
         large = [pair(200, 300, seed=seed) for seed in (1, 2)]
         for one, images in zip(self.matcher.match_all(large), large):
             self.assertEqual(one.max_disparity, mrfgs.match(*images, device="cpu").max_disparity)
@@ -1416,11 +1608,11 @@ class Sequences(Folder):
             self.assertEqual(len(found), 1)
         # What the match itself refuses.
         self.refused(ValueError, "pair 0: the views have too few matches", lambda: list(self.matcher.match_all([(left * 0, right * 0)])))
-        self.refused(ValueError, "pair 0: options[\"memory\"]: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
+        self.refused(ValueError, "pair 0: memory: 1 MiB", lambda: list(self.matcher.match_all([(left, right)], 15, options={"memory": 1})))
         # Before any pair is taken.
         taken = iter([(left, right)])
         for error, words, call in (
-            (ValueError, "no preset", lambda: self.matcher.match_all(taken, 15, preset="best")),
+            (ValueError, "no preset", lambda: self.matcher.match_all(taken, 15, method="best")),
             (ValueError, "max_disparity", lambda: self.matcher.match_all(taken, -5)),
             (TypeError, "pairs: give an iterable of pairs", lambda: self.matcher.match_all(7, 15)),
         ):
@@ -1536,6 +1728,221 @@ class Sequences(Folder):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
 
 
+def digest(*things):
+    """A number for all bits of arrays and texts."""
+    found = 0
+    for thing in things:
+        bytes_ = np.ascontiguousarray(np.ma.filled(thing, 0)).tobytes() if isinstance(thing, np.ndarray) else str(thing).encode()
+        found = zlib.crc32(bytes_, found)
+    return found
+
+
+def everything(matcher=None):
+    """What all that computes has given, as a number."""
+    matcher = matcher or mrfgs.Matcher(device="cpu")
+    views, raw = pair(200, 300), raw_pair()
+    found = matcher.match(*views)
+    maps = [matcher.match(*views, 15, roi=(100, 50, 90, 60)).disparity]
+    maps += [one.disparity for one in matcher.match_all([views] * 3, 15)]
+    maps += [mrfgs.match(*views, 15, device="cpu", threads=2, warn=False).disparity]
+    by, of_pair = mrfgs.Rectification(CAMERAS), mrfgs.Rectification.of_pair(*raw)
+    maps += [*by.apply(*raw), *by.maps()[1], *of_pair.apply(*raw), mrfgs.read_image(RAW / "left.png")]
+    drift = mrfgs.Drift(by)
+    drift.follow(*by.apply(*raw), 31)
+    maps += [mrfgs.Steady().follow(found, views[0]).disparity, by.rig.depth(found.disparity[:180, :240])]
+    return digest(*maps, found.disparity, drift.turn, mrfgs.evaluate(found.disparity, found.disparity))
+
+
+def matched_by_a_worker(seed):
+    return digest(mrfgs.match(*pair(200, 300, seed=seed), device="cpu").disparity)
+
+
+# What makes the children of the tests below.
+FORKED = '''
+import os, pickle, signal, sys, threading, time, traceback, itertools
+
+def forked(call, leave=os._exit):
+    """What `call` returns in a child; a child that hangs is ended."""
+    read, write = os.pipe()
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            os.close(read)
+            os.write(write, pickle.dumps(call()))
+            os.close(write)
+            status = 0
+        except BaseException:
+            traceback.print_exc()
+        sys.stdout.flush()
+        leave(status)
+    os.close(write)
+    for _ in range(1200):
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            break
+        time.sleep(0.1)
+    else:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        raise SystemExit("the child hangs")
+    assert status == 0, f"the child ended with {status}"
+    with os.fdopen(read, "rb") as file:
+        return pickle.load(file)
+'''
+
+
+@unittest.skipUnless(hasattr(os, "fork"), "no forks there")
+class Processes(unittest.TestCase):
+    """Children by fork, spawn and forkserver. What hangs is killed, and fails."""
+
+    def apart(self, code, said, **environment):
+        """That `code`, run by a Python of its own, prints what is `said`."""
+        before = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\nfrom test_mrfgs import *\n"
+        with subprocess.Popen([sys.executable, "-c", FORKED + before + textwrap.dedent(code)], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, env={**os.environ, **environment}, start_new_session=True) as process:
+            try:
+                out, wrong = process.communicate(timeout=300)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                self.fail("it hangs")
+        self.assertEqual((out.strip(), process.returncode), (said, 0), wrong)
+
+    def test_everything_works_in_a_child_as_in_its_parent(self):
+        self.apart("""
+            matcher = mrfgs.Matcher(device="cpu")
+            # Before anything has run, and after all has.
+            same = [forked(everything), forked(lambda: everything(matcher))]
+            expected = everything(matcher)
+            same += [forked(everything), forked(lambda: everything(matcher)), forked(lambda: everything(matcher), leave=sys.exit)]
+            # A child of a child, and the parent after all of them.
+            same += [forked(lambda: forked(lambda: everything(matcher))), everything(matcher)]
+            # Control: other maps would be seen.
+            assert matched_by_a_worker(1) != matched_by_a_worker(2)
+            print(*(one == expected for one in same))
+        """, " ".join(["True"] * 7))
+
+    def test_a_child_is_forked_while_others_match(self):
+        self.apart("""
+            matcher, steady, drift = mrfgs.Matcher(device="cpu"), mrfgs.Steady(), mrfgs.Drift(mrfgs.Rectification(CAMERAS))
+            views, raw = pair(200, 300), raw_pair()
+            found, done = matcher.match(*views, 15), threading.Event()
+            expected = digest(found.disparity)
+
+            def busy(call):
+                while not done.is_set():
+                    call()
+
+            calls = (lambda: matcher.match(*views, 15), lambda: mrfgs.match(*views, device="cpu"), lambda: steady.follow(found, views[0]),
+                     lambda: drift.follow(*raw, 31), lambda: mrfgs.read_image(RAW / "left.png"))
+            threads = [threading.Thread(target=busy, args=[call]) for call in calls]
+            for thread in threads:
+                thread.start()
+
+            def child():
+                for call in (lambda: steady.follow(found, views[0]), lambda: drift.follow(*raw, 31)):
+                    try:
+                        call()
+                    except RuntimeError as error:
+                        assert "when the process was forked" in str(error), error
+                return digest(matcher.match(*views, 15).disparity)
+
+            same = []
+            for _ in range(12):
+                time.sleep(0.03)
+                same.append(forked(child) == expected)
+            done.set()
+            print(*same)
+        """, " ".join(["True"] * 12))
+
+    def test_an_iterator_stays_in_its_process(self):
+        self.apart("""
+            matcher = mrfgs.Matcher(device="cpu")
+            results = matcher.match_all(itertools.repeat(pair()), 15)
+            expected = digest(next(results).disparity)
+
+            def child():
+                try:
+                    next(results)
+                except RuntimeError as error:
+                    print(error)
+                results.close()
+                return digest(matcher.match(*pair(), 15).disparity)
+
+            print(forked(child, leave=sys.exit) == expected, digest(next(results).disparity) == expected)
+        """, "this iterator was begun before the process was forked, and ends with that; call match_all here\nTrue True")
+
+    def test_devices_stay_in_their_process(self):
+        if not has_device():
+            self.skipTest("there is no device")
+        self.apart("""
+            matcher = mrfgs.Matcher(device="gpu")
+            expected = digest(matcher.match(*pair(), 15).disparity)
+
+            def child():
+                for call in (lambda: matcher.match(*pair(), 15), lambda: mrfgs.match(*pair(), 15, device="gpu"), lambda: mrfgs.Matcher(device=0)):
+                    try:
+                        call()
+                        print("no error")
+                    except RuntimeError as error:
+                        assert '"spawn"' in str(error) and "forked" in str(error) and len(str(error).splitlines()) == 1, error
+                return digest(mrfgs.match(*pair(), 15, device="cpu").disparity)
+
+            print(forked(child) == expected, digest(matcher.match(*pair(), 15).disparity) == expected)
+        """, "True True")
+
+    def test_pools_of_processes_give_the_same_bits(self):
+        seeds = [1, 2, 3]
+        expected = [matched_by_a_worker(seed) for seed in seeds]
+        self.assertEqual(len(set(expected)), 3)
+        # In a time that no hang keeps to.
+        for way in ("fork", "spawn", "forkserver"):
+            with multiprocessing.get_context(way).Pool(2) as pool:
+                self.assertEqual(pool.map_async(matched_by_a_worker, seeds).get(timeout=240), expected, way)
+        with multiprocessing.pool.ThreadPool(3) as pool:
+            self.assertEqual(pool.map_async(matched_by_a_worker, seeds).get(timeout=240), expected)
+
+    @unittest.skipUnless(Path("/proc/self/task").is_dir(), "Linux alone counts threads so")
+    def test_no_other_threads_work_than_are_asked_for(self):
+        code = """
+            def alive():
+                return len(os.listdir("/proc/self/task"))
+
+            views, before = pair(200, 300), alive()
+            matcher, counts = mrfgs.Matcher(device="cpu", threads=%d), []
+            for call in (lambda: matcher.match(*views), lambda: matcher.match(*views, 15), lambda: list(matcher.match_all([views] * 2))):
+                call()
+                # Whoever has ended may take a moment to go.
+                time.sleep(0.5)
+                counts.append(alive() - before)
+            print(*counts)
+        """
+        self.apart(code % 1, "1 1 1")
+        # Control: others are seen.
+        self.apart(code % 3, "3 3 3")
+
+    def test_the_environment_says_how_many_threads_are_usual(self):
+        code = "print(mrfgs.match(*pair(200, 300), 15, device='cpu').ran_on)"
+        one, names = "the CPU path, 1 thread", ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE")
+        nothing = dict.fromkeys(names, "")
+        for name in names:
+            self.apart(code, one, **{**nothing, name: "1"})
+        # What is said counts more.
+        self.apart(code.replace("'cpu'", "'cpu', threads=3"), "the CPU path, 3 threads", **{**nothing, "OMP_NUM_THREADS": "1"})
+        if hasattr(os, "sched_setaffinity"):
+            self.apart("os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])\n" + code, one, **nothing)
+
+    def test_far_too_many_threads_take_no_longer(self):
+        for size in ((60, 80), (200, 300)):
+            self.apart(f"""
+                views = pair(*{size})
+                many = mrfgs.match(*views, 15, device="cpu", threads=1024)
+                assert np.array_equal(many.disparity, mrfgs.match(*views, 15, device="cpu", threads=1).disparity)
+                print(int(many.ran_on.split()[-2]) <= 4 * os.cpu_count())
+            """, "True")
+
+
 class Help(unittest.TestCase):
     def test_everything_is_explained(self):
         for name in mrfgs.__all__:
@@ -1557,6 +1964,8 @@ class Help(unittest.TestCase):
 
     def test_the_stubs_name_what_there_is(self):
         stubs = (Path(mrfgs.__file__).parent / "__init__.pyi").read_text()
+        listed = next(node.value for node in ast.parse(stubs).body if isinstance(node, ast.Assign) and node.targets[0].id == "__all__")
+        self.assertEqual(ast.literal_eval(listed), mrfgs.__all__)
         for name in mrfgs.__all__:
             thing = getattr(mrfgs, name)
             self.assertRegex(stubs, rf"(class|def) {name}\b|{name}:")
