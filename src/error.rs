@@ -288,6 +288,11 @@ pub enum RangeError {
         /// The width of the images.
         width: usize,
     },
+    /// No range was given, and the sparse matches are too few to find it; once the pair is rectified by its own matches, they are enough.
+    #[error(
+        "the views have too few matches on the same rows to find the range of disparities, because they are not rectified"
+    )]
+    NotRectified,
     /// No range was given, and the sparse matches are too few to find it.
     #[error("the views have too few matches to find the range of disparities{}", after_colon(cause.as_deref()))]
     NotFound {

@@ -53,6 +53,8 @@ pub struct Words {
     pub calibration: &'static str,
     /// What turns images upright.
     pub orient: Option<&'static str>,
+    /// What rectifies a pair.
+    pub rectify: Option<&'static str>,
 }
 
 impl Words {
@@ -78,6 +80,7 @@ impl Words {
         no_data: None,
         calibration: "a calibration",
         orient: None,
+        rectify: None,
     };
 }
 
@@ -100,9 +103,10 @@ pub fn error(error: &Error, words: &Words) -> String {
 
 /// A warning with its remedy.
 #[must_use]
-pub fn warning(warning: &Warning, Words { min, max, mask, orient, .. }: &Words) -> String {
+pub fn warning(warning: &Warning, Words { min, max, mask, orient, rectify, .. }: &Words) -> String {
     let remedy = match warning {
         Warning::Oriented { .. } => and(": turn them upright by ", *orient),
+        Warning::NotRectified { .. } => and(": use ", *rectify),
         Warning::Saturated { .. } => format!(": expose both alike{}", and(", or ", *mask)),
         Warning::Swapped { .. } => {
             format!(": exchange the two images, or lower {min} below 0 if the cameras converge")
@@ -155,12 +159,19 @@ impl Words {
             RangeError::TooManyLabels { .. } => (max, ": narrow the range".into()),
             RangeError::OutsideImages { .. } => (max, ": give a range that fits the pair".into()),
             RangeError::NotFound { cause: Some(_) } => return cause.to_string(),
-            RangeError::NotFound { cause: None } => {
-                return format!("{cause}: give {}", range.map_or(max.into(), |range| format!("the {range}")));
+            RangeError::NotFound { cause: None } => return format!("{cause}: give {}", self.given_range()),
+            RangeError::NotRectified => {
+                let by = and(" by ", self.rectify);
+                return format!("{cause}: rectify the pair{by}, or give {}", self.given_range());
             }
             RangeError::TooFar { .. } => (max, String::new()),
         };
         format!("{}: {cause}{remedy}", range.unwrap_or(end))
+    }
+
+    /// What gives a range.
+    fn given_range(&self) -> String {
+        self.range.map_or(self.max.into(), |range| format!("the {range}"))
     }
 
     fn execution(&self, cause: &ExecutionError) -> String {

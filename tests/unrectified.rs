@@ -7,7 +7,7 @@ mod raw;
 #[path = "../testdata/scenes.rs"]
 mod scenes;
 
-use mrfgs::error::RectificationError;
+use mrfgs::error::{RangeError, RectificationError};
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Correspondence, Doubt, Options, Rectification};
@@ -161,7 +161,11 @@ fn photographs_may_be_rolled_far() {
     let scene = scene("slanted");
     let cameras = [[1.0, -2.0, 9.0], [-1.0, 1.0, -11.0]].map(|turn| phone(degrees(turn), SIZE));
     let pair = photographs(&cameras, SIZE, [&scene.left, &scene.right]);
+    // As they are they show no range; what the error says is so.
+    assert_eq!(check::range(&pair), Err(RangeError::NotRectified.into()));
     let by = by_matches(&pair);
+    let range = check::range(&by.apply(&pair).unwrap()).unwrap();
+    assert!(range.labels() < 60, "{range:?}");
     let mut rows = Vec::new();
     for (x, y) in (20..SIZE.1 - 20).step_by(5).flat_map(|y| (50..SIZE.0 - 20).step_by(5).map(move |x| (x, y)))
     {

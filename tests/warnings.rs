@@ -7,7 +7,7 @@
 use mrfgs::error::{Error, RangeError};
 use mrfgs::image::{Image, Pair, Plane, Rect, calib::Calibration, grey, read};
 use mrfgs::low_level::engine::Inspection;
-use mrfgs::low_level::front::check::{self, Warning};
+use mrfgs::low_level::front::check::{self, Part, Warning};
 use mrfgs::maps::{FRACTION, Maps};
 use mrfgs::options::{DisparityRange, Method};
 use mrfgs::{Found, Matched, Matcher};
@@ -373,6 +373,176 @@ fn swapped_views_are_told() {
     }
 }
 
+/// Where matches lie says nothing of the order while cameras are turned. Once the pair is rectified, it does.
+#[test]
+fn views_that_are_not_rectified_may_be_in_order() {
+    let mixed = Case::scene("mixed").pair;
+    let aside = |image: &Image, (right, down): (i32, i32)| moved(image, |x, y| (x - right, y - down));
+    let told = |left: &Image, right: Image| check::warnings(&Pair::new(left.clone(), right).unwrap(), None);
+    // The right camera looks to the left, so that all lies further right in its view.
+    let warnings = told(mixed.left(), aside(mixed.right(), (60, 3)));
+    assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{warnings:?}");
+    let warnings = told(mixed.right(), aside(mixed.left(), (0, 3)));
+    assert!(matches!(warnings[..], [Warning::NotRectified { .. }]), "{warnings:?}");
+    // Control: the rows are right, and the order is not.
+    let warnings = told(mixed.right(), mixed.left().clone());
+    assert!(matches!(warnings[..], [Warning::Swapped { .. }]), "{warnings:?}");
+}
+
+/// `image` with what `is_there` of it taken from `other`.
+fn mixed_with(image: &Image, other: &Image, is_there: impl Fn(usize, usize) -> bool) -> Image {
+    let (width, height) = image.pixels.size();
+    let from = |x, y| if is_there(x, y) { other } else { image };
+    Image {
+        pixels: Plane::from_fn(width, height, |x, y| from(x, y).pixels[(x, y)]),
+        masked: image.masked.clone(),
+    }
+}
+
+/// The means over squares of so many pixels beside, three times over: nearly a Gaussian.
+fn blurred(image: &Image, radius: i32) -> Image {
+    let mut planes: [Plane<f64>; 3] = std::array::from_fn(|i| image.pixels.map(|p| f64::from(p[i] >> 8)));
+    let (width, height) = image.pixels.size();
+    for plane in &mut planes {
+        for _ in 0..3 {
+            for (dx, dy) in [(1, 0), (0, 1)] {
+                *plane = Plane::from_fn(width, height, |x, y| {
+                    let at = |step: i32| {
+                        let x = (x as i32 + step * dx).clamp(0, width as i32 - 1);
+                        let y = (y as i32 + step * dy).clamp(0, height as i32 - 1);
+                        plane[(x as usize, y as usize)]
+                    };
+                    (-radius..=radius).map(at).sum::<f64>() / f64::from(2 * radius + 1)
+                });
+            }
+        }
+    }
+    Image::from_rgb8(&Plane::from_fn(width, height, |x, y| {
+        std::array::from_fn(|i| planes[i][(x, y)].round() as u8)
+    }))
+}
+
+/// Of a view whose part is none, the rest has a good map. Faint texture alone, as on walls, is no doubt.
+#[test]
+fn parts_that_do_not_belong_are_told() {
+    const SOUND: [&str; 15] = [
+        "slanted",
+        "thin",
+        "wall",
+        "repetitive",
+        "exposure",
+        "light",
+        "steep",
+        "mixed",
+        "focus",
+        "grain",
+        "poster",
+        "screen",
+        "border",
+        "corridor",
+        "behind",
+    ];
+    for scene in SOUND {
+        assert_eq!(check::warnings(&Case::scene(scene).pair, None), [], "control: {scene}");
+    }
+    let (mixed, other) = (Case::scene("mixed").pair, Case::scene("exposure").pair);
+    for scene in ["mixed", "slanted"] {
+        let pair = Case::scene(scene).pair;
+        let (left, right) = (pair.left(), pair.right());
+        let (width, height) = pair.size();
+        let of = if scene == "mixed" { other.right() } else { mixed.right() };
+        let (w, h) = of.pixels.size();
+        // Another scene, of any size, and the same one further down.
+        let strange = Plane::from_fn(width, height, |x, y| of.pixels[(x % w, y % h)]);
+        let strange = Image { pixels: strange, ..right.clone() };
+        let [much, little] = [20, 3].map(|rows| moved(right, |x, y| (x, y - rows)));
+        let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729) * (x + 3 * y + 11) / 7 % 251) as u8;
+        let noise = Image::from_rgb8(&Plane::from_fn(width, height, |x, y| [noise(x, y); 3]));
+        let plain = Image::from_rgb8(&Plane::filled(width, height, [90; 3]));
+        let blur = blurred(right, 4);
+        let half = |y: usize| y >= height / 2;
+        let told = |left: &Image, right: Image| {
+            let warnings = check::warnings(&Pair::new(left.clone(), right).unwrap(), None);
+            let [warning] = warnings[..] else { panic!("{scene}: {warnings:?}") };
+            warning
+        };
+        let rows = |first: usize, last: usize| Part::Rows { first, last, of: height };
+        let columns = |first: usize, last: usize| Part::Columns { first, last, of: width };
+
+        // A copy of the other view.
+        let copies: [(Part, &dyn Fn(usize, usize) -> bool); 4] = [
+            (rows(0, height / 2 - 1), &|_, y| !half(y)),
+            (rows(height / 2, height - 1), &|_, y| half(y)),
+            (columns(0, width / 2 - 1), &|x, _| x < width / 2),
+            (columns(width / 2, width - 1), &|x, _| x >= width / 2),
+        ];
+        for (part, is_there) in copies {
+            assert_eq!(told(left, mixed_with(right, left, is_there)), Warning::Copied { part }, "{scene}");
+        }
+        // Blur, of all and of a part, and nothing at all.
+        let lacks = |view, part| Warning::Blurred { view, part };
+        assert_eq!(told(left, blur.clone()), lacks("right", Part::Whole), "{scene}");
+        assert_eq!(told(&blurred(left, 4), right.clone()), lacks("left", Part::Whole), "{scene}");
+        let lower_half = rows(height / 2, height - 1);
+        for with in [&blur, &plain] {
+            assert_eq!(
+                told(left, mixed_with(right, with, |_, y| half(y))),
+                lacks("right", lower_half),
+                "{scene}"
+            );
+        }
+        // Another scene, another place and noise, in the lower half or the middle.
+        for (what, with) in [("scene", &strange), ("20 rows", &much), ("3 rows", &little), ("noise", &noise)]
+        {
+            let torn = told(left, mixed_with(right, with, |_, y| half(y)));
+            let Warning::Torn { part: Part::Rows { first, last, .. } } = torn else {
+                panic!("{scene}, {what}: {torn:?}")
+            };
+            assert!(first.abs_diff(height / 2) < 20 && last + 20 > height, "{scene}, {what}: {torn:?}");
+        }
+        let torn = told(&mixed_with(left, &noise, |_, y| half(y)), right.clone());
+        assert!(matches!(torn, Warning::Torn { .. }), "{scene}: {torn:?}");
+        // What is masked in the right view alone is no doubt.
+        let mut masked = right.clone();
+        masked.masked = Plane::from_fn(width, height, |_, y| half(y));
+        assert_eq!(check::warnings(&Pair::new(left.clone(), masked).unwrap(), None), [], "{scene}");
+    }
+}
+
+/// A mask of one view takes what it covers from the statistics of both.
+#[test]
+fn a_mask_is_no_doubt() {
+    let mixed = Case::scene("mixed").pair;
+    let (width, height) = mixed.size();
+    let masked = |is_masked: &dyn Fn(usize, usize) -> bool| {
+        let mut left = mixed.left().clone();
+        left.masked = Plane::from_fn(width, height, is_masked);
+        Pair::new(left, mixed.right().clone()).unwrap()
+    };
+    // The upper rows have little contrast, and the others much; without their mask, the same rows of both views are compared with all.
+    let plain_rows = masked(&|_, y| y >= 20);
+    assert_eq!(check::warnings(&plain_rows, None), []);
+    let exposed = |gain: u16| {
+        let mut pair = plain_rows.clone();
+        let pixels = pair.right().pixels.map(|p| p.map(|v| v / gain));
+        pair = Pair::new(pair.left().clone(), Image { pixels, ..pair.right().clone() }).unwrap();
+        check::warnings(&pair, None)
+    };
+    assert!(exposed(8).iter().any(|w| matches!(w, Warning::Contrast { .. })), "control: {:?}", exposed(8));
+
+    // What is left of a mask of 85 % is hardly found: at the left border, whose matches are outside, and of small islands.
+    let mut matcher = Matcher::builder().method(Method::fast()).device("cpu").build().unwrap();
+    let mut told = |pair: &Pair| matcher.run(pair, 0..=47).unwrap().warnings();
+    for is_masked in [(|x, _| x >= 40) as fn(usize, usize) -> bool, |x, y| x % 25 >= 10 || y % 26 >= 10] {
+        let warnings = told(&masked(&is_masked));
+        assert!(
+            matches!(warnings[..], [Warning::LittleLeft { percent: 0..35, masked: 80..90 }]),
+            "{warnings:?}"
+        );
+    }
+    assert_eq!(told(&masked(&|x, y| (100..224).contains(&x) || (75..168).contains(&y))), []);
+}
+
 #[test]
 fn identical_images_are_told() {
     let case = Case::scene("mixed");
@@ -380,7 +550,9 @@ fn identical_images_are_told() {
     let mut other = left.clone();
     other.pixels[(9, 9)] = [1, 2, 3, 4];
     assert_eq!(check::warnings(&Pair::new(left.clone(), left.clone()).unwrap(), None), [Warning::Identical]);
-    assert_eq!(check::warnings(&Pair::new(left.clone(), other.clone()).unwrap(), None), []);
+    // A pixel more or less makes no pair of them.
+    let copied = [Warning::Copied { part: Part::Whole }];
+    assert_eq!(check::warnings(&Pair::new(left.clone(), other.clone()).unwrap(), None), copied);
     // A difference at a masked pixel does not count.
     other.masked[(9, 9)] = true;
     assert_eq!(check::warnings(&Pair::new(left.clone(), other).unwrap(), None), [Warning::Identical]);
@@ -393,6 +565,13 @@ fn warnings_are_one_line_with_the_cause() {
         (Warning::NotRectified { offset: 512 }, ["2.0 px", "rectify"]),
         (Warning::Turned { how: "upside down" }, ["upside down", "turn it back"]),
         (Warning::Sideways, ["same column", "turn both"]),
+        (
+            Warning::Copied { part: Part::Columns { first: 0, last: 9, of: 20 } },
+            ["in columns 0 to 9 of 20", "wrote"],
+        ),
+        (Warning::Blurred { view: "left", part: Part::Whole }, ["the left view lacks", "everywhere"]),
+        (Warning::Torn { part: Part::Rows { first: 4, last: 9, of: 10 } }, ["in rows 4 to 9 of 10", "torn"]),
+        (Warning::LittleLeft { percent: 4, masked: 85 }, ["only 4 %", "covers 85 %"]),
         (Warning::Swapped { percent: 97 }, ["97 %", "seem to be swapped"]),
         (Warning::Plain { view: "left" }, ["the left view is all one colour", "right image"]),
         (Warning::Contrast { percent: 12 }, ["12 % of the other's contrast", "expose both alike"]),

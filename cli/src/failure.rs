@@ -35,7 +35,9 @@ impl Failure {
 
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Error(Error::Range(RangeError::NotFound { .. })) => ExitCode::FAILURE,
+            Self::Error(Error::Range(RangeError::NotFound { .. } | RangeError::NotRectified)) => {
+                ExitCode::FAILURE
+            }
             Self::Usage(_)
             | Self::Error(
                 Error::Option { .. }

@@ -22,6 +22,7 @@ pub(crate) const FLAGS: Words = Words {
     no_data: Some("--no-data"),
     calibration: "a calibration by --calib",
     orient: Some("--orient"),
+    rectify: Some("--rectify (or `mrfgs rectify`)"),
     ..Words::PLAIN
 };
 
@@ -31,7 +32,7 @@ pub(crate) const COLUMNS: Words = Words { min: "min_disparity", max: "max_dispar
 #[cfg(test)]
 mod tests {
     use mrfgs::Error;
-    use mrfgs::check::Warning;
+    use mrfgs::check::{Part, Warning};
     use mrfgs::error::{
         BudgetError, DeviceError, ExecutionError, MemoryError, OptionError, Purpose, RangeError, ReadError,
         RectificationError,
@@ -96,6 +97,10 @@ mod tests {
                 "--max-disparity ... give a range",
             ),
             (RangeError::NotFound { cause: None }.into(), "too few matches ... give --max-disparity"),
+            (
+                RangeError::NotRectified.into(),
+                "not rectified ... rectify the pair by --rectify ... or give --max-disparity",
+            ),
             (RangeError::NotFound { cause: Some("it is plain".into()) }.into(), "disparities: it is plain"),
             (no_device.into(), "--device ... 0: llvmpipe ... `mrfgs devices`"),
             (
@@ -140,17 +145,26 @@ mod tests {
         ]
     }
 
+    const ROWS: Part = Part::Rows { first: 90, last: 179, of: 180 };
+
     /// Every warning, and what is said of it.
-    const WARNINGS: [(Warning, &str); 12] = [
+    const WARNINGS: [(Warning, &str); 16] = [
         (Warning::Oriented { which: 2 }, "both images ... turn them upright by --orient"),
         (Warning::Identical, "give the right view"),
         (Warning::Plain { view: "left" }, "the left view"),
         (Warning::Masked { view: "right" }, "the right view is masked"),
         (Warning::HardlyMatch { percent: 7 }, "only 7 % ... rectified"),
+        (Warning::LittleLeft { percent: 7, masked: 85 }, "only 7 % ... covers 85 % ... what is no image"),
         (Warning::Contrast { percent: 12 }, "12 %"),
         (Warning::Saturated { percent: [1, 37] }, ", or --mask"),
         (Warning::Turned { how: "upside down" }, "upside down"),
-        (Warning::NotRectified { offset: 512 }, "2.0 px"),
+        (Warning::NotRectified { offset: 512 }, "2.0 px ... its own matches: use --rectify"),
+        (Warning::Copied { part: Part::Whole }, "the same pixels everywhere ... wrote the images"),
+        (
+            Warning::Blurred { view: "right", part: ROWS },
+            "the right view ... rows 90 to 179 of 180 ... in focus",
+        ),
+        (Warning::Torn { part: ROWS }, "in rows 90 to 179 of 180 ... torn"),
         (Warning::Swapped { percent: 97 }, "lower --min-disparity below 0"),
         (Warning::Clipped { end: 63, upper: true, percent: 9 }, ": raise --max-disparity"),
         (Warning::Clipped { end: -5, upper: false, percent: 9 }, ": lower --min-disparity"),
@@ -183,7 +197,7 @@ mod tests {
         let errors = ranges.map(|(cause, _)| error(&cause, &COLUMNS));
         let clipped = WARNINGS.iter().filter(|(cause, _)| matches!(cause, Warning::Clipped { .. }));
         let said: Vec<String> = errors.chain(clipped.map(|(cause, _)| warning(cause, &COLUMNS))).collect();
-        assert_eq!(said.len(), 9);
+        assert_eq!(said.len(), 10);
         assert!(said.iter().all(|said| said.contains("_disparity") && !said.contains("--")), "{said:?}");
     }
 }

@@ -12,6 +12,7 @@ const WORDS: Words = Words {
     fork: "start it by multiprocessing.get_context(\"spawn\") or \"forkserver\", or make no Matcher with a device before the fork",
     memory: Some(["memory", "MiB"]),
     mask: Some("give a mask of what is no image"),
+    rectify: Some("Rectification.of_pair()"),
     ..Words::PLAIN
 };
 

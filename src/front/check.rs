@@ -1,11 +1,14 @@
 //! Warnings about probable mistakes. Before a pair is matched they come from its pixels and from sparse
 //! matches, which also suggest the range to search; after a match they come from its maps.
 
-use super::matches::{self, Match};
+use super::matches::{self, Match, Survey};
+use super::parts;
+pub use super::parts::Part;
 use crate::error::{RangeError, Result};
 use crate::image::{Image, Orientation, Pair};
 use crate::maps::{FRACTION, Maps, flag};
 use crate::options::DisparityRange;
+use crate::rectification::{self, Rectification};
 
 /// Fewer matches than this give no statistics.
 const MIN_MATCHES: usize = 30;
@@ -24,6 +27,8 @@ const ROWS: usize = 8;
 /// rectified (indoors, from cars, from the air, rendered), none has more than 0.40 px; with one view shifted
 /// down by one pixel, all have 0.61 px or more.
 const MAX_OFFSET: u32 = FRACTION as u32 / 2;
+/// Corners that are found so far above or below their row, in 1/256 px, are not found on it.
+const MAX_APART: u32 = 3 * FRACTION as u32 / 2;
 /// Percentage of matches with the wrong sign from which on the views count as swapped.
 const SWAPPED_PERCENT: usize = 90;
 /// A view counts as plain when nearly all of its grey lies within this many 8-bit levels, noise included.
@@ -47,6 +52,8 @@ const CLIPPED_PERCENT: usize = 2;
 /// with a view of another scene, with one inverted, of noise, and 20 rows apart, 202 of 208 have less than this by the default, and 194
 /// by `fast`.
 const MEASURED_PERCENT: usize = 35;
+/// Percentage of masked pixels from which on the mask is to blame where few of the others are found (open).
+const MASKED_PERCENT: usize = 50;
 /// Pixels in a thousand at the upper end of a range that sparse matches found from which on it is [`wider`] (open). Of 54 ranges, two cut
 /// off a road: these have 11 and 12 by the default, 23 and 25 by `fast`. By `fast`, three of the others have more than 8 (one of them lacks
 /// the nearest 3 px), and 47 less than 4.
@@ -68,14 +75,30 @@ const MIN_LABELS: usize = 3;
 /// The range then extends down to 0, the horizon of parallel cameras.
 ///
 /// # Errors
-/// [`RangeError::NotFound`] where there are too few matches to tell, with the warning where one says that the pair must be mended;
+/// [`RangeError::NotRectified`] where the pair has too few matches to tell, and enough once it is rectified by its own;
+/// [`RangeError::NotFound`] where it has too few in any case, with the warning where one says that the pair must be mended;
 /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
 pub fn range(pair: &Pair) -> Result<DisparityRange> {
     matches::check_memory(pair)?;
+    if let Some(range) = range_by_matches(pair) {
+        return range;
+    }
+    let cause = of_pixels(pair, None).into_iter().find(Warning::is_beyond_range);
+    let rectified = || {
+        let by = Rectification::of_pair(pair, &rectification::Options::default()).ok()?;
+        range_by_matches(&by.apply(pair).ok()?)
+    };
+    if matches!(cause, None | Some(Warning::NotRectified { .. })) && matches!(rectified(), Some(Ok(_))) {
+        return Err(RangeError::NotRectified.into());
+    }
+    Err(RangeError::NotFound { cause: cause.map(|cause| cause.to_string()) }.into())
+}
+
+/// The range of the matches of `pair`; `None` where there are too few.
+fn range_by_matches(pair: &Pair) -> Option<Result<DisparityRange>> {
     let found = matches::find(pair, None, None);
     if found.len() < MIN_MATCHES {
-        let cause = of_pixels(pair, None).into_iter().find(Warning::is_beyond_range);
-        return Err(RangeError::NotFound { cause: cause.map(|cause| cause.to_string()) }.into());
+        return None;
     }
     let (width, height) = pair.size();
     let mut bare = [true; PARTS * PARTS];
@@ -92,7 +115,7 @@ pub fn range(pair: &Pair) -> Result<DisparityRange> {
     let min = if 4 * bare > PARTS * PARTS { min.min(0) } else { min };
     let below = disparities.partition_point(|d| *d < -FRACTION);
     let min = if 100 * below > BELOW_PERCENT * disparities.len() { min } else { min.max(0) };
-    DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION))
+    Some(DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION)))
 }
 
 /// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
@@ -126,6 +149,35 @@ pub enum Warning {
     Plain {
         /// Name of the view: "left" or "right".
         view: &'static str,
+    },
+    /// Both views hold the same pixels in a part.
+    #[error(
+        "both views hold the same pixels {part}, so a part of one has got into the other, and shows no depth there: check what wrote \
+         the images"
+    )]
+    Copied {
+        /// The part.
+        part: Part,
+    },
+    /// A view lacks the detail of the other one.
+    #[error(
+        "the {view} view lacks the detail of the other {part}, so little can be matched there: check that it is in focus and that \
+         nothing covers the camera, and mask what is no image"
+    )]
+    Blurred {
+        /// Name of the view: "left" or "right".
+        view: &'static str,
+        /// The part.
+        part: Part,
+    },
+    /// Next to nothing of some rows was found, other than of the rest.
+    #[error(
+        "next to nothing {part} of the left view is on the same rows of the right one, other than elsewhere: check that no view is torn, \
+         and that both show one moment there"
+    )]
+    Torn {
+        /// The rows.
+        part: Part,
     },
     /// One view has far less contrast than the other.
     #[error(
@@ -187,6 +239,17 @@ pub enum Warning {
         /// Pixels that were found, in percent of those that are not masked.
         percent: usize,
     },
+    /// Few of the pixels that a large mask leaves were found in the right view.
+    #[error(
+        "only {percent} % of the pixels that the mask leaves were found in both views; it covers {masked} % of the left view: check that \
+         it covers what is no image, and leaves what both views show in one piece"
+    )]
+    LittleLeft {
+        /// Pixels that were found, in percent of those that are not masked.
+        percent: usize,
+        /// Masked pixels of the left view, in percent of all.
+        masked: usize,
+    },
     /// Many disparities are at an end of the range.
     #[error(
         "{percent} % of the measured pixels are at disparity {end}, an end of the range, which probably cuts off part of \
@@ -205,7 +268,10 @@ pub enum Warning {
 impl Warning {
     /// Whether no range helps: the pair itself must be mended.
     fn is_beyond_range(&self) -> bool {
-        !matches!(self, Self::Contrast { .. } | Self::Saturated { .. } | Self::Clipped { .. })
+        !matches!(
+            self,
+            Self::Contrast { .. } | Self::Saturated { .. } | Self::Blurred { .. } | Self::Clipped { .. }
+        )
     }
 }
 
@@ -221,15 +287,21 @@ impl Warning {
 /// - Contrast, saturated: gain and offset between the views do no harm by themselves, because the matching
 ///   cost uses a census. Detail that falls between the levels or is clipped at either end is lost. Contrast
 ///   is the span of the middle 90 % of grey.
+/// - Copied: of a part of at least an eighth, most pixels with texture are equal in both views.
+/// - Blurred: in a part of at least an eighth of the rows, a view has less than a quarter of the other's fine detail, measured against the
+///   contrast of the whole.
+/// - Torn: corners of a sixth of the rows or more are found on their row in the right view no more often than by chance, and elsewhere
+///   far more often. Faint corners do not count: a plain wall or the sky has no others.
 /// - Turned: there are hardly any matches, and many once the right view is turned.
 /// - Sideways: the matches along rows are few or not rectified, and those along columns are neither.
 /// - Not rectified: the median of |dy| exceeds half a pixel. This needs half of the matches to be off, in
 ///   whichever direction (a rotation moves the two sides in opposite directions), so a few false matches do
 ///   not matter.
-/// - Swapped: nine in ten matches lie more than a pixel on the negative side. Converging cameras may cause
-///   that too; a user who gives a range with negative disparities knows, and is not warned.
+/// - Swapped: nine in ten matches of a rectified pair lie more than a pixel on the negative side. Converging cameras may cause
+///   that too; a user who gives a range with negative disparities knows, and is not warned. Of a pair that is not rectified, turned
+///   cameras decide on which side matches lie.
 ///
-/// On a machine without memory for the search only the first three checks are made.
+/// On a machine without memory for the search only the checks are made that need none: up to the copied parts.
 #[must_use]
 pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let mut out = Vec::from_iter(oriented(pair));
@@ -250,7 +322,8 @@ fn oriented(pair: &Pair) -> Option<Warning> {
 
 /// The other ones.
 fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
-    let tones = [("left", Tones::of(pair.left())), ("right", Tones::of(pair.right()))];
+    let tones = [("left", pair.left()), ("right", pair.right())]
+        .map(|(view, image)| (view, Tones::of(image, |x, y| !image.masked[(x, y)])));
     let masked = tones.iter().filter(|(_, tones)| tones.is_none());
     let masked: Vec<_> = masked.map(|(view, _)| Warning::Masked { view }).collect();
     if !masked.is_empty() {
@@ -264,16 +337,17 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     if identical(pair.left(), pair.right()) {
         return vec![Warning::Identical];
     }
-    let mut out = match tones {
-        [(_, Some(left)), (_, Some(right))] => exposure(&left, &right),
-        _ => Vec::new(),
-    };
-    if matches::check_memory(pair).is_err() {
+    let (width, height) = pair.size();
+    let survey = |pair: &Pair| matches::survey(pair, None, None, width * height / SAMPLE, ROWS);
+    let is_searched = matches::check_memory(pair).is_ok();
+    let found = if is_searched { survey(pair) } else { Survey::default() };
+    let mut out = exposure(pair, matches::median(found.matches.iter().map(|m| m.disparity)) / FRACTION);
+    let is_exposed_alike = out.is_empty();
+    let copied = parts::copied(pair.left(), pair.right()).map(|part| Warning::Copied { part });
+    out.extend(copied);
+    if !is_searched {
         return out;
     }
-    let (width, height) = pair.size();
-    let search = |pair: &Pair| matches::search(pair, None, None, width * height / SAMPLE, ROWS);
-    let found = search(pair);
     // `None` where there are too few matches to tell.
     let offset = |found: &[Match]| {
         let offset = || matches::median(found.iter().map(|m| m.dy.abs())).unsigned_abs();
@@ -281,10 +355,16 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     };
     let sideways = || {
         let pair = Pair::new(pair.left().transposed(), pair.right().transposed()).ok()?;
-        offset(&search(&pair)).filter(|offset| *offset <= MAX_OFFSET)
+        offset(&survey(&pair).matches).filter(|offset| *offset <= MAX_OFFSET)
     };
-    match offset(&found) {
-        Some(offset) if offset <= MAX_OFFSET => {}
+    match offset(&found.matches) {
+        Some(offset) if offset <= MAX_OFFSET => {
+            let disparities = found.matches.iter().map(|m| m.disparity);
+            let percent = 100 * disparities.filter(|d| *d < -FRACTION).count() / found.matches.len();
+            if percent >= SWAPPED_PERCENT && range.is_none_or(|r| r.min >= 0) {
+                out.push(Warning::Swapped { percent });
+            }
+        }
         _ if sideways().is_some() => {
             out.push(Warning::Sideways);
             return out;
@@ -301,23 +381,33 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
             ];
             let matches = |view: Image| {
                 let turned = Pair::new(pair.left().clone(), view).ok()?;
-                offset(&search(&turned))
+                offset(&survey(&turned).matches)
             };
-            let how = ways.into_iter().find(|(_, view)| matches(view()).is_some());
-            out.extend(how.map(|(how, _)| Warning::Turned { how }));
-            return out;
+            if let Some((how, _)) = ways.into_iter().find(|(_, view)| matches(view()).is_some()) {
+                out.push(Warning::Turned { how });
+                return out;
+            }
         }
     }
-    let percent = 100 * found.iter().filter(|m| m.disparity < -FRACTION).count() / found.len();
-    if percent >= SWAPPED_PERCENT && range.is_none_or(|r| r.min >= 0) {
-        out.push(Warning::Swapped { percent });
+    if copied.is_none() {
+        // Exposures that are far apart take the detail of one view, too.
+        let blurred = is_exposed_alike.then(|| parts::blurred(pair.left(), pair.right())).flatten();
+        let blurred = blurred.map(|(view, part)| Warning::Blurred { view: ["left", "right"][view], part });
+        let torn = || {
+            let is_rectified = offset(&found.matches).is_some_and(|offset| offset <= MAX_OFFSET);
+            let part = parts::strange(&found, &pair.right().masked, MAX_APART).filter(|_| is_rectified)?;
+            Some(Warning::Torn { part })
+        };
+        out.extend(blurred.or_else(torn));
     }
     out
 }
 
 /// The probable mistakes in a match over `range` that gave `maps`.
 ///
-/// - Hardly match: fewer than 35 % of the pixels that are not masked were found in both views. No other warning is given then.
+/// - Hardly match: fewer than 35 % of the pixels that are not masked were found in both views. Where half of the left view or more is
+///   masked, that is little left: pixels beside masked ones are often not found, and neither are those whose match is outside the right
+///   view. No other warning is given then.
 /// - Clipped: many disparities at an end of the range, so that it probably cuts off part of the scene. The lower end does not count where
 ///   it is 0, the horizon of parallel cameras.
 #[must_use]
@@ -332,7 +422,12 @@ pub fn warnings_of(maps: &Maps, range: DisparityRange) -> Vec<Warning> {
         at[1] += usize::from(*disparity >= range.max * FRACTION);
     }
     if 100 * all < MEASURED_PERCENT * known {
-        return vec![Warning::HardlyMatch { percent: 100 * all / known }];
+        let (percent, masked) = (100 * all / known, 100 - 100 * known / maps.raw.data().len());
+        return vec![if masked >= MASKED_PERCENT {
+            Warning::LittleLeft { percent, masked }
+        } else {
+            Warning::HardlyMatch { percent }
+        }];
     }
     let ends = [(range.min, false, at[0]), (range.max, true, at[1])];
     ends.into_iter()
@@ -387,12 +482,13 @@ struct Tones {
 }
 
 impl Tones {
-    /// The statistics of the unmasked pixels; `None` where all are masked.
-    fn of(image: &Image) -> Option<Self> {
+    /// The statistics of the pixels that `count`; `None` where there are none.
+    fn of(image: &Image, count: impl Fn(usize, usize) -> bool) -> Option<Self> {
+        let (width, height) = image.pixels.size();
         let mut counts = [0_usize; 256];
-        for (pixel, _) in image.pixels.data().iter().zip(image.masked.data()).filter(|(_, masked)| !**masked)
-        {
-            counts[usize::from(pixel[3] >> 8)] += 1;
+        for y in 0..height {
+            let row = image.pixels.row(y);
+            (0..width).filter(|x| count(*x, y)).for_each(|x| counts[usize::from(row[x][3] >> 8)] += 1);
         }
         let all: usize = counts.iter().sum();
         // The lowest level such that more than this many percent of the pixels are at or below it.
@@ -409,8 +505,20 @@ impl Tones {
     }
 }
 
-/// Warns of exposures so different that one view lacks detail that the other shows.
-fn exposure(left: &Tones, right: &Tones) -> Vec<Warning> {
+/// Warns of exposures so different that one view lacks detail that the other shows. `disparity` is the usual one, in pixels: what is masked
+/// in one view does not count in the other either.
+fn exposure(pair: &Pair, disparity: i32) -> Vec<Warning> {
+    let of = |image: &Image, other: &Image, right: i32| {
+        Tones::of(image, |x, y| {
+            let there = x as i32 + right;
+            let hidden = (0..other.width() as i32).contains(&there) && other.masked[(there as usize, y)];
+            !image.masked[(x, y)] && !hidden
+        })
+    };
+    let [left, right] = [pair.left(), pair.right()];
+    let (Some(left), Some(right)) = (of(left, right, -disparity), of(right, left, disparity)) else {
+        return Vec::new();
+    };
     let mut out = Vec::new();
     let (less, more) = (left.contrast.min(right.contrast), left.contrast.max(right.contrast));
     if 100 * less < CONTRAST_PERCENT * more {

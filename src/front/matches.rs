@@ -91,6 +91,25 @@ pub(super) fn check_memory(pair: &Pair) -> Result<()> {
     Ok(memory::check(BYTES * (width * height) as u64, Purpose::Image)?)
 }
 
+/// A corner of the left view that was searched.
+pub(super) struct Corner {
+    /// Its row.
+    pub(super) y: usize,
+    /// The smaller eigenvalue of its structure tensor.
+    pub(super) strength: f64,
+    /// How far above or below its row it was found, in 1/256 px, where it was found.
+    pub(super) offset: Option<u32>,
+}
+
+/// What a search gives.
+#[derive(Default)]
+pub(super) struct Survey {
+    /// What was searched, in raster order.
+    pub(super) corners: Vec<Corner>,
+    /// What was found.
+    pub(super) matches: Vec<Match>,
+}
+
 /// [`find`] with one corner per `spacing` pixels ([`SPACING`] at least), on up to `rows` rows above and below
 /// its own.
 pub(super) fn search(
@@ -100,22 +119,34 @@ pub(super) fn search(
     spacing: usize,
     rows: usize,
 ) -> Vec<Match> {
-    threads::run(|| searched(pair, zones, range, spacing.max(SPACING), rows))
+    survey(pair, zones, range, spacing, rows).matches
 }
 
-fn searched(
+/// The same, with what was searched.
+pub(super) fn survey(
     pair: &Pair,
     zones: Option<(&Plane<u32>, usize)>,
     range: Option<DisparityRange>,
     spacing: usize,
     rows: usize,
-) -> Vec<Match> {
+) -> Survey {
+    threads::run(|| surveyed(pair, zones, range, spacing.max(SPACING), rows))
+}
+
+fn surveyed(
+    pair: &Pair,
+    zones: Option<(&Plane<u32>, usize)>,
+    range: Option<DisparityRange>,
+    spacing: usize,
+    rows: usize,
+) -> Survey {
     let reach = (pair.size().0 / REACH) as i32;
     let (min, max) = range.map_or((-reach, reach), |r| (r.min, r.max));
     let (left, right) = rayon::join(|| View::new(pair.left()), || View::new(pair.right()));
-    let matches = corners(&left, zones, spacing)
-        .into_par_iter()
-        .filter_map(|(x, y)| {
+    let corners = corners(&left, zones, spacing);
+    let matches = corners
+        .par_iter()
+        .filter_map(|&(x, y, _)| {
             let there = peak(&left, (x, y), &right, x as i32 - max..=x as i32 - min, rows)?;
             let (rx, ry) = (there.x as i32, there.y as i32);
             let back = peak(&right, (there.x, there.y), &left, rx + min..=rx + max, rows)?;
@@ -128,7 +159,13 @@ fn searched(
             })
         })
         .collect();
-    consistent(matches, cell(spacing))
+    let matches = consistent(matches, cell(spacing));
+    let mut found = matches.iter().peekable();
+    let corners = corners.iter().map(|&(x, y, strength)| {
+        let offset = found.next_if(|m| (m.x, m.y) == (x, y)).map(|m| m.dy.unsigned_abs());
+        Corner { y, strength, offset }
+    });
+    Survey { corners: corners.collect(), matches }
 }
 
 /// The position where a window is found again.

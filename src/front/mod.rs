@@ -8,6 +8,7 @@ mod filter;
 pub mod illumination;
 pub mod label_range;
 pub mod matches;
+mod parts;
 mod unrectified;
 pub mod zones;
 

@@ -92,7 +92,7 @@ impl StereoPair {
     pub fn range(&self) -> Thrown<Option<Range>> {
         match check::range(&self.pair) {
             Ok(range) => Ok(Some(Range { range, found: true })),
-            Err(Error::Range(RangeError::NotFound { .. })) => Ok(None),
+            Err(Error::Range(RangeError::NotFound { .. } | RangeError::NotRectified)) => Ok(None),
             Err(error) => Err(thrown(error)),
         }
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mrfgs::Error;
+use mrfgs::depth::Rig;
 use mrfgs::image::calib::Calibration;
 use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::Maps;
@@ -97,6 +98,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let known = Some((path.as_deref().unwrap_or("--focal".as_ref()), &calibration));
     let takes_unit = also.iter().find(|word| word.takes_unit()).or(also.first());
     let rig = takes_unit.map(|word| input::rig(word, known, &args.map, map.size(), "give one with --calib"));
+    let rig = rig.transpose()?;
+    let behind = rig.as_ref().map(|rig| behind(args, &map, rig)).transpose()?.flatten();
     let (width, height) = map.size();
     let confidence = confidence.unwrap_or_else(|| Plane::filled(width, height, u8::MAX));
     let maps = Maps::from_pixels(&map, confidence, Plane::filled(width, height, 0));
@@ -109,7 +112,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         range,
         sign: Sign::default(),
         left: left.as_ref(),
-        rig: rig.transpose()?,
+        rig,
         rectifying: None,
         third,
         sigma: None,
@@ -122,12 +125,47 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         said.extend(written.note(&path, args.also.write(word, &path, &outcome))?);
     }
     written.keep();
+    if let Some(behind) = behind.filter(|_| !args.quiet) {
+        console::say(&format!("warning: {}: {behind}", args.map.display()));
+    }
     if !args.quiet && !said.is_empty() {
         said.dedup();
         let unit = input::unit(calibration.unit, path.as_deref());
         console::say(&format!("{}; unit: {unit}", said.join("; ")));
     }
     Ok(())
+}
+
+/// What is wrong where most of the map is behind the cameras.
+///
+/// # Errors
+/// Where all of it is, or it holds no disparity.
+fn behind(args: &Args, map: &Plane<f32>, rig: &Rig) -> Result<Option<String>> {
+    let known = || map.data().iter().copied().filter(|d| d.is_finite());
+    let in_front = |sign: f64| known().filter(|d| rig.depth(sign * f64::from(*d)).is_some()).count();
+    let (all, seen, negated) = (known().count(), in_front(1.0), in_front(-1.0));
+    if all == 0 {
+        return Err(Error::read(
+            &args.map,
+            "holds no disparity: all of its pixels are infinite or no numbers",
+        )
+        .into());
+    }
+    if 2 * seen >= all {
+        return Ok(None);
+    }
+    let remedy = if negated > seen {
+        let sign = match args.sign {
+            Sign::LeftMinusRight => "right-minus-left",
+            Sign::RightMinusLeft => "left-minus-right",
+        };
+        format!("they may count the other way: give --sign {sign}")
+    } else {
+        "check that the calibration is of this map, and that the map is not empty".into()
+    };
+    let told =
+        format!("{} of {all} disparities are of nothing in front of the cameras; {remedy}", all - seen);
+    if seen == 0 { Err(Error::read(&args.map, told).into()) } else { Ok(Some(told)) }
 }
 
 /// The calibration of a map of this size, and its file, where it has one.

@@ -245,3 +245,16 @@ fn a_breakdown_adds_up() {
     }
     refused(&folder, &format!("{line} --breakdown"), 2, "--breakdown & unexpected argument");
 }
+
+#[test]
+fn a_map_of_the_other_sign_is_told() {
+    let folder = Folder::new();
+    let line = "match @slanted/im0.png @slanted/im1.png d.pfm --device cpu --quiet";
+    run(&folder, &format!("{line} --sign right-minus-left --max-disparity 0 --min-disparity -31"))
+        .succeeded();
+    let told = evaluated(&folder, "map d.pfm --truth @slanted/disp0GT.pfm");
+    told.says("warning: d.pfm & the other way than & disp0GT.pfm");
+    run(&folder, &format!("{line} --max-disparity 31")).succeeded();
+    let told = evaluated(&folder, "map d.pfm --truth @slanted/disp0GT.pfm");
+    assert_eq!(told.stderr, "", "control");
+}

@@ -125,9 +125,6 @@ fn depth_and_points_of_a_map_that_is_there() {
         read_tiff(folder.join("other.depth.tif")).data().iter().filter(|depth| depth.is_finite()).count()
             > 1000
     );
-    // The other sign is another map.
-    run(&folder, &format!("depth again/d.pfm {more} --sign right-minus-left --quiet")).succeeded();
-    assert!(read_pfm(folder.join("again/d.depth.pfm")).data().iter().all(|depth| depth.is_infinite()));
     // Limits, here and in a match.
     run(
         &folder,
@@ -175,6 +172,43 @@ fn depth_and_points_of_a_map_that_is_there() {
     }
     run(&folder, "match @mixed/im0.png @mixed/im1.png e.pfm --clip-depth 2")
         .failed(2, "--clip-depth & --also depth");
+}
+
+/// What shows nothing in front of the cameras is refused, and what shows little is told, with the sign that would help.
+#[test]
+fn depth_of_what_is_behind_the_cameras() {
+    let folder = Folder::new();
+    let map = |name: &str, disparity: &dyn Fn(usize) -> f32| {
+        let rows: Vec<u8> = (0..320 * 240).flat_map(|i| disparity(i).to_le_bytes()).collect();
+        fs::write(folder.join(name), [b"Pf\n320 240\n-1\n".as_slice(), &rows].concat()).unwrap();
+    };
+    map("sound.pfm", &|i| 5.0 + (i % 9) as f32);
+    map("negative.pfm", &|i| -5.0 - (i % 9) as f32);
+    map("mostly.pfm", &|i| if i % 3 == 0 { 5.0 } else { -5.0 });
+    map("zero.pfm", &|_| 0.0);
+    map("infinite.pfm", &|_| f32::INFINITY);
+    map("nan.pfm", &|_| f32::NAN);
+    let depth = |line: &str| run(&folder, &format!("depth {line} --calib @mixed/calib.txt"));
+    let before = listing(&folder);
+    for (line, words) in [
+        ("negative.pfm", "negative.pfm & 76800 of 76800 & give --sign right-minus-left"),
+        ("sound.pfm --sign right-minus-left", "sound.pfm & give --sign left-minus-right"),
+        ("zero.pfm", "zero.pfm & in front of the cameras & calibration"),
+        ("infinite.pfm", "infinite.pfm & no disparity"),
+        ("nan.pfm", "nan.pfm & no disparity"),
+    ] {
+        depth(line).failed(1, words);
+        assert_eq!(listing(&folder), before, "{line}");
+    }
+    depth("mostly.pfm")
+        .succeeded()
+        .says("warning: mostly.pfm: 51200 of 76800 & give --sign right-minus-left");
+    let sound = depth("sound.pfm").succeeded();
+    assert!(!sound.stderr.contains("warning"), "{}", sound.stderr);
+    // The remedy gives what the other map gives.
+    depth("negative.pfm --sign right-minus-left").succeeded();
+    let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
+    assert!(bytes("negative.depth.pfm") == bytes("sound.depth.pfm"));
 }
 
 /// Ranges by depth are those by disparity.

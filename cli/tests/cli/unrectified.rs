@@ -37,6 +37,10 @@ fn a_pair_is_rectified_by_its_matches() {
 
     // On the way it gives the same bits.
     let end = "--device cpu";
+    // Without the flag no range is found, and the line says what helps.
+    run(&folder, &format!("match @raw/left.png @raw/right.png a.pfm {end}"))
+        .failed(1, "too few matches & not rectified & --rectify & --max-disparity");
+    assert!(!folder.join("a.pfm").exists());
     let said = run(
         &folder,
         &format!("match @raw/left.png @raw/right.png a.pfm --rectify {end} --json a.json --also preview"),

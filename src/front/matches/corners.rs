@@ -17,13 +17,13 @@ pub(super) fn cell(spacing: usize) -> usize {
     CELL * (spacing / SPACING).isqrt().max(1)
 }
 
-/// Corners of `view` in raster order: the best of each zone in each cell of the image, one per `spacing`
-/// pixels.
+/// Corners of `view` in raster order, each with the smaller eigenvalue of its structure tensor: the best of each zone in each cell of the
+/// image, one per `spacing` pixels.
 pub(super) fn corners(
     view: &View,
     zones: Option<(&Plane<u32>, usize)>,
     spacing: usize,
-) -> Vec<(usize, usize)> {
+) -> Vec<(usize, usize, f64)> {
     let (width, height) = view.grey.size();
     if let Some((map, _)) = zones {
         assert_eq!(map.size(), (width, height), "the map of zones has the size of the images");
@@ -62,11 +62,11 @@ pub(super) fn corners(
             of_zone.into_values().flat_map(|(pixels, mut optima)| {
                 optima.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
                 optima.truncate(pixels.div_ceil(spacing));
-                optima
+                optima.into_iter().map(|(x, y)| (x, y, values[(x, y)]))
             })
         })
         .collect();
-    out.sort_by_key(|&(x, y)| (y, x));
+    out.sort_by_key(|&(x, y, _)| (y, x));
     out
 }
 
@@ -89,7 +89,7 @@ mod tests {
         let found = |zones| {
             let all = corners(&view, zones, 256);
             assert!(all.len() <= 192 * 128 / 256);
-            all.iter().filter(|(_, y)| faint(*y)).count()
+            all.iter().filter(|(_, y, _)| faint(*y)).count()
         };
         let (with, without) = (found(Some((&zones, 2))), found(None));
         assert!(with >= 40 && without <= 10, "{with} with zones, {without} without");
@@ -97,7 +97,7 @@ mod tests {
         // The maximum is among them, and no corner is next to a better one.
         let all = corners(&view, None, 256);
         let values: Vec<Vec<f64>> = (0..128).map(|y| view.eigenvalues(y)).collect();
-        for &(x, y) in &all {
+        for &(x, y, _) in &all {
             let around = (y - 2..=y + 2).flat_map(|v| (x - 2..=x + 2).map(move |u| (u, v)));
             assert!(around.into_iter().all(|(u, v)| values[v][u] <= values[y][x]));
         }
@@ -114,7 +114,7 @@ mod tests {
         assert!(row.iter().all(|&value| value == 0.0), "{row:?}");
         let found = corners(&view, None, 64);
         assert_eq!(found.len(), 4, "{found:?}");
-        for (x, y) in found {
+        for (x, y, _) in found {
             assert!([x, y].iter().all(|c| c.abs_diff(10).min(c.abs_diff(29)) <= 1), "{x}, {y}");
         }
         let at = |x: usize, y: usize| f64::from(view.grey[(x, y)]);

@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use mrfgs::image::Plane;
+
+use crate::console;
 use crate::failure::Result;
 use crate::outputs::files;
 use crate::pairs::folder;
@@ -44,10 +47,23 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let estimate = reader.disparity(&args.map)?;
     let (map, mask) = (&args.map, args.mask.as_deref());
     let ground = folder::ground_truth(reader, &args.truth, *truth_scale, mask, map, estimate.size())?;
+    if is_negated(&estimate, ground.truth()) {
+        let [map, truth] = [map, &args.truth].map(|path| path.display());
+        console::say(&format!(
+            "warning: {map} seems to count disparities the other way than {truth}: turn the sign of one of the two"
+        ));
+    }
     let name = map.file_stem().unwrap_or(map.as_os_str()).to_string_lossy().into_owned();
     let pictures = begun.as_ref().map(|_| report::pictures(&name, ground.truth(), &estimate, None));
     let pictures: Vec<_> = pictures.transpose()?.into_iter().collect();
     let figures = Figures { finished: Some(ground.evaluate(&estimate)?), ..Figures::default() };
     let findings = Findings::new(None, None, vec![Scored { name, figures, seconds: None }]);
     report::deliver(json, &findings, &metrics::text(&findings), begun, &pictures)
+}
+
+/// Whether a map is far nearer to the truth with its sign turned.
+fn is_negated(map: &Plane<f32>, truth: &Plane<f32>) -> bool {
+    let both = || map.data().iter().zip(truth.data()).filter(|(d, truth)| d.is_finite() && truth.is_finite());
+    let apart = |sign: f32| both().map(|(d, truth)| f64::from((sign * d - truth).abs())).sum::<f64>();
+    2.0 * apart(-1.0) < apart(1.0)
 }

@@ -1,0 +1,219 @@
+//! Parts of a pair that are not like the rest of it: what statistics of the whole do not show.
+
+use super::matches::{Corner, Survey};
+use crate::image::{Image, Plane};
+use std::fmt;
+use std::ops::Range;
+
+/// The views are divided into so many bands along each side.
+const BANDS: usize = 8;
+/// Difference across two pixels from which on a pixel has texture, in 1/256 of a level.
+const TEXTURE: u16 = 2 << 8;
+/// Smallest part of a band that has texture, where it has any to speak of: one in so many pixels (open).
+const TEXTURED: u64 = 50;
+/// Percentage of the pixels with texture that are equal in both views from which on a band was copied (open). Of 68 sound pairs, no band
+/// has more than 12; a copy has 100.
+const COPIED_PERCENT: u64 = 60;
+/// Distance over which contrast is measured, in pixels: blur leaves it.
+const FAR: usize = 8;
+/// Bend of the grey along a row that counts as no detail, in 1/256 of a level: rounding bends what is blurred by as much.
+const ROUNDING: f64 = 512.0;
+/// How many times the detail of the other view a band has, where one of the two is blurred or covered (open). Of 68 sound pairs, one out of
+/// focus by 5 x 5 pixels among them, none has more than 2.4; blur with a sigma of 2 gives 4.3 at least, of 4 gives 20.
+const SHARPER: f64 = 4.0;
+/// A band with less than this part of the detail of the whole view is plain.
+const PLAIN: f64 = 1.0 / 8.0;
+/// Corners with less than this part of the usual strength of those that were found may be noise on a plain surface.
+const FAINT: f64 = 0.25;
+/// Share of corners that are found by chance where the views do not belong together.
+const CHANCE: f64 = 0.03;
+/// Smallest part of the height that is doubted, one in so many rows, and the fewest corners in it.
+const LEAST: (usize, usize) = (6, 20);
+/// Logarithm of the odds that rows do not belong together, from which on that is said (open). Of 68 sound pairs, one has 19.1, a pattern
+/// that repeats; the others have 13.3 at most.
+const ODDS: f64 = 20.0;
+
+/// A part of both views: rows from side to side, or columns from top to bottom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// Some rows.
+    Rows {
+        /// The first one.
+        first: usize,
+        /// The last one.
+        last: usize,
+        /// How many the views have.
+        of: usize,
+    },
+    /// Some columns.
+    Columns {
+        /// The first one.
+        first: usize,
+        /// The last one.
+        last: usize,
+        /// How many the views have.
+        of: usize,
+    },
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Whole => f.write_str("everywhere"),
+            Self::Rows { first, last, of } => write!(f, "in rows {first} to {last} of {of}"),
+            Self::Columns { first, last, of } => write!(f, "in columns {first} to {last} of {of}"),
+        }
+    }
+}
+
+/// The most bands in a row that `are`, where any are.
+fn longest(are: [bool; BANDS]) -> Option<Range<usize>> {
+    let run = |first: usize| first..(first..BANDS).find(|i| !are[*i]).unwrap_or(BANDS);
+    (0..BANDS).map(run).max_by_key(|run| (run.len(), BANDS - run.start)).filter(|run| !run.is_empty())
+}
+
+/// The pixels `of` a side that are in these bands, the first and the last.
+fn pixels(bands: &Range<usize>, of: usize) -> [usize; 2] {
+    [bands.start * of / BANDS, bands.end * of / BANDS - 1]
+}
+
+fn rows(bands: &Range<usize>, of: usize) -> Part {
+    let [first, last] = pixels(bands, of);
+    if bands.len() == BANDS { Part::Whole } else { Part::Rows { first, last, of } }
+}
+
+/// The part of the views that holds the same pixels in both. Only pixels with texture count: what is black or white is so in both.
+pub(super) fn copied(left: &Image, right: &Image) -> Option<Part> {
+    let (width, height) = left.pixels.size();
+    if width < BANDS || height < BANDS {
+        return None;
+    }
+    // Of each cell the pixels with texture, and those of them that are equal.
+    let mut cells = [[[0_u64; 2]; BANDS]; BANDS];
+    for y in 0..height {
+        let views = [left.pixels.row(y), right.pixels.row(y)];
+        let masks = [left.masked.row(y), right.masked.row(y)];
+        let cells = &mut cells[y * BANDS / height];
+        for x in 1..width - 1 {
+            let texture = views[0][x + 1][3].abs_diff(views[0][x - 1][3]);
+            if texture >= TEXTURE && !masks[0][x] && !masks[1][x] {
+                let [textured, equal] = &mut cells[x * BANDS / width];
+                *textured += 1;
+                *equal += u64::from(views[0][x] == views[1][x]);
+            }
+        }
+    }
+    let least = (width * height / BANDS) as u64 / TEXTURED;
+    let is_copied = |cells: [[u64; 2]; BANDS]| {
+        let [textured, equal] = [0, 1].map(|i| cells.iter().map(|cell| cell[i]).sum::<u64>());
+        textured > least && 100 * equal >= COPIED_PERCENT * textured
+    };
+    let down = longest(cells.map(is_copied));
+    let across = longest(std::array::from_fn(|i| is_copied(cells.map(|row| row[i]))));
+    match (down, across) {
+        (Some(down), across) if across.as_ref().is_none_or(|across| across.len() <= down.len()) => {
+            Some(rows(&down, height))
+        }
+        (_, across) => across.map(|across| {
+            let [first, last] = pixels(&across, width);
+            Part::Columns { first, last, of: width }
+        }),
+    }
+}
+
+/// Detail of each band of rows of a view.
+struct Detail {
+    bands: [f64; BANDS],
+}
+
+impl Detail {
+    /// The mean bend of the grey along the rows beyond `rounding`, in parts of the `contrast`.
+    fn of(image: &Image, contrast: f64, rounding: f64) -> Self {
+        let (_, height) = image.pixels.size();
+        let mut bands = [(0.0, 0_u64); BANDS];
+        for y in 0..height {
+            let (row, masked) = (image.pixels.row(y), image.masked.row(y));
+            let (sum, count) = &mut bands[y * BANDS / height];
+            for (pixels, masked) in row.windows(3).zip(masked.windows(3)) {
+                if !masked.contains(&true) {
+                    let [before, at, after] = [0, 1, 2].map(|i| i32::from(pixels[i][3]));
+                    *sum += (f64::from((before - 2 * at + after).abs()) - rounding).max(0.0);
+                    *count += 1;
+                }
+            }
+        }
+        Self { bands: bands.map(|(sum, count)| sum / (count.max(1) as f64 * contrast)) }
+    }
+
+    /// Which bands have far more of it than those of the `other` view, and are not plain.
+    fn is_more(&self, other: &Self) -> [bool; BANDS] {
+        let mean = self.bands.iter().sum::<f64>() / BANDS as f64;
+        std::array::from_fn(|i| self.bands[i] > SHARPER * other.bands[i] && self.bands[i] > PLAIN * mean)
+    }
+}
+
+/// The mean difference of the grey across [`FAR`] pixels; `None` where there is none.
+fn contrast(image: &Image) -> Option<f64> {
+    let (mut sum, mut count) = (0_u64, 0_u64);
+    for y in 0..image.pixels.height() {
+        let (row, masked) = (image.pixels.row(y), image.masked.row(y));
+        for x in FAR..row.len() {
+            if !masked[x] && !masked[x - FAR] {
+                sum += u64::from(row[x][3].abs_diff(row[x - FAR][3]));
+                count += 1;
+            }
+        }
+    }
+    (sum > 0).then(|| sum as f64 / count as f64)
+}
+
+/// The view, left (0) or right (1), that is blurred or covered in a part where the other one shows detail.
+pub(super) fn blurred(left: &Image, right: &Image) -> Option<(usize, Part)> {
+    let height = left.pixels.height();
+    let contrasts = [contrast(left)?, contrast(right)?];
+    let detail = |image: &Image, i: usize| {
+        // As many parts of the contrast in both.
+        Detail::of(image, contrasts[i], ROUNDING * (contrasts[i] / contrasts[1 - i]).max(1.0))
+    };
+    let [left, right] = [detail(left, 0), detail(right, 1)];
+    let [of_left, of_right] = [right.is_more(&left), left.is_more(&right)].map(longest);
+    let found = [of_left.map(|bands| (0, bands)), of_right.map(|bands| (1, bands))].into_iter().flatten();
+    let (view, bands) = found.max_by_key(|(_, bands)| bands.len())?;
+    Some((view, rows(&bands, height)))
+}
+
+/// The rows of which next to nothing is found on the same rows of the right view, other than of the rest. Faint corners do not count.
+/// `masked` is the mask of the right view.
+///
+/// The rows are those with the largest likelihood ratio: how much likelier it is that their corners were found by chance alone than as
+/// often as all.
+pub(super) fn strange(survey: &Survey, masked: &Plane<bool>, most_rows: u32) -> Option<Part> {
+    let (width, height) = masked.size();
+    let found = |corner: &&Corner| corner.offset.is_some_and(|dy| dy <= most_rows);
+    let mut strengths: Vec<f64> = survey.corners.iter().filter(found).map(|corner| corner.strength).collect();
+    strengths.sort_unstable_by(f64::total_cmp);
+    let least = FAINT * strengths.get(strengths.len() / 2)?;
+    // What is mostly masked in the right view is found nowhere.
+    let is_seen = |y: usize| 2 * masked.row(y).iter().filter(|masked| **masked).count() < width;
+    let seen: Vec<bool> = (0..height).map(is_seen).collect();
+    let strong: Vec<_> = survey.corners.iter().filter(|c| c.strength >= least && seen[c.y]).collect();
+    let share = strong.iter().filter(|corner| found(corner)).count() as f64 / strong.len() as f64;
+    if share <= CHANCE || share >= 1.0 {
+        return None;
+    }
+    let odds = [((1.0 - CHANCE) / (1.0 - share)).ln(), (CHANCE / share).ln()];
+    let (mut best, mut sum, mut start, mut rows) = (ODDS, 0.0, 0, None);
+    for (i, corner) in strong.iter().enumerate() {
+        if sum <= 0.0 {
+            (sum, start) = (0.0, i);
+        }
+        sum += odds[usize::from(found(corner))];
+        let (first, last) = (strong[start].y, corner.y);
+        if sum > best && LEAST.0 * (last - first) >= height && i - start >= LEAST.1 {
+            (best, rows) = (sum, Some(Part::Rows { first, last, of: height }));
+        }
+    }
+    rows
+}
