@@ -100,14 +100,14 @@ pub enum ReadError {
         /// Most pixels that are read.
         limit: u64,
     },
-    /// An 8-bit PNG was read as a disparity map, and nothing tells the scale of its values.
+    /// Whole numbers were read as a disparity map, and nothing tells their scale.
     #[error(
-        "is an 8-bit PNG, which does not tell the scale of its disparities; disparity maps are .pfm, float .tif, or \
+        "holds whole numbers, which do not tell the scale of its disparities; disparity maps are .pfm, float .tif or .npy, or \
          16-bit .png with disparity times 256"
     )]
     UnknownScale,
-    /// A scale was given for a disparity map that is no grey 8-bit PNG.
-    #[error("is no grey 8-bit PNG, and only such a disparity map needs a scale")]
+    /// A scale was given for a disparity map of floats.
+    #[error("holds disparities in pixels, and only whole numbers need a scale")]
     NeedlessScale,
     /// The file says which value stands for no data, but not as a number.
     #[error("has the no-data value {value}, which is no number")]

@@ -45,7 +45,7 @@ pub struct Words {
     pub mask: Option<&'static str>,
     /// The maximum of pixels.
     pub max_pixels: Option<&'static str>,
-    /// The scale of the values of a ground truth.
+    /// The scale of whole numbers in a disparity map or a ground truth.
     pub truth_scale: Option<&'static str>,
     /// The value that stands for no data.
     pub no_data: Option<&'static str>,
@@ -217,7 +217,7 @@ impl Words {
         match cause {
             ReadError::TooManyPixels { .. } => format!("; if that is true, {}crop it", raised()),
             ReadError::TooManyBytes { .. } => format!("; {}crop it", raised()),
-            ReadError::UnknownScale => and("; of a ground truth, give the scale by ", self.truth_scale),
+            ReadError::UnknownScale => and("; give the scale by ", self.truth_scale),
             ReadError::NeedlessScale => and("; remove ", self.truth_scale),
             ReadError::NoData { .. } => and("; give one by ", self.no_data),
             ReadError::Option { cause, .. } => self.of_key(cause),

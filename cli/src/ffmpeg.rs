@@ -4,6 +4,7 @@
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 
 use mrfgs::image::write;
@@ -47,6 +48,18 @@ pub(crate) struct Decoder {
     process: Process,
     frames: ChildStdout,
     ended: bool,
+    complaint: Complaint,
+}
+
+/// What ffmpeg complains of in a film that it decodes to its end nevertheless.
+#[derive(Clone, Default)]
+pub(crate) struct Complaint(Arc<OnceLock<String>>);
+
+impl Complaint {
+    /// In its words, where there is one.
+    pub(crate) fn said(&self) -> Option<&str> {
+        self.0.get().map(String::as_str).filter(|said| !said.is_empty())
+    }
 }
 
 impl Decoder {
@@ -66,7 +79,12 @@ impl Decoder {
         let begun = Process::new(command.stdin(Stdio::null()).stdout(Stdio::piped()));
         let mut process = begun.map_err(|e| Error::read(path, missing(&e, "decodes")))?;
         let frames = process.child.stdout.take().ok_or_else(|| Error::read(path, "ffmpeg has no output"))?;
-        Ok(Self { process, frames, ended: false })
+        Ok(Self { process, frames, ended: false, complaint: Complaint::default() })
+    }
+
+    /// What it complains of by the end of the film.
+    pub(crate) fn complaint(&self) -> Complaint {
+        self.complaint.clone()
     }
 }
 
@@ -75,7 +93,8 @@ impl Read for Decoder {
         let count = self.frames.read(out)?;
         if count == 0 && !out.is_empty() && !self.ended {
             self.ended = true;
-            self.process.end()?;
+            let said = self.process.end()?;
+            self.complaint.0.get_or_init(|| said);
         }
         Ok(count)
     }
@@ -149,15 +168,15 @@ impl Process {
         Ok(Self { child, says })
     }
 
-    /// Waits for its end.
+    /// Waits for its end. Returns what it says last.
     ///
     /// # Errors
-    /// What it says last, where it has failed.
-    fn end(&mut self) -> io::Result<()> {
+    /// The same, where it has failed.
+    fn end(&mut self) -> io::Result<String> {
         let status = self.child.wait()?;
         let said = self.says.take().and_then(|says| says.join().ok()).unwrap_or_default();
         if status.success() {
-            return Ok(());
+            return Ok(said);
         }
         Err(io::Error::other(if said.is_empty() {
             format!("ffmpeg: {status}")

@@ -141,7 +141,7 @@ pub fn list(bytes: &[u8]) {
         let mut names = HashSet::new();
         for row in rows {
             assert!(names.insert(row.name.to_lowercase()), "{} is there twice", row.name);
-            assert!(!row.name.is_empty() && !row.left.is_empty() && !row.right.is_empty());
+            assert!(!row.name.is_empty() && !row.left.is_empty() && row.right.as_deref() != Some(""));
             assert!(!row.name.contains(['/', '\\']) && !row.name.starts_with('.'), "{}", row.name);
             if let Some(Largest::Pixels(max)) = row.max_disparity {
                 assert!(DisparityRange::new(row.min_disparity.unwrap_or(0), max).is_ok());

@@ -120,9 +120,15 @@ fn range_by_matches(pair: &Pair) -> Option<Result<DisparityRange>> {
 
 /// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
 /// an argument of the front end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
+    /// The file of an image is damaged, in a way that its decoder makes up for.
+    #[error("{doubt}; a part of the image may be wrong: get the file again")]
+    Damaged {
+        /// The name of the file, and what is wrong with it.
+        doubt: String,
+    },
     /// Images are stored turned, by the tags of their files, and were not turned upright.
     #[error(
         "{} stored turned, by the orientation tag of EXIF or TIFF, and taken as stored",
@@ -281,6 +287,7 @@ impl Warning {
 /// Corners are searched in both directions along the row, up to half the width, and up to 8 rows away from
 /// it.
 ///
+/// - Damaged: the file of an image is damaged, and could be decoded nevertheless.
 /// - Oriented: the tag of a file says that its image is stored turned.
 /// - Masked: no pixel of a view counts.
 /// - Plain: nearly all grey of a view is within 4 levels of 8 bits. No other warning is given then.
@@ -304,9 +311,18 @@ impl Warning {
 /// On a machine without memory for the search only the checks are made that need none: up to the copied parts.
 #[must_use]
 pub fn warnings(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
-    let mut out = Vec::from_iter(oriented(pair));
+    let mut out = damaged(pair);
+    out.extend(oriented(pair));
     out.extend(of_pixels(pair, range));
     out
+}
+
+/// What is wrong with the files of `pair`, once where both views are of one: [`Warning::Damaged`] alone, without any look at the pixels.
+#[must_use]
+pub fn damaged(pair: &Pair) -> Vec<Warning> {
+    let mut doubts: Vec<_> = pair.doubts().iter().flatten().collect();
+    doubts.dedup();
+    doubts.into_iter().map(|doubt| Warning::Damaged { doubt: doubt.clone() }).collect()
 }
 
 /// Whether images are stored turned.

@@ -10,7 +10,7 @@ use image::{ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use super::file::{self, MAX_PIXELS_PER_BYTE, check_claim, check_size, damaged, max_bytes_of, unsupported};
 use super::orientation::Orientation;
 use super::raster::{Raster, Sample, Samples};
-use super::{jpeg, pfm, tiff};
+use super::{jpeg, npy, pfm, tiff};
 use crate::error::{ReadError, Result};
 use crate::memory::{self, Claim};
 use crate::text::one_line;
@@ -28,6 +28,8 @@ pub(super) fn load(path: &Path, max_pixels: u64) -> Result<Vec<u8>> {
 pub(super) enum Kind {
     Pfm,
     Tiff,
+    Npy,
+    Npz,
     Coded(ImageFormat),
 }
 
@@ -36,10 +38,20 @@ impl Kind {
         if pfm::is_pfm(bytes) {
             return Some(Self::Pfm);
         }
+        if npy::is_npy(bytes) {
+            return Some(Self::Npy);
+        }
+        if npy::is_npz(bytes) {
+            return Some(Self::Npz);
+        }
         Some(match bytes {
+            // A raw photograph, of which only its preview would be read.
+            [b'I', b'I', 42, 0, _, _, _, _, b'C', b'R', ..] => return None,
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Self::Tiff,
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Self::Coded(ImageFormat::Png),
             [0xff, 0xd8, 0xff, ..] => Self::Coded(ImageFormat::Jpeg),
+            // Behind the size of the file there is nothing, and the first head says how long it is.
+            [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Self::Coded(ImageFormat::Bmp),
             [b'P', b'1'..=b'7', c, ..] if c.is_ascii_whitespace() || *c == b'#' => {
                 Self::Coded(ImageFormat::Pnm)
             }
@@ -48,14 +60,57 @@ impl Kind {
     }
 }
 
+/// What a file is that is not read, by bytes at a place in it, and what to do about that.
+const FOREIGN: [(usize, &[u8], &str, &str); 35] = [
+    (8, b"AVI ", "a film", FILM),
+    (8, b"CR\x02", "a raw photograph", RAW),
+    (8, b"WEBP", "a WebP image", PICTURE),
+    (4, b"jP  \r\n\x87\n", "a JPEG 2000 image", PICTURE),
+    (0, b"\xff\x4f\xff\x51", "a JPEG 2000 image", PICTURE),
+    (4, b"JXL \r\n\x87\n", "a JPEG XL image", PICTURE),
+    (0, b"\xff\x0a", "a JPEG XL image", PICTURE),
+    (4, b"ftypavi", "an AVIF image", PICTURE),
+    (4, b"ftyphei", "a HEIC image", PICTURE),
+    (4, b"ftyphev", "a HEIC image", PICTURE),
+    (4, b"ftypmif1", "a HEIC image", PICTURE),
+    (4, b"ftypmsf1", "a HEIC image", PICTURE),
+    (4, b"ftypcrx", "a raw photograph", RAW),
+    (0, b"FUJIFILMCCD-RAW", "a raw photograph", RAW),
+    (0, b"IIU\0", "a raw photograph", RAW),
+    (0, b"IIRO", "a raw photograph", RAW),
+    (0, b"IIRS", "a raw photograph", RAW),
+    (0, b"FOVb", "a raw photograph", RAW),
+    (0, b"GIF8", "a GIF image", PICTURE),
+    (0, b"8BPS", "a Photoshop file", PICTURE),
+    (0, b"DDS ", "a DDS texture", PICTURE),
+    (0, b"qoif", "a QOI image", PICTURE),
+    (0, b"\x76\x2f\x31\x01", "an OpenEXR image", FLOATS),
+    (0, b"#?R", "a Radiance HDR image", FLOATS),
+    (0, b"SIMPLE  =", "a FITS file", FLOATS),
+    (0, b"\x89HDF", "an HDF5 file", FLOATS),
+    (0, b"MATLAB", "a MATLAB file", FLOATS),
+    (0, b"%PDF", "a PDF document", PICTURE),
+    (0, b"\x1f\x8b", "a file packed by gzip", "unpack it with `gunzip`"),
+    (0, b"\x28\xb5\x2f\xfd", "a file packed by Zstandard", "unpack it with `zstd -d`"),
+    (4, b"ftyp", "a film", FILM),
+    (0, b"\x1a\x45\xdf\xa3", "a film", FILM),
+    (0, b"YUV4MPEG2", "a film", FILM),
+    (0, b"\x89MCAP0", "a recording of ROS", FILM),
+    (0, b"#ROSBAG", "a recording of ROS", FILM),
+];
+const PICTURE: &str = "convert it to PNG";
+const FLOATS: &str = "convert it to PFM or to TIFF with floats";
+const RAW: &str = "develop both views alike, to TIFF or PNG with 16 bits, without a correction of the lens";
+const FILM: &str = "its frames are pairs of a sequence, not an image";
+
 /// The message for a file of an unknown kind.
 fn unknown(bytes: &[u8]) -> String {
-    const REMEDY: &str = "give PNG, JPEG, PNM, TIFF or PFM";
-    match image::guess_format(bytes) {
-        Ok(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Pnm | ImageFormat::Tiff) | Err(_) => {
-            format!("not an image of a known format; {REMEDY}")
-        }
-        Ok(other) => format!("is a {} file; {REMEDY}", other.extensions_str()[0]),
+    let begins = |(at, magic, ..): &&(usize, &[u8], &str, &str)| {
+        bytes.get(*at..).is_some_and(|rest| rest.starts_with(magic))
+    };
+    match FOREIGN.iter().find(begins) {
+        Some((_, _, what, remedy)) => format!("is {what}, which is not read here: {remedy}"),
+        None => "not an image of a known format; give PNG, JPEG, PNM, TIFF, BMP, PFM or NPY".into(),
     }
 }
 
@@ -74,6 +129,8 @@ pub(super) fn decode(
     guarded(|| match Kind::of(bytes) {
         Some(Kind::Pfm) => decode_pfm(bytes, max_pixels).and_then(marked),
         Some(Kind::Tiff) => tiff::decode(bytes, max_pixels, no_data),
+        Some(Kind::Npy) => npy::decode(bytes, max_pixels).and_then(marked),
+        Some(Kind::Npz) => npy::decode_archive(bytes, max_pixels).and_then(marked),
         Some(Kind::Coded(ImageFormat::Jpeg)) => jpeg::decode(bytes, max_pixels).and_then(marked),
         Some(Kind::Coded(format)) => decode_coded(bytes, format, max_pixels).and_then(marked),
         None => Err(unknown(bytes).into()),
@@ -202,6 +259,21 @@ mod tests {
         assert!(!is_guarded());
         assert_eq!(guarded(|| Ok(1)), Ok(1));
         assert_eq!(guarded(|| Err::<(), _>("told".into())), Err("told".into()));
+    }
+
+    /// Each foreign file is named, with a way out; none of them is taken for one that is read.
+    #[test]
+    fn foreign_files_are_named() {
+        for (at, magic, what, remedy) in FOREIGN {
+            let bytes = [&vec![0; at][..], magic, &[0; 64]].concat();
+            assert_eq!(Kind::of(&bytes), None, "{what}");
+            assert_eq!(unknown(&bytes), format!("is {what}, which is not read here: {remedy}"));
+        }
+        assert!(
+            unknown(b"RIFF\0\0\0\0WEBPVP8 ")
+                .contains("is a WebP image, which is not read here: convert it to PNG")
+        );
+        assert!(unknown(b"hello").contains("known format; give PNG"));
     }
 
     #[test]

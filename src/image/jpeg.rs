@@ -1,5 +1,9 @@
 //! JPEG files. The decoder runs in strict mode: by default it silently replaces missing or damaged parts with
-//! grey.
+//! grey. What it does not notice even so is a doubt about the image.
+
+mod scan;
+
+use std::ops::Range;
 
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -41,7 +45,19 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Raster<'static>, R
     let mut samples = memory::filled(count, 0)?;
     decoder.decode_into(&mut samples).map_err(reason)?;
     let orientation = decoder.exif().map_or(Orientation::UPRIGHT, |data| Orientation::of_exif(data));
-    Ok(Raster { orientation, ..Raster::of(size, channels, Samples::Byte(samples.into())) })
+    let doubt = scan::damage(bytes).map(|reason| format!("the JPEG data is damaged: {reason}"));
+    Ok(Raster { orientation, doubt, ..Raster::of(size, channels, Samples::Byte(samples.into())) })
+}
+
+/// The segments before the first scan: the kind of each, and where its data is.
+pub(super) fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, Range<usize>)> + '_ {
+    let mut at = if bytes.starts_with(&[0xff, 0xd8]) { 2 } else { bytes.len() };
+    std::iter::from_fn(move || {
+        let &[0xff, marker, a, b] = bytes.get(at..)?.first_chunk()? else { return None };
+        let (start, end) = (at + 4, at + 2 + usize::from(u16::from_be_bytes([a, b])));
+        at = end;
+        (marker != 0xda && start <= end && end <= bytes.len()).then_some((marker, start..end))
+    })
 }
 
 /// The error of the decoder, which prints some values in Rust's debug format.

@@ -1,5 +1,6 @@
 //! Planes of pixels, and the stereo pair.
 
+mod both;
 pub mod calib;
 pub mod cloud;
 pub(crate) mod cubic;
@@ -11,6 +12,7 @@ mod halved;
 mod jpeg;
 #[cfg(feature = "las")]
 mod las;
+mod npy;
 mod orientation;
 pub mod pcd;
 pub mod pfm;
@@ -325,6 +327,7 @@ pub struct Pair {
     right: Arc<Image>,
     georeferences: [Option<Georeference>; 2],
     orientations: [Orientation; 2],
+    doubts: [Option<String>; 2],
     full: Option<Box<Pair>>,
 }
 
@@ -353,6 +356,7 @@ impl Pair {
             right: Arc::new(right),
             georeferences: [None, None],
             orientations: [Orientation::UPRIGHT; 2],
+            doubts: [None, None],
             full: None,
         }
     }
@@ -369,6 +373,18 @@ impl Pair {
     #[must_use]
     pub fn orientations(&self) -> [Orientation; 2] {
         self.orientations
+    }
+
+    /// Why a part of the left and of the right image may be wrong, each with the name of its file: see [`raster::Raster::doubt`]. Mirror
+    /// images of a pair have no doubts.
+    #[must_use]
+    pub fn doubts(&self) -> &[Option<String>; 2] {
+        &self.doubts
+    }
+
+    /// The same pair with the doubts about another one, of which it was made.
+    pub(crate) fn doubted_as(self, other: &Self) -> Self {
+        Self { doubts: other.doubts.clone(), ..self }
     }
 
     /// The reference view.
@@ -399,7 +415,7 @@ impl Pair {
     /// A pair of what `f` makes of each view, of one size.
     pub(crate) fn map(&self, f: impl Fn(&Image) -> Image + Sync) -> Self {
         let (left, right) = threads::join(|| f(&self.left), || f(&self.right));
-        Self::without_georeference(left, right)
+        Self::without_georeference(left, right).doubted_as(self)
     }
 
     /// The pair at its full size, where this one is [at half of that](Self::halved).

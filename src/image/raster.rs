@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
+use std::path::Path;
 
 use super::georeference::Georeference;
 use super::orientation::Orientation;
@@ -49,6 +50,8 @@ pub struct Raster<'a> {
     pub(super) georeference: Option<Georeference>,
     /// How its file says that it is turned.
     pub(super) orientation: Orientation,
+    /// Why a part of it may be wrong, in words that go after the name of its file; once that is known, with this.
+    pub(super) doubt: Option<String>,
 }
 
 /// The sample types of a frame in memory: `u8`, `u16`, `f32` and `f64`.
@@ -142,7 +145,7 @@ impl<'a> Raster<'a> {
     /// As [`Raster::new`], of samples that are known to fit.
     pub(super) fn of((width, height): (usize, usize), channels: usize, samples: Samples<'a>) -> Self {
         let orientation = Orientation::UPRIGHT;
-        Self { width, height, channels, samples, no_data: None, georeference: None, orientation }
+        Self { width, height, channels, samples, no_data: None, georeference: None, orientation, doubt: None }
     }
 
     /// Masks every pixel whose grey, or all of whose colour samples, are `value`, as it is stored.
@@ -175,6 +178,17 @@ impl<'a> Raster<'a> {
             return Err(Error::Mismatch(format!("the mask is {w} x {h} and its image {width} x {height}")));
         }
         Ok(self.ignoring(ignored.into_data()))
+    }
+
+    /// Why a part of the image may be wrong, with the name of its file: damage that its decoder makes up for.
+    #[must_use]
+    pub fn doubt(&self) -> Option<&str> {
+        self.doubt.as_deref()
+    }
+
+    /// The same with the name of its file.
+    pub(super) fn named(self, file: &Path) -> Self {
+        Self { doubt: self.doubt.map(|doubt| format!("{}: {doubt}", file.display())), ..self }
     }
 
     /// (width, height) in pixels.
@@ -224,7 +238,8 @@ impl<'a> Raster<'a> {
         let (of, n) = (self.width, self.channels);
         let samples = of_any!(&self.samples, v => Sample::samples(rows(v, of, part, n)?.into()));
         let no_data = self.no_data.as_ref().map(|marked| rows(marked, of, part, 1)).transpose()?;
-        Ok(Raster { no_data, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
+        let doubt = self.doubt.clone();
+        Ok(Raster { no_data, doubt, ..Raster::new(part.x.len(), part.y.len(), n, samples)? })
     }
 
     /// The image as it is seen, where its file says that it is stored turned; then without its georeference.
@@ -250,7 +265,7 @@ impl<'a> Raster<'a> {
         let size = if by.is_sideways() { (self.height, self.width) } else { self.size() };
         let samples = of_any!(&self.samples, v => Sample::samples(turned(v, n, by, size)?.into()));
         let no_data = self.no_data.as_ref().map(|marked| turned(marked, 1, by, size)).transpose()?;
-        Ok(Self { no_data, ..Self::of(size, n, samples) })
+        Ok(Self { no_data, doubt: self.doubt, ..Self::of(size, n, samples) })
     }
 
     /// `f` applied to the grey or colour samples of each pixel.
@@ -354,9 +369,10 @@ pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Disp
     let [in_left, in_right] = masks;
     let georeferences = [&left, &right].map(|raster| raster.georeference.clone());
     let orientations = [left.orientation, right.orientation];
+    let doubts = [left.doubt.clone(), right.doubt.clone()];
     let l = scale.apply(&left, in_left);
     drop(left);
-    Ok(Pair { georeferences, orientations, ..Pair::new(l, scale.apply(&right, in_right))? })
+    Ok(Pair { georeferences, orientations, doubts, ..Pair::new(l, scale.apply(&right, in_right))? })
 }
 
 /// The conversion from samples to levels, the same for both images of a pair.

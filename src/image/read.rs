@@ -8,12 +8,15 @@ use image::ImageFormat;
 
 use super::decode::{Kind, decode, load};
 use super::raster::{self, Raster, Sample, Samples, of_any};
-use super::{Pair, Plane, grey};
+use super::{Pair, Plane, both, grey};
 use crate::error::{Error, ReadError, Result};
 use crate::threads;
 
 pub use super::decode::is_guarded;
 pub use super::file::MAX_PIXELS;
+
+/// Disparities in PNG files with 16 bits are in 1/256 of a pixel, as in the KITTI benchmark.
+const KITTI_SCALE: f32 = 256.0;
 
 /// The settings for reading files. The functions of this module use the default.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +42,7 @@ impl Default for Reader {
 }
 
 impl Reader {
-    /// Reads a rectified pair from PNG, JPEG, PNM, TIFF or PFM files, told apart by their content.
+    /// Reads a rectified pair from PNG, JPEG, PNM, TIFF, BMP or PFM files or arrays of NumPy, told apart by their content.
     ///
     /// Values become 1/256 of an 8-bit level:
     ///
@@ -69,19 +72,35 @@ impl Reader {
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
         let (first, second) = threads::join(|| self.raster(left), || self.raster(right));
-        let (mut first, second) = (first?, second?);
-        if let Some(path) = mask {
-            let ignored = self.mask(path)?;
-            let ((w, h), (width, height)) = (ignored.size(), first.size());
-            first = first.masked_by(ignored).map_err(|_| {
-                Error::Mismatch(format!(
-                    "the mask {} is {w} x {h} and {} is {width} x {height}: a mask has the size of the left image",
-                    path.display(),
-                    left.display()
-                ))
-            })?;
-        }
+        let (first, second) = (self.masked(first?, mask, left)?, second?);
         raster::joined([first, second], [left, right].map(Path::display))
+    }
+
+    /// As [`Reader::pair`], from a file with both views: MPO with its two images, or JPS with the right view on the left half unless it says
+    /// otherwise.
+    ///
+    /// # Errors
+    /// Those of [`Reader::pair`], and where it holds one view alone.
+    pub fn both(self, file: &Path, mask: Option<&Path>) -> Result<Pair> {
+        let bytes = load(file, self.max_pixels)?;
+        let views = both::decode_both(file, &bytes, self.max_pixels, self.no_data, self.orient);
+        let [left, right] = views.map_err(|cause| Error::read(file, cause))?;
+        let names = ["left", "right"].map(|side| format!("the {side} view in {}", file.display()));
+        raster::joined([self.masked(left, mask, file)?, right], names)
+    }
+
+    /// A left image without what the file `mask` masks.
+    fn masked(self, image: Raster<'static>, mask: Option<&Path>, file: &Path) -> Result<Raster<'static>> {
+        let Some(path) = mask else { return Ok(image) };
+        let ignored = self.mask(path)?;
+        let ((w, h), (width, height)) = (ignored.size(), image.size());
+        image.masked_by(ignored).map_err(|_| {
+            Error::Mismatch(format!(
+                "the mask {} is {w} x {h} and {} is {width} x {height}: a mask has the size of the left image",
+                path.display(),
+                file.display()
+            ))
+        })
     }
 
     /// Reads one image, as it is stored or upright: one view, or both beside each other. [`Pair::of_frames`] makes a pair of two.
@@ -121,13 +140,13 @@ impl Reader {
     pub fn raster_in_memory(self, name: &Path, bytes: &[u8]) -> Result<Raster<'static>> {
         let raster =
             decode(bytes, self.max_pixels, self.no_data).map_err(|cause| Error::read(name, cause))?;
-        self.oriented(raster, name)
+        self.oriented(raster.named(name), name)
     }
 
     fn with_kind(self, path: &Path) -> Result<(Option<Kind>, Raster<'static>)> {
         let bytes = load(path, self.max_pixels)?;
         let raster = decode(&bytes, self.max_pixels, self.no_data);
-        Ok((Kind::of(&bytes), raster.map_err(|cause| Error::read(path, cause))?))
+        Ok((Kind::of(&bytes), raster.map_err(|cause| Error::read(path, cause))?.named(path)))
     }
 
     /// Reads a mask from any image that [`Reader::pair`] reads: `true` where a pixel is not black (alpha does not count).
@@ -160,29 +179,53 @@ impl Reader {
         })))
     }
 
-    /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM and float TIFF hold disparities
+    /// Reads a disparity map in pixels; invalid pixels become +infinity. PFM, float TIFF, and floats of NumPy hold disparities
     /// as they are (not finite = invalid), 16-bit PNG holds them times 256 (0 = invalid).
     ///
     /// # Errors
     /// [`Error::Read`] when the file is missing, damaged, or holds no disparities in one of these ways.
     pub fn disparity(self, path: &Path) -> Result<Plane<f32>> {
-        const REMEDY: &str = "disparity maps are .pfm, float .tif, or 16-bit .png with disparity times 256";
+        self.map(path, None)
+    }
+
+    /// Reads whole numbers, of a PNG, TIFF or array of NumPy with 8 or 16 bits, that are disparities times `scale`, as in the ground truth of
+    /// the older Middlebury sets; 0 means unknown and becomes +infinity.
+    ///
+    /// # Errors
+    /// [`Error::Read`] when the file is missing, damaged, or holds no such numbers.
+    pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
+        self.map(path, Some(scale))
+    }
+
+    fn map(self, path: &Path, scale: Option<f32>) -> Result<Plane<f32>> {
+        fn scaled<S: Sample>(values: &[S], scale: f32) -> Vec<f32> {
+            let disparity = |v: f64| if v == 0.0 { f32::INFINITY } else { v as f32 / scale };
+            values.iter().map(|v| disparity(v.double())).collect()
+        }
+        const REMEDY: &str =
+            "disparity maps are .pfm, float .tif or .npy, or 16-bit .png with disparity times 256";
         let (kind, raster) = self.with_kind(path)?;
         let wrong = |what: &str| Err(Error::read(path, format!("{what}; {REMEDY}")));
+        let is_png = kind == Some(Kind::Coded(ImageFormat::Png));
         if raster.channels != 1 {
             return wrong("has more than one channel");
         }
+        if !is_png && !matches!(kind, Some(Kind::Pfm | Kind::Tiff | Kind::Npy | Kind::Npz)) {
+            return wrong("holds no disparities");
+        }
         let valid = |d: f32| if d.is_finite() { d } else { f32::INFINITY };
-        let values: Vec<f32> = match (kind, raster.samples) {
-            (Some(Kind::Pfm | Kind::Tiff), Samples::Float(v)) => v.iter().copied().map(valid).collect(),
-            (Some(Kind::Tiff), Samples::Double(v)) => v.iter().copied().map(|d| valid(d as f32)).collect(),
-            (Some(Kind::Coded(ImageFormat::Png)), Samples::Word(v)) => {
-                v.iter().copied().map(|v| if v == 0 { f32::INFINITY } else { v as f32 / 256.0 }).collect()
+        let values: Vec<f32> = match (raster.samples, scale) {
+            (Samples::Float(_) | Samples::Double(_), Some(_)) => {
+                return Err(Error::read(path, ReadError::NeedlessScale));
             }
-            (Some(Kind::Coded(ImageFormat::Png)), _) => {
+            (Samples::Float(v), None) => v.iter().copied().map(valid).collect(),
+            (Samples::Double(v), None) => v.iter().map(|d| valid(*d as f32)).collect(),
+            (Samples::Byte(v), Some(scale)) => scaled(&v, scale),
+            (Samples::Word(v), Some(scale)) => scaled(&v, scale),
+            (Samples::Word(v), None) if is_png => scaled(&v, KITTI_SCALE),
+            (Samples::Byte(_) | Samples::Word(_), None) => {
                 return Err(Error::read(path, ReadError::UnknownScale));
             }
-            _ => return wrong("holds no disparities"),
         };
         let mut map = Plane::new(raster.width, raster.height, values);
         for (disparity, no_data) in map.data_mut().iter_mut().zip(raster.no_data.iter().flatten()) {
@@ -191,22 +234,6 @@ impl Reader {
             }
         }
         Ok(map)
-    }
-
-    /// Reads an 8-bit PNG that holds disparities times `scale`, as in the ground truth of the older
-    /// Middlebury sets; 0 means unknown and becomes +infinity.
-    ///
-    /// # Errors
-    /// [`Error::Read`] when the file is missing, damaged, or not a grey 8-bit PNG.
-    pub fn scaled_disparity(self, path: &Path, scale: f32) -> Result<Plane<f32>> {
-        let (kind, raster) = self.with_kind(path)?;
-        match (kind, raster.channels, raster.samples) {
-            (Some(Kind::Coded(ImageFormat::Png)), 1, Samples::Byte(v)) => {
-                let disparity = |v| if v == 0 { f32::INFINITY } else { f32::from(v) / scale };
-                Ok(Plane::new(raster.width, raster.height, v.iter().copied().map(disparity).collect()))
-            }
-            _ => Err(Error::read(path, ReadError::NeedlessScale)),
-        }
     }
 }
 

@@ -238,7 +238,7 @@ impl Rectification {
             }
             None => sampling::resample(images[view], rectified, bytes, |x, y| self.place(view, x, y)),
         };
-        Pair::new(view(0)?, view(1)?)
+        Ok(Pair::new(view(0)?, view(1)?)?.doubted_as(pair))
     }
 
     /// The calibration of the rectified pair.

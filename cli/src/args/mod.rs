@@ -13,7 +13,7 @@ mod sign;
 pub(crate) use cameras::CameraArgs;
 pub(crate) use execution::{ExecutionArgs, ThreadArgs};
 pub(crate) use method::MethodArgs;
-pub(crate) use reading::ReadingArgs;
+pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics, nanoseconds};
 pub(crate) use rectification::{RectificationArgs, shown};
 pub(crate) use region::RegionArgs;

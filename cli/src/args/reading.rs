@@ -1,7 +1,8 @@
 //! How images, masks and maps are read.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use mrfgs::image::Plane;
 use mrfgs::image::read::{MAX_PIXELS, Reader};
 
 use crate::failure::{Failure, Result};
@@ -26,6 +27,20 @@ pub(crate) struct ReadingArgs {
     /// Otherwise pixels are taken as they are stored, and a line says so
     #[arg(long)]
     pub(crate) orient: bool,
+}
+
+/// The scale of whole numbers in a map.
+pub(crate) fn scale(text: &str) -> std::result::Result<f32, String> {
+    let scale = text.parse().ok().filter(|scale| (0.1..=65535.0).contains(scale));
+    scale.ok_or_else(|| "give a number from 0.1 to 65535, such as 3".into())
+}
+
+/// A disparity map by `reader`, of whole numbers by their `scale` where there is one.
+pub(crate) fn disparity(reader: Reader, path: &Path, scale: Option<f32>) -> mrfgs::Result<Plane<f32>> {
+    match scale {
+        Some(scale) => reader.scaled_disparity(path, scale),
+        None => reader.disparity(path),
+    }
 }
 
 impl ReadingArgs {

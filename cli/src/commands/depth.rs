@@ -9,7 +9,7 @@ use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
-use crate::args::{CameraArgs, ReadingArgs, Sign};
+use crate::args::{CameraArgs, ReadingArgs, Sign, disparity, scale};
 use crate::console;
 use crate::failure::{Failure, Result};
 use crate::outputs::{AlsoArgs, Outcome, Written, files};
@@ -49,6 +49,9 @@ pub(crate) struct Args {
     /// Sign convention of the disparities in MAP
     #[arg(long, value_enum, default_value_t, value_name = "WHICH")]
     sign: Sign,
+    /// How many levels of whole numbers in MAP are one pixel of disparity; level 0 is unknown [default: 256 of a PNG with 16 bits]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
+    scale: Option<f32>,
     #[command(flatten)]
     reading: ReadingArgs,
     /// Prints errors only
@@ -79,7 +82,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let named: Vec<_> = outputs.iter().map(|(flag, path)| (flag.as_str(), path.as_path())).collect();
     files::distinct(&inputs, &named)?;
     let reader = args.reading.reader();
-    let map = args.sign.map(reader.disparity(&args.map)?);
+    let map = args.sign.map(disparity(reader, &args.map, args.scale)?);
     let left = args.left.as_deref().map(|path| left(args, path)).transpose()?;
     let confidence = args.confidence.as_deref().map(|path| reader.grey8(path)).transpose()?;
     let of_size = |path: &Option<PathBuf>, size: Option<(usize, usize)>| match (path, size) {

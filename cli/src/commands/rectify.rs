@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use mrfgs::calibration;
 use mrfgs::image::{Image, pfm, write};
 use mrfgs::rectification::Rectification;
+use mrfgs::{calibration, check};
 
 use crate::args::{ReadingArgs, RectificationArgs};
 use crate::failure::Result;
@@ -43,14 +43,14 @@ Examples:
 /// is above the other, both images are rotated by 90 degrees, so that rows are epipolar lines:
 /// counter-clockwise if the first camera is the upper one, clockwise if it is the lower one.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_missing_positional = true)]
 pub(crate) struct Args {
     /// Image of the left camera: the first one of the calibration
     left: PathBuf,
-    /// Image of the right camera, of the same size
-    right: PathBuf,
+    /// Image of the right camera, of the same size; left out where LEFT is a .mpo or .jps, which holds both views
+    right: Option<PathBuf>,
     /// Folder for the rectified pair, new or empty
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR", required = true)]
     folder: PathBuf,
 
     /// Calibration of the cameras; where it has several files, such as those of ROS, one after the other
@@ -77,9 +77,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let folder = StagedFolder::new_or_empty(&args.folder)?;
     let reader = args.reading.raw_reader(&args.calib)?;
     let options = args.rectification.options();
-    let read = || reader.pair(&args.left, &args.right, args.mask.as_deref());
+    let (left, right) = (args.left.as_path(), args.right.as_deref());
+    let read = || input::views(reader, left, right, args.mask.as_deref());
     let (rectification, pair) = if args.calib.is_empty() {
-        input::rectify_alone([&args.left, &args.right], &read()?, &options)?
+        input::rectify_alone([left, right.unwrap_or(left)], &read()?, &options)?
     } else {
         let calibration = calibration::read(&args.calib)?;
         input::rectify(&calibration, &args.calib, &read()?, &options)?
@@ -88,6 +89,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         .map_err(|e| folder.named(e))?;
     folder.publish()?;
     if !args.quiet {
+        input::warn(check::damaged(&pair));
         input::doubt(&rectification, &args.calib);
         let (width, height) = rectification.size();
         let known = |image: &Image| {

@@ -7,7 +7,7 @@ use mrfgs::image::{Pair, Plane, calib::Calibration, read::Reader};
 use mrfgs::options::DisparityRange;
 use mrfgs::{Error, Result};
 
-use crate::args::calibrated_range;
+use crate::args::{calibrated_range, disparity};
 
 /// What a folder holds.
 struct Layout {
@@ -157,7 +157,7 @@ fn range_of(ground: &GroundTruth) -> Result<DisparityRange> {
     DisparityRange::new(0, known.fold(0.0, f32::max).ceil() as i32)
 }
 
-/// The truth, of 8 bits where it has a `scale`, and the mask for `what`, which is of the given size.
+/// The truth, of whole numbers where it has a `scale`, and the mask for `what`, which is of the given size.
 pub(crate) fn ground_truth(
     reader: Reader,
     truth: &Path,
@@ -179,10 +179,7 @@ pub(crate) fn ground_truth(
             size.1
         )))
     }
-    let plane = match scale {
-        Some(scale) => reader.scaled_disparity(truth, scale)?,
-        None => reader.disparity(truth)?,
-    };
+    let plane = disparity(reader, truth, scale)?;
     let plane = fits(plane, truth, what, size)?;
     if !plane.data().iter().any(|d| d.is_finite()) {
         return Err(Error::read(truth, "holds no known disparity; nothing can be compared with it"));

@@ -6,6 +6,7 @@ use mrfgs::calibration::{self, cameras::StereoCalibration, matrix::Matrix};
 use mrfgs::check::{self, Warning};
 use mrfgs::depth::Rig;
 use mrfgs::image::calib::{Calibration, Unit};
+use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Rect};
 use mrfgs::options::DisparityRange;
 use mrfgs::rectification::{Options, Rectification, Trust};
@@ -25,8 +26,9 @@ use crate::remedy;
 pub(crate) struct PairArgs {
     /// Left image, the reference view
     pub(crate) left: PathBuf,
-    /// Right image, of the same size and rectified, so that matches are on the same row
-    pub(crate) right: PathBuf,
+    /// Right image, of the same size and rectified, so that matches are on the same row; left out where LEFT is a .mpo or .jps, which
+    /// holds both views
+    pub(crate) right: Option<PathBuf>,
 
     #[command(flatten)]
     pub(crate) search: Search,
@@ -121,13 +123,18 @@ impl PairArgs {
             Some(_) => self.reading.raw_reader(&self.calib)?,
             None => self.reading.reader(),
         };
-        let pair = reader.pair(&self.left, &self.right, self.mask.as_deref())?;
+        let pair = views(reader, &self.left, self.right.as_deref(), self.mask.as_deref())?;
         if let Some(options) = rectify.filter(|_| self.calib.is_empty()) {
-            let (by, pair) = rectify_alone([&self.left, &self.right], &pair, options)?;
+            let (by, pair) = rectify_alone([&self.left, self.right()], &pair, options)?;
             return Input::rectified_alone(pair, by, &self.search, sign);
         }
         let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
         Input::new(pair, &self.search, sign, Calib::Files(&self.calib), numbers, rectify, beside)
+    }
+
+    /// The file with the right view.
+    fn right(&self) -> &Path {
+        self.right.as_deref().unwrap_or(&self.left)
     }
 
     /// The paths for a record.
@@ -135,7 +142,7 @@ impl PairArgs {
         let path = |path: &Path| path.display().to_string();
         Files {
             left: path(&self.left),
-            right: path(&self.right),
+            right: path(self.right()),
             mask: self.mask.as_deref().map(path),
             calibration: input.calibration_files(),
             output: output.map(path),
@@ -144,7 +151,8 @@ impl PairArgs {
 
     /// The files that no output may overwrite, each with its name.
     pub(crate) fn inputs<'a>(&'a self, input: &'a Input) -> Vec<(&'static str, &'a Path)> {
-        let mut inputs = vec![("LEFT", self.left.as_path()), ("RIGHT", self.right.as_path())];
+        let mut inputs = vec![("LEFT", self.left.as_path())];
+        inputs.extend(self.right.as_deref().map(|path| ("RIGHT", path)));
         inputs.extend(self.mask.as_deref().map(|path| ("the mask", path)));
         let files = input.calibration.iter().flat_map(|known| &known.files);
         inputs.extend(files.map(|path| ("the calibration file", path.as_path())));
@@ -312,6 +320,19 @@ impl Input {
             None => remedy::warning(warning, words),
         }));
         said
+    }
+}
+
+/// The pair in two files, or in one that holds both views.
+pub(crate) fn views(
+    reader: Reader,
+    left: &Path,
+    right: Option<&Path>,
+    mask: Option<&Path>,
+) -> mrfgs::Result<Pair> {
+    match right {
+        Some(right) => reader.pair(left, right, mask),
+        None => reader.both(left, mask),
     }
 }
 

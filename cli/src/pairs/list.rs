@@ -32,8 +32,8 @@ pub struct Row {
     pub name: String,
     /// Path of the left image. Paths are as the list has them.
     pub left: String,
-    /// Path of the right image.
-    pub right: String,
+    /// Path of the right image; `None` where the left file holds both views.
+    pub right: Option<String>,
     /// Path of the mask, if there is one.
     pub mask: Option<String>,
     /// Paths of the files of the calibration; none where the list does not say it.
@@ -108,6 +108,10 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
         let place = columns.iter().position(|column| *column == name)?;
         fields.get(place).filter(|field| !field.is_empty())
     };
+    let holds_both = |path: &str| {
+        let extension = Path::new(path).extension().unwrap_or_default();
+        ["mpo", "jps"].iter().any(|both| extension.eq_ignore_ascii_case(both))
+    };
     let required =
         |name: &str| field(name).map(str::to_owned).ok_or_else(|| format!("the {name} is missing"));
     let within = |column: &str, reason: String| format!("{column}: {reason}");
@@ -117,7 +121,10 @@ fn row(columns: &[&str], fields: &StringRecord) -> std::result::Result<Row, Stri
     let row = Row {
         name: required("name")?,
         left: required("left")?,
-        right: required("right")?,
+        right: match field("left") {
+            Some(left) if holds_both(left) => field("right").map(str::to_owned),
+            _ => Some(required("right")?),
+        },
         mask: field("mask").map(str::to_owned),
         calibration: files.map(|file| file.trim().to_owned()).filter(|file| !file.is_empty()).collect(),
         max_disparity: max.map_err(|reason| within("max_disparity", reason))?,

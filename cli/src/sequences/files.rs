@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use mrfgs::{Error, Result};
 
 /// What an image in a folder may be called.
-const EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "tif", "tiff", "pfm"];
+const EXTENSIONS: [&str; 11] =
+    ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "tif", "tiff", "bmp", "pfm", "npy"];
 
 /// The images that `path`, a folder or a pattern, names; `None` where it names something else.
 ///

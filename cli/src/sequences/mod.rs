@@ -18,6 +18,8 @@ use mrfgs::image::{Pair, Plane, Rect};
 use mrfgs::{Error, Result, threads};
 use mrfgs_ros::messages::Header;
 
+use crate::ffmpeg::Complaint;
+
 pub(crate) use pairing::Pairing;
 pub(crate) use recorded::Recorded;
 pub(crate) use rectifier::{Rectifier, turned};
@@ -212,8 +214,8 @@ impl Frames {
         }
     }
 
-    /// The films that ffmpeg decodes.
-    pub(crate) fn films(&self) -> impl Iterator<Item = &Path> {
+    /// The films that ffmpeg decodes, each with what that complains of by its end.
+    pub(crate) fn films(&self) -> impl Iterator<Item = (&Path, Complaint)> {
         self.sources().filter_map(|source| match source {
             Source::Files { .. } => None,
             Source::Stream(stream) => stream.film(),

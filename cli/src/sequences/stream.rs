@@ -10,7 +10,7 @@ use clap::ValueEnum;
 use mrfgs::image::raster::{Raster, Samples};
 use mrfgs::{Error, Result};
 
-use crate::ffmpeg::{self, Decoder};
+use crate::ffmpeg::{self, Complaint, Decoder};
 
 /// Frames a second, as a fraction.
 pub(crate) type FrameRate = (usize, usize);
@@ -88,8 +88,8 @@ pub(super) struct Stream {
     read: Arc<AtomicU64>,
     whole: u64,
     ended: bool,
-    /// Whether ffmpeg decodes it.
-    decoded: bool,
+    /// What ffmpeg complains of, where it decodes it.
+    decoded: Option<Complaint>,
 }
 
 enum Format {
@@ -117,7 +117,7 @@ impl Stream {
         } else {
             Box::new(BufReader::new(File::open(path).map_err(|e| Error::read(path, e))?))
         };
-        let mut decoded = false;
+        let mut decoded = None;
         if let Some(raw) = raw {
             check_size(raw.size, max_pixels).map_err(error)?;
             let mut start = Vec::new();
@@ -131,9 +131,10 @@ impl Stream {
             let read = bytes.by_ref().take(MAX_HEADER).read_until(b'\n', &mut header);
             read.map_err(|e| Error::read(&name, e))?;
             if !stdin && ffmpeg::reads(&header) {
-                bytes = Box::new(BufReader::new(Decoder::new(path)?));
+                let decoder = Decoder::new(path)?;
+                decoded = Some(decoder.complaint());
+                bytes = Box::new(BufReader::new(decoder));
                 header.clear();
-                decoded = true;
                 let read = bytes.by_ref().take(MAX_HEADER).read_until(b'\n', &mut header);
                 read.map_err(|e| Error::read(&name, e))?;
             }
@@ -169,9 +170,9 @@ impl Stream {
         self.name.is_file().then_some(&self.name)
     }
 
-    /// Its file, where ffmpeg decodes it.
-    pub(super) fn film(&self) -> Option<&Path> {
-        self.decoded.then_some(&self.name)
+    /// Its file, where ffmpeg decodes it, and what that complains of by the end.
+    pub(super) fn film(&self) -> Option<(&Path, Complaint)> {
+        Some((&self.name, self.decoded.clone()?))
     }
 
     /// The next frame; `None` after the last one, and after an error.

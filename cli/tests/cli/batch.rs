@@ -463,6 +463,7 @@ fn a_bad_list_is_refused_before_anything_runs() {
         ("name,left,right\na,l,r\n\n# comment\nb,l\n", "line 5 & 2 fields and 3 columns"),
         ("name,left,right\na,l,r,31\n", "line 2 & 4 fields and 3 columns"),
         ("name,left,right\na,,r\n", "line 2 & left is missing"),
+        ("name,left,right\na,l.jpg,\n", "line 2 & right is missing"),
         ("name,left,right\n,l,r\n", "line 2 & name is missing"),
         ("name,left,right\na,l,r\nA,l,r\n", "line 3 & name A is taken by line 2 & rename"),
         ("name,left,right\n../a,l,r\n", "line 2 & `../a` is no name for files & rename"),

@@ -146,16 +146,16 @@ fn older_layouts_give_the_figures_of_the_same_truth_by_the_other_route() {
 fn scales_and_incomplete_folders_are_refused() {
     let folder = older_layouts();
     let at = |name: &str| folder.join(name);
-    for scale in ["0", "-3", "nan", "inf", "three", "0.01", "256"] {
-        refused(&folder, &format!("old --truth-scale {scale}"), 2, "--truth-scale & 0.1 to 255");
+    for scale in ["0", "-3", "nan", "inf", "three", "0.01", "65536"] {
+        refused(&folder, &format!("old --truth-scale {scale}"), 2, "--truth-scale & 0.1 to 65535");
     }
     copy("slanted", &at("new"));
     Plane::filled(240, 180, 1.0).save(at("map.pfm")).unwrap();
     refused(&folder, "new --truth-scale 3", 2, "--truth-scale & leave it out");
     let line = "map map.pfm --truth map.pfm --truth-scale 3";
-    refused(&folder, line, 1, "map.pfm & 8-bit PNG & remove --truth-scale");
+    refused(&folder, line, 1, "map.pfm & whole numbers & remove --scale");
     refused(&folder, "map map.pfm --truth old/disp2.png", 1, "disp2.png & --truth-scale");
-    refused(&folder, "map map.pfm --truth old/im2.png --truth-scale 3", 1, "im2.png & grey");
+    refused(&folder, "map map.pfm --truth old/im2.png --truth-scale 3", 1, "im2.png & more than one channel");
 
     fs::remove_file(at("newer/view5.png")).unwrap();
     refused(&folder, "old newer", 1, "newer/view5.png & holds view1.png, view5.png, disp1.png");

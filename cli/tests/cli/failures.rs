@@ -13,7 +13,9 @@ const FAILURES: &[Failure] = &[
     // The command line itself.
     ("", 2, "subcommand & match, rectify, depth, sequence, ros, batch & --help"),
     ("frobnicate", 2, "frobnicate & --help"),
-    ("match left.png", 2, "<RIGHT> <OUTPUT> & mrfgs match --help"),
+    ("match left.png", 2, "<OUTPUT> & mrfgs match --help"),
+    ("match left.png out.pfm --max-disparity 9", 1, "left.png & holds one view & .mpo and .jps"),
+    ("rectify left.png out", 1, "left.png & holds one view & .mpo and .jps"),
     ("completions", 2, "<SHELL> & mrfgs completions --help"),
     ("completions tcsh", 2, "tcsh & bash & zsh"),
     ("man none/man1", 1, "none/man1 & no folder & create that first"),
@@ -36,7 +38,11 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --no-data none", 2, "--no-data & none"),
     ("match left.png empty.png out.pfm --max-disparity 9", 1, "empty.png & empty & get it again"),
     ("match text.png right.png out.pfm --max-disparity 9", 1, "text.png & not an image & give PNG"),
-    ("match a.gif right.png out.pfm --max-disparity 9", 1, "a.gif & is a gif file & give PNG"),
+    (
+        "match a.gif right.png out.pfm --max-disparity 9",
+        1,
+        "a.gif & is a GIF image, which is not read here: convert it to PNG",
+    ),
     ("match left.png a.jpg out.pfm --max-disparity 9", 1, "a.jpg & ends too early & get the file again"),
     ("match left.png a.pgm out.pfm --max-disparity 9", 1, "a.pgm & truncated & get the file again"),
     ("match left.png a.pfm out.pfm --max-disparity 9", 1, "a.pfm & the scale & no number other than 0"),
@@ -120,7 +126,7 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --set memory=0", 2, "--set memory & 0 is outside 1 to 16777216"),
     ("P --max-disparity 900 --memory 1MiB", 2, "--memory & 1 MiB & 60 x 40 & at least & smaller"),
     // Inspection.
-    ("inspect left.png", 2, "<RIGHT> & mrfgs inspect --help"),
+    ("inspect left.png --max-disparity 9", 1, "left.png & holds one view & the file of the right view"),
     ("I folder/full", 1, "folder/full & not empty"),
     ("I left.png", 1, "left.png & is a file"),
     ("I none/steps", 1, "none/steps & no folder none & create it"),

@@ -10,6 +10,7 @@ for last; do :; done
 case "$*" in
 *-version*) ;;
 *" -i - "*) cat > "${last#file:}" ;;
+*hurt*) tail -c +13 hurt.mp4; echo "hurt.mp4: error while decoding MB 3 4" >&2 ;;
 *torn*) head -c 9000 torn.mp4 | tail -c +13; echo "some warning" >&2; echo "torn.mp4: moov atom not found" >&2; exit 69 ;;
 *) for word; do case "$word" in file:*) tail -c +13 "${word#file:}" ;; esac; done ;;
 esac
@@ -32,7 +33,7 @@ fn films() -> Folder {
         }
     }
     fs::write(folder.join("plain.y4m"), &stream).unwrap();
-    for name in ["whole.mp4", "torn.mp4"] {
+    for name in ["whole.mp4", "torn.mp4", "hurt.mp4"] {
         fs::write(folder.join(name), [b"\0\0\0\x20ftypisom", stream.as_slice()].concat()).unwrap();
     }
     fs::write(folder.join("whole.mkv"), [b"\x1a\x45\xdf\xa3\0\0\0\0\0\0\0\0", stream.as_slice()].concat())
@@ -84,6 +85,12 @@ fn films_are_those_of_the_plain_stream() {
 #[test]
 fn what_ffmpeg_cannot_do_is_said() {
     let folder = films();
+    // Damage that it makes up for ends nothing.
+    let words = "warning: hurt.mp4: some frames may be wrong, since ffmpeg says: hurt.mp4: error while decoding MB 3 4";
+    with_ffmpeg(&folder, &format!("sequence hurt.mp4 hurt {RANGE}")).succeeded().says(words);
+    assert_eq!(listing(&folder.join("hurt")).len(), 2);
+    let said = with_ffmpeg(&folder, &format!("sequence whole.mp4 sound {RANGE}")).succeeded().stderr;
+    assert!(!said.contains("warning"), "{said}");
     with_ffmpeg(&folder, &format!("sequence torn.mp4 maps --quiet {RANGE}"))
         .failed(1, "torn.mp4 & ffmpeg: torn.mp4: moov atom not found");
     // The first frame was whole.

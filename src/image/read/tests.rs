@@ -357,8 +357,12 @@ fn files_that_are_no_images_are_refused() {
     bad(f.0.path(), &["folder"]);
     for (name, bytes, word) in [
         ("empty.png", &b""[..], "is empty"),
-        ("text.png", b"What is this?\nNo image.\n", "PNG, JPEG, PNM, TIFF or PFM"),
-        ("a.png", b"GIF89a.....................", "a gif file; give PNG, JPEG, PNM, TIFF or PFM"),
+        ("text.png", b"What is this?\nNo image.\n", "PNG, JPEG, PNM, TIFF, BMP, PFM or NPY"),
+        (
+            "a.png",
+            b"GIF89a.....................",
+            "is a GIF image, which is not read here: convert it to PNG",
+        ),
         ("huge.pgm", b"P5\n4000000000 4000000000\n255\n", "at most"),
         ("none.pgm", b"P5\n0 5\n255\n", ""),
         ("lie.pgm", b"P5\n16384 16384\n255\n", "get the file again"),
@@ -434,7 +438,7 @@ fn damaged_files_never_panic_and_never_lie_about_their_size() {
 fn disparities_are_refused_where_their_scale_is_unknown() {
     let f = Folder::new();
     for (path, words) in [
-        (f.grey8("d.png", RAMP), &["d.png", "8-bit PNG", "16-bit"][..]),
+        (f.grey8("d.png", RAMP), &["d.png", "whole numbers", "16-bit"][..]),
         (f.grey16("d.tif", [9; N]), &["d.tif", "float .tif"]),
         (f.grey8("d.pgm", RAMP), &["d.pgm", ".pfm"]),
         (f.image::<Rgb<u16>>("flow.png", &[0; 3 * N]), &["flow.png", "more than one channel"]),
@@ -462,5 +466,91 @@ fn levels_become_disparities_by_their_scale() {
     for path in [f.grey8("d.pgm", RAMP), f.at("none.png")] {
         assert!(scaled(&path).is_err(), "{}", path.display());
     }
-    refused(scaled(&f.grey16("k.png", [9; N])), &["k.png", "8-bit PNG", "needs a scale"]);
+    // 16 bits may have another scale than that of KITTI, and TIFF has none at all by itself.
+    for path in [f.grey16("k.png", [9; N]), f.grey16("k.tif", [9; N])] {
+        assert_eq!(scaled(&path).unwrap().data(), [3.0; N], "{}", path.display());
+    }
+    let path = f.at("f.pfm");
+    pfm::write(&path, &Plane::filled(2, 2, 1.0)).unwrap();
+    refused(scaled(&path), &["f.pfm", "in pixels", "whole numbers"]);
+}
+
+/// A byte of the coded data of a JPEG file that is another one: the decoder hardly ever notices, and the pair has a doubt that names the
+/// file, but for bits that change nothing of the lengths. A sound file has none.
+#[test]
+fn damaged_jpeg_data_is_a_doubt() {
+    let f = Folder::new();
+    let noise = GrayImage::from_fn(64, 64, |x, y| {
+        Luma([(x * 7919 + y * 104_729).wrapping_mul(0x9e37_79b9).to_be_bytes()[0]])
+    });
+    let mut file = Cursor::new(Vec::new());
+    noise.write_to(&mut file, ImageFormat::Jpeg).unwrap();
+    let sound = file.into_inner();
+    let start = sound.windows(2).position(|two| two == [0xff, 0xda]).unwrap() + 16;
+    let path = f.bytes("sound.jpg", &sound);
+    assert_eq!(*twice(&path).doubts(), [None, None]);
+    let (mut tried, mut silent) = (0, 0);
+    for at in (start..sound.len() - 40).step_by(7) {
+        let mut damaged = sound.clone();
+        damaged[at] ^= 0x55;
+        let Ok(pair) = pair(&path, &f.bytes("damaged.jpg", &damaged), None) else { continue };
+        let [left, right] = pair.doubts();
+        assert_eq!(*left, None);
+        assert!(
+            right.iter().all(|doubt| doubt.contains("damaged.jpg: the JPEG data is damaged: ")),
+            "{right:?}"
+        );
+        (tried, silent) = (tried + 1, silent + usize::from(right.is_none()));
+        // What is made of the pair keeps the doubt.
+        assert_eq!(pair.crop(&crate::image::Rect::whole((9, 9))).doubts(), pair.doubts());
+    }
+    assert!(tried > 100 && silent * 2 < tried, "{silent} of {tried}");
+}
+
+/// BMP, as machine vision has it, and arrays of NumPy are read wherever other images are.
+#[test]
+fn bitmaps_and_arrays_are_read() {
+    let f = Folder::new();
+    let grey = f.grey8("g.png", RAMP);
+    let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 4), }";
+    let npy = |kind: &str, data: &[u8]| {
+        let header = header.replace("|u1", kind);
+        [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), data].concat()
+    };
+    let array = f.bytes("g.npy", &npy("|u1", &RAMP));
+    let bitmap = bmp(4, 3, &RAMP);
+    let path = f.bytes("g.bmp", &bitmap);
+    assert_eq!(twice(&array), twice(&grey));
+    assert_eq!(twice(&path), twice(&grey));
+    for length in 0..bitmap.len() {
+        assert!(decode(&bitmap[..length]).is_err(), "{length}");
+    }
+    let floats: Vec<u8> = (0..12).flat_map(|v| (v as f32 / 2.0).to_le_bytes()).collect();
+    let map = read_disparity(&f.bytes("d.npy", &npy("<f4", &floats))).unwrap();
+    assert_eq!(map.data()[..4], [0.0, 0.5, 1.0, 1.5]);
+    refused(read_disparity(&array), &["g.npy", "whole numbers"]);
+    assert_eq!(
+        Reader::default().scaled_disparity(&array, 2.0).unwrap().data()[11],
+        f32::from(RAMP[11]) / 2.0
+    );
+    let mask = Reader::default()
+        .mask(&f.bytes("m.npy", &npy("|b1", &[0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1])))
+        .unwrap();
+    assert_eq!(mask.data().iter().filter(|masked| **masked).count(), 2);
+}
+
+/// An 8-bit bitmap with a palette of greys, the bottom row first.
+fn bmp(width: u32, height: u32, levels: &[u8]) -> Vec<u8> {
+    let start = 54 + 4 * 256_u32;
+    let row = width.next_multiple_of(4);
+    let mut bytes = b"BM".to_vec();
+    for v in [start + row * height, 0, start, 40, width, height, 1 | 8 << 16, 0, row * height, 0, 0, 256, 0] {
+        bytes.extend(v.to_le_bytes());
+    }
+    (0..=255).for_each(|v| bytes.extend([v, v, v, 0]));
+    for line in levels.chunks(width as usize).rev() {
+        bytes.extend(line);
+        bytes.extend(vec![0; (row - width) as usize]);
+    }
+    bytes
 }

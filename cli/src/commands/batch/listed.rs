@@ -108,7 +108,14 @@ impl Listed {
                 let takes_calibration = given.cameras.is_some() || max_disparity.is_none();
                 let beside = Some(calibration_beside(left))
                     .filter(|_| takes_calibration && calibration.is_empty() && given.calib.is_empty());
-                [left, right].into_iter().chain(mask).chain(calibration).cloned().chain(beside).collect()
+                [left]
+                    .into_iter()
+                    .chain(right)
+                    .chain(mask)
+                    .chain(calibration)
+                    .cloned()
+                    .chain(beside)
+                    .collect()
             }
             Source::Folder => {
                 folder::inputs(Path::new(&self.name)).map(|path| shown(&path)).collect::<Vec<_>>()
@@ -146,8 +153,9 @@ impl Listed {
                 if !calibration.is_empty() {
                     calib = calibration.iter().map(at).collect();
                 }
-                let pair = reader.pair(&at(left), &at(right), mask.as_ref().map(at).as_deref())?;
-                (pair, None, [left, right].map(Clone::clone), mask.clone())
+                let (other, mask_file) = (right.as_ref().map(at), mask.as_ref().map(at));
+                let pair = input::views(reader, &at(left), other.as_deref(), mask_file.as_deref())?;
+                (pair, None, [left, right.as_ref().unwrap_or(left)].map(Clone::clone), mask.clone())
             }
             // Its calibration and its truth are of rectified images.
             Source::Folder if given.rectify.is_some() => {

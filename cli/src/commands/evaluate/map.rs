@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use mrfgs::image::Plane;
 
+use crate::args::{disparity, scale};
 use crate::console;
 use crate::failure::Result;
 use crate::outputs::files;
@@ -22,9 +23,12 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// Map to evaluate: .pfm, float .tif, or 16-bit .png with disparity times 256
+    /// Map to evaluate: .pfm, float .tif or .npy, or 16-bit .png with disparity times 256; other whole numbers with --scale
     map: PathBuf,
-    /// Ground truth, in one of the same formats, or an 8-bit .png with --truth-scale; pixels that are invalid there do not
+    /// How many levels of whole numbers in MAP are one pixel of disparity; level 0 is unknown [default: 256 of a PNG with 16 bits]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = scale)]
+    scale: Option<f32>,
+    /// Ground truth, in one of the same formats, or whole numbers with --truth-scale; pixels that are invalid there do not
     /// count
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
@@ -44,7 +48,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let inputs = [Some(&args.map), Some(&args.truth), args.mask.as_ref()];
     files::check_json(json, inputs.into_iter().flatten().cloned())?;
     let reader = reading.reader();
-    let estimate = reader.disparity(&args.map)?;
+    let estimate = disparity(reader, &args.map, args.scale)?;
     let (map, mask) = (&args.map, args.mask.as_deref());
     let ground = folder::ground_truth(reader, &args.truth, *truth_scale, mask, map, estimate.size())?;
     if is_negated(&estimate, ground.truth()) {

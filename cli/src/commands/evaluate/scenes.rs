@@ -7,7 +7,7 @@ use mrfgs::Matcher;
 use mrfgs::maps::Maps;
 use mrfgs::options::{Execution, Method};
 
-use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs};
+use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, scale};
 use crate::failure::{Failure, Result};
 use crate::matching;
 use crate::outputs::files;
@@ -21,8 +21,8 @@ pub(super) struct SceneArgs {
     /// Writes all figures as JSON; `-` prints them instead of the table
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
-    /// Levels of an 8-bit PNG truth that are one pixel of disparity; level 0 is unknown [default: 3 for the layout of
-    /// 2005 and 2006, 4 for that of 2003]
+    /// Levels of a truth of whole numbers that are one pixel of disparity; level 0 is unknown [default: 256 of a PNG with 16 bits, 3
+    /// for the layout of 2005 and 2006, 4 for that of 2003]
     ///
     /// The defaults are those of the small sizes, third and quarter. Of 2005 and 2006 the full size has 1, the half size 2,
     /// the third size 3.
@@ -30,11 +30,6 @@ pub(super) struct SceneArgs {
     pub(super) truth_scale: Option<f32>,
     #[command(flatten)]
     pub(super) reading: ReadingArgs,
-}
-
-fn scale(text: &str) -> std::result::Result<f32, String> {
-    let scale = text.parse().ok().filter(|scale| (0.1..=255.0).contains(scale));
-    scale.ok_or_else(|| "give a number from 0.1 to 255, such as 3".into())
 }
 
 /// How pairs with their truth are read and matched.

@@ -32,6 +32,8 @@ Examples:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Two photographs of one camera, without a calibration:
   mrfgs match l.jpg r.jpg d.pfm --rectify
+  # Both views in a file of a stereo camera:
+  mrfgs match photo.mpo d.pfm --rectify
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Points as LAZ, in the frame of the left camera as it took the image:
@@ -39,8 +41,8 @@ Examples:
 
 /// Match a rectified pair and write its disparity map
 ///
-/// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF or PFM, recognised by their
-/// content. Pixels that are transparent, not finite, or without data are ignored.
+/// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF, BMP, PFM or NPY, recognised by their
+/// content. A .mpo or .jps of a stereo camera holds both views, and stands alone. Pixels that are transparent, not finite, or without data are ignored.
 ///
 /// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for
 /// invalid pixels, .tif or .tiff as float with NaN and with the georeference of LEFT, .png as in KITTI: 16
@@ -55,7 +57,7 @@ Examples:
 /// OpenCV. Where d + doffs is 0 or less there is no depth. An entry `unit` in the file (mm, cm or m) states
 /// the unit. --focal and --baseline take the place of a calibration whose doffs is 0.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_missing_positional = true)]
 pub(crate) struct Args {
     #[command(flatten)]
     pair: PairArgs,
@@ -64,6 +66,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     numbers: CameraArgs,
     /// Disparity map to write: .pfm, .tif, .tiff or .png, or `-`
+    #[arg(required = true)]
     output: PathBuf,
 
     /// Sign convention of disparities, in the range, OUTPUT and --also raw; the Ames Stereo Pipeline takes

@@ -72,6 +72,13 @@ impl Log {
         self.complain(reason);
     }
 
+    /// Says now and then why a part of an image may be wrong.
+    pub(super) fn doubted(&mut self, doubt: &str) {
+        if !self.quiet {
+            self.complain(&format!("warning: {doubt}"));
+        }
+    }
+
     /// Counts a pair whose cameras have not told their calibration, and says so where that lasts.
     pub(super) fn waits(&mut self, cameras: &Cameras) {
         self.frames.waiting += 1;

@@ -84,7 +84,10 @@ impl<'a> Matching<'a> {
             return Ok(());
         }
         match self.published(&arrived, infos, to) {
-            Ok(()) => log.published(&arrived),
+            Ok(doubts) => {
+                log.published(&arrived);
+                doubts.iter().flatten().for_each(|doubt| log.doubted(doubt));
+            }
             Err(Failure::Stopped(_)) => {}
             Err(failure @ Failure::Usage(_)) => return Err(failure),
             Err(failure) => log.failed(&failure.to_string()),
@@ -97,7 +100,7 @@ impl<'a> Matching<'a> {
         arrived: &Arrived,
         infos: Option<[CameraInfo; 2]>,
         to: &mut Publications,
-    ) -> Result<()> {
+    ) -> Result<[Option<String>; 2]> {
         let header = &arrived.header;
         let pair = self.pair(arrived)?;
         let is_known = |known: &Known| known.size == pair.size() && known.infos == infos;
@@ -105,7 +108,7 @@ impl<'a> Matching<'a> {
             self.known = None;
             self.known = Some(self.begin(pair.clone(), infos)?);
         }
-        let Some(known) = &mut self.known else { return Ok(()) };
+        let Some(known) = &mut self.known else { return Ok([None, None]) };
         let (pair, _) = known.rectifier.rectified(pair)?;
         let matched = self.matcher.job(&pair, known.range).cancel(stop::flag()).run()?;
         if let Some(note) = matched.note.as_ref().filter(|_| !std::mem::replace(&mut self.noted, true)) {
@@ -135,7 +138,7 @@ impl<'a> Matching<'a> {
             to.put(messages::DEPTH_CAMERA, header, &camera)?;
         }
         messages.put(header, self.args.also.contents(&outcome), to)?;
-        Ok(())
+        Ok(pair.doubts().clone())
     }
 
     /// The images of a pair.

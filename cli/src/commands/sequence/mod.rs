@@ -189,6 +189,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let first_image = frames.first_image().map(Path::to_owned);
     check_outputs(args, &frames, first_image.as_deref())?;
     let rate = frames.rate();
+    let films: Vec<_> = frames.films().map(|(film, complaint)| (film.to_owned(), complaint)).collect();
     // The first frame decides on the range and, for all that follow, on the size.
     let (first, frames) = pipeline::patiently(move || (frames.next(), frames))?;
     let Frame { name, header, pair } = first.ok_or_else(|| Error::read(&args.left, "holds no frame"))??;
@@ -265,8 +266,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let rectifier = Rectifier::new(input.rectification, known, range, recalibrate);
     let first = Frame { name, header, pair: input.pair };
     let ended = pipeline.run(first, frames, rectifier, &mut sink);
-    if let Some(said) = remarks.and_then(|remarks| remarks.said()).filter(|_| !args.quiet) {
-        console::say(&said);
+    if !args.quiet {
+        for (film, complaint) in &films {
+            if let Some(said) = complaint.said() {
+                console::say(&format!(
+                    "warning: {}: some frames may be wrong, since ffmpeg says: {said}",
+                    film.display()
+                ));
+            }
+        }
+        if let Some(said) = remarks.and_then(|remarks| remarks.said()) {
+            console::say(&said);
+        }
     }
     ended
 }
@@ -398,7 +409,7 @@ fn open(args: &Args) -> Result<Frames> {
     let mut frames = pipeline::patiently(open)??;
     frames = masked(frames, args)?;
     if !args.quiet {
-        frames.films().for_each(|film| console::say(&format!("ffmpeg decodes {}", film.display())));
+        frames.films().for_each(|(film, _)| console::say(&format!("ffmpeg decodes {}", film.display())));
     }
     if args.pairing.is_some() && !frames.are_images_of_two() {
         return Err(Failure::usage(

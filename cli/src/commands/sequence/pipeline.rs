@@ -6,6 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use mrfgs::Matcher;
+use mrfgs::check::Warning;
 use mrfgs::drift::Turn;
 use mrfgs::image::Pair;
 use mrfgs::options::DisparityRange;
@@ -15,6 +16,7 @@ use serde::Serialize;
 use crate::args::Sign;
 use crate::failure::{Failure, Result};
 use crate::outputs::{Files, MatchRecord};
+use crate::pairs::input;
 use crate::progress::Counter;
 use crate::sequences::{Frame, Frames, Rectifier, turned};
 use crate::text::plural;
@@ -70,8 +72,9 @@ impl Pipeline {
         let mut bar = Counter::of_frames(frames.len(), self.quiet);
         let (sender, receiver) = sync_channel(WAITING);
         let turn = rectifier.followed(&first.pair)?;
+        let told = first.pair.doubts().each_ref().map(|doubt| self.quiet || doubt.is_some());
         // It may wait for standard input for ever, so nobody waits for it.
-        thread::spawn(move || read(frames, rectifier, &sender));
+        thread::spawn(move || read(frames, rectifier, told, &sender));
         let (found, to_write) = sync_channel::<Found>(WAITING);
         let (matched, written) = thread::scope(|scope| {
             let writing = scope.spawn(|| write(to_write, sink, &mut bar));
@@ -232,9 +235,16 @@ fn received<T>(from: &Receiver<T>) -> Option<Result<T>> {
     }
 }
 
-/// Reads and rectifies frames until one fails or nobody takes them.
-fn read(frames: Frames, mut rectifier: Rectifier, to: &SyncSender<Next>) {
+/// Reads and rectifies frames until one fails or nobody takes them. Says which frame of each camera is the first with a damaged image,
+/// where that was not `told`.
+fn read(frames: Frames, mut rectifier: Rectifier, mut told: [bool; 2], to: &SyncSender<Next>) {
     for frame in frames {
+        let doubts = frame.iter().flat_map(|frame| frame.pair.doubts().iter().enumerate());
+        for (side, doubt) in doubts {
+            if let Some(doubt) = doubt.as_ref().filter(|_| !std::mem::replace(&mut told[side], true)) {
+                input::warn([Warning::Damaged { doubt: doubt.clone() }]);
+            }
+        }
         let rectified = |Frame { name, header, pair }: Frame| {
             let (pair, turn) = rectifier.rectified(pair)?;
             Ok((Frame { name, header, pair }, turn))
