@@ -9,7 +9,8 @@ use mrfgs::image::read::Reader;
 use crate::messages::{CompressedImage, Image, Result};
 
 /// What is read, as an error says it.
-const KNOWN: &str = "mono8, mono16, bgr8, rgb8, bgra8, rgba8, their kinds of 16 bits, 8UC1, 8UC3, 8UC4, 16UC1, 16UC3 and bayer_* are read";
+const KNOWN: &str = "mono8, mono16, bgr8, rgb8, bgra8, rgba8, their kinds of 16 bits, 8UC1, 8UC3, 8UC4, 16UC1, 16UC3, bayer_*, yuv422 (uyvy), \
+                     yuv422_yuy2 (yuyv), nv12, nv21 and nv24 are read";
 
 /// The colours of a pixel, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +77,71 @@ fn mosaic_of(letters: &str) -> Option<[Colour; 4]> {
     })
 }
 
+/// Luma and chroma of 8 bits, as cameras and encoders of films have them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Yuv {
+    /// Two pixels in four bytes, and where of these their luma, u and v stand.
+    Packed { luma: [usize; 2], chroma: [usize; 2] },
+    /// All luma, and behind it pairs of chroma in rows as wide as those; where of a pair u and v stand, and how many pixels share one, across
+    /// and down.
+    Planes { chroma: [usize; 2], shared: (usize, usize) },
+}
+
+impl Yuv {
+    fn of(encoding: &str) -> Option<Self> {
+        Some(match encoding {
+            // The first name is that of ROS 1, and of ROS 2 before Iron.
+            "yuv422" | "uyvy" | "UYVY" => Self::Packed { luma: [1, 3], chroma: [0, 2] },
+            "yuv422_yuy2" | "yuyv" | "YUYV" | "yuy2" => Self::Packed { luma: [0, 2], chroma: [1, 3] },
+            "nv12" | "NV12" => Self::Planes { chroma: [0, 1], shared: (2, 2) },
+            "nv21" | "NV21" => Self::Planes { chroma: [1, 0], shared: (2, 2) },
+            "nv24" | "NV24" => Self::Planes { chroma: [0, 1], shared: (1, 1) },
+            _ => return None,
+        })
+    }
+
+    /// Bytes of a row of so many pixels; `None` where there is no such row.
+    fn row(self, width: usize) -> Option<usize> {
+        match self {
+            Self::Packed { .. } => width.is_multiple_of(2).then_some(2 * width),
+            Self::Planes { shared: (across, _), .. } => width.is_multiple_of(across).then_some(width),
+        }
+    }
+
+    /// Rows of `step` bytes behind those of luma; a pair for each pixel takes two.
+    fn more_rows(self, height: usize) -> usize {
+        match self {
+            Self::Packed { .. } => 0,
+            Self::Planes { shared: (across, down), .. } => 2 * height.div_ceil(down) / across,
+        }
+    }
+
+    /// Luma, u and v at (x, y).
+    fn sample(self, data: &[u8], step: usize, height: usize, (x, y): (usize, usize)) -> [u8; 3] {
+        match self {
+            Self::Packed { luma, chroma: [u, v] } => {
+                let four = &data[y * step + x / 2 * 4..][..4];
+                [four[luma[x % 2]], four[u], four[v]]
+            }
+            Self::Planes { chroma: [u, v], shared: (across, down) } => {
+                let two = &data[height * step + y / down * (2 * step / across) + x / across * 2..][..2];
+                [data[y * step + x], two[u], two[v]]
+            }
+        }
+    }
+}
+
+/// Red, green and blue of luma and chroma, in the numbers of OpenCV, by which other programs of ROS convert: ITU-R BT.601, where 16 is
+/// black and 235 is white.
+fn rgb([luma, u, v]: [u8; 3]) -> [u8; 3] {
+    // In 1/2^20 of a level: luma, and what red, green and blue take of chroma.
+    const LUMA: i32 = 1_220_542;
+    let luma = (i32::from(luma) - 16).max(0) * LUMA;
+    let [u, v] = [u, v].map(|chroma| i32::from(chroma) - 128);
+    let sums = [luma + 1_673_527 * v, luma - 852_492 * v - 409_993 * u, luma + 2_116_026 * u];
+    sums.map(|sum| ((sum + (1 << 19)) >> 20).clamp(0, 255) as u8)
+}
+
 /// The image of a message, of at most `max_pixels` pixels. A mosaic of colours becomes colours, by the mean of the nearest samples.
 ///
 /// # Errors
@@ -83,29 +149,48 @@ fn mosaic_of(letters: &str) -> Option<[Colour; 4]> {
 pub fn image(message: &Image, max_pixels: u64) -> Result<Raster<'static>> {
     let Image { encoding, data, .. } = message;
     let [width, height, step] = [message.width, message.height, message.step].map(|v| v as usize);
-    let Some(layout) = Layout::of(encoding) else {
+    let (layout, yuv) = (Layout::of(encoding), Yuv::of(encoding));
+    if layout.is_none() && yuv.is_none() {
         return Err(format!("its encoding is `{}`; {KNOWN}", shortened(encoding)).into());
-    };
+    }
     if width == 0 || height == 0 {
         return Err(format!("has {width} x {height} pixels").into());
     }
     if width as u64 * height as u64 > max_pixels {
         return Err(format!("claims {width} x {height} pixels and at most {max_pixels} are read").into());
     }
-    let row = width * layout.channels * layout.bytes;
+    let row = match (&layout, yuv) {
+        (Some(layout), _) => Some(width * layout.channels * layout.bytes),
+        (None, yuv) => yuv.and_then(|yuv| yuv.row(width)),
+    };
+    let Some(row) = row else {
+        return Err(format!(
+            "{width} is no width of an image in {encoding}, of which two pixels share a colour"
+        )
+        .into());
+    };
     if step < row {
         return Err(
             format!("a row of {width} pixels in {encoding} has {row} bytes, and its step is {step}").into()
         );
     }
-    if step as u64 * height as u64 > data.len() as u64 {
+    let rows = height + yuv.map_or(0, |yuv| yuv.more_rows(height));
+    if step as u64 * rows as u64 > data.len() as u64 {
         return Err(format!(
-            "{height} rows of {step} bytes are {}, and it has {} bytes of data",
-            step as u64 * height as u64,
+            "{rows} rows of {step} bytes are {}, and it has {} bytes of data",
+            step as u64 * rows as u64,
             data.len()
         )
         .into());
     }
+    let Some(layout) = layout else {
+        let yuv = yuv.into_iter();
+        let places =
+            yuv.flat_map(|yuv| (0..height).flat_map(move |y| (0..width).map(move |x| (yuv, (x, y)))));
+        let pixels = places.flat_map(|(yuv, place)| rgb(yuv.sample(data, step, height, place)));
+        let raster = Raster::new(width, height, 3, Samples::Byte(pixels.collect()));
+        return raster.map_err(|e| Reason::from(e.to_string()));
+    };
     let rows = data.chunks_exact(step).take(height).map(|line| &line[..row]);
     let size = (width, height);
     if layout.bytes == 1 {
@@ -129,6 +214,12 @@ pub fn compressed(message: &CompressedImage, reader: Reader, name: &Path) -> mrf
             "holds depths, not what a camera has seen; give the topic of an image",
         ));
     }
+    if is_video(format, data) {
+        return Err(mrfgs::Error::read(
+            name,
+            "holds a part of a film (H.264 or the like) and not an image; decode it first, and give the topic of images",
+        ));
+    }
     let raster = reader.raster_in_memory(name, data)?;
     // As `image_transport` packs what it cannot name in OpenCV's colours: the mosaic, in grey.
     let encoding = format.split(';').next().unwrap_or_default().trim();
@@ -144,6 +235,14 @@ pub fn compressed(message: &CompressedImage, reader: Reader, name: &Path) -> mrf
         }
         _ => Ok(raster),
     }
+}
+
+/// Whether a compressed image is none, but the next part of a film, by what it is called or how it begins.
+fn is_video(format: &str, data: &[u8]) -> bool {
+    let format = format.to_ascii_lowercase();
+    let is_called =
+        ["h264", "h265", "hevc", "avc", "av1", "vp8", "vp9"].iter().any(|codec| format.contains(codec));
+    is_called || data.starts_with(&[0, 0, 1]) || data.starts_with(&[0, 0, 0, 1])
 }
 
 /// The image of all `samples`.
@@ -266,11 +365,58 @@ mod tests {
         assert_ne!(bytes(&made("bayer_bggr8", (4, 4), 4, &data).unwrap()), raster);
     }
 
+    /// Grey and four colours of ITU-R BT.601, and what OpenCV makes of them, within a level.
+    const COLOURS: [([u8; 3], [u8; 3]); 5] = [
+        ([16, 128, 128], [0, 0, 0]),
+        ([126, 128, 128], [128, 128, 128]),
+        ([81, 90, 240], [254, 0, 0]),
+        ([145, 54, 34], [0, 255, 1]),
+        ([41, 240, 110], [0, 0, 255]),
+    ];
+
+    #[test]
+    fn luma_and_chroma_become_colours() {
+        for (yuv, wanted) in COLOURS {
+            let off = rgb(yuv).into_iter().zip(wanted).map(|(a, b)| a.abs_diff(b)).max();
+            assert!(off <= Some(1), "{:?} for {wanted:?}", rgb(yuv));
+        }
+        // Two pairs of colours beside each other; below them the same, so that all kinds hold the same pixels.
+        let [(left, of_left), (right, of_right)] = [COLOURS[2], COLOURS[4]];
+        let ([y, u, v], [other, s, t]) = (left, right);
+        let packed = [[u, y, v, y, s, other, t, other], [y, u, y, v, other, s, other, t]];
+        let luma = [y, y, other, other, 99, 98];
+        let chroma = [u, v, s, t, 97, 96];
+        let swapped = [v, u, t, s, 97, 96];
+        let each = [u, v, u, v, s, t, s, t, 95, 94, 93, 92];
+        let rows = |row: &[u8]| [row, &[99, 98], row, &[99, 98]].concat();
+        for (encoding, step, data) in [
+            ("yuv422", 10, rows(&packed[0])),
+            ("uyvy", 10, rows(&packed[0])),
+            ("yuv422_yuy2", 10, rows(&packed[1])),
+            ("yuyv", 10, rows(&packed[1])),
+            ("nv12", 6, [&luma[..], &luma, &chroma].concat()),
+            ("nv21", 6, [&luma[..], &luma, &swapped].concat()),
+            ("nv24", 6, [&luma[..], &luma, &each, &each].concat()),
+        ] {
+            let found = bytes(&made(encoding, (4, 2), step, &data).unwrap());
+            let wanted = [of_left, of_left, of_right, of_right].repeat(2).concat();
+            let off = found.iter().zip(&wanted).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(found.len() == wanted.len() && off <= Some(1), "{encoding}: {found:?}");
+        }
+        // Control: the other order of bytes gives other colours.
+        let found = bytes(&made("uyvy", (4, 2), 10, &rows(&packed[1])).unwrap());
+        assert!(found[0].abs_diff(of_left[0]) > 1);
+    }
+
     #[test]
     fn contradictions_are_told() {
         let data = [0; 64];
         for (encoding, size, step, words) in [
-            ("yuv422", (4, 4), 8, "`yuv422`; mono8, mono16"),
+            ("yuv444", (4, 4), 8, "`yuv444`; mono8, mono16"),
+            ("yuv422", (3, 4), 8, "3 is no width of an image in yuv422"),
+            ("uyvy", (4, 9), 8, "9 rows of 8 bytes are 72, and it has 64 bytes"),
+            ("nv12", (8, 6), 8, "9 rows of 8 bytes are 72, and it has 64 bytes"),
+            ("nv24", (8, 3), 8, "9 rows of 8 bytes are 72, and it has 64 bytes"),
             ("bayer_rgbg8", (4, 4), 4, "`bayer_rgbg8`"),
             ("32FC1", (4, 4), 16, "`32FC1`"),
             ("mono8", (0, 4), 4, "0 x 4 pixels"),
@@ -298,5 +444,11 @@ mod tests {
         let colours = read("bayer_rggb8; png compressed ").unwrap();
         assert_eq!(bytes(&colours), bytes(&made("bayer_rggb8", (4, 4), 4, grey.as_raw()).unwrap()));
         assert!(read("16UC1; compressedDepth png").unwrap_err().to_string().contains("holds depths"));
+        let said = read("h264").unwrap_err().to_string();
+        assert!(said.contains("H.264 or the like") && said.contains("decode it first"), "{said}");
+        let data = [0, 0, 0, 1, 0x67, 0x64][..].into();
+        let message = CompressedImage { format: "jpeg".into(), data, ..CompressedImage::default() };
+        let said = compressed(&message, Reader::default(), Path::new("a.mcap")).unwrap_err().to_string();
+        assert!(said.contains("H.264 or the like"), "{said}");
     }
 }

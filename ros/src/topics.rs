@@ -31,6 +31,12 @@ impl Topic {
         self.kind == CompressedImage::NAME
     }
 
+    /// Whether its messages are parts of a film, such as H.264.
+    #[must_use]
+    pub fn has_video(&self) -> bool {
+        ["CompressedVideo", "FFMPEGPacket"].iter().any(|kind| self.kind.ends_with(kind))
+    }
+
     /// Whether its images are rectified, by its name: `image_rect` and the like, or a part of that name.
     #[must_use]
     pub fn is_rectified(&self) -> bool {
@@ -53,6 +59,10 @@ impl Topic {
         above.map(|above| format!("{above}/camera_info")).collect()
     }
 }
+
+/// What to do about a film.
+const DECODE: &str = "decode it to sensor_msgs/msg/Image first, by the republish node of image_transport, and record that; or give `mrfgs sequence` the films \
+                      themselves";
 
 /// What two topics of a pair of cameras are called apart from each other, the most certain first.
 const APART: [&[(&str, &str)]; 3] =
@@ -142,7 +152,10 @@ fn wrong(topic: &Topic) -> Reason {
     if [Image::NAME, CompressedImage::NAME].contains(&kind.as_str()) {
         return format!("{name} is neither in CDR nor in the bytes of ROS 1").into();
     }
-    let kind = if kind.is_empty() { "of no type" } else { kind };
+    if topic.has_video() {
+        return format!("{name} holds a film ({kind}) and not images; {DECODE}").into();
+    }
+    let kind = if kind.is_empty() { "messages of no type" } else { kind };
     format!("{name} holds {kind}, not sensor_msgs/msg/Image or CompressedImage; give the topic of images")
         .into()
 }
@@ -153,6 +166,9 @@ fn none(topics: &[Topic]) -> Reason {
         return "holds no messages".into();
     }
     let shown: Vec<_> = topics.iter().map(|topic| format!("{} ({})", topic.name, topic.kind)).collect();
+    if topics.iter().any(Topic::has_video) {
+        return format!("has films and no images on its topics; {DECODE}; it has {}", listed(&shown)).into();
+    }
     format!("has no images of sensor_msgs/msg/Image or CompressedImage; it has {}", listed(&shown)).into()
 }
 
@@ -221,6 +237,16 @@ mod tests {
             let said = found(names).unwrap_err();
             assert!(words.split(" & ").all(|word| said.contains(word)), "{said}");
         }
+        let films = ["/left/video", "/right/video"].map(|name| Topic {
+            name: name.into(),
+            kind: "foxglove.CompressedVideo".into(),
+            encoding: None,
+            count: None,
+        });
+        let said = pair(&films, "--topics").unwrap_err().to_string();
+        assert!(said.contains("has films and no images") && said.contains("republish"), "{said}");
+        let said = named(&films, "/left/video").unwrap_err().to_string();
+        assert!(said.contains("/left/video holds a film (foxglove.CompressedVideo)"), "{said}");
         let topics = topics("/left/image /left/camera_info");
         assert_eq!(named(&topics, "left/image").unwrap().name, "/left/image");
         assert!(

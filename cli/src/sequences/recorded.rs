@@ -29,8 +29,8 @@ pub(crate) struct Recorded {
     /// How many pairs came so far, and the time of the first image of each camera.
     count: usize,
     first: [Option<Stamp>; 2],
-    /// Whether an image of time 0 came of each camera.
-    has_zero: [bool; 2],
+    /// Images of each camera with a time, and with 0 in its place.
+    timed: [[usize; 2]; 2],
     remarks: Remarks,
 }
 
@@ -51,6 +51,8 @@ struct Noted {
     tally: Tally,
     /// Where and when a calibration became another one.
     changed: Option<(String, Stamp)>,
+    /// How many messages a bag should hold, and how many fewer it does.
+    missing: Option<(u64, u64)>,
 }
 
 /// Both views of one time, and the header of the left one.
@@ -79,6 +81,8 @@ impl Recorded {
         let cameras = cameras(&recording, &chosen)?;
         let infos = cameras.iter().flatten().map(|(topic, _)| topic.as_str());
         let names: Vec<_> = chosen.iter().map(|topic| topic.name.as_str()).chain(infos).collect();
+        let remarks = Remarks::default();
+        remarks.note(|noted| noted.missing = recording.missing());
         Ok(Self {
             files: recording.files().map(Path::to_owned).collect(),
             messages: Box::new(recording.messages(&names)),
@@ -88,8 +92,8 @@ impl Recorded {
             ended: false,
             count: 0,
             first: [None; 2],
-            has_zero: [false; 2],
-            remarks: Remarks::default(),
+            timed: [[0; 2]; 2],
+            remarks,
             images: Images { path: path.to_owned(), topics: chosen, reader },
         })
     }
@@ -145,6 +149,9 @@ impl Recorded {
     /// The next pair; `None` after the last one.
     pub(super) fn next(&mut self) -> Option<Result<Views>> {
         loop {
+            if let Some(error) = self.without_times() {
+                return Some(Err(error));
+            }
             let pair = self.pairing.next(self.ended);
             self.remarks.note(|noted| noted.tally = self.pairing.tally());
             if let Some([(_, left), (_, right)]) = pair {
@@ -174,13 +181,24 @@ impl Recorded {
         }
         let Header { stamp, .. } = header(&message).map_err(|reason| self.images.at(&message, reason))?;
         self.first[side].get_or_insert(stamp);
-        if stamp.0 == 0 && std::mem::replace(&mut self.has_zero[side], true) {
-            return Err(self
-                .images
-                .at(&message, "has no time in its headers, and images are paired by these"));
-        }
+        self.timed[side][usize::from(stamp.0 == 0)] += 1;
         self.pairing.add(side, stamp, message, bytes);
         Ok(())
+    }
+
+    /// Refuses images without times, all at once: nothing of them is a pair. A simulation begins at 0, which is a time then.
+    fn without_times(&mut self) -> Option<Error> {
+        let are_untimed =
+            |[timed, untimed]: [usize; 2]| untimed > 1 || self.ended && timed == 0 && untimed == 1;
+        let side = self.timed.into_iter().position(are_untimed)?;
+        (self.ended, self.error, self.pairing, self.timed) = (true, None, Pairing::new(0), [[0; 2]; 2]);
+        self.count = self.count.max(1);
+        let reason = format!(
+            "the images on {} have no time in their headers (it is 0), and images are paired by these; let the driver of the camera set it, \
+             and record again",
+            self.images.topics[side].name
+        );
+        Some(Error::read(&self.images.path, reason))
     }
 
     /// Notes where a camera says something else than before. (What makes no sense does not count: the first one did.)
@@ -233,9 +251,12 @@ impl Remarks {
 
     /// In words, where there is something to say.
     pub(crate) fn said(&self) -> Option<String> {
-        let Noted { tally, changed } = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Noted { tally, changed, missing } = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let Tally { alone: [left, right], repeated, late } = tally;
         let mut said = Vec::new();
+        if let Some((claimed, found)) = missing {
+            said.push(format!("the recording holds {found} messages, and {claimed} by its metadata.yaml"));
+        }
         if left + right > 0 {
             said.push(format!("{left} left and {right} right image{} had no partner", plural(right)));
         }

@@ -493,3 +493,137 @@ fn recordings_that_are_wrong_are_told_in_one_line() {
     frame("thin", 0).save(at("left/1.png")).unwrap();
     run(&folder, "sequence left left maps --tolerance 1").failed(2, "--tolerance & LEFT is none");
 }
+
+/// Images without times in their headers are refused, however many there are; one that begins at 0 has times.
+#[test]
+fn images_without_times_are_refused() {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
+    // Seconds and nanoseconds stand behind the first four bytes.
+    let at_zero = |message: &Message| {
+        let mut message = message.clone();
+        message.2[4..12].fill(0);
+        message
+    };
+    let good = images("image_rect", 0);
+    for count in [2, 4, 6] {
+        let untimed: Vec<_> = good[..count].iter().map(at_zero).collect();
+        record(&at("untimed.mcap"), &untimed);
+        run(&folder, &format!("sequence untimed.mcap maps {RANGE}")).failed(
+            1,
+            "untimed.mcap: the images on /left/image_rect have no time in their headers & record again",
+        );
+        assert!(!at("maps").exists(), "{count}");
+    }
+    let simulated: Vec<_> = good[..2].iter().map(at_zero).chain(good[2..].iter().cloned()).collect();
+    record(&at("simulated.mcap"), &simulated);
+    run(&folder, &format!("sequence simulated.mcap maps --quiet {RANGE}")).succeeded();
+    assert_eq!(listing(&at("maps")).len(), 3);
+}
+
+/// A part of a bag that its metadata names, and messages that it counts, are missed.
+#[test]
+fn what_a_bag_lacks_is_told() {
+    let folder = Folder::new();
+    let bag = folder.join("bag");
+    fs::create_dir(&bag).unwrap();
+    let good = images("image_rect", 0);
+    let metadata = |parts: &[&str], count: usize| {
+        let files = parts.iter().map(|part| format!("  - {part}\n")).collect::<Vec<_>>().concat();
+        let text = format!(
+            "rosbag2_bagfile_information:\n  message_count: {count}\n  relative_file_paths:\n{files}"
+        );
+        fs::write(bag.join("metadata.yaml"), text).unwrap();
+    };
+    record(&bag.join("bag_0.mcap"), &good[..2]);
+    metadata(&["bag_0.mcap", "bag_1.mcap"], 4);
+    run(&folder, &format!("sequence bag maps {RANGE}"))
+        .failed(1, "bag_1.mcap: there is no such file, though metadata.yaml names it & take its line out");
+    assert!(!folder.join("maps").exists());
+    metadata(&["bag_0.mcap"], 4);
+    let told = run(&folder, &format!("sequence bag maps {RANGE}")).succeeded();
+    told.says("the recording holds 2 messages, and 4 by its metadata.yaml");
+    // Control: all is there.
+    record(&bag.join("bag_1.mcap"), &good[2..4]);
+    metadata(&["bag_0.mcap", "bag_1.mcap"], 4);
+    let said = run(&folder, &format!("sequence bag whole {RANGE}")).succeeded().stderr;
+    assert!(!said.contains("metadata"), "{said}");
+    assert_eq!(listing(&folder.join("whole")).len(), 2);
+}
+
+/// The first damaged image of each camera is named, and no other; its frame is matched.
+#[test]
+fn damaged_images_in_recordings_are_named_once() {
+    let folder = Folder::new();
+    let compressed = |stamp: u64, image: &image::RgbImage, damaged: bool| {
+        let mut file = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
+        let mut file = file.into_inner();
+        if damaged {
+            // Some bytes less: a part of the pixels is missing.
+            let end = file.len() - 200;
+            file.drain(end..end + 60);
+        }
+        let message = Bytes::with_header(stamp, "camera").text("jpeg");
+        message.u32(file.len() as u32).bytes(&file).0
+    };
+    let mut messages = Vec::new();
+    for (n, scene) in SCENES.iter().enumerate() {
+        for (view, side) in ["left", "right"].into_iter().enumerate() {
+            let image = compressed(START + STEP * n as u64, &frame(scene, view), view == 1 && n > 0);
+            messages.push((
+                format!("/{side}/image_rect/compressed"),
+                "sensor_msgs/msg/CompressedImage",
+                image,
+            ));
+        }
+    }
+    record(&folder.join("jpeg.mcap"), &messages);
+    let said = run(&folder, &format!("sequence jpeg.mcap maps {RANGE}")).succeeded().stderr;
+    let warnings: Vec<_> = said.lines().filter(|line| line.contains("is damaged")).collect();
+    let words =
+        "warning: jpeg.mcap:/right/image_rect/compressed at 1700000000.050000000: the JPEG data is damaged";
+    assert!(warnings.len() == 1 && warnings[0].contains(words), "{said}");
+    assert_eq!(listing(&folder.join("maps")).len(), 3);
+    let said = run(&folder, &format!("sequence jpeg.mcap quiet --quiet {RANGE}")).succeeded().stderr;
+    assert_eq!(said, "");
+}
+
+/// What cameras of robots send: luma and chroma give the map of the colours that they stand for.
+#[test]
+fn images_in_luma_and_chroma_are_matched() {
+    let folder = Folder::new();
+    let all = images("image_rect", 0);
+    let pixels = 3 * (SIZE.0 * SIZE.1) as usize;
+    // Luma of 16 to 235 is grey, and chroma of 128 is none.
+    let luma = |message: &Message| -> Vec<u8> {
+        let rgb = &message.2[message.2.len() - pixels..];
+        rgb.chunks_exact(3).map(|p| 16 + (u32::from(p[1]) * 219 / 255) as u8).collect()
+    };
+    let message = |stamp: u64, encoding: &str, step: u32, data: &[u8]| {
+        let message = Bytes::with_header(stamp, "camera").u32(SIZE.1).u32(SIZE.0).text(encoding).bytes(&[0]);
+        message.u32(step).u32(data.len() as u32).bytes(data).0
+    };
+    let record_as = |name: &str, encoding: &str, step: u32, data: &dyn Fn(&[u8]) -> Vec<u8>| {
+        let made = all.iter().enumerate().map(|(n, one)| {
+            let stamp = START + STEP * (n / 2) as u64;
+            (one.0.clone(), IMAGE, message(stamp, encoding, step, &data(&luma(one))))
+        });
+        record(&folder.join(name), &made.collect::<Vec<_>>());
+        run(&folder, &format!("sequence {name} {encoding} --quiet {RANGE}")).succeeded();
+        listing(&folder.join(encoding)).into_values().collect::<Vec<_>>()
+    };
+    let wanted = record_as("grey.mcap", "mono8", SIZE.0, &|luma| {
+        luma.iter().map(|y| (((u32::from(*y) - 16) * 1_220_542 + (1 << 19)) >> 20).min(255) as u8).collect()
+    });
+    for (encoding, first) in [("uyvy", 1), ("yuv422_yuy2", 0)] {
+        let packed = record_as("packed.mcap", encoding, 2 * SIZE.0, &|luma| {
+            luma.iter().flat_map(|y| if first == 0 { [*y, 128] } else { [128, *y] }).collect()
+        });
+        assert!(packed == wanted, "{encoding}");
+    }
+    let planes = record_as("planes.mcap", "nv12", SIZE.0, &|luma| {
+        luma.iter().copied().chain(vec![128; luma.len() / 2]).collect()
+    });
+    assert!(planes == wanted);
+}

@@ -3,7 +3,6 @@
 
 use std::collections::HashMap;
 use std::mem;
-use std::path::Path;
 
 use mrfgs::Result;
 use mrfgs::error::Reason;
@@ -11,6 +10,7 @@ use mrfgs::error::Reason;
 use super::chunk::{Chunk, unpacked};
 use super::file::{File, MAX_RECORD};
 use super::message::{Message, Source, damage, topic};
+use super::place::Place;
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
@@ -36,8 +36,8 @@ pub(super) struct Bag {
 }
 
 impl Bag {
-    pub(super) fn open(path: &Path, wanted: Vec<String>) -> Result<Self> {
-        let mut file = File::open(path)?;
+    pub(super) fn open(place: &Place, wanted: Vec<String>) -> Result<Self> {
+        let mut file = File::open(place)?;
         if file.left() < MAGIC.len() as u64 || file.take(MAGIC.len() as u64)? != MAGIC {
             return Err(file.error("is no bag of ROS 1: it does not begin with #ROSBAG V2.0"));
         }
@@ -60,12 +60,12 @@ impl Bag {
     }
 
     /// The topics of a file.
-    pub(super) fn topics(path: &Path) -> Result<Vec<Topic>> {
-        let mut bag = Self::open(path, Vec::new())?;
+    pub(super) fn topics(place: &Place) -> Result<Vec<Topic>> {
+        let mut bag = Self::open(place, Vec::new())?;
         if bag.index > bag.file.at() && bag.index < bag.file.len() && bag.connections_of_index().is_ok() {
             return Ok(bag.topics);
         }
-        let mut bag = Self::open(path, Vec::new())?;
+        let mut bag = Self::open(place, Vec::new())?;
         // Damage is told when the messages are read: what lies before it counts.
         match damage(&mut bag) {
             Some(error) if bag.topics.is_empty() => Err(error),

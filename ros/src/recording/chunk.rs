@@ -9,6 +9,8 @@ use ruzstd::decoding::StreamingDecoder;
 
 use super::file::MAX_RECORD;
 use super::message::Message;
+use super::place::ZSTD;
+use crate::messages::Encoding;
 
 /// The records of a chunk, which are taken one by one.
 #[derive(Default)]
@@ -76,6 +78,16 @@ pub(super) fn unpacked(packed: &[u8], method: &str, size: u64) -> Result<Vec<u8>
         Ok(_) => Err(format!("is damaged: it holds more than the {size} bytes that it claims").into()),
         Err(error) => Err(format!("is damaged: {}", error.to_string().replace('\n', " ")).into()),
     }
+}
+
+/// The bytes of a message, unpacked where it is packed by itself.
+///
+/// # Errors
+/// Where nothing can be unpacked, in words that go after the name of the message.
+pub(super) fn plain(bytes: &[u8], encoding: Encoding) -> Result<Vec<u8>, Reason> {
+    // None in CDR begins so.
+    let is_packed = encoding == Encoding::Cdr && bytes.starts_with(ZSTD);
+    if is_packed { unpacked_alone(bytes) } else { Ok(bytes.to_vec()) }
 }
 
 /// What is in a message of its own that is packed by Zstandard.

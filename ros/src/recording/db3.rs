@@ -1,19 +1,16 @@
 //! Bags of ROS 2 in SQLite, in the order in which they were recorded.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use mrfgs::Result;
 use mrfgs::error::Reason;
 
-use super::chunk::unpacked_alone;
+use super::chunk::plain;
 use super::message::{Message, Source, topic};
+use super::place::Place;
 use super::sqlite::{Database, Rows, Table, Value};
 use crate::messages::Encoding;
 use crate::topics::Topic;
-
-/// How a message begins that is packed by Zstandard: none in CDR does.
-const PACKED: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
 
 /// A file that is being read.
 pub(super) struct Db3 {
@@ -26,8 +23,8 @@ pub(super) struct Db3 {
 }
 
 impl Db3 {
-    pub(super) fn open(path: &Path, wanted: &[String]) -> Result<Self> {
-        let mut database = Database::open(path)?;
+    pub(super) fn open(place: &Place, wanted: &[String]) -> Result<Self> {
+        let mut database = Database::open(place)?;
         let topics = all_topics(&mut database)?;
         let (messages, columns) = table(&mut database, "messages", ["topic_id", "data"])?;
         let wanted = topics.into_iter().filter_map(|(id, topic)| {
@@ -38,8 +35,8 @@ impl Db3 {
     }
 
     /// The topics of a file.
-    pub(super) fn topics(path: &Path) -> Result<Vec<Topic>> {
-        let mut database = Database::open(path)?;
+    pub(super) fn topics(place: &Place) -> Result<Vec<Topic>> {
+        let mut database = Database::open(place)?;
         let topics = all_topics(&mut database)?;
         // Damage is told when the messages are read: what lies before it counts.
         let counts = counts(&mut database).ok();
@@ -64,10 +61,9 @@ impl Source for Db3 {
             let Value::Bytes(bytes) = row.value(data) else {
                 return Err(self.database.error(format!("has a message without bytes: row {}", row.id)));
             };
-            let data = if bytes.starts_with(PACKED) { unpacked_alone(bytes) } else { Ok(bytes.to_vec()) };
             let error =
                 |reason: Reason| self.database.error(format!("the message of row {} {reason}", row.id));
-            return Ok(Some(Message { topic, encoding, data: data.map_err(error)? }));
+            return Ok(Some(Message { topic, encoding, data: plain(bytes, encoding).map_err(error)? }));
         }
         Ok(None)
     }

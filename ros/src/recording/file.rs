@@ -2,10 +2,12 @@
 
 use std::fs;
 use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mrfgs::error::Reason;
 use mrfgs::{Error, Result};
+
+use super::place::Place;
 
 /// The largest record that is read at once, in bytes.
 pub(super) const MAX_RECORD: u64 = 1 << 30;
@@ -19,8 +21,9 @@ pub(super) struct File {
 }
 
 impl File {
-    pub(super) fn open(path: &Path) -> Result<Self> {
-        let opened = fs::File::open(path).map_err(|e| match e.kind() {
+    pub(super) fn open(place: &Place) -> Result<Self> {
+        let path = &place.path;
+        let opened = fs::File::open(place.file()).map_err(|e| match e.kind() {
             std::io::ErrorKind::NotFound => {
                 Error::read(path, Reason::of(e, "there is no such file; check the name"))
             }

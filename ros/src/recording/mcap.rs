@@ -2,16 +2,16 @@
 
 use std::collections::HashMap;
 use std::mem;
-use std::path::Path;
 
 use mcap::MAGIC;
 use mcap::records::{Record, op};
 use mrfgs::Result;
 use mrfgs::error::Reason;
 
-use super::chunk::{Chunk, unpacked};
+use super::chunk::{Chunk, plain, unpacked};
 use super::file::{File, MAX_RECORD};
 use super::message::{Message, Source, damage, topic};
+use super::place::Place;
 use crate::messages::Encoding;
 use crate::topics::Topic;
 
@@ -40,8 +40,8 @@ struct Channel {
 }
 
 impl Mcap {
-    pub(super) fn open(path: &Path, wanted: Vec<String>) -> Result<Self> {
-        let mut file = File::open(path)?;
+    pub(super) fn open(place: &Place, wanted: Vec<String>) -> Result<Self> {
+        let mut file = File::open(place)?;
         if file.left() < MAGIC.len() as u64 || file.take(MAGIC.len() as u64)? != MAGIC {
             return Err(file.error("is no MCAP file: it does not begin as one"));
         }
@@ -56,12 +56,12 @@ impl Mcap {
     }
 
     /// The topics of a file.
-    pub(super) fn topics(path: &Path) -> Result<Vec<Topic>> {
-        let mut file = Self::open(path, Vec::new())?;
+    pub(super) fn topics(place: &Place) -> Result<Vec<Topic>> {
+        let mut file = Self::open(place, Vec::new())?;
         if let Some(topics) = file.summary() {
             return Ok(topics);
         }
-        let mut file = Self::open(path, Vec::new())?;
+        let mut file = Self::open(place, Vec::new())?;
         // Damage is told when the messages are read: what lies before it counts.
         match damage(&mut file) {
             Some(error) if file.topics.is_empty() => Err(error),
@@ -152,7 +152,8 @@ impl Mcap {
                 let (Some(topic), Some(encoding)) = (channel.wanted, channel.encoding) else {
                     return Ok(None);
                 };
-                Ok(Some(Message { topic, encoding, data: data.into_owned() }))
+                let data = plain(&data, encoding).map_err(|reason| format!("has a message that {reason}"))?;
+                Ok(Some(Message { topic, encoding, data }))
             }
             Ok(_) => Ok(None),
             Err(reason) => Err(format!("has a damaged record: {reason}").into()),

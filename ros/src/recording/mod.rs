@@ -6,9 +6,12 @@ mod db3;
 mod file;
 mod mcap;
 mod message;
+mod metadata;
+mod place;
 mod sqlite;
 mod write;
 
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -22,12 +25,16 @@ use db3::Db3;
 use mcap::Mcap;
 pub use message::Message;
 use message::messages;
+use metadata::Metadata;
+use place::Place;
 pub use write::Writer;
 
 /// The names that the files of recordings end with.
 const EXTENSIONS: [&str; 3] = ["mcap", "bag", "db3"];
 /// What the files of a recording in a folder end with.
 const PARTS: [&str; 4] = [".mcap", ".mcap.zstd", ".db3", ".db3.zstd"];
+/// What a file that is packed as a whole ends with.
+const PACKED: &str = ".zstd";
 /// Beside these.
 const METADATA: &str = "metadata.yaml";
 
@@ -35,8 +42,10 @@ const METADATA: &str = "metadata.yaml";
 #[derive(Clone, Debug)]
 pub struct Recording {
     path: PathBuf,
-    files: Vec<(PathBuf, Format)>,
+    files: Vec<(Place, Format)>,
     topics: Vec<Topic>,
+    /// How many messages it should hold, where that is known.
+    claimed: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,11 +62,11 @@ impl Recording {
         if path.is_dir() {
             // Folders of images may have such a file, too.
             let entries = fs::read_dir(path).into_iter().flatten().flatten();
-            let is_part = |name: &str| PARTS.iter().any(|end| name.to_ascii_lowercase().ends_with(end));
-            let has_parts = entries.into_iter().any(|entry| entry.file_name().to_str().is_some_and(is_part));
+            let has_parts = entries.into_iter().any(|entry| is_part(&entry.path()));
             return has_parts && path.join(METADATA).is_file();
         }
-        extension(path).is_some() || path.is_file() && format(path).is_ok_and(|format| format.is_some())
+        let begins_as_one = || format(&Place::plain(path)).is_ok_and(|format| format.is_some());
+        extension(path).is_some() || is_part(path) || path.is_file() && begins_as_one()
     }
 
     /// Opens the recording `path` and finds its topics: in its summary, or by reading it once where it has none.
@@ -65,12 +74,8 @@ impl Recording {
     /// # Errors
     /// [`Error::Read`] where there is no recording, or of another kind.
     pub fn open(path: &Path) -> Result<Self> {
-        let mut files = Vec::new();
-        if path.is_dir() {
-            files = in_folder(path)?;
-        } else {
-            files.push((path.to_owned(), known(path)?));
-        }
+        let (paths, claimed) = if path.is_dir() { in_folder(path)? } else { (vec![path.to_owned()], None) };
+        let files = paths.iter().map(|path| known(path)).collect::<Result<Vec<_>>>()?;
         let mut topics: Vec<Topic> = Vec::new();
         for (file, format) in &files {
             let more = match format {
@@ -86,7 +91,14 @@ impl Recording {
             }
         }
         topics.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(Self { path: path.to_owned(), files, topics })
+        Ok(Self { path: path.to_owned(), files, topics, claimed })
+    }
+
+    /// How many messages it should hold by its `metadata.yaml`, and how many it does, where these are fewer.
+    #[must_use]
+    pub fn missing(&self) -> Option<(u64, u64)> {
+        let found = self.topics.iter().map(|topic| topic.count).sum::<Option<u64>>()?;
+        self.claimed.filter(|claimed| *claimed > found).map(|claimed| (claimed, found))
     }
 
     /// As it was opened.
@@ -97,7 +109,7 @@ impl Recording {
 
     /// Its files, in order.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
-        self.files.iter().map(|(file, _)| file.as_path())
+        self.files.iter().map(|(file, _)| file.path.as_path())
     }
 
     /// Its topics, by their names.
@@ -124,7 +136,7 @@ impl Recording {
 type Messages = Box<dyn Iterator<Item = Result<Message>> + Send>;
 
 /// The messages of a file.
-fn open(file: &Path, format: Format, names: Vec<String>) -> Messages {
+fn open(file: &Place, format: Format, names: Vec<String>) -> Messages {
     let opened = match format {
         Format::Mcap => Mcap::open(file, names).map(|file| Box::new(messages(file)) as Messages),
         Format::Bag => Bag::open(file, names).map(|file| Box::new(messages(file)) as Messages),
@@ -139,19 +151,27 @@ fn extension(path: &Path) -> Option<String> {
     EXTENSIONS.contains(&extension.as_str()).then_some(extension)
 }
 
+/// Whether `path` is called like a file of a recording in a folder.
+fn is_part(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    PARTS.iter().any(|end| name.ends_with(end))
+}
+
 /// The format of a file, by its first bytes.
-fn format(path: &Path) -> Result<Option<Format>> {
-    let mut file = file::File::open(path)?;
+fn format(place: &Place) -> Result<Option<Format>> {
+    let mut file = file::File::open(place)?;
     let start = file.take(file.left().min(16))?;
     let known = [(MAGIC, Format::Mcap), (bag::MAGIC, Format::Bag), (sqlite::MAGIC, Format::Db3)];
     Ok(known.into_iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, format)| format))
 }
 
-fn known(path: &Path) -> Result<Format> {
-    let reason = match format(path)? {
-        Some(format) => return Ok(format),
+/// A file of a recording with its format.
+fn known(path: &Path) -> Result<(Place, Format)> {
+    let place = Place::of(path)?;
+    let reason = match format(&place)? {
+        Some(format) => return Ok((place, format)),
         None if fs::metadata(path).is_ok_and(|file| file.len() == 0) => "is empty",
-        None => match extension(path).as_deref() {
+        None => match extension(Path::new(unpacked(&path.to_string_lossy()))).as_deref() {
             Some("bag") => "is no bag of ROS 1: it does not begin with #ROSBAG V2.0",
             Some("db3") => "is no bag of ROS 2: it does not begin as a database of SQLite",
             _ => "is no MCAP file: it does not begin as one",
@@ -160,26 +180,45 @@ fn known(path: &Path) -> Result<Format> {
     Err(Error::read(path, reason))
 }
 
-/// The files of the recording in a folder, in order.
-fn in_folder(folder: &Path) -> Result<Vec<(PathBuf, Format)>> {
+/// The files of the recording in a folder, in order, and how many messages they should hold.
+fn in_folder(folder: &Path) -> Result<(Vec<PathBuf>, Option<u64>)> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     let mut paths: Vec<PathBuf> =
         entries.map_err(|e| Error::read(folder, e))?.into_iter().map(|entry| entry.path()).collect();
-    let ends = |path: &Path, end: &str| path.to_string_lossy().to_ascii_lowercase().ends_with(end);
-    if let Some(packed) = paths.iter().find(|path| ends(path, ".mcap.zstd") || ends(path, ".db3.zstd")) {
-        return Err(Error::read(packed, "is packed as a whole; unpack it with `zstd -d`"));
+    paths.retain(|path| is_part(path) && path.is_file());
+    let metadata = Metadata::read(&folder.join(METADATA));
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    // Somebody may have packed or unpacked it since.
+    let is_there = |file: &String| paths.iter().any(|path| unpacked(&name(path)) == unpacked(file));
+    if let Some(missing) = metadata.files.iter().find(|file| !is_there(file)) {
+        let reason = "there is no such file, though metadata.yaml names it as a part of this recording; get it, or take its line out of \
+                      metadata.yaml to do without it";
+        return Err(Error::read(folder.join(missing), reason));
     }
-    paths.retain(|path| (ends(path, ".mcap") || ends(path, ".db3")) && path.is_file());
+    if !["", "zstd"].contains(&metadata.packed.as_str()) {
+        let packed: String = metadata.packed.chars().filter(|c| !c.is_control()).take(20).collect();
+        let reason = format!("is packed by `{packed}`, and zstd is read; unpack it with `ros2 bag convert`");
+        return Err(Error::read(folder, reason));
+    }
     if paths.is_empty() {
         return Err(Error::read(folder, "has a metadata.yaml and no MCAP or .db3 file"));
     }
+    // `zstd -d` leaves the packed file beside the other.
+    let names: HashSet<_> = paths.iter().map(|path| name(path)).collect();
+    paths.retain(|path| name(path).strip_suffix(PACKED).is_none_or(|plain| !names.contains(plain)));
     // The number at the end says their order, and 9 comes before 10.
     paths.sort_by_key(|path| {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = unpacked(&name(path)).to_owned();
+        let stem = name.rsplit_once('.').map_or(&*name, |(stem, _)| stem).to_owned();
         let start = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
         (stem[..start].to_owned(), stem[start..].parse::<u64>().ok(), stem)
     });
-    paths.into_iter().map(|path| known(&path).map(|format| (path, format))).collect()
+    Ok((paths, metadata.count))
+}
+
+/// The name of a file before it was packed.
+fn unpacked(name: &str) -> &str {
+    name.strip_suffix(PACKED).unwrap_or(name)
 }
 
 #[cfg(test)]

@@ -3,12 +3,13 @@
 
 use std::fs;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mrfgs::Result;
 use mrfgs::error::Reason;
 
 use super::file::{File, MAX_RECORD};
+use super::place::Place;
 
 /// How such a file begins.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
@@ -77,8 +78,8 @@ pub(super) enum Value<'a> {
 }
 
 impl Database {
-    pub(super) fn open(path: &Path) -> Result<Self> {
-        let mut file = File::open(path)?;
+    pub(super) fn open(place: &Place) -> Result<Self> {
+        let mut file = File::open(place)?;
         if file.left() < HEAD as u64 {
             return Err(file.error("is no database of SQLite: it is shorter than its head"));
         }
@@ -87,7 +88,7 @@ impl Database {
             return Err(file.error("is no database of SQLite: it does not begin as one"));
         }
         for end in UNFINISHED {
-            let beside = PathBuf::from(format!("{}{end}", path.display()));
+            let beside = PathBuf::from(format!("{}{end}", place.path.display()));
             // One that was done with begins with a 0, or is empty.
             let mut first = [0];
             let is_used = fs::File::open(&beside).and_then(|mut beside| beside.read(&mut first)).is_ok();

@@ -353,7 +353,92 @@ fn folders_have_their_files_in_order() {
     fs::copy(of_sqlite("small.db3"), at("drive_11.db3")).unwrap();
     assert_eq!(Recording::open(folder.path()).unwrap().topics()[0].count, Some(13));
     fs::write(at("drive_12.mcap.zstd"), "").unwrap();
-    said("zstd -d");
+    said("drive_12.mcap.zstd: is empty");
+}
+
+/// What `rosbag2` says of its files is so, or is told.
+#[test]
+fn what_metadata_says_is_kept() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for number in [0_i64, 1] {
+        let mut writer = Writer::new(fs::File::create(at(&format!("a_{number}.mcap"))).unwrap()).unwrap();
+        writer.add("/left/image", Stamp(number), &frame(number)).unwrap();
+        writer.finish().unwrap();
+    }
+    let metadata = |files: &str, count: u64, codec: &str| {
+        let text = format!(
+            "rosbag2_bagfile_information:\n  message_count: {count}\n  compression_format: {codec}\n  relative_file_paths:\n{files}"
+        );
+        fs::write(at("metadata.yaml"), text).unwrap();
+    };
+    let both = "  - a_0.mcap\n  - a_1.mcap\n";
+    metadata(both, 2, "''");
+    assert_eq!(read(folder.path()).0.len(), 2);
+    assert_eq!(Recording::open(folder.path()).unwrap().missing(), None);
+    metadata(both, 5, "''");
+    assert_eq!(Recording::open(folder.path()).unwrap().missing(), Some((5, 2)));
+    metadata(&format!("{both}  - a_2.mcap\n"), 3, "''");
+    let said = read(folder.path()).1.unwrap();
+    assert!(said.contains("a_2.mcap: there is no such file, though metadata.yaml names it"), "{said}");
+    metadata(both, 2, "fake_comp");
+    assert!(read(folder.path()).1.unwrap().contains("packed by `fake_comp`"));
+    // A part that was packed since, and one beside what it was unpacked to.
+    metadata(both, 2, "zstd");
+    let packed = zstd(&fs::read(at("a_1.mcap")).unwrap());
+    fs::write(at("a_1.mcap.zstd"), &packed).unwrap();
+    assert_eq!(read(folder.path()).0.len(), 2);
+    fs::remove_file(at("a_1.mcap")).unwrap();
+    assert_eq!(read(folder.path()), ([0, 1].map(|number| frame(number).encode()).to_vec(), None));
+}
+
+fn zstd(bytes: &[u8]) -> Vec<u8> {
+    ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest)
+}
+
+#[test]
+fn files_may_be_packed_as_a_whole() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.db3.zstd");
+    let whole = fs::read(of_sqlite("small.db3")).unwrap();
+    let all: Vec<_> = (0..10).map(|number| frame(number).encode()).collect();
+    // In one part, or in two, each packed by itself.
+    let halves = [zstd(&whole[..1000]), zstd(&whole[1000..])].concat();
+    for packed in [zstd(&whole), halves] {
+        fs::write(&path, &packed).unwrap();
+        assert!(Recording::is(&path));
+        assert_eq!(read(&path), (all.clone(), None));
+        fs::write(&path, &packed[..packed.len() / 2]).unwrap();
+        let said = read(&path).1.unwrap();
+        assert!(said.contains("a.db3.zstd: is damaged, or cut off"), "{said}");
+    }
+    fs::write(&path, zstd(b"a text")).unwrap();
+    let said = read(&path).1.unwrap();
+    assert!(said.contains("a.db3.zstd: is no bag of ROS 2"), "{said}");
+    // What is unpacked goes with the recording.
+    fs::write(&path, zstd(&whole)).unwrap();
+    let recording = Recording::open(&path).unwrap();
+    let copy = recording.files[0].0.file().to_owned();
+    let messages = recording.messages(&["/left/image"]);
+    drop(recording);
+    assert!(copy.is_file() && copy != path);
+    assert_eq!(messages.count(), 10);
+    assert!(!copy.exists());
+}
+
+/// A message of an MCAP file that is packed by itself, as `rosbag2` does it.
+#[test]
+fn messages_of_mcap_files_may_be_packed_alone() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.mcap");
+    let file = std::io::BufWriter::new(fs::File::create(&path).unwrap());
+    let mut writer = ::mcap::WriteOptions::new().compression(None).create(file).unwrap();
+    let schema = writer.add_schema(<Image as crate::messages::Type>::NAME, "ros2msg", b"").unwrap();
+    let images = writer.add_channel(schema, "/left/image", "cdr", &BTreeMap::new()).unwrap();
+    let header = MessageHeader { channel_id: images, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, &zstd(&frame(3).encode())).unwrap();
+    writer.finish().unwrap();
+    assert_eq!(read(&path), (vec![frame(3).encode()], None));
 }
 
 #[test]

@@ -165,6 +165,9 @@ impl Arrivals {
         pairing: &mut LivePairing<(Header, Vec<u8>)>,
     ) -> mrfgs_ros::messages::Result<()> {
         let header = Header::of(&bytes, Encoding::Cdr)?;
+        if header.stamp.0 == 0 {
+            return Err("has no time in its header (it is 0), and images are paired by it".into());
+        }
         let pair = pairing.add(side, header.stamp, (header, bytes));
         let mut state = self.state();
         state.count.images[side] += 1;
