@@ -138,12 +138,24 @@ pub enum ReadError {
 pub struct Reason {
     text: String,
     io: Option<Arc<io::Error>>,
+    of_request: bool,
 }
 
 impl Reason {
     /// Other words for an error of the system.
     pub fn of(error: io::Error, words: impl Into<String>) -> Self {
-        Self { text: words.into(), io: Some(error.into()) }
+        Self { text: words.into(), io: Some(error.into()), of_request: false }
+    }
+
+    /// Why nothing could serve what was asked for, whatever the machine: a name whose extension says no format.
+    pub fn of_request(words: impl Into<String>) -> Self {
+        Self { of_request: true, ..words.into().into() }
+    }
+
+    /// Whether what was asked for makes no sense.
+    #[must_use]
+    pub fn is_of_request(&self) -> bool {
+        self.of_request
     }
 
     /// The same error in the words that `f` makes of its own.
@@ -174,7 +186,7 @@ impl PartialEq for Reason {
 
 impl From<String> for Reason {
     fn from(text: String) -> Self {
-        Self { text, io: None }
+        Self { text, io: None, of_request: false }
     }
 }
 
@@ -186,8 +198,24 @@ impl From<&str> for Reason {
 
 impl From<io::Error> for Reason {
     fn from(error: io::Error) -> Self {
-        let text = error.to_string();
+        let text = in_words(&error);
         Self::of(error, text)
+    }
+}
+
+/// An error of the system for people: without its number, and without the names that Rust has for kinds of errors.
+#[must_use]
+pub fn in_words(error: &io::Error) -> String {
+    let text = error.to_string();
+    if let Some(code) = error.raw_os_error() {
+        return text.strip_suffix(&format!(" (os error {code})")).unwrap_or(&text).to_owned();
+    }
+    match error.kind() {
+        _ if error.get_ref().is_some() => text,
+        io::ErrorKind::UnexpectedEof => "it ends too early".into(),
+        io::ErrorKind::NotFound => "it is not there".into(),
+        io::ErrorKind::WriteZero => "no more can be written".into(),
+        _ => text,
     }
 }
 
@@ -536,6 +564,25 @@ fn size(bytes: u64) -> String {
 mod tests {
     use super::*;
     use std::fs;
+
+    /// The system's words, without Rust's.
+    #[test]
+    fn errors_of_the_system_are_for_people() {
+        let cut = io::Error::from(io::ErrorKind::UnexpectedEof);
+        let own = io::Error::new(io::ErrorKind::NotFound, "the chunk is missing");
+        for (error, words) in [
+            (io::ErrorKind::NotFound.into(), "it is not there"),
+            (cut, "it ends too early"),
+            (io::ErrorKind::WriteZero.into(), "no more can be written"),
+            (own, "the chunk is missing"),
+        ] {
+            assert_eq!(Error::write("a", error).to_string(), format!("cannot write a: {words}"));
+        }
+        for code in 1..40 {
+            let said = Error::read("a", io::Error::from_raw_os_error(code)).to_string();
+            assert!(!said.contains("os error") && !said.contains("uncategorized"), "{said}");
+        }
+    }
 
     /// A library user knows no flags, and no program.
     #[test]

@@ -46,6 +46,7 @@ impl Failure {
                 | Error::Execution(_)
                 | Error::Budget(_),
             ) => ExitCode::from(2),
+            Self::Error(Error::Write { reason, .. }) if reason.is_of_request() => ExitCode::from(2),
             Self::Stopped(_) => ExitCode::from(stop::STOPPED),
             Self::Failed(_) | Self::Error(_) => ExitCode::FAILURE,
         }

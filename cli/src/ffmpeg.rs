@@ -7,6 +7,7 @@ use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 
+use mrfgs::error::in_words;
 use mrfgs::image::write;
 use mrfgs::{Error, Result};
 use tempfile::TempDir;
@@ -217,7 +218,7 @@ fn missing(error: &io::Error, does: &str) -> String {
         ErrorKind::NotFound => {
             format!("ffmpeg {does} such films, and there is none on the PATH: install it, or use NAME.y4m")
         }
-        _ => format!("ffmpeg, which {does} such films, cannot be run: {error}"),
+        _ => format!("ffmpeg, which {does} such films, cannot be run: {}", in_words(error)),
     }
 }
 

@@ -52,7 +52,7 @@ Examples:
   mrfgs presets paper > paper.toml
 
 Exit status: 0 when all went well, 2 when the command line makes no sense (for this pair, or on this machine), 130 when \
-stopped by Ctrl-C or SIGTERM, 1 for any other failure. A failure is one line on standard error and leaves no output behind.";
+stopped by Ctrl-C or another signal that ends programs, 1 for any other failure. A failure is one line on standard error and leaves no output behind.";
 
 #[derive(Parser)]
 #[command(name = "mrfgs", version, about = ABOUT, after_help = EXAMPLES, max_term_width = 100)]
@@ -88,6 +88,7 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     process::tell_panics_in_one_line();
+    stop::tell_of_full_files();
     match panic::catch_unwind(run) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         // The hook has told about it.
@@ -160,6 +161,57 @@ mod tests {
     #[test]
     fn the_parser_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    /// What is wrong with the flags of an example.
+    fn fault(line: &str) -> Option<String> {
+        let line = ["  #", " | ", " > ", " && "]
+            .iter()
+            .fold(line, |line, end| line.split(end).next().unwrap_or(line));
+        let answer =
+            Cli::try_parse_from(line.split_whitespace().map(|word| word.trim_matches(['\'', '"']))).err()?;
+        // Prose calls a command without what it takes.
+        let is_short = matches!(
+            answer.kind(),
+            ErrorKind::DisplayHelp
+                | ErrorKind::DisplayVersion
+                | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+                | ErrorKind::MissingRequiredArgument
+        );
+        (!is_short).then(|| format!("{line}: {}", one_line(&answer)))
+    }
+
+    /// Every command line that the help and the documents show is one.
+    #[test]
+    fn examples_are_command_lines() {
+        fn texts(command: &clap::Command) -> Vec<String> {
+            let help = [command.get_after_help(), command.get_long_about()]
+                .map(|text| text.map(ToString::to_string));
+            help.into_iter().flatten().chain(command.get_subcommands().flat_map(texts)).collect()
+        }
+        // A plug-in's line, and those that stand for words.
+        let no_lines = ["mrfgs /path/to/asp-plugin", "mrfgs --threads"];
+        let of_help = texts(&Cli::command());
+        let mut lines: Vec<String> = of_help
+            .iter()
+            .flat_map(|text| text.lines())
+            .filter_map(|line| line.strip_prefix("  ").filter(|line| line.starts_with("mrfgs ")))
+            .map(str::to_owned)
+            .collect();
+        let of_help = lines.len();
+        for document in ["README.md", "docs/guide.md", "docs/results.md"] {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(document);
+            let text = std::fs::read_to_string(path).unwrap();
+            let prose = text.split("\n```").step_by(2).collect::<Vec<_>>().join("\n");
+            let spans = prose.split('`').skip(1).step_by(2).map(|span| span.replace('\n', " "));
+            lines.extend(spans.filter(|span| span.starts_with("mrfgs ") && !span.contains("...")));
+        }
+        lines.retain(|line| !no_lines.iter().any(|start| line.starts_with(start)));
+        let faults: Vec<_> = lines.iter().filter_map(|line| fault(line)).collect();
+        assert!(faults.is_empty(), "{faults:#?}");
+        assert!(of_help > 40 && lines.len() > of_help + 30, "{of_help} of {} lines", lines.len());
+        assert!(fault("mrfgs match l.png r.png d.pfm --frobnicate  # control").is_some());
+        assert!(fault("mrfgs frobnicate").is_some());
     }
 
     /// The flags that a command may have, --help apart.

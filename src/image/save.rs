@@ -15,23 +15,40 @@ const MAX_LINKS: usize = 40;
 /// Where a file at `path` will be once it is complete, replacing what is there, and its folder. `None` for anything else that
 /// exists: a device or a pipe must not be replaced by a file.
 fn destination(path: &Path) -> Result<Option<(PathBuf, PathBuf)>> {
-    let error = |reason: &str| Err(Error::write(path, reason));
-    let file = match fs::metadata(path) {
-        Ok(m) if m.is_dir() => return error("is a folder; give the name of a file"),
+    let error = |reason: Reason| Err(Error::write(path, reason));
+    let there = fs::metadata(path);
+    match &there {
+        Ok(m) if m.is_dir() => return error("is a folder; give the name of a file".into()),
         Ok(m) if !m.is_file() => return Ok(None),
         Ok(m) if m.permissions().readonly() => {
-            return error("the file there is read-only; remove it first");
+            return error("the file there is read-only; remove it first".into());
         }
-        _ => followed(path).map_err(|e| Error::write(path, e))?,
-    };
-    if file.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator) {
-        return error("names no file; give the name of one");
+        _ => {}
     }
+    if path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator) {
+        return error(Reason::of_request("names no file; give the name of one"));
+    }
+    let file = match there {
+        Err(e) if e.kind() == ErrorKind::NotADirectory => return error(no_folder(folder_of(path))),
+        // Such as a name that is too long: it would be found out when all is done.
+        Err(e) if e.kind() != ErrorKind::NotFound => followed(path).and(Err(e)),
+        _ => followed(path),
+    };
+    let file = file.map_err(|e| Error::write(path, e))?;
     let folder = folder_of(&file).to_owned();
     if !folder.is_dir() {
-        return error(&format!("there is no folder {}; create it first", folder.display()));
+        return error(no_folder(&folder));
     }
     Ok(Some((file, folder)))
+}
+
+/// Why nothing can be written into `folder`, which is none.
+#[must_use]
+pub fn no_folder(folder: &Path) -> Reason {
+    match folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
+        Some(file) => format!("{} is a file and no folder; give another name", file.display()).into(),
+        None => format!("there is no folder {}; create it first", folder.display()).into(),
+    }
 }
 
 fn folder_of(file: &Path) -> &Path {
@@ -74,8 +91,11 @@ impl Sink {
             return Ok(Self::Unnamed(file));
         }
         builder().tempfile_in(folder).map(Self::Named).map_err(|e| {
-            let words = format!("no file can be created in {}: {}", folder.display(), e.kind());
-            Error::write(path, Reason::of(e, words))
+            let place = folder.display();
+            Error::write(
+                path,
+                Reason::from(e).reworded(|words| format!("no file can be created in {place}: {words}")),
+            )
         })
     }
 

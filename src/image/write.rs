@@ -9,9 +9,9 @@ use super::cloud::Cloud;
 use super::picture::{Picture, png, png_or_tiff_size};
 use super::save::check;
 use super::{Georeference, Plane, pcd, pfm, ply, tiff};
-use crate::error::{Error, Result};
+use crate::error::{Error, Reason, Result};
 
-pub use super::save::{Growing, publish, remove, save};
+pub use super::save::{Growing, no_folder, publish, remove, save};
 
 /// Disparities in 16-bit PNG files are in 1/256 of a pixel, as in the KITTI benchmark.
 const PNG_SCALE: f32 = 256.0;
@@ -107,7 +107,7 @@ pub fn check_disparity_path(path: &Path, min_disparity: i32, max_disparity: i32)
             "16-bit PNG holds disparities from 0 to 255 and the range is {min_disparity} to {max_disparity}; \
              write .pfm or .tif"
         );
-        return Err(Error::write(path, reason));
+        return Err(Error::write(path, Reason::of_request(reason)));
     }
     check(path)
 }
@@ -154,7 +154,9 @@ pub fn cloud(path: &Path, cloud: &Cloud) -> Result<()> {
             super::las::encode(cloud, word == "laz").map_err(|reason| Error::write(path, reason))?
         }
         _ if is_special(path) => ply::encode(cloud),
-        _ => return Err(Error::write(path, format!("point clouds end in {CLOUDS}"))),
+        _ => {
+            return Err(Error::write(path, Reason::of_request(format!("point clouds end in {CLOUDS}"))));
+        }
     };
     save(path, &bytes)
 }
@@ -171,7 +173,7 @@ pub fn picture(path: &Path, picture: &impl Picture) -> Result<()> {
 fn check_float(path: &Path) -> Result<()> {
     match format(path) {
         Ok(Format::Pfm | Format::Tiff) => Ok(()),
-        _ => Err(Error::write(path, "depth maps end in .pfm or .tif (float)")),
+        _ => Err(Error::write(path, Reason::of_request("depth maps end in .pfm or .tif (float)"))),
     }
 }
 
@@ -179,7 +181,7 @@ fn png_extension(path: &Path) -> Result<()> {
     if extension(path).as_deref() == Some("png") || is_special(path) {
         return Ok(());
     }
-    Err(Error::write(path, "pictures are written as PNG; give a name that ends in .png"))
+    Err(Error::write(path, Reason::of_request("pictures are written as PNG; give a name that ends in .png")))
 }
 
 fn format(path: &Path) -> Result<Format> {
@@ -188,7 +190,10 @@ fn format(path: &Path) -> Result<Format> {
         Some("png") => Ok(Format::Png),
         Some("tif" | "tiff") => Ok(Format::Tiff),
         _ if is_special(path) => Ok(Format::Pfm),
-        _ => Err(Error::write(path, "disparity maps end in .pfm (float), .tif (float) or .png (16-bit)")),
+        _ => Err(Error::write(
+            path,
+            Reason::of_request("disparity maps end in .pfm (float), .tif (float) or .png (16-bit)"),
+        )),
     }
 }
 

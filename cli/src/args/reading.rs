@@ -4,15 +4,17 @@ use std::path::{Path, PathBuf};
 
 use mrfgs::image::Plane;
 use mrfgs::image::read::{MAX_PIXELS, Reader};
+use serde::{Serialize, Serializer};
 
 use crate::failure::{Failure, Result};
 
 /// How images, masks and maps are read.
-#[derive(clap::Args)]
+#[derive(clap::Args, Serialize)]
 pub(crate) struct ReadingArgs {
     /// Ignores pixels that have this value in every channel, as the file stores it [default: the no-data
     /// value that a TIFF file names]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    #[serde(serialize_with = "in_words")]
     pub(crate) no_data: Option<f64>,
     /// Largest number of pixels of an image; a file that claims more is refused before it takes memory
     #[arg(
@@ -22,6 +24,8 @@ pub(crate) struct ReadingArgs {
         default_value_t = MAX_PIXELS,
         value_parser = clap::value_parser!(u64).range(1..)
     )]
+    // It refuses images, and changes none.
+    #[serde(skip)]
     pub(crate) max_pixels: u64,
     /// Turns images and masks upright that are stored turned, as the orientation tag of EXIF or TIFF says.
     /// Otherwise pixels are taken as they are stored, and a line says so
@@ -41,6 +45,12 @@ pub(crate) fn disparity(reader: Reader, path: &Path, scale: Option<f32>) -> mrfg
         Some(scale) => reader.scaled_disparity(path, scale),
         None => reader.disparity(path),
     }
+}
+
+/// JSON has no numbers that are not finite.
+#[allow(clippy::ref_option, reason = "serde hands it over so")]
+fn in_words<S: Serializer>(value: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+    value.map(|value| value.to_string()).serialize(to)
 }
 
 impl ReadingArgs {

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use mrfgs::rectification::Options;
+use serde::Serialize;
 
 use crate::failure::{Failure, Result};
 
 /// The calibration that rectifies, and how.
-#[derive(clap::Args)]
+#[derive(clap::Args, Serialize)]
 pub(crate) struct RectificationArgs {
     /// How much to show, from 0 (only pixels that have a source) to 1 (all pixels of the images). Without it
     /// the rectification is that of the calibration if it has one, else one that keeps the focal length

@@ -1,7 +1,8 @@
 //! `mrfgs demo`.
 
-use std::fs;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use clap::Parser;
 
@@ -18,6 +19,13 @@ const PAIR: [(&str, &[u8]); 2] = [
 /// Its range and cameras, and what else is made of it.
 const FLAGS: &str = "--max-disparity 47 --focal 240 --baseline 0.186m --also preview,points";
 
+/// What is made of it.
+const MADE: [(&str, &str); 3] = [
+    ("disparity.preview.png", "the map in colours"),
+    ("disparity.points.ply", "the points; MeshLab, CloudCompare and Blender show them"),
+    ("disparity.pfm", "the disparities in pixels"),
+];
+
 const EXAMPLES: &str = "\
 Examples:
   mrfgs demo
@@ -29,7 +37,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The folder for the pair and what is made of it; it must be new or empty
+    /// The folder for the pair and what is made of it; it must be new or empty, or hold what a demo has made, which is made anew
     #[arg(default_value = "mrfgs-demo")]
     folder: PathBuf,
 }
@@ -42,7 +50,11 @@ struct Matching {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let folder = StagedFolder::new_or_empty(&args.folder)?;
+    let folder = if is_demo(&args.folder) {
+        StagedFolder::new(&args.folder)?
+    } else {
+        StagedFolder::new_or_empty(&args.folder)?
+    };
     for (name, bytes) in PAIR {
         fs::write(folder.path().join(name), bytes).map_err(|e| folder.error(e))?;
     }
@@ -51,12 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     r#match::run(&matching.args)?;
     folder.publish()?;
     let shown = words(&args.folder).map(|path| path.display().to_string()).join(" ");
-    let made = [
-        ("disparity.preview.png", "the map in colours"),
-        ("disparity.points.ply", "the points; MeshLab, CloudCompare and Blender show them"),
-        ("disparity.pfm", "the disparities in pixels"),
-    ];
-    let made = made.map(|(name, what)| (args.folder.join(name).display().to_string(), what));
+    let made = MADE.map(|(name, what)| (args.folder.join(name).display().to_string(), what));
     let width = made.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     let made = made.map(|(name, what)| format!("  {name:width$}  {what}\n")).concat();
     console::print(&format!(
@@ -70,6 +77,17 @@ If it is not, and they are not:               mrfgs match LEFT RIGHT disparity.p
 "
     ))?;
     Ok(())
+}
+
+/// Whether `folder` holds the pair and nothing but what is made of it.
+fn is_demo(folder: &Path) -> bool {
+    let is_ours =
+        |name: &OsStr| PAIR.iter().map(|file| file.0).chain(MADE.map(|file| file.0)).any(|own| name == own);
+    let is_kept =
+        |(name, bytes): &(&str, &[u8])| fs::read(folder.join(name)).is_ok_and(|there| there == *bytes);
+    let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    entries.is_ok_and(|entries| entries.iter().all(|entry| is_ours(&entry.file_name())))
+        && PAIR.iter().all(is_kept)
 }
 
 /// The pair and the map in `folder`.

@@ -11,6 +11,7 @@ use mrfgs::image::cloud::Frame;
 use mrfgs::image::write::Writer;
 use mrfgs::image::{Plane, write};
 use mrfgs::options::{DisparityRange, Method};
+use serde::{Serialize, Serializer};
 
 use crate::failure::{Failure, Result};
 use crate::outputs::also::{ALL, Also, Kind};
@@ -20,21 +21,27 @@ use crate::outputs::outcome::{Of, Outcome, View};
 use crate::text::plural;
 
 /// The outputs beside the disparity map.
-#[derive(clap::Args)]
+#[derive(clap::Args, Serialize)]
 #[command(next_help_heading = "More outputs")]
 pub(crate) struct AlsoArgs {
     /// Writes more files beside the disparity map, as STEM.WORD.EXTENSION: `--also raw,validity` with d.pfm writes d.raw.pfm
     /// and d.validity.png
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parser())]
+    // The names of the outputs say it.
+    #[serde(skip)]
     also: Vec<&'static Also>,
     /// Colours of the previews, from far to near [default: turbo]
     #[arg(long, value_name = "NAME", value_parser = colours())]
+    #[serde(serialize_with = "colours_in_a_word")]
     colours: Option<ColourMap>,
     /// The camera of --also depth-registered, such as that of a rig's colours: its lens, its size, and how it stands to the left
     /// camera. One camera by the names of OpenCV (K, D, R, T and a size), Kalibr's chain, whose last camera it is, or the file of an OAK
     #[arg(long, value_name = "FILE")]
+    // It is among the inputs.
+    #[serde(skip)]
     pub(crate) into: Option<PathBuf>,
     #[command(flatten)]
+    #[serde(flatten)]
     pub(crate) limits: Limits,
 }
 
@@ -45,15 +52,22 @@ fn parser() -> impl TypedValueParser<Value = &'static Also> {
         .try_map(|word| ALL.iter().find(|also| also.word == word).ok_or("no such word"))
 }
 
+/// The words of `--colours`, with their help.
+const COLOURS: [(&str, &str, ColourMap); 3] = [
+    ("turbo", "Cold to warm", ColourMap::Turbo),
+    ("viridis", "Violet to yellow, with even steps of lightness", ColourMap::Viridis),
+    ("grey", "Dark to bright", ColourMap::Grey),
+];
+
 fn colours() -> impl TypedValueParser<Value = ColourMap> {
-    let maps = [
-        ("turbo", "Cold to warm", ColourMap::Turbo),
-        ("viridis", "Violet to yellow, with even steps of lightness", ColourMap::Viridis),
-        ("grey", "Dark to bright", ColourMap::Grey),
-    ];
-    PossibleValuesParser::new(maps.map(|(name, help, _)| PossibleValue::new(name).help(help))).try_map(
-        move |word| maps.into_iter().find(|map| map.0 == word).map(|map| map.2).ok_or("no such word"),
-    )
+    PossibleValuesParser::new(COLOURS.map(|(name, help, _)| PossibleValue::new(name).help(help)))
+        .try_map(|word| COLOURS.into_iter().find(|map| map.0 == word).map(|map| map.2).ok_or("no such word"))
+}
+
+#[allow(clippy::ref_option, reason = "serde hands it over so")]
+fn colours_in_a_word<S: Serializer>(colours: &Option<ColourMap>, to: S) -> Result<S::Ok, S::Error> {
+    let colours = colours.unwrap_or_default();
+    COLOURS.iter().find(|map| map.2 == colours).map(|map| map.0).serialize(to)
 }
 
 impl AlsoArgs {

@@ -28,15 +28,16 @@ impl Claim {
     /// it.
     pub(crate) fn new(parent: &Path, name: impl AsRef<OsStr>) -> Result<Option<Self>> {
         let folder = staging(parent, name.as_ref());
-        let failed = |e: io::Error| {
-            let words = format!("nothing can be created in it: {}", e.kind());
-            Error::write(parent, Reason::of(e, words))
-        };
+        let failed = |e: io::Error| Error::write(&folder, e);
         loop {
             if let Err(e) = fs::create_dir(&folder)
                 && e.kind() != ErrorKind::AlreadyExists
             {
-                return Err(failed(e));
+                let reason = Reason::from(e);
+                return Err(Error::write(
+                    parent,
+                    reason.reworded(|words| format!("nothing can be created in it: {words}")),
+                ));
             }
             let path = folder.join(LOCK);
             let lock = match File::options().write(true).create(true).truncate(false).open(&path) {
@@ -51,7 +52,7 @@ impl Claim {
             }
             let locked = Handle::from_file(lock.try_clone().map_err(failed)?).map_err(failed)?;
             if Handle::from_path(&path).is_ok_and(|there| there == locked) {
-                let claim = Self { folder, _lock: lock };
+                let claim = Self { folder: folder.clone(), _lock: lock };
                 claim.clear().map_err(failed)?;
                 return Ok(Some(claim));
             }

@@ -72,6 +72,15 @@ pub(crate) fn is_printed(path: &Path) -> bool {
     path == Path::new("-")
 }
 
+/// Finds out before any computing whether the JSON has somewhere to go.
+pub(crate) fn check_json_path(json: Option<&Path>) -> mrfgs::Result<()> {
+    match json {
+        Some(path) if is_printed(path) => console::check_leads_somewhere(),
+        Some(path) => write::check_path(path),
+        None => Ok(()),
+    }
+}
+
 /// The file that the JSON goes to, unless it is printed.
 pub(crate) fn json_file(json: Option<&Path>) -> Option<&Path> {
     json.filter(|path| !is_printed(path))
@@ -79,8 +88,8 @@ pub(crate) fn json_file(json: Option<&Path>) -> Option<&Path> {
 
 /// Finds out before any computing whether the JSON can be written, and refuses it in place of an input.
 pub(crate) fn check_json(json: Option<&Path>, inputs: impl IntoIterator<Item = PathBuf>) -> Result<()> {
+    check_json_path(json)?;
     let Some(path) = json_file(json) else { return Ok(()) };
-    write::check_path(path)?;
     let inputs: Vec<_> = inputs.into_iter().collect();
     let inputs: Vec<_> = inputs.iter().map(|path| ("an input", path.as_path())).collect();
     distinct(&inputs, &[("--json", path)])
@@ -130,10 +139,7 @@ pub(crate) fn folder_place(name: &Path) -> mrfgs::Result<PathBuf> {
             let parent = parent(name);
             match (fs::canonicalize(parent), name.file_name()) {
                 (Ok(parent), Some(last)) if parent.is_dir() => Ok(parent.join(last)),
-                _ => {
-                    let reason = format!("there is no folder {}; create it first", parent.display());
-                    Err(Error::write(name, reason))
-                }
+                _ => Err(Error::write(name, write::no_folder(parent))),
             }
         }
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use mrfgs::image::write;
 use mrfgs::options::DisparityRange;
+use serde::Serialize;
 
 use crate::failure::Result;
 use crate::outputs::also::Also;
@@ -13,12 +14,15 @@ use crate::outputs::files::Written;
 use crate::outputs::outcome::{Outcome, View};
 
 /// The maps to write of each pair.
-#[derive(clap::Args)]
+#[derive(clap::Args, Serialize)]
 pub(crate) struct MapArgs {
     /// Format of the disparity maps, as the extensions of `mrfgs match` [default: pfm]
     #[arg(long, value_enum, value_name = "WHICH")]
+    // The names of the outputs say it.
+    #[serde(skip)]
     pub(crate) format: Option<Format>,
     #[command(flatten)]
+    #[serde(flatten)]
     pub(crate) also: AlsoArgs,
 }
 

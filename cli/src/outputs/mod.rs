@@ -19,7 +19,6 @@ pub(crate) use also_args::AlsoArgs;
 pub(crate) use claim::Claim;
 pub(crate) use files::{Written, is_printed};
 pub(crate) use film::Film;
-pub(crate) use limits::Limits;
 pub(crate) use map_args::{Format, MapArgs};
 pub(crate) use messages::Cameras;
 pub(crate) use outcome::{Outcome, View};

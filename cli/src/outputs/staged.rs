@@ -4,12 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mrfgs::error::Reason;
-use mrfgs::image::write;
 use mrfgs::{Error, Result};
 
 use crate::failure::{self, Failure};
 use crate::outputs::claim::{Claim, FOLDERS};
-use crate::outputs::files::{folder_place, json_file, parent};
+use crate::outputs::files::{check_json_path, folder_place, json_file, parent};
 
 /// A folder in the making, beside the place that it takes once it is whole. If it is dropped before, it is removed with all it
 /// holds; if the program is killed, the next run that makes the folder removes it.
@@ -25,7 +24,7 @@ impl StagedFolder {
     pub(crate) fn new(name: &Path) -> Result<Self> {
         let place = folder_place(name)?;
         let (Some(beside), Some(last)) = (place.parent(), place.file_name()) else {
-            return Err(Error::write(name, "has no name; give the name of a folder"));
+            return Err(Error::write(name, Reason::of_request("has no name; give the name of a folder")));
         };
         let staging = Claim::new(beside, last).map_err(|e| match e {
             Error::Write { reason, .. } => {
@@ -53,8 +52,8 @@ impl StagedFolder {
 
     /// Refuses JSON that cannot be written, or lies in the folder, which is replaced as a whole; `flag` names the folder.
     pub(crate) fn check_json(&self, flag: &str, json: Option<&Path>) -> Result<(), Failure> {
+        check_json_path(json)?;
         let Some(path) = json_file(json) else { return Ok(()) };
-        write::check_path(path)?;
         let beside = fs::canonicalize(parent(path));
         if path == self.place || beside.is_ok_and(|parent| parent.starts_with(&self.place)) {
             let reason = format!("{} lies in the folder of {flag}; give another name", path.display());

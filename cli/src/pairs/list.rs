@@ -17,7 +17,8 @@ use crate::outputs::also;
 use crate::remedy;
 
 /// The columns of a list; the first three are required.
-const COLUMNS: [&str; 7] = ["name", "left", "right", "max_disparity", "min_disparity", "mask", "calibration"];
+pub(crate) const COLUMNS: [&str; 7] =
+    ["name", "left", "right", "max_disparity", "min_disparity", "mask", "calibration"];
 const REQUIRED: usize = 3;
 
 /// The longest name of a pair, in bytes: file systems allow more, which leaves room for the endings of its files.

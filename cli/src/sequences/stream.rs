@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use clap::ValueEnum;
+use mrfgs::error::in_words;
 use mrfgs::image::raster::{Raster, Samples};
 use mrfgs::{Error, Result};
 
@@ -250,7 +251,7 @@ fn said(error: &y4m::Error) -> String {
                 .into()
         }
         y4m::Error::EOF => "is cut off".into(),
-        y4m::Error::IoError(e) => e.to_string(),
+        y4m::Error::IoError(e) => in_words(e),
         y4m::Error::BadInput | y4m::Error::ParseError(_) | y4m::Error::OutOfMemory => "is damaged".into(),
     }
 }
@@ -322,7 +323,7 @@ fn raw_frame(bytes: &mut Counted, raw: RawFrames) -> Result<Option<Raster<'stati
     let mut data = vec![0; width * height * format.bytes()];
     match bytes.read_exact(&mut data) {
         Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
-        Err(e) => return Err(e.to_string()),
+        Err(e) => return Err(in_words(&e)),
         Ok(()) => {}
     }
     let (channels, samples) = match format {

@@ -298,10 +298,18 @@ fn runs_at_the_same_time_share_the_pairs() {
 fn an_interrupted_batch_tidies_up() {
     let folder = pairs(12, (160, 120));
     let out = folder.join("out");
-    for (signal, records) in [("-INT", 1), ("-TERM", 4)] {
+    let signals: &[(&str, usize)] = match cfg!(target_os = "linux") {
+        true => &[("-INT", 1), ("-TERM", 3), ("-HUP", 5), ("-XCPU", 7)],
+        false => &[("-INT", 1), ("-TERM", 4)],
+    };
+    for &(signal, records) in signals {
         let child = begun(&folder);
         wait_for(&out, records);
         send(signal, &child);
+        if records > 4 {
+            // A terminal that is gone says so twice: by the system and by the shell; a limit of time, every second.
+            send(signal, &child);
+        }
         let output = child.wait_with_output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(130), "{said}");
@@ -309,8 +317,64 @@ fn an_interrupted_batch_tidies_up() {
         assert_eq!(said, format!("mrfgs: stopped after {complete} of 12; run it again to resume\n"));
         assert_eq!(listing(&out).len(), 2 * complete, "nothing half written is left");
     }
-    batch(&folder, "list.csv out").succeeded();
+    // As `nohup` starts it.
+    let mut child = Command::new("sh");
+    child.args(["-c", "trap '' HUP && exec \"$0\" batch list.csv out --device cpu --threads 1"]);
+    child.arg(env!("CARGO_BIN_EXE_mrfgs")).current_dir(&*folder).stderr(Stdio::null());
+    let mut child = child.spawn().unwrap();
+    wait_for(&out, 10);
+    send("-HUP", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
     assert_eq!(listing(&out).len(), 24);
+}
+
+/// What is wrong with the files of one pair in the output folder is wrong with that pair alone.
+#[test]
+fn a_record_that_cannot_be_written_fails_its_pair_alone() {
+    let folder = pairs(4, (64, 48));
+    let out = folder.join("out");
+    fs::create_dir_all(out.join("pair-0.json/full")).unwrap();
+    fs::write(out.join(".pair-1.tmp"), "no folder").unwrap();
+    fs::create_dir(out.join("pair-2.pfm")).unwrap();
+    let told = batch(&folder, "list.csv out --quiet");
+    assert_eq!(told.code, Some(1), "{told:?}");
+    told.says("pair-0: cannot write out/pair-0.json: is a folder & pair-1: cannot write out/.pair-1.tmp");
+    told.says("pair-2: cannot write out/pair-2.pfm: is a folder & 1 done, 0 skipped, 3 failed");
+    assert_eq!(told.stderr.lines().count(), 4, "{told:?}");
+    assert_eq!(record(&out, "pair-2")["status"], "failed");
+    assert_eq!(record(&out, "pair-3")["status"], "done");
+    fs::remove_dir_all(out.join("pair-0.json")).unwrap();
+    fs::remove_file(out.join(".pair-1.tmp")).unwrap();
+    fs::remove_dir(out.join("pair-2.pfm")).unwrap();
+    batch(&folder, "list.csv out").succeeded().says("3 done, 1 skipped, 0 failed");
+}
+
+/// A run that resumes leaves what a run from the beginning would have made.
+#[test]
+fn a_flag_that_changes_an_output_makes_it_anew() {
+    let folder = pairs(1, (64, 48));
+    for (flags, anew) in [
+        ("--also preview", true),
+        ("--also preview --colours grey", true),
+        ("--also preview --colours viridis --min-confidence 40", true),
+        ("--also preview --colours viridis --no-data 200", true),
+        ("--also preview --colours viridis --no-data 90", true),
+        ("--also preview --colours viridis --no-data 90 --orient", true),
+        ("--also preview --colours viridis --no-data 90 --orient --threads 1", false),
+        ("--also preview --colours viridis --no-data 90 --orient --quiet", false),
+        ("--also preview --colours viridis --no-data 90 --orient --max-pixels 5000", false),
+        ("--also preview --colours viridis --no-data 90 --orient --shard 1/1", false),
+    ] {
+        let told = batch(&folder, &format!("list.csv out {flags}")).succeeded();
+        let says = if anew { "1 done, 0 skipped" } else { "0 done, 1 skipped" };
+        assert!(flags.contains("quiet") || told.stderr.contains(says), "{flags}: {told:?}");
+        let _ = fs::remove_dir_all(folder.join("fresh"));
+        batch(&folder, &format!("list.csv fresh {flags}")).succeeded();
+        for name in ["pair-0.pfm", "pair-0.preview.png"] {
+            let [resumed, fresh] = ["out", "fresh"].map(|out| fs::read(folder.join(out).join(name)).unwrap());
+            assert!(resumed == fresh, "{name} by {flags}");
+        }
+    }
 }
 
 #[test]
@@ -435,7 +499,7 @@ fn the_folders_in_a_folder_are_pairs() {
     assert!(maps(&folder.join("out"))["wall"] == maps(&folder)["wall"]);
     fs::create_dir(folder.join("data/empty")).unwrap();
     batch(&folder, "data out").says("0 done, 2 skipped, 1 failed: empty;");
-    batch(&folder, "data data/out").failed(1, "data/out & the folder of the pairs & give another");
+    batch(&folder, "data data/out").failed(2, "data/out & the folder of the pairs & give another");
     fs::remove_dir(folder.join("data/empty")).unwrap();
     // Whatever file systems allow is a name.
     for name in ["two words", "straße №1 (ä) 日本"] {

@@ -26,6 +26,16 @@ fn a_first_map_is_that_of_the_command_that_it_shows() {
             [&folder, &again].map(|folder| fs::read(folder.join("mrfgs-demo").join(name)).unwrap());
         assert!(first == again, "{name}");
     }
+    // Once more, in its place, but not where something else is among it.
+    let before = listing(&folder);
+    run(&folder, "demo").succeeded().prints("This was mrfgs match");
+    assert!(listing(&folder) == before);
+    let mine = folder.join("mrfgs-demo/mine.txt");
+    fs::write(&mine, "my own").unwrap();
+    run(&folder, "demo").failed(1, "mrfgs-demo & the folder is not empty; name a new one");
+    fs::remove_file(mine).unwrap();
+    fs::copy(scene("wall/im0.png"), folder.join("mrfgs-demo/left.png")).unwrap();
+    run(&folder, "demo").failed(1, "mrfgs-demo & the folder is not empty; name a new one");
 }
 
 #[test]

@@ -58,18 +58,22 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --mask none.png", 1, "none.png & check the name"),
     ("M out.pfm --mask text.png", 1, "text.png & give PNG"),
     // Outputs.
-    ("M out.jpg", 1, "out.jpg & .pfm (float), .tif (float) or .png"),
-    ("M out", 1, "out: & .pfm"),
+    ("M out.jpg", 2, "out.jpg & .pfm (float), .tif (float) or .png"),
+    ("M out", 2, "out: & .pfm"),
     ("M none/out.pfm", 1, "none/out.pfm & there is no folder none & create it"),
-    ("M left.png/out.pfm", 1, "left.png/out.pfm & there is no folder & create it"),
+    ("M left.png/out.pfm", 1, "left.png/out.pfm & left.png is a file and no folder & give another name"),
+    ("M left.png/a/out.pfm", 1, "left.png/a/out.pfm & left.png is a file and no folder"),
+    ("I left.png/steps", 1, "left.png/steps & left.png is a file and no folder"),
+    ("M folder/", 1, "folder/ & is a folder"),
+    ("M out.pfm/", 2, "out.pfm/ & names no file"),
     ("M taken.pfm", 1, "taken.pfm & is a folder & name of a file"),
     ("M taken.tif --also raw", 1, "taken.raw.tif & is a folder"),
     ("M taken.tif --also confidence,validity", 1, "taken.validity.png & is a folder"),
     ("M out.pfm --also", 2, "--also & raw, right, depth, depth-mm, depth-registered & preview, side-by-side"),
     ("M out.pfm --also raw,row", 2, "--also & 'row' & raw, right, depth, depth-mm, depth-registered"),
     ("M none/out.pfm --also preview", 1, "none/out.pfm & create it"),
-    ("M out.png --min-disparity -1", 1, "out.png & -1 to 9 & .pfm or .tif"),
-    ("match left.png right.png out.png --max-disparity 256", 1, "out.png & 0 to 256 & .pfm or .tif"),
+    ("M out.png --min-disparity -1", 2, "out.png & -1 to 9 & .pfm or .tif"),
+    ("match left.png right.png out.png --max-disparity 256", 2, "out.png & 0 to 256 & .pfm or .tif"),
     ("M out.pfm --json out.pfm", 2, "--json & out.pfm is OUTPUT already & another name"),
     ("M out.pfm --json ./folder/../out.pfm", 2, "--json & OUTPUT & another name"),
     (
@@ -291,8 +295,8 @@ const FAILURES: &[Failure] = &[
     ("batch folder/full out", 1, "folder/full & lists no pair"),
     ("batch pairs.csv none/out", 1, "none/out & there is no folder none & create it"),
     ("batch pairs.csv left.png", 1, "left.png & is a file & folder"),
-    ("batch pairs.csv .", 1, "./left.png & is an input & another folder"),
-    ("batch . zero", 1, "zero & the folder of the pairs & give another"),
+    ("batch pairs.csv .", 2, "./left.png & is an input & another folder"),
+    ("batch . zero", 2, "zero & the folder of the pairs & give another"),
     ("batch pairs.csv out --shard 0/3", 2, "--shard & '0/3' & K/N & --help"),
     ("batch pairs.csv out --shard 4/3", 2, "--shard & K from 1 to N"),
     ("batch pairs.csv out --shard 2", 2, "--shard & 2/8"),
@@ -352,6 +356,62 @@ fn every_failure_is_one_line_and_leaves_nothing() {
         assert!(listing(&folder) == before, "{line}: the folder has changed");
     }
     assert!(other.is_empty(), "another exit status: {other:#?}");
+}
+
+/// Names that no file can have are refused before anything runs: a match would say so in a line of its own.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_cannot_be_are_refused_at_once() {
+    let folder = workshop();
+    let before = listing(&folder);
+    let (long, nearly) = ("n".repeat(252), "n".repeat(251));
+    std::os::unix::fs::symlink("circle.pfm", folder.join("circle.pfm")).unwrap();
+    let matched = "match left.png right.png";
+    for (line, words) in [
+        (format!("{matched} {long}.pfm --max-disparity 9"), "cannot write nnn & File name too long"),
+        (
+            format!("{matched} {nearly}.pfm --max-disparity 9 --also validity"),
+            "validity.png: File name too long",
+        ),
+        (format!("{matched} out.pfm --max-disparity 9 --json {long}.json"), ".json: File name too long"),
+        (
+            format!("{matched} circle.pfm --max-disparity 9"),
+            "cannot write circle.pfm: & links lead in a circle",
+        ),
+        (format!("inspect left.png right.png {nearly} --max-disparity 9"), "File name too long"),
+        (format!("inspect left.png right.png {long}nnnn --max-disparity 9"), "File name too long"),
+        (
+            format!("rectify @raw/left.png @raw/right.png {long}nnnn --calib @raw/cameras.yml"),
+            "File name too long",
+        ),
+        (format!("sequence left.png right.png {long}.mcap --max-disparity 9"), "File name too long"),
+        (format!("sequence left.png right.png {long}.y4m --max-disparity 9"), "File name too long"),
+        (format!("sequence left.png right.png {long}nnnn --max-disparity 9"), "File name too long"),
+        (format!("batch pairs.csv {long}nnnn"), "File name too long"),
+        (format!("demo {long}nnnn"), "File name too long"),
+        (format!("match {long}nnnn right.png out.pfm"), "File name too long"),
+        (format!("match left.png/a right.png out.pfm"), "left.png/a: Not a directory"),
+    ] {
+        let told = run(&folder, &line);
+        told.failed(1, words);
+        assert!(!told.stderr.contains("os error"), "{told:?}");
+        let _ = fs::remove_file(folder.join("circle.pfm"));
+        assert!(listing(&folder) == before, "{line}");
+        std::os::unix::fs::symlink("circle.pfm", folder.join("circle.pfm")).unwrap();
+    }
+}
+
+/// What the system refuses is told in its words alone.
+#[cfg(target_os = "linux")]
+#[test]
+fn few_files_may_be_open() {
+    let folder = workshop();
+    let before = listing(&folder);
+    let told =
+        shell(&folder, "ulimit -n 3", "match left.png right.png out.pfm --max-disparity 9 --device cpu");
+    told.failed(1, "Too many open files");
+    assert!(!told.stderr.contains("os error"), "{told:?}");
+    assert!(listing(&folder) == before);
 }
 
 #[cfg(target_os = "linux")]

@@ -9,6 +9,8 @@ mod contradictions;
 mod demo;
 mod documents;
 mod evaluate;
+#[cfg(unix)]
+mod examples;
 mod failures;
 #[path = "../../../tests/common/files.rs"]
 mod files;
@@ -101,6 +103,13 @@ fn program(folder: &Path, line: &str) -> Command {
 /// The program at work in `folder`, with pipes to all its ends.
 fn started(folder: &Path, line: &str) -> Child {
     let mut program = program(folder, line);
+    if cfg!(target_os = "linux") {
+        // Whoever runs the tests may keep signals from them.
+        let mut listening = Command::new("env");
+        listening.arg("--default-signal").arg(program.get_program()).args(program.get_args());
+        listening.current_dir(folder).env_remove("XDG_RUNTIME_DIR").env_remove("RUST_BACKTRACE");
+        program = listening;
+    }
     program.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
@@ -487,6 +496,44 @@ fn a_reader_that_leaves_early_is_no_failure() {
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = program(&folder, "presets").stdout(full).output().unwrap();
     Run::of("presets", output).failed(1, "standard output");
+}
+
+/// What is asked for with `-` and would reach nobody is refused before any computing; text may go nowhere.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_standard_output_that_takes_nothing_is_told() {
+    let folder = workshop();
+    let redirected = |line: &str, to: &str| {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &format!("exec \"$0\" \"$@\" {to}"), env!("CARGO_BIN_EXE_mrfgs")]);
+        Run::of(line, shell.current_dir(&*folder).args(words(line)).output().unwrap())
+    };
+    let before = listing(&folder);
+    let map = "match left.png right.png - --max-disparity 9 --device cpu";
+    let json = "match left.png right.png out.pfm --json - --max-disparity 9 --device cpu";
+    let truth = "evaluate map @wall/disp0GT.pfm --truth @wall/disp0GT.pfm";
+    for (line, to, code, words) in [
+        (map, ">&-", 1, "standard output & is closed & redirect it"),
+        (json, ">&-", 1, "standard output & is closed"),
+        (&*format!("{truth} --json -"), ">&-", 1, "standard output & is closed"),
+        ("sequence left.png right.png - --max-disparity 9", ">&-", 1, "standard output & is closed"),
+        ("inspect left.png right.png --max-disparity 9 --json -", ">&-", 1, "standard output & is closed"),
+        (map, "1<left.png", 1, "standard output & for reading alone"),
+        ("presets", "1<left.png", 1, "standard output & for reading alone"),
+        ("--help", "1<left.png", 1, "standard output & for reading alone"),
+        ("completions bash", "1<left.png", 1, "standard output & for reading alone"),
+        (&*format!("{map} --quiet"), ">/dev/full", 1, "standard output & No space left"),
+        ("--help", ">/dev/full", 1, "standard output & No space left"),
+        ("sequence - out --max-disparity 9", "<&-", 1, "standard input"),
+    ] {
+        redirected(line, to).failed(code, words);
+        assert!(listing(&folder) == before, "{line} {to}");
+    }
+    // To nowhere by name, and text that nobody asked for.
+    redirected(map, ">/dev/null").succeeded();
+    redirected(truth, ">&-").succeeded();
+    redirected("match left.png right.png out.pfm --max-disparity 9 --device cpu", ">&- 2>&- <&-").succeeded();
+    assert!(folder.join("out.pfm").exists());
 }
 
 #[test]

@@ -139,6 +139,19 @@ fn record(path: &Path, messages: &[Message]) {
     writer.finish().unwrap();
 }
 
+/// Writes a recording of three frames of 320 x 240, rectified.
+pub(super) fn record_drive(path: &Path) {
+    let mut messages = cameras((320, 240));
+    for n in 0..3 {
+        for (view, side) in ["left", "right"].into_iter().enumerate() {
+            let image = image::open(scene("mixed").join(format!("im{view}.png"))).unwrap().to_rgb8();
+            let stamp = START + 123_456_789 + STEP * n;
+            messages.push((format!("/{side}/image_rect_color"), IMAGE, image_message(stamp, &image)));
+        }
+    }
+    record(path, &messages);
+}
+
 const NAMES: [&str; 3] = ["1700000000.000000000", "1700000000.050000000", "1700000000.100000000"];
 
 /// What `match` writes for each scene: the files that end so.

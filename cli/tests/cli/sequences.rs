@@ -509,17 +509,30 @@ fn what_was_done_before_a_signal_stays() {
         assert!(!folder.join("never").exists());
     }
     let end = "mrfgs: stopped after 2 frames\n";
-    let (code, said) = stopped("maps", "-INT", &|| folder.join("maps/000001.pfm").exists());
-    assert!(code == Some(130) && said.ends_with(end), "{code:?}: {said}");
-    assert_eq!(listing(&folder.join("maps")).len(), 2);
+    let signals: &[&str] = match cfg!(target_os = "linux") {
+        true => &["-INT", "-HUP", "-QUIT", "-XCPU", "-ALRM", "-VTALRM", "-PROF", "-USR1", "-USR2"],
+        false => &["-INT"],
+    };
+    for signal in signals {
+        let output = format!("maps{signal}");
+        let (code, said) = stopped(&output, signal, &|| folder.join(&output).join("000001.pfm").exists());
+        assert!(code == Some(130) && said.ends_with(end), "{signal}: {code:?}: {said}");
+        assert_eq!(listing(&folder.join(output)).len(), 2, "{signal}");
+    }
     // A film has no name before its end, so nobody sees how far it is.
-    let done = [1, 4, 16].into_iter().any(|seconds| {
-        let start = Instant::now();
-        let patience = Duration::from_secs(seconds);
-        let (code, said) = stopped("film.y4m", "-TERM", &|| start.elapsed() > patience);
-        code == Some(130) && said.ends_with(end)
-    });
-    assert!(done, "no film of two frames");
+    let hang_up = if cfg!(target_os = "linux") { "-HUP" } else { "-TERM" };
+    for (output, signal) in [("film.y4m", "-TERM"), ("found.mcap", hang_up)] {
+        let done = [1, 4, 16].into_iter().any(|seconds| {
+            let start = Instant::now();
+            let patience = Duration::from_secs(seconds);
+            let (code, said) = stopped(output, signal, &|| start.elapsed() > patience);
+            code == Some(130) && said.ends_with(end)
+        });
+        assert!(done, "no {output} of two frames");
+    }
+    let recording = fs::read(folder.join("found.mcap")).unwrap();
+    let reader = mcap::MessageStream::new(&recording).unwrap();
+    assert_eq!(reader.filter(|message| message.as_ref().unwrap().channel.topic == "/disparity").count(), 2);
     let film = fs::read(folder.join("film.y4m")).unwrap();
     assert_eq!(film.windows(6).filter(|bytes| bytes == b"FRAME\n").count(), 2);
 }

@@ -10,7 +10,7 @@ use mrfgs::rectification::Options;
 
 use crate::args::{Search, Sign};
 use crate::failure::{Failure, Result};
-use crate::outputs::{Also, Files, Limits};
+use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
 use crate::pairs::input;
 use crate::pairs::list::{self, Names, Row};
@@ -45,8 +45,6 @@ pub(super) struct Given<'a> {
     pub(super) cameras: Option<&'a Also>,
     /// The file of the camera that an output is in the view of.
     pub(super) into: Option<&'a Path>,
-    /// What is left out of the outputs.
-    pub(super) limits: Limits,
 }
 
 /// A pair, read.

@@ -5,17 +5,21 @@ mod request;
 mod shard;
 
 use std::collections::{HashSet, VecDeque};
+use std::error::Error as _;
 use std::fmt::Write as _;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use mrfgs::calibration::cameras::ThirdCamera;
+use mrfgs::error::Reason;
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, write};
 use mrfgs::options::Method;
 use mrfgs::sigma::Sigma;
 use mrfgs::{Error, Matched, Matcher};
+use serde::Serialize;
 
 use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs, Sign};
 use crate::failure::{self, Failure, Result};
@@ -57,27 +61,34 @@ A list:
 ///
 /// For each pair the map goes to OUTDIR/NAME.pfm (see --format), and then its record to OUTDIR/NAME.json: the fields of
 /// `match --json`, `status` ("done" or "failed", with a `reason`), `warnings`, the `request` (inputs with sizes in bytes and
-/// times in ms since 1970, range and outputs), and the `bytes` of each output. A pair is complete when its record says done,
-/// has the same request, method and version, and its outputs are there with as many bytes. A further run skips complete pairs
-/// and matches all others. A pair that fails is named, and the others go on.
-#[derive(clap::Args)]
+/// times in ms since 1970, range, outputs, and the flags that change them), and the `bytes` of each output. A pair is complete
+/// when its record says done, has the same request, method and version, and its outputs are there with as many bytes. A further
+/// run skips complete pairs and matches all others. A pair that fails is named, and the others go on.
+// A record holds all that is not skipped here: what is skipped changes no byte of an output, or is in the record otherwise.
+#[derive(clap::Args, Serialize)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     /// CSV file with a row for each pair, or folder with a folder for each
+    #[serde(skip)]
     list: PathBuf,
     /// Folder for maps and records; created where there is none
     #[arg(value_name = "OUTDIR")]
+    #[serde(skip)]
     folder: PathBuf,
 
     /// Calibration of all pairs for which LIST has none, as `mrfgs match` takes it [default: a calib.txt beside the left image]
     #[arg(long, value_name = "FILE")]
+    // It is among the inputs.
+    #[serde(skip)]
     calib: Vec<PathBuf>,
     /// The images are raw: rectifies each pair by its calibration first, as `mrfgs rectify` does
     #[arg(long)]
     rectify: bool,
     #[command(flatten)]
+    #[serde(flatten)]
     rectification: RectificationArgs,
     #[command(flatten)]
+    #[serde(flatten)]
     maps: MapArgs,
     /// Matches the K-th of N parts of the list (K from 1 on), such as 2/8
     ///
@@ -86,19 +97,26 @@ pub(crate) struct Args {
     /// of the whole, match each pair once: a run locks the pair that it matches (OUTDIR/.NAME.tmp), where the file system has
     /// locks.
     #[arg(long, value_name = "K/N", value_parser = shard)]
+    #[serde(skip)]
     shard: Option<Shard>,
     /// Prints the state of each pair (complete, failed or missing) for the same arguments, and runs nothing
     #[arg(long)]
+    #[serde(skip)]
     status: bool,
     #[command(flatten)]
+    #[serde(flatten)]
     reading: ReadingArgs,
     /// Prints errors only
     #[arg(long)]
+    #[serde(skip)]
     quiet: bool,
 
+    // The record has the method that follows from it.
     #[command(flatten)]
+    #[serde(skip)]
     method: MethodArgs,
     #[command(flatten)]
+    #[serde(skip)]
     execution: ExecutionArgs,
 }
 
@@ -117,27 +135,16 @@ struct Batch<'a> {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let execution = args.execution.execution();
-    args.maps.also.check(args.rectify)?;
-    let method = args.maps.also.made_by(args.method.method()?)?;
-    let List { base, mut pairs } = List::read(&args.list)?;
-    let given = Given {
-        calib: &args.calib,
-        rectify: args.rectification.options_if(args.rectify)?,
-        cameras: args.maps.also.take_cameras(),
-        into: args.maps.also.into.as_deref(),
-        limits: args.maps.also.limits,
-    };
-    let third = args.maps.also.third()?;
-    check_folder(args, &base, &pairs, &given)?;
+    let (batch, mut pairs) = Batch::new(args)?;
+    check_folder(args, &batch.base, &pairs, &batch.given)?;
     if let Some(shard) = args.shard {
         pairs.retain(|listed| shard.holds(&listed.name));
     }
-    let batch = Batch { args, given, third, method: method.clone(), reader: args.reading.reader(), base };
     if args.status {
         return batch.print_status(&pairs);
     }
     stop::listen();
-    let matcher = Matcher::builder().method(method.clone()).execution(execution).build()?;
+    let matcher = Matcher::builder().method(batch.method.clone()).execution(execution).build()?;
     files::create_folder(&args.folder).map_err(|e| Error::write(&args.folder, e))?;
     batch.run(&pairs, matcher)
 }
@@ -149,7 +156,7 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed], given: &Given) -> Re
     if args.list.is_dir() {
         if args.list.canonicalize().is_ok_and(|list| place.starts_with(list)) {
             let reason = format!("lies in {}, the folder of the pairs; give another", args.list.display());
-            return Err(Error::write(folder, reason).into());
+            return Err(Error::write(folder, Reason::of_request(reason)).into());
         }
         return Ok(());
     }
@@ -169,7 +176,7 @@ fn check_folder(args: &Args, base: &Path, pairs: &[Listed], given: &Given) -> Re
     match owned.into_iter().find(|name| inside.contains(&name.to_lowercase())) {
         Some(name) => {
             let reason = "is an input, and an output would take its place; give another folder";
-            Err(Error::write(folder.join(name), reason).into())
+            Err(Error::write(folder.join(name), Reason::of_request(reason)).into())
         }
         None => Ok(()),
     }
@@ -184,11 +191,26 @@ fn owned(name: &str) -> Vec<String> {
     maps.chain(beside).chain([format!("{name}.json")]).collect()
 }
 
-impl Batch<'_> {
-    fn request(&self, listed: &Listed) -> Request {
+impl<'a> Batch<'a> {
+    /// With its pairs.
+    fn new(args: &'a Args) -> Result<(Self, Vec<Listed>)> {
+        args.maps.also.check(args.rectify)?;
+        let method = args.maps.also.made_by(args.method.method()?)?;
+        let List { base, pairs } = List::read(&args.list)?;
+        let given = Given {
+            calib: &args.calib,
+            rectify: args.rectification.options_if(args.rectify)?,
+            cameras: args.maps.also.take_cameras(),
+            into: args.maps.also.into.as_deref(),
+        };
+        let third = args.maps.also.third()?;
+        Ok((Self { args, given, third, method, reader: args.reading.reader(), base }, pairs))
+    }
+
+    fn request(&self, listed: &Listed) -> Request<'_> {
         let (maps, name) = (&self.args.maps, &listed.name);
         let outputs = std::iter::once(maps.map(name)).chain(maps.also(name).map(|(_, file)| file));
-        Request::new(listed, &self.base, &self.given, outputs.collect())
+        Request::new(self.args, listed, &self.base, &self.given, outputs.collect())
     }
 
     fn record(&self, listed: &Listed) -> PathBuf {
@@ -226,7 +248,8 @@ impl Batch<'_> {
     /// Matches every pair that is not complete.
     fn run(&self, pairs: &[Listed], mut matcher: Matcher) -> Result<()> {
         for listed in pairs {
-            Claim::remove_remains(&self.args.folder, &listed.name)?;
+            // Where that fails, so does the claim that the pair takes.
+            let _ = Claim::remove_remains(&self.args.folder, &listed.name);
         }
         let mut left: VecDeque<_> =
             pairs.iter().filter(|listed| self.state(listed) != State::Complete).collect();
@@ -246,24 +269,28 @@ impl Batch<'_> {
             if stop::go_on().is_break() {
                 return Err(interrupted());
             }
-            let Some(claim) = Claim::new(&self.args.folder, name)? else {
-                left.push_back(listed);
-                taken += 1;
-                if taken >= left.len() {
-                    std::thread::sleep(PATIENCE);
-                    taken = 0;
+            let made = match Claim::new(&self.args.folder, name) {
+                Ok(None) => {
+                    left.push_back(listed);
+                    taken += 1;
+                    if taken >= left.len() {
+                        std::thread::sleep(PATIENCE);
+                        taken = 0;
+                    }
+                    continue;
                 }
-                continue;
+                Ok(Some(_)) if self.state(listed) == State::Complete => {
+                    // Another run has matched it since this one began.
+                    skipped += 1;
+                    bar.end_pair();
+                    continue;
+                }
+                Ok(Some(claim)) => self.pair(listed, &claim, &mut matcher),
+                Err(error) => Err(error.into()),
             };
             taken = 0;
-            if self.state(listed) == State::Complete {
-                // Another run has matched it since this one began.
-                skipped += 1;
-                bar.end_pair();
-                continue;
-            }
-            match self.pair(listed, &claim, &mut matcher) {
-                Ok(Ok((note, warnings))) => {
+            match made {
+                Ok((note, warnings)) => {
                     done += 1;
                     doubtful += usize::from(!warnings.is_empty());
                     if !self.args.quiet {
@@ -276,12 +303,12 @@ impl Batch<'_> {
                         told = note;
                     }
                 }
-                Ok(Err(error)) => {
-                    failed.push(name);
-                    bar.past(|| console::say(&format!("{name}: {}", error.message(&remedy::COLUMNS))));
-                }
                 Err(Failure::Stopped(_)) => return Err(interrupted()),
-                Err(failure) => return Err(failure),
+                Err(failure) if self.concerns_all(&failure) => return Err(failure),
+                Err(failure) => {
+                    failed.push(name);
+                    bar.past(|| console::say(&format!("{name}: {}", failure.message(&remedy::COLUMNS))));
+                }
             }
             bar.end_pair();
         }
@@ -298,26 +325,52 @@ impl Batch<'_> {
         Ok(())
     }
 
+    /// Whether the pairs that follow would fail for the same reason.
+    fn concerns_all(&self, failure: &Failure) -> bool {
+        use ErrorKind::{FileTooLarge, QuotaExceeded, ReadOnlyFilesystem, StorageFull};
+        match failure {
+            Failure::Stopped(_) | Failure::Error(Error::Device(_)) => true,
+            Failure::Error(Error::Write { path, reason }) => {
+                let of_system = reason.source().and_then(|cause| cause.downcast_ref::<io::Error>());
+                let is_of_disk =
+                    |kind| matches!(kind, FileTooLarge | QuotaExceeded | ReadOnlyFilesystem | StorageFull);
+                *path == self.args.folder || of_system.is_some_and(|error| is_of_disk(error.kind()))
+            }
+            _ => false,
+        }
+    }
+
     /// Matches one pair and writes its outputs, or why it failed. Returns the note of the match, and the warnings.
-    ///
-    /// # Errors
-    /// An error that concerns all pairs; inside, one that concerns this pair.
     fn pair(
         &self,
         listed: &Listed,
         claim: &Claim,
         matcher: &mut Matcher,
-    ) -> Result<Result<(Option<String>, Vec<String>)>> {
-        let (request, record) = (self.request(listed), self.record(listed));
-        let (read, matched, time, warnings) = match self.compute(listed, matcher, claim) {
-            Ok(computed) => computed,
-            Err(failure @ (Failure::Stopped(_) | Failure::Error(Error::Device(_)))) => return Err(failure),
-            Err(error) => {
-                let text = request.failed(&record, &self.method, &error)?;
-                self.publish(claim, &[], &record, &text)?;
-                return Ok(Err(error));
+    ) -> Result<(Option<String>, Vec<String>)> {
+        let made = self.made(listed, claim, matcher);
+        if let Err(failure) = &made
+            && !self.concerns_all(failure)
+        {
+            let (request, record) = (self.request(listed), self.record(listed));
+            let text = request.failed(&record, &self.method, failure);
+            match text.and_then(|text| self.publish(claim, &[], &record, &text)) {
+                Err(failure) if self.concerns_all(&failure) => return Err(failure),
+                // A record that cannot be written is why the pair failed, or comes after that: it is told anyway.
+                _ => {}
             }
-        };
+        }
+        made
+    }
+
+    fn made(
+        &self,
+        listed: &Listed,
+        claim: &Claim,
+        matcher: &mut Matcher,
+    ) -> Result<(Option<String>, Vec<String>)> {
+        let (request, record) = (self.request(listed), self.record(listed));
+        write::check_path(&record)?;
+        let (read, matched, time, warnings) = self.compute(listed, matcher)?;
         let Read { input, rig, mut files } = read;
         let (range, rectifying) = (matched.range(), input.rectifying());
         let pair = input.pair;
@@ -333,22 +386,20 @@ impl Batch<'_> {
         found.rectified = self.args.rectify;
         let text = request.done(&record, claim.folder(), found, &warnings)?;
         self.publish(claim, request.outputs(), &record, &text)?;
-        Ok(Ok((matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)), warnings)))
+        Ok((matched.note.as_ref().map(|note| remedy::error(note, &remedy::FLAGS)), warnings))
     }
 
     fn compute(
         &self,
         listed: &Listed,
         matcher: &mut Matcher,
-        claim: &Claim,
     ) -> Result<(Read, Matched, Duration, Vec<String>)> {
-        let wanted = &self.args.maps;
+        let (wanted, folder) = (&self.args.maps, &self.args.folder);
         let read = listed.read(&self.base, self.reader, &self.given)?;
         let (input, pair) = (&read.input, &read.input.pair);
-        // The folder is there, so what can be wrong is the range.
-        self.named(claim, wanted.check(claim.folder(), &listed.name, input.range))?;
+        wanted.check(folder, &listed.name, input.range)?;
         let mut warnings = input.warnings(&remedy::COLUMNS);
-        let searched = input.searched(|wider| wanted.check(claim.folder(), &listed.name, wider).is_ok());
+        let searched = input.searched(|wider| wanted.check(folder, &listed.name, wider).is_ok());
         let start = Instant::now();
         let matched = searched.job(matcher, pair).on_progress(|_| stop::go_on()).run()?;
         let time = start.elapsed();
@@ -384,5 +435,144 @@ impl Batch<'_> {
             write::publish(&claim.folder().join(map), &self.args.folder.join(map))?;
         }
         Ok(write::publish(&staged_record, record)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use clap::{CommandFactory, Parser};
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::pairs::list;
+
+    #[derive(Parser)]
+    struct Program {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    /// For every flag: command lines without and with it, or with another value of it; and whether that changes a byte of an output.
+    const FLAGS: [(&str, &str, &str, bool); 20] = [
+        ("calib", "--calib one.yml --also depth", "--calib two.yml --also depth", true),
+        ("rectify", "--calib one.yml", "--calib one.yml --rectify", true),
+        ("alpha", "--calib one.yml --rectify", "--calib one.yml --rectify --alpha 0.5", true),
+        ("format", "", "--format tif", true),
+        ("also", "--also raw", "--also raw,validity", true),
+        ("colours", "--also preview", "--also preview --colours grey", true),
+        ("into", "--also depth-registered --into one.yml", "--also depth-registered --into two.yml", true),
+        ("min-confidence", "", "--min-confidence 48", true),
+        ("clip-depth", "--also depth", "--also depth --clip-depth 3.5", true),
+        ("no-data", "--no-data 0", "--no-data inf", true),
+        ("orient", "", "--orient", true),
+        ("method", "", "--method fast", true),
+        ("set", "", "--set temperature=0.3", true),
+        ("memory", "", "--memory 1GiB", true),
+        ("shard", "", "--shard 1/1", false),
+        ("status", "", "--status", false),
+        ("max-pixels", "", "--max-pixels 1000000", false),
+        ("quiet", "", "--quiet", false),
+        ("device", "", "--device cpu", false),
+        ("threads", "", "--threads 1", false),
+    ];
+
+    /// A folder with one pair, and files of a camera.
+    fn workshop() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["left.png", "right.png", "mask.png", "other.png"] {
+            fs::write(at(name), "an image").unwrap();
+        }
+        let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/raw/third.yml");
+        for name in ["one.yml", "two.yml", "calib.txt"] {
+            fs::copy(camera, at(name)).unwrap();
+        }
+        fs::write(at("list.csv"), "name,left,right\na,left.png,right.png\n").unwrap();
+        folder
+    }
+
+    /// What the record of the first pair in `list` would hold of the request; names of files are those in `folder`.
+    fn asked(folder: &Path, list: &str, flags: &str) -> Value {
+        let words = ["batch", list, "out"].into_iter().chain(flags.split_whitespace());
+        let words = words.map(|word| {
+            let is_file = word.ends_with(".csv") || word.ends_with(".yml");
+            if is_file { folder.join(word).into_os_string() } else { word.into() }
+        });
+        let args = Program::try_parse_from(words).map_err(|e| panic!("{flags}: {e}")).unwrap().args;
+        let (batch, pairs) = Batch::new(&args).map_err(|e| panic!("{flags}: {e}")).unwrap();
+        json!({"request": batch.request(&pairs[0]), "method": batch.method})
+    }
+
+    #[test]
+    fn every_flag_that_changes_an_output_is_in_the_request() {
+        let folder = workshop();
+        let program = Program::command();
+        let known: Vec<_> = program.get_arguments().filter_map(clap::Arg::get_long).collect();
+        assert_eq!(known.len(), FLAGS.len(), "each flag is in the table: {known:?}");
+        for name in known {
+            let row = FLAGS
+                .iter()
+                .find(|row| row.0 == name)
+                .unwrap_or_else(|| panic!("{name} is not in the table"));
+            let (_, before, after, changes) = row;
+            assert!(after.contains(&format!("--{name}")), "{name}");
+            let [before, after] = [before, after].map(|flags| asked(folder.path(), "list.csv", flags));
+            assert_eq!(before != after, *changes, "{name}: {before}");
+        }
+    }
+
+    #[test]
+    fn every_column_of_a_list_is_in_the_request() {
+        let folder = workshop();
+        let row = |column: &str| match column {
+            "name" => "b",
+            "left" | "right" => "other.png",
+            "mask" => "mask.png",
+            "calibration" => "one.yml",
+            "max_disparity" => "40",
+            "min_disparity" => "-3",
+            other => panic!("{other} is not in the table"),
+        };
+        let of = |changed: &str| {
+            let values = list::COLUMNS.map(|column| match column {
+                _ if column == changed => row(column),
+                "name" => "a",
+                "left" => "left.png",
+                "right" => "right.png",
+                _ => "",
+            });
+            let text = format!("{}\n{}\n", list::COLUMNS.join(","), values.join(","));
+            fs::write(folder.path().join("list.csv"), text).unwrap();
+            asked(folder.path(), "list.csv", "")
+        };
+        let plain = of("");
+        assert_eq!(plain, of(""), "control");
+        for column in list::COLUMNS {
+            assert_ne!(plain, of(column), "{column}");
+        }
+    }
+
+    #[test]
+    fn what_changes_in_a_file_changes_the_request() {
+        let folder = workshop();
+        let header = "name,left,right,mask,calibration\n";
+        fs::write(folder.path().join("list.csv"), format!("{header}a,left.png,right.png,mask.png,\n"))
+            .unwrap();
+        let ask =
+            || asked(folder.path(), "list.csv", "--calib one.yml --also depth-registered --into two.yml");
+        for name in ["left.png", "right.png", "mask.png", "one.yml", "two.yml"] {
+            let (before, path) = (ask(), folder.path().join(name));
+            let mut bytes = fs::read(&path).unwrap();
+            bytes.push(b'\n');
+            fs::write(&path, bytes).unwrap();
+            assert_ne!(before, ask(), "{name}");
+        }
+        // A calibration beside the left image, where none is given.
+        let ask = || asked(folder.path(), "list.csv", "--also depth");
+        let before = ask();
+        fs::remove_file(folder.path().join("calib.txt")).unwrap();
+        assert_ne!(before, ask());
     }
 }

@@ -12,31 +12,24 @@ use serde_json::Value;
 
 use crate::args::Search;
 use crate::failure::{Failure, Result};
-use crate::outputs::{Limits, MatchRecord, files};
+use crate::outputs::{MatchRecord, files};
 use crate::remedy;
 
+use super::Args;
 use super::listed::{Given, Listed};
 
 /// What a batch is asked to make of a pair. The record of a complete pair holds the same request.
 #[derive(Serialize)]
-pub(super) struct Request {
+pub(super) struct Request<'a> {
     inputs: Vec<InputFile>,
     #[serde(flatten)]
     search: Search,
-    /// How much the rectified views show, where the images are as the cameras took them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    rectified: Option<Rectified>,
-    /// What is left out of the outputs, where the user says it.
+    /// Every flag, but for those that change no output and those that something else here says; they are left out where they are
+    /// declared.
     #[serde(flatten)]
-    limits: Limits,
+    flags: &'a Args,
     /// The names of the maps, in the output folder.
     outputs: Vec<String>,
-}
-
-/// That images are rectified first, and how.
-#[derive(Serialize)]
-struct Rectified {
-    alpha: Option<f64>,
 }
 
 /// A file as it was when it was read.
@@ -62,7 +55,7 @@ pub(super) enum State {
 #[derive(Serialize)]
 struct Done<'a> {
     status: &'static str,
-    request: &'a Request,
+    request: &'a Request<'a>,
     /// The size of each output.
     bytes: BTreeMap<&'a str, u64>,
     warnings: &'a [String],
@@ -74,14 +67,19 @@ struct Done<'a> {
 struct Failed<'a> {
     status: &'static str,
     reason: &'a str,
-    request: &'a Request,
+    request: &'a Request<'a>,
     version: &'static str,
     method: &'a Method,
 }
 
-impl Request {
-    pub(super) fn new(listed: &Listed, base: &Path, given: &Given, outputs: Vec<String>) -> Self {
-        let rectified = given.rectify.as_ref().map(|options| Rectified { alpha: options.alpha });
+impl<'a> Request<'a> {
+    pub(super) fn new(
+        flags: &'a Args,
+        listed: &Listed,
+        base: &Path,
+        given: &Given,
+        outputs: Vec<String>,
+    ) -> Self {
         let inputs = listed.inputs(base, given).into_iter().map(|path| {
             let about = fs::metadata(base.join(&path)).ok();
             let modified =
@@ -92,7 +90,7 @@ impl Request {
                 modified: modified.and_then(|time| u64::try_from(time.as_millis()).ok()),
             }
         });
-        Self { inputs: inputs.collect(), search: listed.search(), rectified, limits: given.limits, outputs }
+        Self { inputs: inputs.collect(), search: listed.search(), flags, outputs }
     }
 
     pub(super) fn outputs(&self) -> &[String] {

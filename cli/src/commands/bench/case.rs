@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use mrfgs::error::in_words;
 use mrfgs::image::Pair;
 use mrfgs::low_level::backend::Stage;
 use mrfgs::low_level::backend::cpu::Cpu;
@@ -41,7 +42,9 @@ impl Case<'_> {
         let failed = Failure::Failed;
         let program = std::env::current_exe().map_err(|e| Failure::from(Error::read("this program", e)))?;
         let run = Command::new(program).args(self.arguments()).output();
-        let run = run.map_err(|e| failed(format!("a process for a measurement cannot be started: {e}")))?;
+        let run = run.map_err(|e| {
+            failed(format!("a process for a measurement cannot be started: {}", in_words(&e)))
+        })?;
         let said = String::from_utf8_lossy(&run.stderr);
         if !run.status.success() {
             let said = said.trim().trim_start_matches("mrfgs: ");

@@ -88,8 +88,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 fn check_outputs(args: &Args, input: &Input, folder: Option<&StagedFolder>) -> Result<()> {
     let json = files::json_file(args.json.as_deref());
     match folder {
-        Some(folder) => folder.check_json("DIR", json)?,
-        None => json.map_or(Ok(()), mrfgs::image::write::check_path)?,
+        Some(folder) => folder.check_json("DIR", args.json.as_deref())?,
+        None => files::check_json_path(args.json.as_deref())?,
     }
     let mut inputs = args.pair.inputs(input);
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));

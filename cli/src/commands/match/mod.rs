@@ -193,7 +193,7 @@ fn check_outputs(args: &Args, input: &Input) -> Result<Vec<(&'static Also, PathB
     }
     check_range(args, input.range)?;
     let also: Vec<_> = args.also.wanted().map(|word| (word, word.beside(output))).collect();
-    files::json_file(args.json.as_deref()).map_or(Ok(()), write::check_path)?;
+    files::check_json_path(args.json.as_deref())?;
     let mut inputs = args.pair.inputs(input);
     inputs.extend(args.method.files().map(|path| ("the file of --method", path)));
     inputs.extend(args.also.into.as_deref().map(|path| ("the file of --into", path)));

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mrfgs::low_level::text::quoted;
 use mrfgs_node::names::{Names, Rule};
 use mrfgs_node::topics::{GID_BYTES, LONG_GID_BYTES, MOST_DOMAIN};
 
@@ -104,7 +105,7 @@ impl Args {
         match std::env::var(DOMAIN) {
             Ok(text) if !text.is_empty() => {
                 let domain = text.trim().parse().ok().filter(|domain| *domain <= MOST_DOMAIN);
-                let reason = format!("{text:?} is no domain; give a number from 0 to {MOST_DOMAIN}");
+                let reason = format!("{} is no domain; give a number from 0 to {MOST_DOMAIN}", quoted(&text));
                 domain.ok_or_else(|| Failure::usage(DOMAIN, reason))
             }
             _ => Ok(0),

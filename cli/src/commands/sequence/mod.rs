@@ -6,6 +6,7 @@ mod writer;
 
 use std::path::{Path, PathBuf};
 
+use mrfgs::error::Reason;
 use mrfgs::image::write;
 use mrfgs::low_level::plan::Plan;
 use mrfgs::options::DisparityRange;
@@ -253,7 +254,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             }
             sink
         }
-        (Kind::Film, _) => writer.begin_film(records)?,
+        (Kind::Film, _) => writer.begin_film(records),
         (Kind::Recording, _) => writer.begin_recording(messages(), records)?,
         _ => writer.begin_folder(records)?,
     };
@@ -442,8 +443,8 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     let given = args.mask.iter().chain(&args.calib).chain(&args.maps.also.into).chain(&beside);
     inputs.extend(given.map(PathBuf::as_path));
     let named: Vec<_> = inputs.iter().map(|file| ("an input", *file)).collect();
+    files::check_json_path(args.json.as_deref())?;
     if let Some(json) = files::json_file(args.json.as_deref()) {
-        write::check_path(json)?;
         files::distinct(&named, &[("OUTPUT", output), ("--json", json)])?;
     }
     if is_printed(output) {
@@ -454,11 +455,15 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     }
     match Kind::of(output) {
         Kind::Viewer => return Ok(()),
-        Kind::Recording => return files::distinct(&named, &[("OUTPUT", output)]),
+        Kind::Recording => {
+            write::check_path(output)?;
+            return files::distinct(&named, &[("OUTPUT", output)]);
+        }
         Kind::Film => {
             if ffmpeg::writes(output) {
                 ffmpeg::check(output)?;
             }
+            write::check_path(output)?;
             return files::distinct(&named, &[("OUTPUT", output)]);
         }
         Kind::Folder => {}
@@ -466,7 +471,10 @@ fn check_outputs(args: &Args, frames: &Frames, first_image: Option<&Path>) -> Re
     let place = files::folder_place(output)?;
     let inside = |file: &&Path| file.canonicalize().is_ok_and(|file| file.parent() == Some(&place));
     match inputs.iter().find(|file| inside(file)) {
-        Some(_) => Err(Error::write(output, "holds frames that are read; give another folder").into()),
+        Some(_) => {
+            let reason = Reason::of_request("holds frames that are read; give another folder");
+            Err(Error::write(output, reason).into())
+        }
         None => Ok(()),
     }
 }

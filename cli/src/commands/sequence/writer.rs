@@ -8,7 +8,7 @@ use mrfgs::Error;
 use mrfgs::calibration::cameras::ThirdCamera;
 use mrfgs::calibration::matrix::Matrix;
 use mrfgs::depth::Rig;
-use mrfgs::image::{Georeference, Pair, write, write::Growing};
+use mrfgs::image::{Georeference, Pair, write::Growing};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 use mrfgs::sigma::Sigma;
@@ -113,15 +113,9 @@ impl<'a> Writer<'a> {
     }
 
     /// Begins a film.
-    ///
-    /// # Errors
-    /// Where it cannot be written.
-    pub(super) fn begin_film(self, records: Option<Records>) -> Result<Sink<'a>> {
-        if !is_printed(self.output) {
-            write::check_path(self.output)?;
-        }
+    pub(super) fn begin_film(self, records: Option<Records>) -> Sink<'a> {
         let film = To::Film(Film::new(self.output, self.rate));
-        Ok(self.begin(film, records))
+        self.begin(film, records)
     }
 
     /// Begins a recording of these `messages`.

@@ -1,0 +1,297 @@
+//! The examples of the README and the guide: each runs as it stands there and prints what stands below it, or is named here with the
+//! reason why it does not run.
+
+use super::recordings::record_drive;
+use super::*;
+
+const DOCUMENTS: [&str; 2] = ["README.md", "docs/guide.md"];
+
+/// The first lines of what does not run here, and why.
+const NOT_RUN: &[(&str, &str)] = &[
+    // It installs, builds, or serves.
+    ("cargo install --locked --path cli", "installs"),
+    ("pip install ./python", "installs; scripts/python tries it"),
+    ("scripts/c --install ~/.local", "installs; scripts/c tries it"),
+    ("cargo add --path path/to/mrfgs", "changes another crate"),
+    ("scripts/web --serve", "takes Node.js"),
+    ("scripts/web", "takes Node.js"),
+    ("scripts/web --serve 8000", "takes Node.js"),
+    ("scripts/web --test", "takes Node.js and browsers"),
+    ("scripts/test", "runs this"),
+    ("export PKG_CONFIG_PATH=~/.local/lib/pkgconfig LD_LIBRARY_PATH=~/.local/lib", "scripts/c tries it"),
+    ("cc video.c $(pkg-config --cflags --libs mrfgs)", "scripts/c tries it"),
+    // Programs of others.
+    (
+        "ffmpeg -i stereo.mkv -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
+        "takes ffmpeg",
+    ),
+    (
+        "ffmpeg -i /dev/video0 -pix_fmt yuv444p -f yuv4mpegpipe - | mrfgs sequence - - --method fast --max-disparity 63 | ffplay -",
+        "takes ffmpeg and a camera",
+    ),
+    (
+        "ffmpeg -i stereo.mkv -f rawvideo -pix_fmt gray16le - | mrfgs sequence - maps --raw-frames 1280x480,gray16le --max-disparity 63",
+        "takes ffmpeg",
+    ),
+    ("mrfgs sequence left right - --max-disparity 63 | ffmpeg -i - disparity.gif", "takes ffmpeg"),
+    ("mrfgs sequence left.mp4 right.mp4 disparity.mp4 --method fast", "takes ffmpeg"),
+    ("parallel mrfgs batch pairs.csv maps --threads 2 --shard {}/8 ::: $(seq 8)", "takes GNU parallel"),
+    (
+        "sbatch --array=1-8 --wrap 'mrfgs batch pairs.csv maps --shard $SLURM_ARRAY_TASK_ID/8'",
+        "takes Slurm; scripts/slurm tries it",
+    ),
+    (
+        "parallel_stereo --alignment-method local_epipolar --stereo-algorithm \"mrfgs --threads 2 --memory 2GiB\" left.tif right.tif ...",
+        "takes the Ames Stereo Pipeline",
+    ),
+    // Machines of others, and what does not end.
+    (
+        "mrfgs ros --method fast --also points --remap left/image_raw:=/cam0/image_raw --remap right/image_raw:=/cam1/image_raw",
+        "takes cameras; scripts/node tries it",
+    ),
+    ("mrfgs ros --method fast --max-disparity 63", "takes cameras; scripts/node tries it"),
+    (
+        "mrfgs ros --method fast --also depth,points --remap left/image_raw:=/camera/infra1/image_rect_raw --remap right/image_raw:=/camera/infra2/image_rect_raw",
+        "takes cameras; scripts/node tries it",
+    ),
+    ("mrfgs sequence drive.mcap ws://localhost:8765 --also depth,points", "waits for a viewer"),
+    ("mrfgs devices", "tells of the machine"),
+    ("mrfgs match left.png right.png d.pfm --device gpu", "takes a GPU"),
+    ("mrfgs match left.png right.png d.pfm --device 0", "takes a device"),
+    ("mrfgs bench --device cpu --method default --repeats 3", "measures"),
+    ("mrfgs bench --large --method default", "measures for long"),
+    ("mrfgs bench path/to/Teddy --device cpu --device gpu --repeats 20 --json bench.json", "takes a GPU"),
+    // Other languages.
+    ("use mrfgs::{Matcher, Pair};", "Rust"),
+    ("use mrfgs::{Matcher, Method, Pair};", "Rust"),
+    ("use mrfgs::image::raster::Raster;", "Rust"),
+    ("import mrfgs", "Python; scripts/python tries the package"),
+    ("import cv2", "Python with OpenCV"),
+    ("from mcap_ros2.reader import read_ros2_messages", "Python; scripts/recordings reads such files"),
+    (
+        "left, right = (cv2.imread(f\"testdata/raw/{view}.png\")[..., ::-1] for view in (\"left\", \"right\"))",
+        "Python with OpenCV",
+    ),
+    ("matcher = mrfgs.Matcher()", "Python with OpenCV"),
+    (
+        "truth = mrfgs.read_disparity(\"testdata/mixed/disp0GT.pfm\")      # float32 in pixels; +inf where unknown",
+        "Python",
+    ),
+    ("mrfgs_image left = {left_pixels, left_stride, width, height, MRFGS_FORMAT_RGB8}, right = ...;", "C"),
+    ("#include <mrfgs.h>", "C"),
+    ("const char *path = \"stereo.yml\";                        /* ROS has two */", "C"),
+    ("import { createMatcher } from '@mrfgs/wasm';", "JavaScript"),
+];
+
+/// The exit status of those that show a failure.
+const FAILURES: [(&str, i32); 4] = [
+    ("mrfgs match testdata/mixed/im0.png testdata/mixed/im2.png disparity.pfm", 1),
+    ("mrfgs match testdata/mixed/im0.png testdata/mixed/im1.png d.pfm --memory 1MiB", 2),
+    ("mrfgs batch pairs.csv maps --also confidence", 1),
+    ("mrfgs batch pairs.csv maps --also confidence --status", 1),
+];
+
+/// Those that print nothing but times.
+const MEASURES: [&str; 1] = ["mrfgs inspect testdata/mixed/im0.png testdata/mixed/im1.png"];
+
+/// A command, or a block in another language than that of the shell.
+#[derive(Debug)]
+struct Example {
+    language: String,
+    /// A command in one line without its comment, or all lines.
+    code: String,
+    /// What stands below it as printed.
+    printed: String,
+}
+
+impl Example {
+    fn first_line(&self) -> &str {
+        self.code.lines().next().unwrap_or_default()
+    }
+}
+
+/// The examples of each block of a document.
+fn blocks(text: &str) -> Vec<Vec<Example>> {
+    let mut all: Vec<Vec<Example>> = Vec::new();
+    for fenced in text.split("\n```").skip(1).step_by(2) {
+        let (language, body) = fenced.split_once('\n').unwrap_or_default();
+        let example = |code: &str| {
+            let code = code.split("   ").next().unwrap_or(code).replace("cargo run --release -- ", "mrfgs ");
+            Example { language: language.to_owned(), code: code.trim().to_owned(), printed: String::new() }
+        };
+        let mut block: Vec<Example> = Vec::new();
+        match language {
+            "console" => {
+                for line in body.lines() {
+                    match (line.strip_prefix("$ "), block.last_mut()) {
+                        (Some(code), _) => block.push(example(code)),
+                        (None, Some(last)) => last.printed += &format!("{line}\n"),
+                        (None, None) => panic!("printed by nothing: {line}"),
+                    }
+                }
+            }
+            "sh" => {
+                let mut code = String::new();
+                for line in body.lines() {
+                    code = format!("{code} {}", line.trim_start()).trim_start().to_owned();
+                    if let Some(begun) = code.strip_suffix('\\') {
+                        code = begun.trim_end().to_owned();
+                    } else if !code.ends_with('|') {
+                        block.push(example(&std::mem::take(&mut code)));
+                    }
+                }
+                assert_eq!(code, "", "the line goes on");
+            }
+            // What the example before it prints.
+            "text" => {
+                let before =
+                    all.last_mut().and_then(|block| block.last_mut()).expect("an example is before it");
+                before.printed = body.to_owned() + "\n";
+                continue;
+            }
+            _ => block.push(Example { code: body.to_owned(), ..example("") }),
+        }
+        all.push(block);
+    }
+    all
+}
+
+/// What examples find in their folder.
+fn workshop() -> Folder {
+    let folder = Folder::new();
+    let at = |name: &str| folder.join(name);
+    std::os::unix::fs::symlink(scene(""), at("testdata")).unwrap();
+    for inner in ["left", "right", "cam", "frames"] {
+        fs::create_dir(at(inner)).unwrap();
+    }
+    let mixed = ["im0.png", "im1.png"].map(|file| image::open(scene("mixed").join(file)).unwrap().to_rgb8());
+    for (view, (side, letter)) in mixed.iter().zip([("left", 'L'), ("right", 'R')]) {
+        for n in 0..3 {
+            view.save(at(&format!("{side}/{n}.png"))).unwrap();
+        }
+        view.save(at(&format!("cam/0_{letter}.png"))).unwrap();
+        let part = image::imageops::crop_imm(view, 100, 80, 140, 60).to_image();
+        for ending in ["png", "tif"] {
+            part.save(at(&format!("{side}.{ending}"))).unwrap();
+        }
+    }
+    let mut both = image::RgbImage::new(320, 480);
+    for (n, view) in mixed.iter().enumerate() {
+        image::imageops::replace(&mut both, view, 0, 240 * n as i64);
+    }
+    both.save(at("frames/0.png")).unwrap();
+    let mask = |(width, height)| {
+        image::GrayImage::from_fn(width, height, |x, _| image::Luma([if x < 9 { 255 } else { 0 }]))
+    };
+    mask((140, 60)).save(at("clouds.png")).unwrap();
+    mask((320, 240)).save(at("rover.png")).unwrap();
+    let camera = "[[240, 0, 160], [0, 240, 120], [0, 0, 1]]";
+    let rest = "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.186, 0, 0]\nimage_width: 320\nimage_height: 240\nunit: m\n";
+    let none = "[0, 0, 0, 0]";
+    fs::write(at("stereo.yml"), format!("K1: {camera}\nD1: {none}\nK2: {camera}\nD2: {none}\n{rest}"))
+        .unwrap();
+    record_drive(&at("drive.mcap"));
+    folder
+}
+
+/// A line that does not depend on the machine: without times and numbers of threads, and with one space between its words. Of what
+/// `measures`, no number stays.
+fn plain(line: &str, measures: bool) -> String {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let next = |i: usize| words.get(i + 1).copied().unwrap_or_default();
+    let is_number = |word: &str| word.trim_end_matches([',', ':']).parse::<f64>().is_ok();
+    let shown = words.iter().enumerate().map(|(i, word)| {
+        let of_machine =
+            ["s", "s:", "thread", "threads"].contains(&next(i)) || next(i) == "a" && next(i + 1) == "second";
+        match *word {
+            "thread" => "threads",
+            word if is_number(word) && (measures || of_machine) => "N",
+            word => word,
+        }
+    });
+    shown.collect::<Vec<_>>().join(" ")
+}
+
+/// Whether `printed` is what a document says; a line `...` there stands for any lines.
+fn agrees(said: &[String], printed: &[String]) -> bool {
+    match said.split_first() {
+        None => printed.is_empty(),
+        Some((line, rest)) if line == "..." => (0..=printed.len()).any(|from| agrees(rest, &printed[from..])),
+        Some((line, rest)) => printed.first() == Some(line) && agrees(rest, &printed[1..]),
+    }
+}
+
+/// Runs an example; what is wrong with it.
+fn fault(folder: &Path, example: &Example) -> Option<String> {
+    if let Some(file) = example.code.strip_prefix("cat ") {
+        // A file that the reader writes.
+        fs::write(folder.join(file), &example.printed).unwrap();
+        return None;
+    }
+    let code = if example.language == "toml" {
+        fs::write(folder.join("block.toml"), &example.code).unwrap();
+        "mrfgs match left.png right.png d.pfm --max-disparity 9 --dry-run --method block.toml"
+    } else {
+        &example.code
+    };
+    let programs = Path::new(env!("CARGO_BIN_EXE_mrfgs")).parent().unwrap();
+    let path = std::env::join_paths(
+        std::iter::once(programs.to_owned()).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+    );
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &format!("exec 2>&1\n{code}")]).current_dir(folder).env("PATH", path.unwrap());
+    shell.envs(NO_DRIVER.iter().copied()).env("JOB_COMPLETION_INDEX", "0").env_remove("RUST_BACKTRACE");
+    let output = shell.output().unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let status = FAILURES.iter().find(|failure| failure.0 == example.code).map_or(0, |failure| failure.1);
+    if output.status.code() != Some(status) {
+        return Some(format!("exit status {:?}: {}\n{printed}", output.status.code(), example.code));
+    }
+    let measures = MEASURES.contains(&example.code.as_str());
+    let [said, found] = [&example.printed, &printed]
+        .map(|text| text.lines().map(|line| plain(line, measures)).collect::<Vec<_>>());
+    let is_shown = !example.printed.is_empty();
+    (is_shown && !agrees(&said, &found))
+        .then(|| format!("{}\nprints\n{printed}\nand not\n{}", example.code, example.printed))
+}
+
+#[test]
+fn every_example_prints_what_it_says() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let (mut ran, mut named, mut faults) = (0, Vec::new(), Vec::new());
+    for document in DOCUMENTS {
+        let folder = workshop();
+        for block in blocks(&fs::read_to_string(root.join(document)).unwrap()) {
+            if block.iter().any(|example| example.code.contains("mrfgs sequence")) {
+                let _ = fs::remove_dir_all(folder.join("maps"));
+            }
+            let _ = fs::remove_dir_all(folder.join("rectified"));
+            for example in block {
+                if let Some(row) = NOT_RUN.iter().find(|row| row.0 == example.first_line()) {
+                    named.push(row.0);
+                } else if ["console", "sh", "toml"].contains(&&*example.language) {
+                    ran += 1;
+                    faults.extend(fault(&folder, &example).map(|fault| format!("{document}: {fault}")));
+                } else {
+                    faults.push(format!("{document}: neither run nor named: {}", example.first_line()));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n\n"));
+    assert!(ran > 40, "{ran} examples");
+    let gone: Vec<_> = NOT_RUN.iter().filter(|row| !named.contains(&row.0)).collect();
+    assert!(gone.is_empty(), "no example any more: {gone:?}");
+}
+
+/// Control: what an example does not print, and what nobody has named, is found.
+#[test]
+fn stale_examples_are_found() {
+    let folder = Folder::new();
+    let text = "\n```console\n$ echo one 3   # a comment\none 3\n$ printf 'a\\nb\\nc\\n'\na\n...\nc\n$ echo in 7 s\nin 8 s\n$ echo 2.5\n2.6\n$ false\n```\n";
+    let faults: Vec<_> = blocks(text)[0].iter().map(|example| fault(&folder, example).is_some()).collect();
+    assert_eq!(faults, [false, false, false, true, true]);
+    let sh = blocks("\n```sh\na --b \\\n    c\nd |\n  e   # comment\n```\n\n```text\nprinted\n```\n");
+    let codes: Vec<_> = sh[0].iter().map(|example| (&*example.code, &*example.printed)).collect();
+    assert_eq!(codes, [("a --b c", ""), ("d | e", "printed\n")]);
+}
