@@ -65,7 +65,7 @@ describe('inputs', () => {
     it('keeps the order of files whose names do not tell', async () => {
         const names = [['pear.png', 'apple.png'], ['view.png', 'view.PNG'], ['01.png', '1.png']];
         for (const pair of names) {
-            for (const order of [pair, pair.toReversed()]) {
+            for (const order of [pair, [...pair].reverse()]) {
                 // Both files are the same, so that no pair is better than the other.
                 const files = order.map((name) => ({ name, path: LEFT }));
                 assert.equal(await visit.changed(() => visit.give('dropped', files)), 'ready');

@@ -167,8 +167,11 @@ describe('photos', () => {
         await visit.state('matching');
         await visit.tab.click('#cancel');
         await visit.state('done');
-        assert.equal(await visit.tab.$eval('#size', (size) => size.value), 'full');
-        await visit.tab.select('#size', 'automatic');
+        const size = () => visit.tab.$eval('#size', (select) => select.value);
+        assert.equal(await size(), 'full');
+        // It was for that pair.
+        assert.equal(await visit.changed(() => visit.choose('left', ...VIEWS)), 'ready');
+        assert.equal(await size(), 'automatic');
     });
 
     it('takes a folder of a benchmark, and calls the files after it', async () => {

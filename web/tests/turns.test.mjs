@@ -82,7 +82,7 @@ describe('turns', () => {
         await visit.scene('mixed');
         await visit.holdFiles();
         await visit.changed(async () => {
-            await drop(...named(views('thin').toReversed(), 'my left.png', 'my right.png'));
+            await drop(...named(views('thin').reverse(), 'my left.png', 'my right.png'));
             await visit.tab.click('#swap');
             await visit.release();
         });
