@@ -84,8 +84,7 @@ export class Slots {
         for (const side of SIDES) {
             const input = by<HTMLInputElement>(`${side}-file`);
             input.addEventListener('change', () => {
-                // What was not taken is not held.
-                void this.take([...(input.files ?? [])].map(named), { side }).then(() => this.hold(side));
+                void this.take([...(input.files ?? [])].map(named), { side });
             });
             // The same file can be chosen again.
             input.addEventListener('click', () => (input.value = ''));
