@@ -43,11 +43,12 @@ Examples:
 /// is above the other, both images are rotated by 90 degrees, so that rows are epipolar lines:
 /// counter-clockwise if the first camera is the upper one, clockwise if it is the lower one.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_missing_positional = true)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     /// Image of the left camera: the first one of the calibration
     left: PathBuf,
-    /// Image of the right camera, of the same size; left out where LEFT is a .mpo or .jps, which holds both views
+    /// Image of the right camera, of the same size
+    #[arg(required = true)]
     right: Option<PathBuf>,
     /// Folder for the rectified pair, new or empty
     #[arg(value_name = "DIR", required = true)]

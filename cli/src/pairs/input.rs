@@ -26,8 +26,8 @@ use crate::remedy;
 pub(crate) struct PairArgs {
     /// Left image, the reference view
     pub(crate) left: PathBuf,
-    /// Right image, of the same size and rectified, so that matches are on the same row; left out where LEFT is a .mpo or .jps, which
-    /// holds both views
+    /// Right image, of the same size and rectified, so that matches are on the same row
+    #[arg(required = true)]
     pub(crate) right: Option<PathBuf>,
 
     #[command(flatten)]

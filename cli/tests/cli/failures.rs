@@ -13,9 +13,7 @@ const FAILURES: &[Failure] = &[
     // The command line itself.
     ("", 2, "subcommand & match, rectify, depth, sequence, ros, batch & --help"),
     ("frobnicate", 2, "frobnicate & --help"),
-    ("match left.png", 2, "<OUTPUT> & mrfgs match --help"),
-    ("match left.png out.pfm --max-disparity 9", 1, "left.png & holds one view & .mpo and .jps"),
-    ("rectify left.png out", 1, "left.png & holds one view & .mpo and .jps"),
+    ("match left.png", 2, "<RIGHT> <OUTPUT> & mrfgs match --help"),
     ("completions", 2, "<SHELL> & mrfgs completions --help"),
     ("completions tcsh", 2, "tcsh & bash & zsh"),
     ("man none/man1", 1, "none/man1 & no folder & create that first"),
@@ -130,7 +128,7 @@ const FAILURES: &[Failure] = &[
     ("M out.pfm --set memory=0", 2, "--set memory & 0 is outside 1 to 16777216"),
     ("P --max-disparity 900 --memory 1MiB", 2, "--memory & 1 MiB & 60 x 40 & at least & smaller"),
     // Inspection.
-    ("inspect left.png --max-disparity 9", 1, "left.png & holds one view & the file of the right view"),
+    ("inspect left.png", 2, "<RIGHT> & mrfgs inspect --help"),
     ("I folder/full", 1, "folder/full & not empty"),
     ("I left.png", 1, "left.png & is a file"),
     ("I none/steps", 1, "none/steps & no folder none & create it"),

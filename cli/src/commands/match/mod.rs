@@ -32,8 +32,6 @@ Examples:
   mrfgs match l.png r.png d.pfm --focal 700 --baseline 120mm --also depth
   # Two photographs of one camera, without a calibration:
   mrfgs match l.jpg r.jpg d.pfm --rectify
-  # Both views in a file of a stereo camera:
-  mrfgs match photo.mpo d.pfm --rectify
   # Raw images and a calibration:
   mrfgs match l.png r.png d.pfm --rectify --calib stereo.yml --also depth
   # Points as LAZ, in the frame of the left camera as it took the image:
@@ -42,7 +40,7 @@ Examples:
 /// Match a rectified pair and write its disparity map
 ///
 /// LEFT is the reference view; all maps have its size. Images are PNG, JPEG, PNM, TIFF, BMP, PFM or NPY, recognised by their
-/// content. A .mpo or .jps of a stereo camera holds both views, and stands alone. Pixels that are transparent, not finite, or without data are ignored.
+/// content. Pixels that are transparent, not finite, or without data are ignored.
 ///
 /// The extension of OUTPUT says how disparities (in pixels) are stored: .pfm as float with +infinity for
 /// invalid pixels, .tif or .tiff as float with NaN and with the georeference of LEFT, .png as in KITTI: 16
@@ -57,7 +55,7 @@ Examples:
 /// OpenCV. Where d + doffs is 0 or less there is no depth. An entry `unit` in the file (mm, cm or m) states
 /// the unit. --focal and --baseline take the place of a calibration whose doffs is 0.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_missing_positional = true)]
+#[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
     #[command(flatten)]
     pair: PairArgs,
