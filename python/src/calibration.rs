@@ -10,7 +10,7 @@ use pyo3::exceptions::{PyFileNotFoundError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 
-use crate::exceptions::exception;
+use crate::exceptions::{self, exception};
 use crate::words;
 
 /// What is known of a pair of cameras, read from files.
@@ -49,10 +49,9 @@ impl PyCalibration {
 
     fn read<'py>(files: impl Iterator<Item = Bound<'py, PyAny>>, unit: Option<&str>) -> PyResult<Self> {
         let files = files.map(|file| {
-            let path: PathBuf = file.extract().map_err(|_| {
-                PyTypeError::new_err(
-                    "calibration: give the path of a file, or those of two, or a Calibration",
-                )
+            let path: PathBuf = file.extract().map_err(|error| {
+                let reason = "calibration: give the path of a file, or those of two, or a Calibration";
+                exceptions::instead(file.py(), error, PyTypeError::new_err(reason))
             })?;
             let name = path.display().to_string();
             if name.contains('\n') {

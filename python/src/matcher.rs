@@ -206,8 +206,9 @@ pub(crate) fn match_(
 
 /// The region (x, y, width, height) of the left view of `pair`.
 fn region(given: &Bound<PyAny>, pair: &Pair, range: DisparityRange) -> PyResult<Region> {
-    let [x, y, width, height]: [usize; 4] = given.extract().map_err(|_| {
-        PyTypeError::new_err("roi: give (x, y, width, height), four whole numbers of pixels from 0 on")
+    let [x, y, width, height]: [usize; 4] = given.extract().map_err(|error| {
+        let reason = "roi: give (x, y, width, height), four whole numbers of pixels from 0 on";
+        exceptions::instead(given.py(), error, PyTypeError::new_err(reason))
     })?;
     let part = Rect { x: x..x.saturating_add(width), y: y..y.saturating_add(height) };
     Region::new(part, pair.size(), range).map_err(|error| PyValueError::new_err(format!("roi: {error}")))

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyFileNotFoundError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
 
-use crate::exceptions::exception;
+use crate::exceptions::{self, exception};
 
 /// A camera beside the pair, such as the colour camera of a rig: `Rig.registered` gives depths in its view.
 ///
@@ -30,9 +30,10 @@ impl PyThirdCamera {
         if let Ok(camera) = given.cast::<Self>() {
             return Ok(camera.get().camera);
         }
-        let path: PathBuf = given
-            .extract()
-            .map_err(|_| PyTypeError::new_err("camera: give a ThirdCamera, or the path of its file"))?;
+        let path: PathBuf = given.extract().map_err(|error| {
+            let reason = "camera: give a ThirdCamera, or the path of its file";
+            exceptions::instead(given.py(), error, PyTypeError::new_err(reason))
+        })?;
         Ok(Self::read(&path)?.camera)
     }
 
