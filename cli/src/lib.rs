@@ -190,7 +190,7 @@ mod tests {
             help.into_iter().flatten().chain(command.get_subcommands().flat_map(texts)).collect()
         }
         // A plug-in's line, and those that stand for words.
-        let no_lines = ["mrfgs /path/to/asp-plugin", "mrfgs --threads"];
+        let no_lines = ["mrfgs /path/to/asp-plugin", "mrfgs --threads", "mrfgs evaluate map --json"];
         let of_help = texts(&Cli::command());
         let mut lines: Vec<String> = of_help
             .iter()

@@ -382,9 +382,9 @@ fn names_that_cannot_be_are_refused_at_once() {
             format!("rectify @raw/left.png @raw/right.png {long}nnnn --calib @raw/cameras.yml"),
             "File name too long",
         ),
-        (format!("sequence left.png right.png {long}.mcap --max-disparity 9"), "File name too long"),
-        (format!("sequence left.png right.png {long}.y4m --max-disparity 9"), "File name too long"),
-        (format!("sequence left.png right.png {long}nnnn --max-disparity 9"), "File name too long"),
+        (format!("sequence lef*.png righ*.png {long}.mcap --max-disparity 9"), "File name too long"),
+        (format!("sequence lef*.png righ*.png {long}.y4m --max-disparity 9"), "File name too long"),
+        (format!("sequence lef*.png righ*.png {long}nnnn --max-disparity 9"), "File name too long"),
         (format!("batch pairs.csv {long}nnnn"), "File name too long"),
         (format!("demo {long}nnnn"), "File name too long"),
         (format!("match {long}nnnn right.png out.pfm"), "File name too long"),
@@ -397,19 +397,6 @@ fn names_that_cannot_be_are_refused_at_once() {
         assert!(listing(&folder) == before, "{line}");
         std::os::unix::fs::symlink("circle.pfm", folder.join("circle.pfm")).unwrap();
     }
-}
-
-/// What the system refuses is told in its words alone.
-#[cfg(target_os = "linux")]
-#[test]
-fn few_files_may_be_open() {
-    let folder = workshop();
-    let before = listing(&folder);
-    let told =
-        shell(&folder, "ulimit -n 3", "match left.png right.png out.pfm --max-disparity 9 --device cpu");
-    told.failed(1, "Too many open files");
-    assert!(!told.stderr.contains("os error"), "{told:?}");
-    assert!(listing(&folder) == before);
 }
 
 #[cfg(target_os = "linux")]

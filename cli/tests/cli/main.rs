@@ -516,7 +516,7 @@ fn a_standard_output_that_takes_nothing_is_told() {
         (map, ">&-", 1, "standard output & is closed & redirect it"),
         (json, ">&-", 1, "standard output & is closed"),
         (&*format!("{truth} --json -"), ">&-", 1, "standard output & is closed"),
-        ("sequence left.png right.png - --max-disparity 9", ">&-", 1, "standard output & is closed"),
+        ("sequence lef*.png righ*.png - --max-disparity 9", ">&-", 1, "standard output & is closed"),
         ("inspect left.png right.png --max-disparity 9 --json -", ">&-", 1, "standard output & is closed"),
         (map, "1<left.png", 1, "standard output & for reading alone"),
         ("presets", "1<left.png", 1, "standard output & for reading alone"),
