@@ -129,12 +129,12 @@ struct Detail {
 }
 
 impl Detail {
-    /// The mean bend of the grey along the rows beyond `rounding`, in parts of the `contrast`.
-    fn of(image: &Image, contrast: f64, rounding: f64) -> Self {
-        let (_, height) = image.pixels.size();
-        let mut bands = [(0.0, 0_u64); BANDS];
+    /// The mean bend of the grey along the rows beyond `rounding`, in parts of the `contrast`; 0 where most is `masked`.
+    fn of(image: &Image, masked: &Plane<bool>, contrast: f64, rounding: f64) -> Self {
+        let (width, height) = image.pixels.size();
+        let mut bands = [(0.0, 0); BANDS];
         for y in 0..height {
-            let (row, masked) = (image.pixels.row(y), image.masked.row(y));
+            let (row, masked) = (image.pixels.row(y), masked.row(y));
             let (sum, count) = &mut bands[y * BANDS / height];
             for (pixels, masked) in row.windows(3).zip(masked.windows(3)) {
                 if !masked.contains(&true) {
@@ -144,7 +144,10 @@ impl Detail {
                 }
             }
         }
-        Self { bands: bands.map(|(sum, count)| sum / (count.max(1) as f64 * contrast)) }
+        let mean = |(sum, count): (f64, usize)| {
+            if 2 * BANDS * count < width * height { 0.0 } else { sum / (count as f64 * contrast) }
+        };
+        Self { bands: bands.map(mean) }
     }
 
     /// Which bands have far more of it than those of the `other` view, and are not plain.
@@ -155,10 +158,10 @@ impl Detail {
 }
 
 /// The mean difference of the grey across [`FAR`] pixels; `None` where there is none.
-fn contrast(image: &Image) -> Option<f64> {
+fn contrast(image: &Image, masked: &Plane<bool>) -> Option<f64> {
     let (mut sum, mut count) = (0_u64, 0_u64);
     for y in 0..image.pixels.height() {
-        let (row, masked) = (image.pixels.row(y), image.masked.row(y));
+        let (row, masked) = (image.pixels.row(y), masked.row(y));
         for x in FAR..row.len() {
             if !masked[x] && !masked[x - FAR] {
                 sum += u64::from(row[x][3].abs_diff(row[x - FAR][3]));
@@ -171,11 +174,14 @@ fn contrast(image: &Image) -> Option<f64> {
 
 /// The view, left (0) or right (1), that is blurred or covered in a part where the other one shows detail.
 pub(super) fn blurred(left: &Image, right: &Image) -> Option<(usize, Part)> {
-    let height = left.pixels.height();
-    let contrasts = [contrast(left)?, contrast(right)?];
+    let (width, height) = left.pixels.size();
+    // What is masked in one view does not count in the other either.
+    let masked = Plane::from_fn(width, height, |x, y| left.masked[(x, y)] || right.masked[(x, y)]);
+    let contrasts = [contrast(left, &masked)?, contrast(right, &masked)?];
     let detail = |image: &Image, i: usize| {
         // As many parts of the contrast in both.
-        Detail::of(image, contrasts[i], ROUNDING * (contrasts[i] / contrasts[1 - i]).max(1.0))
+        let rounding = ROUNDING * (contrasts[i] / contrasts[1 - i]).max(1.0);
+        Detail::of(image, &masked, contrasts[i], rounding)
     };
     let [left, right] = [detail(left, 0), detail(right, 1)];
     let [of_left, of_right] = [right.is_more(&left), left.is_more(&right)].map(longest);
