@@ -359,8 +359,8 @@ fn of_pixels(pair: &Pair, range: Option<DisparityRange>) -> Vec<Warning> {
     let found = if is_searched { survey(pair) } else { Survey::default() };
     let mut out = exposure(pair, matches::median(found.matches.iter().map(|m| m.disparity)) / FRACTION);
     let is_exposed_alike = out.is_empty();
-    let copied = parts::copied(pair.left(), pair.right()).map(|part| Warning::Copied { part });
-    out.extend(copied);
+    let copied = parts::copied(pair.left(), pair.right());
+    out.extend(copied.map(|part| Warning::Copied { part }));
     if !is_searched {
         return out;
     }
