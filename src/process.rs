@@ -141,7 +141,7 @@ mod tests {
 
     /// As a child finds what its parent has left.
     fn of_parent<T>(thing: T) -> Own<T> {
-        Own { process: id() + 1, ..Own::new(thing) }
+        Own { process: id() + 1, thing: Some(thing) }
     }
 
     impl<T> Own<T> {

@@ -29,7 +29,7 @@ fn nothing_begins_the_global_pool() {
     assert_eq!(by.apply(&pair).unwrap().left(), rectified.left());
     Rectification::of_pair(&pair, &Options::default()).unwrap();
     let range = check::range(&rectified).unwrap();
-    check::warnings(&rectified, Some(range));
+    let _ = check::warnings(&rectified, Some(range));
     Drift::of(&by).unwrap().follow(&rectified, range).unwrap();
     let _ = (rectified.halved(), rectified.left().downsampled());
     let folder = tempfile::tempdir().unwrap();
