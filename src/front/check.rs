@@ -168,7 +168,7 @@ pub enum Warning {
     /// A view lacks the detail of the other one.
     #[error(
         "the {view} view lacks the detail of the other {part}, so little can be matched there: check that it is in focus and that \
-         nothing covers the camera, and mask what is no image"
+         nothing covers the camera, and that the other one shows the scene and no noise"
     )]
     Blurred {
         /// Name of the view: "left" or "right".
