@@ -26,8 +26,9 @@ pub(crate) const FLAGS: Words = Words {
     ..Words::PLAIN
 };
 
-/// In a list of pairs.
-pub(crate) const COLUMNS: Words = Words { min: "min_disparity", max: "max_disparity", ..FLAGS };
+/// In a list of pairs, where --rectify takes a calibration.
+pub(crate) const COLUMNS: Words =
+    Words { min: "min_disparity", max: "max_disparity", rectify: Some("`mrfgs rectify`"), ..FLAGS };
 
 #[cfg(test)]
 mod tests {
@@ -191,15 +192,13 @@ mod tests {
     #[test]
     fn a_list_has_columns_and_no_flags() {
         let ranges = every().into_iter().filter(|(cause, _)| matches!(cause, Error::Range(_)));
-        // Where the pair itself is to be mended, no range helps; a list is rectified by a flag.
-        let mended = |cause: &Error| {
-            matches!(cause, Error::Range(RangeError::NotFound { cause: Some(_) } | RangeError::NotRectified))
-        };
-        let ranges = ranges.filter(|(cause, _)| !mended(cause));
+        // Where the pair itself is to be mended, no range helps.
+        let ranges = ranges
+            .filter(|(cause, _)| !matches!(cause, Error::Range(RangeError::NotFound { cause: Some(_) })));
         let errors = ranges.map(|(cause, _)| error(&cause, &COLUMNS));
         let clipped = WARNINGS.iter().filter(|(cause, _)| matches!(cause, Warning::Clipped { .. }));
         let said: Vec<String> = errors.chain(clipped.map(|(cause, _)| warning(cause, &COLUMNS))).collect();
-        assert_eq!(said.len(), 9);
+        assert_eq!(said.len(), 10);
         assert!(said.iter().all(|said| said.contains("_disparity") && !said.contains("--")), "{said:?}");
     }
 }
