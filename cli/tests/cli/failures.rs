@@ -62,7 +62,6 @@ const FAILURES: &[Failure] = &[
     ("M left.png/out.pfm", 1, "left.png/out.pfm & left.png is a file and no folder & give another name"),
     ("M left.png/a/out.pfm", 1, "left.png/a/out.pfm & left.png is a file and no folder"),
     ("I left.png/steps", 1, "left.png/steps & left.png is a file and no folder"),
-    ("M folder/", 1, "folder/ & is a folder"),
     ("M out.pfm/", 2, "out.pfm/ & names no file"),
     ("M taken.pfm", 1, "taken.pfm & is a folder & name of a file"),
     ("M taken.tif --also raw", 1, "taken.raw.tif & is a folder"),

@@ -268,7 +268,7 @@ fn calibrations_in_recordings_are_those_of_files() {
 }
 
 /// The messages of a topic: times and bytes.
-fn messages(path: &Path, topic: &str) -> Vec<(u64, Vec<u8>)> {
+pub(super) fn messages(path: &Path, topic: &str) -> Vec<(u64, Vec<u8>)> {
     let bytes = fs::read(path).unwrap();
     // Chunks are packed by LZ4, for which the crate of MCAP would take C.
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
