@@ -64,7 +64,7 @@ fn colours() -> impl TypedValueParser<Value = ColourMap> {
         .try_map(|word| COLOURS.into_iter().find(|map| map.0 == word).map(|map| map.2).ok_or("no such word"))
 }
 
-#[allow(clippy::ref_option, reason = "serde hands it over so")]
+#[allow(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "serde hands it over so")]
 fn colours_in_a_word<S: Serializer>(colours: &Option<ColourMap>, to: S) -> Result<S::Ok, S::Error> {
     let colours = colours.unwrap_or_default();
     COLOURS.iter().find(|map| map.2 == colours).map(|map| map.0).serialize(to)

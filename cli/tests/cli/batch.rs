@@ -298,9 +298,10 @@ fn runs_at_the_same_time_share_the_pairs() {
 fn an_interrupted_batch_tidies_up() {
     let folder = pairs(12, (160, 120));
     let out = folder.join("out");
-    let signals: &[(&str, usize)] = match cfg!(target_os = "linux") {
-        true => &[("-INT", 1), ("-TERM", 3), ("-HUP", 5), ("-XCPU", 7)],
-        false => &[("-INT", 1), ("-TERM", 4)],
+    let signals: &[(&str, usize)] = if cfg!(target_os = "linux") {
+        &[("-INT", 1), ("-TERM", 3), ("-HUP", 5), ("-XCPU", 7)]
+    } else {
+        &[("-INT", 1), ("-TERM", 4)]
     };
     for &(signal, records) in signals {
         let child = begun(&folder);

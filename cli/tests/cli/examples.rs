@@ -125,7 +125,7 @@ fn blocks(text: &str) -> Vec<Vec<Example>> {
                 for line in body.lines() {
                     match (line.strip_prefix("$ "), block.last_mut()) {
                         (Some(code), _) => block.push(example(code)),
-                        (None, Some(last)) => last.printed += &format!("{line}\n"),
+                        (None, Some(last)) => last.printed += &[line, "\n"].concat(),
                         (None, None) => panic!("printed by nothing: {line}"),
                     }
                 }
@@ -133,7 +133,7 @@ fn blocks(text: &str) -> Vec<Vec<Example>> {
             "sh" => {
                 let mut code = String::new();
                 for line in body.lines() {
-                    code = format!("{code} {}", line.trim_start()).trim_start().to_owned();
+                    code = [&*code, line].map(str::trim).join(" ").trim().into();
                     if let Some(begun) = code.strip_suffix('\\') {
                         code = begun.trim_end().to_owned();
                     } else if !code.ends_with('|') {

@@ -387,7 +387,7 @@ fn names_that_cannot_be_are_refused_at_once() {
         (format!("batch pairs.csv {long}nnnn"), "File name too long"),
         (format!("demo {long}nnnn"), "File name too long"),
         (format!("match {long}nnnn right.png out.pfm"), "File name too long"),
-        (format!("match left.png/a right.png out.pfm"), "left.png/a: Not a directory"),
+        ("match left.png/a right.png out.pfm".to_owned(), "left.png/a: Not a directory"),
     ] {
         let told = run(&folder, &line);
         told.failed(1, words);

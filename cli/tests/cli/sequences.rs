@@ -509,9 +509,10 @@ fn what_was_done_before_a_signal_stays() {
         assert!(!folder.join("never").exists());
     }
     let end = "mrfgs: stopped after 2 frames\n";
-    let signals: &[&str] = match cfg!(target_os = "linux") {
-        true => &["-INT", "-HUP", "-QUIT", "-XCPU", "-ALRM", "-VTALRM", "-PROF", "-USR1", "-USR2"],
-        false => &["-INT"],
+    let signals: &[&str] = if cfg!(target_os = "linux") {
+        &["-INT", "-HUP", "-QUIT", "-XCPU", "-ALRM", "-VTALRM", "-PROF", "-USR1", "-USR2"]
+    } else {
+        &["-INT"]
     };
     for signal in signals {
         let output = format!("maps{signal}");

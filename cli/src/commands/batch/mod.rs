@@ -497,7 +497,7 @@ mod tests {
     fn asked(folder: &Path, list: &str, flags: &str) -> Value {
         let words = ["batch", list, "out"].into_iter().chain(flags.split_whitespace());
         let words = words.map(|word| {
-            let is_file = word.ends_with(".csv") || word.ends_with(".yml");
+            let is_file = [".csv", ".yml"].iter().any(|ending| word.ends_with(ending));
             if is_file { folder.join(word).into_os_string() } else { word.into() }
         });
         let args = Program::try_parse_from(words).map_err(|e| panic!("{flags}: {e}")).unwrap().args;
