@@ -15,7 +15,7 @@ use crate::failure::{Failure, Result};
 use crate::outputs::{MatchRecord, files};
 use crate::remedy;
 
-use super::Args;
+use super::args::Args;
 use super::listed::{Given, Listed};
 
 /// What a batch is asked to make of a pair. The record of a complete pair holds the same request.
