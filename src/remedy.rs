@@ -9,6 +9,7 @@ use crate::error::{
 };
 use crate::front::check::Warning;
 use crate::maps::FRACTION;
+use crate::rectification::Doubt;
 
 /// What a front end calls what helps. `None` is what it does not have.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +56,10 @@ pub struct Words {
     pub orient: Option<&'static str>,
     /// What rectifies a pair.
     pub rectify: Option<&'static str>,
+    /// What to do about a unit that is wrong.
+    pub unit: Option<&'static str>,
+    /// What says which part of the calibrated images the images are.
+    pub crop: Option<&'static str>,
 }
 
 impl Words {
@@ -81,6 +86,8 @@ impl Words {
         calibration: "a calibration",
         orient: None,
         rectify: None,
+        unit: None,
+        crop: None,
     };
 }
 
@@ -129,6 +136,20 @@ pub fn of_rectified(warning: &Warning, calibrated: bool, words: &Words) -> Strin
     };
     let rows = f64::from(*offset) / f64::from(FRACTION);
     format!("after rectification matches lie {rows:.1} px above or below their row: {why}")
+}
+
+/// A doubt about a rectification, or about the calibration of a rectified pair, with its remedy.
+#[must_use]
+pub fn doubt(doubt: &Doubt, Words { unit, crop, .. }: &Words) -> String {
+    let remedy = match doubt {
+        Doubt::OtherSize { .. } => and("; if they show another part, say which by ", *crop),
+        Doubt::Baseline { .. } => and(": ", *unit),
+        Doubt::FocalLength { .. } => {
+            ": give it in pixels, which are the millimetres by the width of a pixel on the sensor".into()
+        }
+        _ => String::new(),
+    };
+    format!("{doubt}{remedy}")
 }
 
 /// `word` after what joins it; nothing without it.

@@ -393,3 +393,27 @@ fn only_converging_cameras_are_searched_below_0() {
         assert!(converging.min as f32 <= truths[0] - less as f32, "{}: {converging:?}", case.name);
     }
 }
+
+#[test]
+fn known_cameras_see_nothing_behind_them() {
+    // Two surfaces; the lower one would be behind parallel cameras.
+    let noise = |x: i32, y: i32| {
+        let hash = ((x + 1000) as u32 * 73 + y as u32 * 179 + 1).wrapping_mul(0x9e37_79b9);
+        [(hash >> 24) as u8; 3]
+    };
+    let step = |y: usize| if y < 80 { 12 } else { -9 };
+    let view = |moved: bool| {
+        let plane =
+            Plane::from_fn(160, 100, |x, y| noise(x as i32 + if moved { step(y) } else { 0 }, y as i32));
+        Image::from_rgb8(&plane)
+    };
+    let pair = Pair::new(view(false), view(true)).unwrap();
+    let all = check::range(&pair).unwrap();
+    assert!(all.min < -9 && all.max > 12, "{all:?}");
+    let cut = check::range_of_cameras(&pair, 0.0).unwrap();
+    assert!(cut.min == 0 && cut.max > 12 && cut.max < all.max, "{cut:?}");
+    // Of these cameras nothing is behind, and of those nearly all is: then they are not those of the pair.
+    for doffs in [40.0, -40.0] {
+        assert_eq!(check::range_of_cameras(&pair, doffs).unwrap(), all, "{doffs}");
+    }
+}

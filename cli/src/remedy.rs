@@ -1,6 +1,6 @@
 //! The program's words for what helps: flags, and the columns of a list.
 
-pub(crate) use mrfgs::remedy::{Words, error, of_rectified, warning};
+pub(crate) use mrfgs::remedy::{Words, doubt, error, of_rectified, warning};
 
 /// On the command line.
 pub(crate) const FLAGS: Words = Words {
@@ -23,8 +23,14 @@ pub(crate) const FLAGS: Words = Words {
     calibration: "a calibration by --calib",
     orient: Some("--orient"),
     rectify: Some("--rectify (or `mrfgs rectify`)"),
+    unit: Some("say the right one in the file by an entry `unit`: mm, cm or m"),
+    crop: Some("--calib-crop"),
     ..Words::PLAIN
 };
+
+/// Of cameras that the command line gives by their numbers.
+pub(crate) const NUMBERS: Words =
+    Words { unit: Some("give the right one with the number, such as 120mm, 12cm or 0.12m"), ..FLAGS };
 
 /// In a list of pairs, where --rectify takes a calibration.
 pub(crate) const COLUMNS: Words =

@@ -3,7 +3,8 @@
 use super::lens::Lens;
 use super::matrix::{IDENTITY, Matrix, degrees, degrees_between, product, rotated, transposed};
 use crate::error::{Error, Result};
-use crate::image::calib::{Calibration, Camera, Unit};
+use crate::image::Rect;
+use crate::image::calib::{Calibration, Camera, Fit, Unit};
 
 /// A pair of cameras as a calibration program found it. The left camera is the first one.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +18,10 @@ pub struct StereoCalibration {
     pub views: Option<Views>,
     /// Width and height of the images, in pixels.
     pub size: Option<(usize, usize)>,
+    /// Those of the right images, where they are others.
+    pub right_size: Option<(usize, usize)>,
+    /// Whether images of another size are the middle of these, scaled until it fills them.
+    pub(super) fills: bool,
     /// The unit of the baseline.
     pub unit: Unit,
     /// What `calib.txt` says, where it is one.
@@ -122,19 +127,32 @@ impl Views {
         )))
     }
 
-    /// The calibration of the rectified images, of the given size.
+    /// Whether the right camera is on the left of the left one.
+    pub(crate) fn is_exchanged(&self) -> bool {
+        !self.is_vertical() && self.translation[0] > 0.0
+    }
+
+    /// The same with each camera in the place of the other one.
+    pub(crate) fn exchanged(&self) -> Self {
+        let Self { rotations: [r1, r2], cameras: [left, right], translation, size } = *self;
+        Self { rotations: [r2, r1], cameras: [right, left], translation: translation.map(|v| -v), size }
+    }
+
+    /// The calibration of the rectified images, of the given size. Where the right camera is on the left of the left one, each counts as
+    /// the other.
     ///
     /// # Errors
-    /// [`Error::Calibration`] where the right camera is not to the right of the left one.
+    /// [`Error::Calibration`] where one camera is above the other, or both are in one place.
     pub fn calibration(&self, size: Option<(usize, usize)>, unit: Unit) -> Result<Calibration> {
         let error = |reason: &str| Err(Error::Calibration(reason.into()));
         if self.is_vertical() {
             return error("has one camera above the other, and only rows are matched");
         }
-        if self.translation[0] >= 0.0 {
-            return error(
-                "puts the right camera on the left of the left one; exchange the two in it, or the images",
-            );
+        if self.is_exchanged() {
+            return Ok(Calibration { exchanged: true, ..self.exchanged().calibration(size, unit)? });
+        }
+        if self.translation[0] == 0.0 {
+            return error("puts both cameras in one place; calibrate again");
         }
         let [left, right] = self.cameras;
         let count = |count: usize| u32::try_from(count).ok();
@@ -167,30 +185,128 @@ impl StereoCalibration {
         Some(Self { others: sizes.collect(), ..first })
     }
 
-    /// What it says of images of this size, where it is for several; else itself.
-    pub(crate) fn of_size(&self, size: (usize, usize)) -> &Self {
-        std::iter::once(self).chain(&self.others).find(|one| one.size == Some(size)).unwrap_or(self)
+    /// Width and height of the left and of the right images, where they are known.
+    #[must_use]
+    pub fn sizes(&self) -> Option<[(usize, usize); 2]> {
+        self.size.map(|left| [left, self.right_size.unwrap_or(left)])
     }
 
-    /// The calibration of images that are rectified already and of this `size`, which counts where the file is for several; `None`
-    /// where it does not say how they were rectified.
+    /// That of a part of the images, as it is: of what a camera reads of its sensor, or a program has cut out. Both cameras have the same
+    /// part.
+    ///
+    /// # Errors
+    /// [`Error::Calibration`] where the part is empty or not inside the images, and where it is for images of several sizes.
+    pub fn of_part(&self, part: &Rect) -> Result<Self> {
+        let (width, height) = part.size();
+        let error = |reason: String| Err(Error::Calibration(reason));
+        if !self.others.is_empty() {
+            return error(format!("is for images of {}, and a part takes one size", self.shown_sizes()));
+        }
+        let outside = |(w, h): &(usize, usize)| part.x.end > *w || part.y.end > *h;
+        if width.min(height) == 0 || self.sizes().into_iter().flatten().any(|size| outside(&size)) {
+            return error(format!(
+                "is for images of {}, and the part of {width} x {height} from ({}, {}) on is not inside",
+                self.shown_sizes(),
+                part.x.start,
+                part.y.start
+            ));
+        }
+        let fits = [Some(Fit::part(part)); 2];
+        let benchmark = self.benchmark.as_ref().map(|benchmark| benchmark.of_part(part));
+        Ok(Self { fills: false, benchmark, ..self.in_sizes(fits) })
+    }
+
+    /// What it says of images of these sizes, left and right, and how these come out of those that it is of, where they are others.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where nothing tells that.
+    pub(crate) fn of_images(&self, sizes: [(usize, usize); 2]) -> Result<(Self, [Option<Fit>; 2])> {
+        let is_of = |one: &&Self| one.sizes().is_none_or(|known| known == sizes);
+        if let Some(one) = self.all().find(is_of) {
+            return Ok((one.clone(), [None; 2]));
+        }
+        let fitting: Vec<_> = self.all().filter_map(|one| Some((one, one.fits(sizes)?))).collect();
+        if let [(one, fits)] = fitting[..] {
+            return Ok((one.in_sizes(fits), fits));
+        }
+        let [left, right] = sizes.map(shown);
+        let these = if left == right { left } else { format!("{left} and {right}") };
+        Err(Error::Mismatch(format!(
+            "the calibration is for images of {} and these are {these}",
+            self.shown_sizes()
+        )))
+    }
+
+    /// How images of these sizes come out of those that it is of, where that is clear.
+    fn fits(&self, sizes: [(usize, usize); 2]) -> Option<[Option<Fit>; 2]> {
+        let fit = |known: (usize, usize), size: (usize, usize)| match Fit::scaled(known, size) {
+            _ if known == size => Some(None),
+            None if self.fills => Some(Some(Fit::middle(known, size))),
+            fit => fit.map(Some),
+        };
+        let [left, right] = self.sizes()?;
+        Some([fit(left, sizes[0])?, fit(right, sizes[1])?])
+    }
+
+    /// That of images that come out of its own like this.
+    fn in_sizes(&self, fits: [Option<Fit>; 2]) -> Self {
+        let lens = |lenses: [Lens; 2], i: usize| fits[i].map_or(lenses[i], |fit| lenses[i].in_size(&fit));
+        let views = self.views.map(|views| match fits[0] {
+            // Views of a size of their own stay what they are.
+            Some(fit) if views.size.is_none_or(|size| Some(size) == self.size) => {
+                Views { cameras: views.cameras.map(|camera| camera.in_size(&fit)), size: None, ..views }
+            }
+            _ => views,
+        });
+        let size = |i: usize| fits[i].map(|fit| fit.size).or(self.sizes().map(|sizes| sizes[i]));
+        Self {
+            lenses: self.lenses.map(|lenses| [lens(lenses, 0), lens(lenses, 1)]),
+            views,
+            size: size(0),
+            right_size: size(1).filter(|right| Some(*right) != size(0)),
+            ..self.clone()
+        }
+    }
+
+    /// It, and those of the same cameras with images of other sizes.
+    fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.others)
+    }
+
+    fn shown_sizes(&self) -> String {
+        let mut sizes: Vec<_> = self.all().filter_map(Self::sizes).flatten().map(shown).collect();
+        sizes.dedup();
+        if sizes.is_empty() { "a size that it does not say".into() } else { sizes.join(", ") }
+    }
+
+    /// The calibration of images that are rectified already and of this `size`: where the file is of several, of that, and where they
+    /// are those of the file in another size, as [`Calibration::of_size`] makes it. `None` where it does not say how they were rectified.
     ///
     /// # Errors
     /// Those of [`Views::calibration`], and [`Error::Calibration`] where it is for several sizes and not for this one.
     pub fn of_rectified_images(&self, size: Option<(usize, usize)>) -> Result<Option<Calibration>> {
+        let in_size = |of: Calibration| size.map_or_else(|| of.clone(), |size| of.of_size(size));
         if let Some(benchmark) = &self.benchmark {
-            return Ok(Some(benchmark.clone()));
+            return Ok(Some(in_size(benchmark.clone())));
         }
-        let one = size.map_or(self, |size| self.of_size(size));
-        let Some(views) = one.views else { return Ok(None) };
-        if !self.others.is_empty() && one.size != size {
-            let sizes = std::iter::once(self).chain(&self.others).filter_map(|one| one.size);
-            let shown = |(width, height): (usize, usize)| format!("{width} x {height}");
-            let sizes = sizes.map(shown).collect::<Vec<_>>().join(", ");
-            let of = size.map_or("; say which".into(), |size| format!(", and these are {}", shown(size)));
-            return Err(Error::Calibration(format!("is for images of {sizes}{of}")));
+        let one = self.all().find(|one| one.size.is_some() && one.size == size);
+        if let Some(one) = one.or(Some(self).filter(|one| one.others.is_empty() || one.views.is_none())) {
+            let Some(views) = one.views else { return Ok(None) };
+            return views.calibration(views.size.or(one.size), one.unit).map(|found| Some(in_size(found)));
         }
-        views.calibration(views.size.or(one.size), one.unit).map(Some)
+        let mut fitting = Vec::new();
+        for one in self.all() {
+            if let Some(views) = one.views {
+                let found = in_size(views.calibration(views.size.or(one.size), one.unit)?);
+                fitting.extend(Some(found).filter(|found| found.fit.is_some()));
+            }
+        }
+        if fitting.len() == 1 {
+            return Ok(fitting.pop());
+        }
+        let sizes = self.shown_sizes();
+        let of = size.map_or("; say which".into(), |size| format!(", and these are {}", shown(size)));
+        Err(Error::Calibration(format!("is for images of {sizes}{of}")))
     }
 
     /// With the pose that the rectification implies, where a file gives that alone.
@@ -205,6 +321,10 @@ impl StereoCalibration {
     }
 }
 
+fn shown((width, height): (usize, usize)) -> String {
+    format!("{width} x {height}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,7 +335,7 @@ mod tests {
         let benchmark = Some(Calibration::default());
         let mut all = StereoCalibration { others: vec![other], benchmark, ..Default::default() };
         all.set_unit(Unit::Centimetre);
-        assert_eq!([all.unit, all.of_size((320, 240)).unit], [Unit::Centimetre; 2]);
+        assert!(all.all().all(|one| one.unit == Unit::Centimetre));
         assert_eq!(all.of_rectified_images(Some((320, 240))).unwrap().unwrap().unit, Unit::Centimetre);
     }
 }

@@ -17,7 +17,8 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let sockets = Sockets::of(entries)?;
     let left = posed(camera(&sockets.cameras, sockets.left)?, Pose::IN_PLACE)?;
     let right = posed(camera(&sockets.cameras, sockets.right)?, sockets.pose_of(sockets.right)?)?;
-    pair(&left, &right, Unit::Centimetre)
+    // Its cameras give the middle of what they see where images have another aspect.
+    Ok(StereoCalibration { fills: true, ..pair(&left, &right, Unit::Centimetre)? })
 }
 
 /// The camera that is not one of the pair, in most of them that of colours.

@@ -19,19 +19,13 @@ pub(super) fn read(entries: &Entries) -> Result<StereoCalibration> {
     let camera = |name: &str| entries.require(name, name, "a camera of the chain")?.group();
     let (left, right) = (camera("cam0")?, camera("cam1")?);
     let (lenses, sizes) = ([lens(&left)?, lens(&right)?], [size(&left)?, size(&right)?]);
-    if sizes[0] != sizes[1] {
-        let reason = format!(
-            "cam1.resolution: expected {} x {} as cam0 has, found {} x {}",
-            sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1
-        );
-        return Err(Error::read(entries.path(), reason));
-    }
     let (entry, pose) = step(&left, &right, 1)?;
     apart(&entry, &pose)?;
     Ok(StereoCalibration {
         lenses: Some(lenses),
         pose: Some(pose),
         size: Some(sizes[0]),
+        right_size: Some(sizes[1]).filter(|right| *right != sizes[0]),
         unit: Unit::Metre,
         ..StereoCalibration::default()
     })

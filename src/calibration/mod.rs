@@ -44,6 +44,7 @@ use cameras::StereoCalibration;
 use node::{Entries, Node};
 
 use crate::error::{Error, Result};
+use crate::image::calib::Unit;
 use crate::text;
 
 /// A calibration is a few kilobytes; no more than this is read.
@@ -212,7 +213,19 @@ pub fn of_texts(files: &[(&Path, String)]) -> Result<StereoCalibration> {
 
 /// What the files say in the first form that takes them, and its name.
 fn in_some_form<'a>(each: &[Entries]) -> Option<(&'a str, Result<StereoCalibration>)> {
-    FORMS.iter().find_map(|(name, read)| Some((*name, read(each)?.map_err(|error| in_form(error, name)))))
+    FORMS.iter().find_map(|(name, read)| {
+        let found = read(each)?.and_then(|found| in_stated_unit(found, each));
+        Some((*name, found.map_err(|error| in_form(error, name))))
+    })
+}
+
+/// What a file states counts, whatever the unit of its form is.
+fn in_stated_unit(mut found: StereoCalibration, each: &[Entries]) -> Result<StereoCalibration> {
+    let stated = opencv::unit(&Entries::together(each))?;
+    if stated != Unit::Unknown {
+        found.set_unit(stated);
+    }
+    Ok(found)
 }
 
 /// An error about a file beside one that says all.

@@ -19,21 +19,13 @@ pub(super) struct Posed<'a> {
 
 /// The calibration of two of them.
 pub(super) fn pair(left: &Posed, right: &Posed, unit: Unit) -> Result<StereoCalibration> {
-    if let (Some((width, height)), Some(size)) = (left.size, right.size)
-        && size != (width, height)
-    {
-        let reason = format_args!(
-            "is of a camera with images of {} x {}, and those of the left one are {width} x {height}; give a pair of one size",
-            size.0, size.1
-        );
-        return Err(right.entry.error(reason));
-    }
     let pose = Pose::between(&left.pose, &right.pose);
     apart(&right.entry, &pose)?;
     Ok(StereoCalibration {
         lenses: Some([left.lens, right.lens]),
         pose: Some(pose),
         size: left.size,
+        right_size: right.size.filter(|size| Some(*size) != left.size),
         unit,
         ..StereoCalibration::default()
     })

@@ -43,13 +43,6 @@ pub(super) fn read(cameras: [&Entries; 2]) -> Result<StereoCalibration> {
             return Err(Error::read(cameras[1].path(), reason));
         }
     };
-    if left.size != right.size {
-        let reason = format!(
-            "image_width, image_height: expected {} x {} as the left camera has, found {} x {}",
-            left.size.0, left.size.1, right.size.0, right.size.1
-        );
-        return Err(Error::read(entries.path(), reason));
-    }
     let entry = entries.require(PROJECTION, "projection_matrix", "")?;
     let rotations = [left.rotation, right.rotation];
     let views = opencv::rectified(&entry, rotations, [left.projection, right.projection])?;
@@ -57,6 +50,7 @@ pub(super) fn read(cameras: [&Entries; 2]) -> Result<StereoCalibration> {
         lenses: Some([left.lens, right.lens]),
         views: Some(views),
         size: Some(left.size),
+        right_size: Some(right.size).filter(|size| *size != left.size),
         unit: Unit::Metre,
         ..StereoCalibration::default()
     }

@@ -16,6 +16,11 @@ const MIN_MATCHES: usize = 30;
 const STRAYS: usize = 400;
 /// The image is divided into this many parts along each side, to see how much of it has no match.
 const PARTS: usize = 8;
+/// A match beyond all but this percentage at either end, and beyond as much again as lies between these, is an outlier where it stands
+/// [alone](is_alone) (open).
+const TAIL_PERCENT: usize = 5;
+/// Pixels that it lies beyond them at least.
+const LEAST_BEYOND: i32 = 16;
 /// Percentage of matches more than a pixel below 0 from which on the cameras count as converging (open). Of 52 pairs, two of satellites
 /// have more than half there and one of a robot has 2.5; the others, whose truth is above 0, have 1.0 at most, of which many are false.
 const BELOW_PERCENT: usize = 1;
@@ -74,19 +79,36 @@ const MIN_LABELS: usize = 3;
 /// Where more than a quarter of the image has no match, that part may be a plain wall behind everything else.
 /// The range then extends down to 0, the horizon of parallel cameras.
 ///
+/// Matches that are far from all others, in the image or in disparity, do not count.
+///
 /// # Errors
 /// [`RangeError::NotRectified`] where the pair has too few matches to tell, and enough once it is rectified by its own;
 /// [`RangeError::NotFound`] where it has too few in any case, with the warning where one says that the pair must be mended;
 /// [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the search.
 pub fn range(pair: &Pair) -> Result<DisparityRange> {
+    range_from(pair, None)
+}
+
+/// The same where the cameras are known: what is in front of them has disparities above -`doffs`, the distance of their principal points
+/// along the row, in pixels. The range begins there at the least, and matches behind the cameras do not count, unless most are there: then
+/// the pair is not of these cameras.
+///
+/// # Errors
+/// Those of [`range`].
+pub fn range_of_cameras(pair: &Pair, doffs: f64) -> Result<DisparityRange> {
+    range_from(pair, Some(-doffs))
+}
+
+/// That of disparities from `least` on.
+fn range_from(pair: &Pair, least: Option<f64>) -> Result<DisparityRange> {
     matches::check_memory(pair)?;
-    if let Some(range) = range_by_matches(pair) {
+    if let Some(range) = range_by_matches(pair, least) {
         return range;
     }
     let cause = of_pixels(pair, None).into_iter().find(Warning::is_beyond_range);
     let rectified = || {
         let by = Rectification::of_pair(pair, &rectification::Options::default()).ok()?;
-        range_by_matches(&by.apply(pair).ok()?)
+        range_by_matches(&by.apply(pair).ok()?, None)
     };
     if matches!(cause, None | Some(Warning::NotRectified { .. })) && matches!(rectified(), Some(Ok(_))) {
         return Err(RangeError::NotRectified.into());
@@ -94,9 +116,14 @@ pub fn range(pair: &Pair) -> Result<DisparityRange> {
     Err(RangeError::NotFound { cause: cause.map(|cause| cause.to_string()) }.into())
 }
 
-/// The range of the matches of `pair`; `None` where there are too few.
-fn range_by_matches(pair: &Pair) -> Option<Result<DisparityRange>> {
-    let found = matches::find(pair, None, None);
+/// The range of the matches of `pair`, from `least` on; `None` where there are too few.
+fn range_by_matches(pair: &Pair, least: Option<f64>) -> Option<Result<DisparityRange>> {
+    let mut found = matches::find(pair, None, None);
+    let in_front = |m: &Match, least: f64| f64::from(m.disparity) >= least * f64::from(FRACTION);
+    let least = least.filter(|least| 2 * found.iter().filter(|m| in_front(m, *least)).count() > found.len());
+    if let Some(least) = least {
+        found.retain(|m| in_front(m, least));
+    }
     if found.len() < MIN_MATCHES {
         return None;
     }
@@ -106,8 +133,7 @@ fn range_by_matches(pair: &Pair) -> Option<Result<DisparityRange>> {
         bare[m.y * PARTS / height * PARTS + m.x * PARTS / width] = false;
     }
     let bare = bare.into_iter().filter(|bare| *bare).count();
-    let mut disparities: Vec<i32> = found.iter().map(|m| m.disparity).collect();
-    disparities.sort_unstable();
+    let disparities = without_outliers(&found, pair.size());
     let strays = disparities.len() / STRAYS + 1;
     let (far, near) = (disparities[strays], disparities[disparities.len() - 1 - strays]);
     let span = near - far;
@@ -115,7 +141,38 @@ fn range_by_matches(pair: &Pair) -> Option<Result<DisparityRange>> {
     let min = if 4 * bare > PARTS * PARTS { min.min(0) } else { min };
     let below = disparities.partition_point(|d| *d < -FRACTION);
     let min = if 100 * below > BELOW_PERCENT * disparities.len() { min } else { min.max(0) };
-    Some(DisparityRange::new(min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION)))
+    let (min, max) = (min.div_euclid(FRACTION), -(-max).div_euclid(FRACTION));
+    // A float beyond all integers becomes the last one.
+    let least = least.map_or(min, |least| least.floor() as i32);
+    Some(DisparityRange::new(min.max(least), max))
+}
+
+/// The disparities of `found` in an image of this size, sorted, without those of outliers.
+fn without_outliers(found: &[Match], size: (usize, usize)) -> Vec<i32> {
+    let sorted = |found: &mut dyn Iterator<Item = &Match>| {
+        let mut disparities: Vec<i32> = found.map(|m| m.disparity).collect();
+        disparities.sort_unstable();
+        disparities
+    };
+    let all = sorted(&mut found.iter());
+    let tail = all.len() * TAIL_PERCENT / 100;
+    let (low, high) = (all[tail], all[all.len() - 1 - tail]);
+    let beyond = (high - low).max(LEAST_BEYOND * FRACTION);
+    let usual = low.saturating_sub(beyond)..=high.saturating_add(beyond);
+    sorted(&mut found.iter().filter(|m| usual.contains(&m.disparity) || !is_alone(m, found, size)))
+}
+
+/// Whether no two other matches beside `one` have about its disparity: each part of a surface has several.
+fn is_alone(one: &Match, all: &[Match], (width, height): (usize, usize)) -> bool {
+    let reach = width.max(height) / PARTS;
+    let beside = |m: &&Match| {
+        let apart = one.x.abs_diff(m.x).max(one.y.abs_diff(m.y));
+        // A surface so steep is hardly seen by both cameras.
+        let close = 4 * FRACTION + apart as i32 * FRACTION / 4;
+        apart <= reach && one.disparity.abs_diff(m.disparity) <= close.unsigned_abs()
+    };
+    // It is beside itself.
+    all.iter().filter(beside).count() <= 2
 }
 
 /// A probable mistake in a pair. It displays as one line with the cause, and with the remedy unless that is
@@ -559,4 +616,24 @@ fn identical(left: &Image, right: &Image) -> bool {
         .map(|((l, r), _)| l == r)
         .peekable();
     seen.peek().is_some() && seen.all(|same| same)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_do_not_count() {
+        let at = |x: usize, d: i32| Match { x, y: 50, disparity: d * FRACTION, dy: 0, score: 1.0 };
+        // A surface at 10 to 49, and an object before it, whose matches are beside each other.
+        let mut found: Vec<_> = (0..400).map(|x| at(x, 10 + x as i32 / 10)).collect();
+        found.extend([at(200, 120), at(205, 121), at(212, 122)]);
+        let expected: Vec<_> = found.iter().map(|m| m.disparity).collect();
+        found.extend([at(30, -634), at(350, 285), at(90, 120)]);
+        assert_eq!(without_outliers(&found, (400, 100)), expected);
+        // What is alone, but not far away, stays.
+        found.truncate(403);
+        found.push(at(30, 70));
+        assert_eq!(without_outliers(&found, (400, 100)).len(), 404);
+    }
 }

@@ -4,6 +4,7 @@
 pub mod check;
 pub mod conditioning;
 pub mod drift;
+mod exchanged;
 mod filter;
 pub mod illumination;
 pub mod label_range;

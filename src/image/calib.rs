@@ -3,8 +3,11 @@
 use std::path::Path;
 use std::str::FromStr;
 
+use super::Rect;
 use crate::error::{Error, Result};
 use crate::text::{self, quoted};
+
+pub use super::fit::Fit;
 
 /// A calibration file is a dozen lines; no more than this is read.
 const MAX_BYTES: u64 = 1 << 20;
@@ -31,6 +34,10 @@ pub struct Calibration {
     pub vmax: Option<f64>,
     /// The unit of the baseline, which Middlebury's files do not state: millimetres unless the file has `unit`.
     pub unit: Unit,
+    /// How it became that of images of another size than the file's.
+    pub fit: Option<Fit>,
+    /// Whether the file has the right camera on the left of the left one, so that each was taken for the other.
+    pub exchanged: bool,
 }
 
 /// The unit of a baseline, and thereby of depths and points.
@@ -96,6 +103,15 @@ impl Camera {
         let principal_point = [width, height].map(|count| (count as f64 - 1.0) / 2.0);
         Self { focal_length: [focal_length; 2], principal_point }
     }
+
+    /// The same camera with images of another size.
+    pub(crate) fn in_size(&self, fit: &Fit) -> Self {
+        let scale = fit.scale();
+        Self {
+            focal_length: [0, 1].map(|i| self.focal_length[i] * scale[i]),
+            principal_point: fit.place(self.principal_point),
+        }
+    }
 }
 
 impl Calibration {
@@ -103,6 +119,40 @@ impl Calibration {
     #[must_use]
     pub fn of_cameras(camera: Camera, baseline: f64, unit: Unit) -> Self {
         Self { camera: Some(camera), doffs: Some(0.0), baseline: Some(baseline), unit, ..Self::default() }
+    }
+
+    /// The same for images of this (width, height), where these are those of the file in another size; else itself.
+    #[must_use]
+    pub fn of_size(&self, size: (usize, usize)) -> Self {
+        let known = self.width.zip(self.height).map(|(width, height)| (width as usize, height as usize));
+        let Some(fit) = known.filter(|known| *known != size).and_then(|known| Fit::scaled(known, size))
+        else {
+            return self.clone();
+        };
+        let [across, _] = fit.scale();
+        let side = |side: usize| u32::try_from(side).ok();
+        Self {
+            ndisp: self.ndisp.map(|ndisp| (f64::from(ndisp) * across).ceil() as u32),
+            camera: self.camera.map(|camera| camera.in_size(&fit)),
+            doffs: self.doffs.map(|doffs| doffs * across),
+            width: side(size.0),
+            height: side(size.1),
+            vmin: self.vmin.map(|vmin| vmin * across),
+            vmax: self.vmax.map(|vmax| vmax * across),
+            fit: Some(fit),
+            ..self.clone()
+        }
+    }
+
+    /// That of a part of the images, as it is.
+    pub(crate) fn of_part(&self, part: &Rect) -> Self {
+        let side = |side: usize| u32::try_from(side).ok();
+        Self {
+            camera: self.camera.map(|camera| camera.in_size(&Fit::part(part))),
+            width: side(part.x.len()),
+            height: side(part.y.len()),
+            ..self.clone()
+        }
     }
 
     /// Reads `calib.txt` from the folder of `image`; `None` when there is none.
@@ -313,7 +363,7 @@ mod tests {
             height: Some(2000),
             vmin: Some(31.0),
             vmax: Some(257.0),
-            unit: Unit::Millimetre,
+            ..Calibration::default()
         }
     }
 
@@ -395,6 +445,19 @@ mod tests {
         let calibration = Calibration::of_cameras(camera, 0.12, Unit::Metre);
         let text = "cam0=[700 0 319.5; 0 700 240; 0 0 1]\ndoffs=0\nbaseline=0.12\nunit=m\n";
         assert_eq!(calibration, Calibration::parse(text).unwrap());
+    }
+
+    #[test]
+    fn the_same_camera_in_another_size() {
+        let half = expected().of_size((1482, 1000));
+        let camera = Camera { focal_length: [1989.9555; 2], principal_point: [622.136, 509.5035] };
+        assert_eq!(half.camera, Some(camera));
+        assert_eq!((half.ndisp, half.doffs, half.baseline), (Some(140), Some(62.1715), Some(193.001)));
+        assert_eq!((half.width, half.height, half.vmin), (Some(1482), Some(1000), Some(15.5)));
+        assert_eq!(half.fit.map(|fit| fit.calibrated), Some((2964, 2000)));
+        for size in [(2964, 2000), (2964, 1900)] {
+            assert_eq!(expected().of_size(size), expected());
+        }
     }
 
     #[test]

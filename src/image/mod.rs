@@ -7,6 +7,7 @@ pub(crate) mod cubic;
 mod decode;
 mod downsampled;
 mod file;
+mod fit;
 mod georeference;
 mod halved;
 mod jpeg;
@@ -306,6 +307,22 @@ impl Image {
         Self { pixels: self.pixels.crop(part), masked: self.masked.crop(part) }
     }
 
+    /// The image with masked pixels on its right and below it, up to this (width, height).
+    fn extended_to(self, (width, height): (usize, usize)) -> Self {
+        if self.pixels.size() == (width, height) {
+            return self;
+        }
+        let inside = |x: usize, y: usize| x < self.width() && y < self.height();
+        Self {
+            pixels: Plane::from_fn(
+                width,
+                height,
+                |x, y| if inside(x, y) { self.pixels[(x, y)] } else { [0; 4] },
+            ),
+            masked: Plane::from_fn(width, height, |x, y| !inside(x, y) || self.masked[(x, y)]),
+        }
+    }
+
     /// Width in pixels.
     #[must_use]
     pub fn width(&self) -> usize {
@@ -329,6 +346,8 @@ pub struct Pair {
     orientations: [Orientation; 2],
     doubts: [Option<String>; 2],
     full: Option<Box<Pair>>,
+    /// (width, height) of both images, without what is masked because the other one is larger.
+    own_sizes: [(usize, usize); 2],
 }
 
 impl Pair {
@@ -351,7 +370,9 @@ impl Pair {
     }
 
     fn without_georeference(left: Image, right: Image) -> Self {
+        let own_sizes = [&left, &right].map(|image| image.pixels.size());
         Self {
+            own_sizes,
             left: Arc::new(left),
             right: Arc::new(right),
             georeferences: [None, None],
@@ -449,6 +470,12 @@ impl Pair {
             georeference.as_ref().map(|georeference| georeference.moved(part.x.start, part.y.start))
         });
         Self { georeferences, full, ..self.map(|view| view.crop(part)) }
+    }
+
+    /// (width, height) of the left and the right image. They differ in a [pair of raw images](Pair::of_raw_frames) alone.
+    #[must_use]
+    pub fn own_sizes(&self) -> [(usize, usize); 2] {
+        self.own_sizes
     }
 
     /// (width, height) of both views.

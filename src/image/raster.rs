@@ -341,15 +341,35 @@ impl Pair {
     ///
     /// [`Reader::pair`]: super::read::Reader::pair
     pub fn of_frames(left: Raster, right: Raster) -> Result<Self> {
-        joined([left, right], ["the left image", "the right one"])
+        joined([left, right], ["the left image", "the right one"], Sizes::Equal)
+    }
+
+    /// The same of images as two cameras took them, which may differ in size: the pair has the larger one, and the smaller image is masked
+    /// outside of itself. A [`Rectification`](crate::rectification::Rectification) makes views of one size of them.
+    ///
+    /// # Errors
+    /// Those of [`Pair::of_frames`], but for the sizes.
+    pub fn of_raw_frames(left: Raster, right: Raster) -> Result<Self> {
+        joined([left, right], ["the left image", "the right one"], Sizes::Any)
     }
 }
 
+/// Which sizes the images of a pair may have.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Sizes {
+    Equal,
+    Any,
+}
+
 /// As [`Pair::of_frames`], of images that errors call by these names.
-pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Display; 2]) -> Result<Pair> {
+pub(super) fn joined(
+    [left, right]: [Raster; 2],
+    [of_left, of_right]: [impl Display; 2],
+    sizes: Sizes,
+) -> Result<Pair> {
     let images = [&left, &right];
     let ((width, height), (w, h)) = (left.size(), right.size());
-    if (width, height) != (w, h) {
+    if (width, height) != (w, h) && sizes == Sizes::Equal {
         return Err(Error::Mismatch(format!(
             "{of_left} is {width} x {height} and {of_right} is {w} x {h}: both views of a rectified pair have one size"
         )));
@@ -362,7 +382,8 @@ pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Disp
         )));
     }
     // The pixels and the mask of both views.
-    let pixels = width as u64 * height as u64;
+    let size = (width.max(w), height.max(h));
+    let pixels = size.0 as u64 * size.1 as u64;
     memory::check(2 * pixels * (size_of::<Pixel>() + 1) as u64, Purpose::Image)?;
     let masks = images.map(Raster::masked);
     let scale = Scale::of(images, &masks);
@@ -372,7 +393,15 @@ pub(super) fn joined([left, right]: [Raster; 2], [of_left, of_right]: [impl Disp
     let doubts = [left.doubt.clone(), right.doubt.clone()];
     let l = scale.apply(&left, in_left);
     drop(left);
-    Ok(Pair { georeferences, orientations, doubts, ..Pair::new(l, scale.apply(&right, in_right))? })
+    let r = scale.apply(&right, in_right);
+    let own_sizes = [(width, height), (w, h)];
+    Ok(Pair {
+        georeferences,
+        orientations,
+        doubts,
+        own_sizes,
+        ..Pair::new(l.extended_to(size), r.extended_to(size))?
+    })
 }
 
 /// The conversion from samples to levels, the same for both images of a pair.

@@ -7,7 +7,7 @@ use std::path::Path;
 use image::ImageFormat;
 
 use super::decode::{Kind, decode, load};
-use super::raster::{self, Raster, Sample, Samples, of_any};
+use super::raster::{self, Raster, Sample, Samples, Sizes, of_any};
 use super::{Pair, Plane, both, grey};
 use crate::error::{Error, ReadError, Result};
 use crate::threads;
@@ -71,9 +71,21 @@ impl Reader {
     /// [`Error::Read`] when a file is missing, damaged, too large (more than [`Reader::max_pixels`]) or of an unknown kind;
     /// [`Error::Mismatch`] when the sizes differ, or only one of the images has float values.
     pub fn pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
+        self.pair_of(left, right, mask, Sizes::Equal)
+    }
+
+    /// The same of images as two cameras took them, which may differ in size: see [`Pair::of_raw_frames`].
+    ///
+    /// # Errors
+    /// Those of [`Reader::pair`], but for the sizes.
+    pub fn raw_pair(self, left: &Path, right: &Path, mask: Option<&Path>) -> Result<Pair> {
+        self.pair_of(left, right, mask, Sizes::Any)
+    }
+
+    fn pair_of(self, left: &Path, right: &Path, mask: Option<&Path>, sizes: Sizes) -> Result<Pair> {
         let (first, second) = threads::join(|| self.raster(left), || self.raster(right));
         let (first, second) = (self.masked(first?, mask, left)?, second?);
-        raster::joined([first, second], [left, right].map(Path::display))
+        raster::joined([first, second], [left, right].map(Path::display), sizes)
     }
 
     /// As [`Reader::pair`], from a file with both views: MPO with its two images, or JPS with the right view on the left half unless it says
@@ -86,7 +98,7 @@ impl Reader {
         let views = both::decode_both(file, &bytes, self.max_pixels, self.no_data, self.orient);
         let [left, right] = views.map_err(|cause| Error::read(file, cause))?;
         let names = ["left", "right"].map(|side| format!("the {side} view in {}", file.display()));
-        raster::joined([self.masked(left, mask, file)?, right], names)
+        raster::joined([self.masked(left, mask, file)?, right], names, Sizes::Equal)
     }
 
     /// A left image without what the file `mask` masks.
@@ -130,7 +142,7 @@ impl Reader {
     /// Those of [`Reader::pair`].
     pub fn pair_in_memory(self, left: (&Path, &[u8]), right: (&Path, &[u8])) -> Result<Pair> {
         let image = |(name, bytes): (&Path, &[u8])| self.raster_in_memory(name, bytes);
-        raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display))
+        raster::joined([image(left)?, image(right)?], [left.0, right.0].map(Path::display), Sizes::Equal)
     }
 
     /// As [`Reader::raster`], from a file that is in memory, with the name by which errors call it.

@@ -2,6 +2,7 @@
 
 use crate::calibration::cameras::Views;
 use crate::calibration::lens::Lens;
+use crate::image::calib::{Calibration, Fit, Unit};
 
 use super::views::seen;
 
@@ -9,6 +10,43 @@ use super::views::seen;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Doubt {
+    /// A calibration of images of another size.
+    #[error("{fit}")]
+    OtherSize {
+        /// How these come out of those.
+        fit: Fit,
+    },
+    /// A calibration with the right camera on the left of the left one.
+    #[error(
+        "has the right camera on the left of the left one, so each was taken for the other{}",
+        if *images { ", and by their matches the right image for the left one: maps are of that" } else { "" }
+    )]
+    Exchanged {
+        /// Whether the images were exchanged too.
+        images: bool,
+    },
+    /// A distance of the cameras that hardly any have.
+    #[error(
+        "has its cameras {} {} apart, and those of stereo cameras are 1 mm to 20 m apart, so the unit may be another one",
+        digits(*baseline), unit.name()
+    )]
+    Baseline {
+        /// The distance.
+        baseline: f64,
+        /// Its unit.
+        unit: Unit,
+    },
+    /// A focal length that no camera of a rectified pair has.
+    #[error(
+        "has a focal length of {} px, with which images {width} px wide show nearly half of the world, so it may be in millimetres",
+        digits(*focal_length)
+    )]
+    FocalLength {
+        /// The focal length, in pixels.
+        focal_length: f64,
+        /// The width of the images.
+        width: usize,
+    },
     /// A calibration that does not say the size of its images, with the optical axis far from the middle of these.
     #[error(
         "the principal point of the {view} camera, ({:.1}, {:.1}), is {percent} % of the {} from the middle of images of \
@@ -76,15 +114,53 @@ pub enum Doubt {
     },
 }
 
+/// In millimetres: those of endoscopes and microscopes have a few, and the widest rigs that do not fly some metres. With the thousandth
+/// part or the thousandfold all handheld ones are outside.
+const BASELINES: std::ops::RangeInclusive<f64> = 1.0..=20_000.0;
+
+/// A rectified image this many focal lengths wide shows 157 degrees.
+const WIDEST: f64 = 10.0;
+
+impl Doubt {
+    /// The doubts about the calibration of a rectified pair, whose images have this width where it is known.
+    #[must_use]
+    pub fn about(calibration: &Calibration, width: Option<usize>) -> Vec<Self> {
+        let &Calibration { camera, baseline, unit, fit, exchanged, .. } = calibration;
+        let mut found = Vec::from_iter(fit.map(|fit| Self::OtherSize { fit }));
+        found.extend(exchanged.then_some(Self::Exchanged { images: false }));
+        found.extend(baseline.and_then(|baseline| of_baseline(baseline, unit)));
+        if let (Some(camera), Some(width)) = (camera, width) {
+            let focal_length = camera.focal_length[0];
+            let wide = focal_length * WIDEST < width as f64;
+            found.extend(wide.then_some(Self::FocalLength { focal_length, width }));
+        }
+        found
+    }
+}
+
+/// A doubt about the distance of two cameras, where its unit is known.
+pub(super) fn of_baseline(baseline: f64, unit: Unit) -> Option<Doubt> {
+    let millimetres = baseline * unit.millimetres()?;
+    (baseline > 0.0 && !BASELINES.contains(&millimetres)).then_some(Doubt::Baseline { baseline, unit })
+}
+
+/// A number with four digits, as a message shows it.
+fn digits(number: f64) -> String {
+    let before = libm::log10(number.abs()).floor() as i32;
+    let after = usize::try_from(3 - before).unwrap_or(0).min(12);
+    let text = format!("{number:.after$}");
+    if after == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').into() }
+}
+
 /// Cameras have it within a twentieth of the size; a calibration for 3/4 of the size is an eighth away.
 const FAR: f64 = 0.1;
 
-/// A doubt about `views`, of images of `size`, that may be for another size of the rectified images.
-pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, size: (usize, usize)) -> Option<Doubt> {
-    let rectified = views.size.unwrap_or(size);
-    let [images, ends] = [size, rectified].map(|(width, height)| [width as f64, height as f64]);
-    let middle = images.map(|end| (end - 1.0) / 2.0);
+/// A doubt about `views`, of images of these `sizes`, that may be for another size of the rectified images.
+pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, sizes: [(usize, usize); 2]) -> Option<Doubt> {
+    let rectified = views.size.unwrap_or(sizes[0]);
+    let ends = [rectified.0, rectified.1].map(|end| end as f64);
     let at = [0, 1].map(|view| {
+        let middle = [sizes[view].0, sizes[view].1].map(|end| (end as f64 - 1.0) / 2.0);
         let point = seen(&lenses[view], &views.rotations[view], middle);
         let camera = &views.cameras[view];
         [0, 1].map(|i| camera.focal_length[i] * point[i] + camera.principal_point[i])
@@ -97,11 +173,11 @@ pub(super) fn of_views(lenses: &[Lens; 2], views: &Views, size: (usize, usize)) 
         .then(|| Doubt::Middle { at: mean.map(|v| v.round() as i64), size: rectified })
 }
 
-/// A doubt about `lenses` that may be for images of another size than `size`.
-pub(super) fn of_lenses(lenses: &[Lens; 2], size: (usize, usize)) -> Option<Doubt> {
-    let ends = [size.0, size.1].map(|end| end as f64);
+/// A doubt about `lenses` that may be for images of other sizes than these.
+pub(super) fn of_lenses(lenses: &[Lens; 2], sizes: [(usize, usize); 2]) -> Option<Doubt> {
     let off = |view: usize, axis: usize| {
-        (lenses[view].principal_point[axis] - (ends[axis] - 1.0) / 2.0).abs() / ends[axis]
+        let end = [sizes[view].0, sizes[view].1][axis] as f64;
+        (lenses[view].principal_point[axis] - (end - 1.0) / 2.0).abs() / end
     };
     let all = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(view, axis)| (off(view, axis), view, axis));
     let (most, view, axis) = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -110,6 +186,6 @@ pub(super) fn of_lenses(lenses: &[Lens; 2], size: (usize, usize)) -> Option<Doub
         at: lenses[view].principal_point,
         axis,
         percent: (100.0 * most).round() as u32,
-        size,
+        size: sizes[view],
     })
 }

@@ -78,8 +78,17 @@ impl Rectification {
             translation: [-1.0, 0.0],
             size: None,
         };
-        let (lenses, sizes, unit) = ([lens; 2], [size; 2], Unit::default());
-        Ok(Self { lenses, views, sizes, unit, doubts: Vec::new(), trust: None, places: None })
+        Ok(Self {
+            lenses: [lens; 2],
+            views,
+            images: [size; 2],
+            size,
+            unit: Unit::default(),
+            exchanged: false,
+            doubts: Vec::new(),
+            trust: None,
+            places: None,
+        })
     }
 
     fn of_geometry(
@@ -91,7 +100,11 @@ impl Rectification {
         let lens = found.lens()?;
         let views = views::choose(&[lens; 2], &found.pose(agreeing), size, options);
         views
-            .and_then(|views| Self::of_views(&[lens; 2], views, size, Unit::default(), Vec::new()))
+            .and_then(|views| match views.is_exchanged() {
+                true => Err(RectificationError::Forward.into()),
+                false => Ok(views),
+            })
+            .and_then(|views| Self::of_views(&[lens; 2], views, [size; 2], Unit::default(), Vec::new()))
             .map_err(|_| RectificationError::Forward.into())
     }
 

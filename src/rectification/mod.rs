@@ -39,12 +39,13 @@ use crate::calibration::cameras::{StereoCalibration, Views};
 use crate::calibration::lens::{Distortion, Lens};
 use crate::calibration::matrix::{IDENTITY, Matrix, product, rotated, rotation, transposed};
 use crate::error::{Error, Purpose, Result};
-use crate::image::calib::{Calibration, Camera, Unit};
-use crate::image::{Pair, Plane};
+use crate::image::calib::{Calibration, Camera, Fit, Unit};
+use crate::image::{Image, Pair, Plane, Rect};
 use crate::memory;
 use crate::threads;
 use rayon::prelude::*;
 use sampling::{NOWHERE, Place};
+use std::borrow::Cow;
 
 /// How a pair of images becomes a rectified pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,9 +53,13 @@ pub struct Rectification {
     lenses: [Lens; 2],
     /// Their epipolar lines are rows.
     views: Views,
-    /// Of the images, and of the rectified ones: the same, unless the calibration says another.
-    sizes: [(usize, usize); 2],
+    /// (width, height) of the images of both views.
+    images: [(usize, usize); 2],
+    /// That of the rectified views: the same as of the left image, unless the calibration says another.
+    size: (usize, usize),
     unit: Unit,
+    /// Whether the left view is made of the right image, and the right one of the left image.
+    exchanged: bool,
     doubts: Vec<Doubt>,
     /// Where it comes from matches alone, without a scale.
     trust: Option<Trust>,
@@ -70,20 +75,30 @@ impl Rectification {
     /// view is to the right: the upper camera is the left one after a quarter turn counter-clockwise, the lower one after a
     /// quarter turn clockwise.
     ///
+    /// A calibration of images of another size counts where that is a smaller or larger form of the whole, or of the part that cameras of
+    /// this make give. Where the right camera is on the left of the left one, each is taken for the other, and the images stay: see
+    /// [`Rectification::for_pair`]. [`Rectification::doubts`] tells of both.
+    ///
     /// # Errors
-    /// [`Error::Calibration`] when the calibration lacks the lenses or how they stand, when the right camera is on the left of
-    /// the left one, when its rectification contradicts how they stand, or when no rectified views exist or one of them shows
-    /// next to nothing; [`Error::Mismatch`] when it is for images of another size.
+    /// [`Error::Calibration`] when the calibration lacks the lenses or how they stand, when its rectification contradicts how they stand, or
+    /// when no rectified views exist or one of them shows next to nothing; [`Error::Mismatch`] when it is for images of another size.
     pub fn new(calibration: &StereoCalibration, size: (usize, usize), options: &Options) -> Result<Self> {
+        Self::of_sizes(calibration, [size; 2], options)
+    }
+
+    /// The same of left and right images of these sizes. The rectified views have the size of the left images, unless the calibration says
+    /// another one.
+    ///
+    /// # Errors
+    /// Those of [`Rectification::new`].
+    pub fn of_sizes(
+        calibration: &StereoCalibration,
+        sizes: [(usize, usize); 2],
+        options: &Options,
+    ) -> Result<Self> {
         options.check()?;
-        let calibration = calibration.of_size(size);
+        let (calibration, fits) = calibration.of_images(sizes)?;
         let error = |reason: &str| Error::Calibration(reason.into());
-        if let Some((width, height)) = calibration.size.filter(|known| *known != size) {
-            return Err(Error::Mismatch(format!(
-                "the calibration is for images of {width} x {height} and these are {} x {}",
-                size.0, size.1
-            )));
-        }
         let lenses = calibration
             .lenses
             .ok_or_else(|| error("does not say the lenses, K1, D1, K2 and D2, which rectification takes"))?;
@@ -92,42 +107,79 @@ impl Rectification {
                 pose.as_ref().map_or(Ok(()), |pose| views.check(pose))?;
                 views
             }
-            (_, Some(pose)) => views::choose(&lenses, pose, size, options)?,
+            (_, Some(pose)) => {
+                let [size, right] = sizes;
+                let [left_lens, mut right_lens] = lenses;
+                if right != size {
+                    right_lens = right_lens.in_size(&Fit::centred(right, size));
+                }
+                views::choose(&[left_lens, right_lens], pose, size, options)?
+            }
             _ => return Err(error("does not say how the cameras stand to each other, R and T")),
         };
-        let mut doubts = Vec::new();
+        let mut doubts: Vec<_> = fits.into_iter().flatten().map(|fit| Doubt::OtherSize { fit }).collect();
+        doubts.dedup();
         if calibration.size.is_none() {
-            doubts.extend(doubts::of_lenses(&lenses, size));
+            doubts.extend(doubts::of_lenses(&lenses, sizes));
         }
         // Views that are chosen here are around the middle of the images.
         if calibration.views.is_some() && options.alpha.is_none() {
-            doubts.extend(doubts::of_views(&lenses, &views, size));
+            doubts.extend(doubts::of_views(&lenses, &views, sizes));
         }
-        Self::of_views(&lenses, views, size, calibration.unit, doubts)
+        let [x, y] = views.translation;
+        doubts.extend(doubts::of_baseline(x.abs().max(y.abs()), calibration.unit));
+        Self::of_views(&lenses, views, sizes, calibration.unit, doubts)
     }
 
     /// That by `views`, turned where need be.
     fn of_views(
         lenses: &[Lens; 2],
         views: Views,
-        size: (usize, usize),
+        images: [(usize, usize); 2],
         unit: Unit,
         doubts: Vec<Doubt>,
     ) -> Result<Self> {
-        let (views, rectified) = turned(views, views.size.unwrap_or(size));
-        // Says where the right camera is on the left.
-        views.calibration(None, unit)?;
-        let (lenses, sizes) = (*lenses, [size, rectified]);
-        let found = Self { lenses, views, sizes, unit, doubts, trust: None, places: None };
+        let (views, size) = turned(views, views.size.unwrap_or(images[0]));
+        let (lenses, exchanged) = (*lenses, false);
+        let mut found =
+            Self { lenses, views, images, size, unit, exchanged, doubts, trust: None, places: None };
+        if views.is_exchanged() {
+            found.lenses.reverse();
+            found.views = views.exchanged();
+            // Images of another size belong to the camera of that size.
+            found.images.reverse();
+            found.exchanged = found.images != images;
+            found.doubts.insert(0, Doubt::Exchanged { images: found.exchanged });
+        }
+        // Says where both cameras are in one place.
+        found.views.calibration(None, unit)?;
         found.check_shown().map(|()| found)
+    }
+
+    /// Whether the calibration has the right camera on the left of the left one, so that the cameras were exchanged and the images not.
+    pub(crate) fn has_exchanged_cameras(&self) -> bool {
+        self.doubts.contains(&Doubt::Exchanged { images: false })
+    }
+
+    /// The same with the left view made of the right image, and the right one of the left image.
+    pub(crate) fn with_images_exchanged(mut self) -> Self {
+        self.exchanged = true;
+        for doubt in &mut self.doubts {
+            if let Doubt::Exchanged { images } = doubt {
+                *images = true;
+            }
+        }
+        self
     }
 
     /// An error where a view shows next to nothing of its image.
     fn check_shown(&self) -> Result<()> {
         const STEPS: usize = 48;
         const LEAST: f64 = 0.05;
-        let [images, views] = self.sizes.map(|(width, height)| [width as f64, height as f64]);
+        let side = |(width, height): (usize, usize)| [width as f64, height as f64];
+        let views = side(self.size);
         for (view, name) in ["left", "right"].into_iter().enumerate() {
+            let images = side(self.images[view]);
             let at = |step: usize, i: usize| (step as f64 + 0.5) / STEPS as f64 * views[i] - 0.5;
             let steps = (0..STEPS).flat_map(|y| (0..STEPS).map(move |x| [x, y]));
             let inside = |source: [f64; 2]| (0..2).all(|i| (0.0..=images[i] - 1.0).contains(&source[i]));
@@ -154,10 +206,11 @@ impl Rectification {
     /// (width, height) of the rectified images.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
-        self.sizes[1]
+        self.size
     }
 
-    /// Where the left image shows what the rectified left view has at (x, y), in pixels. `None` where it cannot show it; what
+    /// Where the left image (the right one where they were [exchanged](Doubt::Exchanged)) shows what the rectified left view has at (x, y),
+    /// in pixels. `None` where it cannot show it; what
     /// is found may still be outside of the image.
     #[must_use]
     pub fn left(&self, x: f64, y: f64) -> Option<[f64; 2]> {
@@ -223,20 +276,29 @@ impl Rectification {
     /// # Errors
     /// [`Error::Mismatch`] when the pair is of another size; [`Error::Memory`] when the system has not enough memory.
     pub fn apply(&self, pair: &Pair) -> Result<Pair> {
-        let [(width, height), rectified] = self.sizes;
-        if pair.size() != (width, height) {
-            let (w, h) = pair.size();
+        let (mut images, mut sizes) = ([pair.left(), pair.right()], pair.own_sizes());
+        if self.exchanged {
+            images.reverse();
+            sizes.reverse();
+        }
+        if let Some(i) = (0..2).find(|i| sizes[*i] != self.images[*i]) {
+            let [(width, height), (w, h)] = [self.images[i], sizes[i]];
             return Err(Error::Mismatch(format!(
                 "the rectification is of images of {width} x {height} and these are {w} x {h}"
             )));
         }
-        let images = [pair.left(), pair.right()];
         let bytes = images.iter().all(|image| image.holds_bytes());
-        let view = |view: usize| match &self.places {
-            Some(places) => {
-                sampling::resample(images[view], rectified, bytes, |x, y| places[view][y * rectified.0 + x])
+        let view = |view: usize| {
+            let (image, rectified): (Cow<Image>, _) = match sizes[view] {
+                size if size == pair.size() => (Cow::Borrowed(images[view]), self.size),
+                size => (Cow::Owned(images[view].crop(&Rect::whole(size))), self.size),
+            };
+            match &self.places {
+                Some(places) => {
+                    sampling::resample(&image, rectified, bytes, |x, y| places[view][y * rectified.0 + x])
+                }
+                None => sampling::resample(&image, rectified, bytes, |x, y| self.place(view, x, y)),
             }
-            None => sampling::resample(images[view], rectified, bytes, |x, y| self.place(view, x, y)),
         };
         Ok(Pair::new(view(0)?, view(1)?)?.doubted_as(pair))
     }
@@ -274,7 +336,7 @@ impl Rectification {
         let lens = |camera: Camera| Lens::new(camera.focal_length, camera.principal_point, Distortion::NONE);
         let lenses = [lens(cameras[0])?, lens(cameras[1])?];
         let views = Views { rotations: [IDENTITY; 2], cameras, translation: [-1.0, 0.0], size: None };
-        Self::of_views(&lenses, views, size, Unit::default(), Vec::new())
+        Self::of_views(&lenses, views, [size; 2], Unit::default(), Vec::new())
     }
 
     /// The same of a rig whose right camera has turned about this axis of its rectified view, as long as the angle in radians:

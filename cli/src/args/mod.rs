@@ -16,6 +16,6 @@ pub(crate) use method::MethodArgs;
 pub(crate) use reading::{ReadingArgs, disparity, scale};
 pub(crate) use recording::{RecordingArgs, Topics, nanoseconds};
 pub(crate) use rectification::{RectificationArgs, shown};
-pub(crate) use region::RegionArgs;
+pub(crate) use region::{CropArgs, RegionArgs};
 pub(crate) use search::{Found, Search, calibrated_range, depth};
 pub(crate) use sign::Sign;

@@ -1,6 +1,7 @@
-//! A region of the left view.
+//! A region of the left view, and a part of what was calibrated.
 
 use mrfgs::image::Rect;
+use serde::{Serialize, Serializer};
 
 /// The region to match.
 #[derive(clap::Args)]
@@ -9,6 +10,22 @@ pub(crate) struct RegionArgs {
     /// the time of the part, its range and 32 pixels around
     #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
     pub(crate) roi: Option<Rect>,
+}
+
+/// The part that the images are of.
+#[derive(clap::Args, Default, Serialize)]
+pub(crate) struct CropArgs {
+    /// The part of the calibrated images that the images show, as it is or scaled: its first column and row, width and height in
+    /// pixels [default: all of them, or for OAK cameras their middle]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = region, requires = "calib")]
+    #[serde(serialize_with = "as_given", skip_serializing_if = "Option::is_none")]
+    pub(crate) calib_crop: Option<Rect>,
+}
+
+/// First column and row, width and height.
+#[allow(clippy::ref_option, reason = "serde hands it over so")]
+fn as_given<S: Serializer>(part: &Option<Rect>, serializer: S) -> Result<S::Ok, S::Error> {
+    part.as_ref().map(|part| [part.x.start, part.y.start, part.x.len(), part.y.len()]).serialize(serializer)
 }
 
 fn region(text: &str) -> Result<Rect, String> {

@@ -150,7 +150,11 @@ impl Search {
         let range = if let Some(range) = given {
             range
         } else {
-            let found = check::range(pair)?;
+            let doffs = calibration.and_then(|(_, calibration)| calibration.doffs);
+            let found = match doffs {
+                Some(doffs) => check::range_of_cameras(pair, doffs)?,
+                None => check::range(pair)?,
+            };
             let [farthest, nearest] = [found.min, found.max].map(|end| sign.disparity(end));
             between(near.unwrap_or(nearest), far.unwrap_or(farthest))?
         };

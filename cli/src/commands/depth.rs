@@ -9,7 +9,7 @@ use mrfgs::image::{Image, Pair, Plane};
 use mrfgs::maps::Maps;
 use mrfgs::options::DisparityRange;
 
-use crate::args::{CameraArgs, ReadingArgs, Sign, disparity, scale};
+use crate::args::{CameraArgs, CropArgs, ReadingArgs, Sign, disparity, scale};
 use crate::console;
 use crate::failure::{Failure, Result};
 use crate::outputs::{AlsoArgs, Outcome, Written, files};
@@ -38,6 +38,8 @@ pub(crate) struct Args {
     /// Calibration of the rectified pair, as `mrfgs match` takes it [default: a calib.txt beside MAP]
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
+    #[command(flatten)]
+    crop: CropArgs,
     #[command(flatten)]
     numbers: CameraArgs,
     /// Left image, whose colours points have
@@ -98,11 +100,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     of_size(&args.left, left.as_ref().map(|image| image.pixels.size()))?;
     of_size(&args.confidence, confidence.as_ref().map(Plane::size))?;
     let (path, calibration) = calibration(args, map.size())?;
-    let known = Some((path.as_deref().unwrap_or("--focal".as_ref()), &calibration));
+    let known = (path.as_deref().unwrap_or(input::NUMBERS.as_ref()), &calibration);
     let takes_unit = also.iter().find(|word| word.takes_unit()).or(also.first());
-    let rig = takes_unit.map(|word| input::rig(word, known, &args.map, map.size(), "give one with --calib"));
+    let rig =
+        takes_unit.map(|word| input::rig(word, Some(known), &args.map, map.size(), "give one with --calib"));
     let rig = rig.transpose()?;
     let behind = rig.as_ref().map(|rig| behind(args, &map, rig)).transpose()?.flatten();
+    if !args.quiet {
+        input::doubt_of(known, map.size());
+    }
     let (width, height) = map.size();
     let confidence = confidence.unwrap_or_else(|| Plane::filled(width, height, u8::MAX));
     let maps = Maps::from_pixels(&map, confidence, Plane::filled(width, height, 0));
@@ -177,10 +183,10 @@ fn calibration(args: &Args, size: (usize, usize)) -> Result<(Option<PathBuf>, Ca
         return Ok((None, calibration));
     }
     if let Some(first) = args.calib.first() {
-        return Ok((Some(first.clone()), input::of_rectified_images(&args.calib, size)?));
+        return Ok((Some(first.clone()), input::of_rectified_images(&args.calib, &args.crop, size)?));
     }
     if let Some(files) = input::beside(&args.map) {
-        return Ok((files.first().cloned(), input::of_rectified_images(&files, size)?));
+        return Ok((files.first().cloned(), input::of_rectified_images(&files, &args.crop, size)?));
     }
     let reason = format!("there is no calib.txt beside {}; give the cameras of the pair", args.map.display());
     Err(Failure::usage("--calib", reason))

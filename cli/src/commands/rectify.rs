@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use mrfgs::image::{Image, pfm, write};
 use mrfgs::rectification::Rectification;
-use mrfgs::{calibration, check};
+use mrfgs::calibration::write as calibration_text;
+use mrfgs::check;
 
-use crate::args::{ReadingArgs, RectificationArgs};
+use crate::args::{CropArgs, ReadingArgs, RectificationArgs};
 use crate::failure::Result;
 use crate::outputs::StagedFolder;
 use crate::pairs::input;
@@ -47,7 +48,7 @@ Examples:
 pub(crate) struct Args {
     /// Image of the left camera: the first one of the calibration
     left: PathBuf,
-    /// Image of the right camera, of the same size
+    /// Image of the right camera
     #[arg(required = true)]
     right: Option<PathBuf>,
     /// Folder for the rectified pair, new or empty
@@ -58,6 +59,8 @@ pub(crate) struct Args {
     /// [default: matches of the pair]
     #[arg(long, value_name = "CALIB")]
     calib: Vec<PathBuf>,
+    #[command(flatten)]
+    crop: CropArgs,
     #[command(flatten)]
     rectification: RectificationArgs,
     /// Also writes where each rectified pixel comes from: map0x.pfm, map0y.pfm, map1x.pfm and map1y.pfm
@@ -78,13 +81,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let folder = StagedFolder::new_or_empty(&args.folder)?;
     let reader = args.reading.raw_reader(&args.calib)?;
     let options = args.rectification.options();
-    let (left, right) = (args.left.as_path(), args.right.as_deref());
-    let read = || input::views(reader, left, right, args.mask.as_deref());
+    let (left, right, mask) = (args.left.as_path(), args.right.as_deref(), args.mask.as_deref());
     let (rectification, pair) = if args.calib.is_empty() {
-        input::rectify_alone([left, right.unwrap_or(left)], &read()?, &options)?
+        let pair = input::views(reader, left, right, mask)?;
+        input::rectify_alone([left, right.unwrap_or(left)], &pair, &options)?
     } else {
-        let calibration = calibration::read(&args.calib)?;
-        input::rectify(&calibration, &args.calib, &read()?, &options)?
+        let calibration = input::Calib::Files(&args.calib, &args.crop).read()?;
+        let pair = input::raw_views(reader, left, right, mask)?;
+        input::rectify(&calibration, &args.calib, &pair, &options)?
     };
     write_all(&folder.path(), &rectification, [pair.left(), pair.right()], args.maps)
         .map_err(|e| folder.named(e))?;
@@ -125,8 +129,8 @@ fn write_all(folder: &Path, by: &Rectification, images: [&Image; 2], maps: bool)
     }
     let calibration = by.calibration()?;
     let texts = [
-        ("calib.txt", calibration::write::middlebury(&calibration)),
-        ("cameras.yml", calibration::write::opencv(&calibration, by.rotations())),
+        ("calib.txt", calibration_text::middlebury(&calibration)),
+        ("cameras.yml", calibration_text::opencv(&calibration, by.rotations())),
     ];
     texts.into_iter().try_for_each(|(name, text)| write::save(&at(name), text.unwrap_or_default().as_bytes()))
 }

@@ -9,11 +9,11 @@ use mrfgs::image::calib::{Calibration, Unit};
 use mrfgs::image::read::Reader;
 use mrfgs::image::{Pair, Rect};
 use mrfgs::options::DisparityRange;
-use mrfgs::rectification::{Options, Rectification, Trust};
+use mrfgs::rectification::{Doubt, Options, Rectification, Trust};
 use mrfgs::region::Region;
 use mrfgs::{Error, Matched};
 
-use crate::args::{CameraArgs, Found, ReadingArgs, Search, Sign, shown};
+use crate::args::{CameraArgs, CropArgs, Found, ReadingArgs, Search, Sign, shown};
 use crate::console;
 use crate::failure::{self, Failure, Result};
 use crate::matching::Searched;
@@ -36,6 +36,8 @@ pub(crate) struct PairArgs {
     /// with --calib), Kalibr, KITTI, Middlebury and others [default: a calib.txt beside LEFT]
     #[arg(long, value_name = "FILE")]
     pub(crate) calib: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) crop: CropArgs,
     /// Image of the size of LEFT: where it is not black, LEFT is ignored and the maps are invalid
     #[arg(long, value_name = "FILE")]
     pub(crate) mask: Option<PathBuf>,
@@ -46,7 +48,8 @@ pub(crate) struct PairArgs {
 /// A calibration: its files, or texts that stand in for them, each with a name.
 #[derive(Clone, Copy)]
 pub(crate) enum Calib<'a> {
-    Files(&'a [PathBuf]),
+    /// Of these, the images show a part where one is given.
+    Files(&'a [PathBuf], &'a CropArgs),
     Texts(&'a [(PathBuf, String)]),
 }
 
@@ -58,17 +61,22 @@ impl Calib<'_> {
     /// What messages call it.
     fn names(self) -> Vec<PathBuf> {
         match self {
-            Self::Files(files) => files.to_vec(),
+            Self::Files(files, _) => files.to_vec(),
             Self::Texts(texts) => texts.iter().map(|(name, _)| name.clone()).collect(),
         }
     }
 
-    fn read(self) -> mrfgs::Result<StereoCalibration> {
+    pub(crate) fn read(self) -> Result<StereoCalibration> {
         match self {
-            Self::Files(files) => calibration::read(files),
+            Self::Files(files, crop) => {
+                let known = calibration::read(files)?;
+                let Some(part) = &crop.calib_crop else { return Ok(known) };
+                let error = |e| failure::in_file(e, shown(files).as_ref(), "");
+                known.of_part(part).map_err(|e| Failure::usage("--calib-crop", error(e)))
+            }
             Self::Texts(texts) => {
                 let texts: Vec<_> = texts.iter().map(|(name, text)| (name.as_path(), text.clone())).collect();
-                calibration::of_texts(&texts)
+                Ok(calibration::of_texts(&texts)?)
             }
         }
     }
@@ -90,6 +98,9 @@ pub(crate) struct Input {
     pub(crate) rectification: Option<Rectification>,
 }
 
+/// The flag that messages name where the numbers of the cameras are given.
+pub(crate) const NUMBERS: &str = "--focal";
+
 /// A calibration of a rectified pair, and where it comes from.
 struct Known {
     /// None where flags give its numbers.
@@ -100,7 +111,7 @@ struct Known {
 impl Known {
     /// With the file that messages name.
     fn named(&self) -> (&Path, &Calibration) {
-        (self.files.first().map_or(Path::new("--focal"), PathBuf::as_path), &self.calibration)
+        (self.files.first().map_or(Path::new(NUMBERS), PathBuf::as_path), &self.calibration)
     }
 
     fn is_of_flags(&self) -> bool {
@@ -123,13 +134,17 @@ impl PairArgs {
             Some(_) => self.reading.raw_reader(&self.calib)?,
             None => self.reading.reader(),
         };
-        let pair = views(reader, &self.left, self.right.as_deref(), self.mask.as_deref())?;
+        let read = match rectify {
+            Some(_) if !self.calib.is_empty() => raw_views,
+            _ => views,
+        };
+        let pair = read(reader, &self.left, self.right.as_deref(), self.mask.as_deref())?;
         if let Some(options) = rectify.filter(|_| self.calib.is_empty()) {
             let (by, pair) = rectify_alone([&self.left, self.right()], &pair, options)?;
             return Input::rectified_alone(pair, by, &self.search, sign);
         }
         let beside = Some(&*self.left).filter(|_| cameras || self.search.takes_calibration());
-        Input::new(pair, &self.search, sign, Calib::Files(&self.calib), numbers, rectify, beside)
+        Input::new(pair, &self.search, sign, Calib::Files(&self.calib, &self.crop), numbers, rectify, beside)
     }
 
     /// The file with the right view.
@@ -187,8 +202,10 @@ impl Input {
             Some(Known { files, calibration })
         } else if let Some(left) = beside {
             let files = self::beside(left);
-            let calibration =
-                files.as_ref().map(|files| of_rectified_images(files, pair.size())).transpose()?;
+            // A part is said of a calibration that is given alone.
+            let whole = CropArgs::default();
+            let read = |files: &Vec<PathBuf>| of_rectified_images(files, &whole, pair.size());
+            let calibration = files.as_ref().map(read).transpose()?;
             files.zip(calibration).map(|(files, calibration)| Known { files, calibration })
         } else {
             None
@@ -312,6 +329,8 @@ impl Input {
         let files = self.calibration.as_ref().map_or(&[][..], |known| &known.files);
         if let Some(by) = &self.rectification {
             said.extend(doubts(by, files));
+        } else if let Some(known) = &self.calibration {
+            said.extend(doubts_of(known.named(), self.pair.size()));
         }
         // A range that was found does not show what the user knows.
         let warnings = check::warnings(pair, (!self.by_matches).then_some(self.range));
@@ -336,6 +355,19 @@ pub(crate) fn views(
     }
 }
 
+/// The same of a pair as two cameras took it, whose images may differ in size.
+pub(crate) fn raw_views(
+    reader: Reader,
+    left: &Path,
+    right: Option<&Path>,
+    mask: Option<&Path>,
+) -> mrfgs::Result<Pair> {
+    match right {
+        Some(right) => reader.raw_pair(left, right, mask),
+        None => reader.both(left, mask),
+    }
+}
+
 /// The unit of depths, for people, by a calibration `file` or by flags.
 pub(crate) fn unit(unit: Unit, file: Option<&Path>) -> String {
     match (unit, file) {
@@ -353,8 +385,26 @@ pub(crate) fn beside(image: &Path) -> Option<Vec<PathBuf>> {
 }
 
 /// What the calibration in `files` says of images that are rectified and of this `size`.
-pub(crate) fn of_rectified_images(files: &[PathBuf], size: (usize, usize)) -> Result<Calibration> {
-    of_rectified(&calibration::read(files)?, files, size)
+pub(crate) fn of_rectified_images(
+    files: &[PathBuf],
+    crop: &CropArgs,
+    size: (usize, usize),
+) -> Result<Calibration> {
+    of_rectified(&Calib::Files(files, crop).read()?, files, size)
+}
+
+/// Says on standard error what is probably wrong with the calibration of a rectified pair of this `size`, and with its file.
+pub(crate) fn doubt_of(known: (&Path, &Calibration), size: (usize, usize)) {
+    doubts_of(known, size).for_each(|doubt| say(&doubt));
+}
+
+fn doubts_of(
+    (name, calibration): (&Path, &Calibration),
+    (width, _): (usize, usize),
+) -> impl Iterator<Item = String> {
+    let words = if name == Path::new(NUMBERS) { &remedy::NUMBERS } else { &remedy::FLAGS };
+    let doubts = Doubt::about(calibration, Some(width)).into_iter();
+    doubts.map(move |doubt| format!("{}: {}", name.display(), remedy::doubt(&doubt, words)))
 }
 
 /// What the calibration `known`, of these `files`, says of images that are rectified and of this `size`.
@@ -388,7 +438,7 @@ fn trusted(trust: &Trust) -> String {
 
 fn doubts(by: &Rectification, files: &[PathBuf]) -> impl Iterator<Item = String> {
     let of = if files.is_empty() { String::new() } else { format!("{}: ", shown(files)) };
-    by.doubts().iter().map(move |doubt| format!("{of}{doubt}"))
+    by.doubts().iter().map(move |doubt| format!("{of}{}", remedy::doubt(doubt, &remedy::FLAGS)))
 }
 
 fn say(warning: &str) {
@@ -402,8 +452,11 @@ pub(crate) fn rectify(
     pair: &Pair,
     options: &Options,
 ) -> Result<(Rectification, Pair)> {
-    let rectification = Rectification::new(calibration, pair.size(), options).map_err(|e| match e {
-        Error::Mismatch(reason) => Error::Mismatch(format!("{}: {reason}", shown(files))),
+    let rectification = Rectification::for_pair(calibration, pair, options).map_err(|e| match e {
+        Error::Mismatch(reason) => Error::Mismatch(format!(
+            "{}: {reason}: give images of that size, or say by --calib-crop which part of them these show",
+            shown(files)
+        )),
         e => failure::in_file(e, shown(files).as_ref(), ""),
     })?;
     let pair = rectification.apply(pair)?;
@@ -446,7 +499,8 @@ pub(crate) fn rig(
     let size = (calibration.width.unwrap_or(width as u32), calibration.height.unwrap_or(height as u32));
     if size != (width as u32, height as u32) {
         return Err(Error::Mismatch(format!(
-            "{} is for images of {} x {} and {} is {width} x {height}: depth takes the calibration of this size",
+            "{} is for images of {} x {} and {} is {width} x {height}: depth takes the calibration of this size, or --calib-crop, \
+             which says the part of them that these show",
             path.display(),
             size.0,
             size.1,

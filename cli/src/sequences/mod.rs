@@ -121,6 +121,8 @@ pub(crate) struct Frames {
     count: usize,
     /// Where the left view of every frame is ignored.
     mask: Option<Plane<bool>>,
+    /// Whether they are images as the cameras took them, which may differ in size.
+    raw: bool,
     /// (width, height) of the first pair.
     size: Option<(usize, usize)>,
     /// The names of both sources.
@@ -161,14 +163,21 @@ impl Frames {
             let pairs = pairing::pair([mem::take(l).into(), mem::take(r).into()], pairing, &names)?;
             [*l, *r] = pairs.map(Into::into);
         }
-        Ok(Self { views: Views::Sources { left, right, layout }, count: 0, mask: None, size: None, names })
+        Ok(Self {
+            views: Views::Sources { left, right, layout },
+            count: 0,
+            mask: None,
+            raw: false,
+            size: None,
+            names,
+        })
     }
 
     /// The frames of a recording.
     pub(crate) fn of_recording(recorded: Recorded) -> Self {
         let name = recorded.path().display().to_string();
         let views = Views::Recorded(recorded);
-        Self { views, count: 0, mask: None, size: None, names: [name.clone(), name] }
+        Self { views, count: 0, mask: None, raw: false, size: None, names: [name.clone(), name] }
     }
 
     /// The sources where frames come from files and streams, left and right.
@@ -228,6 +237,11 @@ impl Frames {
         self
     }
 
+    /// Takes frames as two cameras took them, to be rectified.
+    pub(crate) fn as_raw(self) -> Self {
+        Self { raw: true, ..self }
+    }
+
     /// The files that are read, none of which an output may overwrite.
     pub(crate) fn files(&self) -> Vec<&Path> {
         match &self.views {
@@ -274,7 +288,8 @@ impl Frames {
             Some(mask) => left.masked_by(mask.clone()).map_err(|e| named(e, &name))?,
             None => left,
         };
-        let pair = Pair::of_frames(left, right).map_err(|e| named(e, &name))?;
+        let pair = if self.raw { Pair::of_raw_frames(left, right) } else { Pair::of_frames(left, right) };
+        let pair = pair.map_err(|e| named(e, &name))?;
         let (size, (width, height)) = (*self.size.get_or_insert(pair.size()), pair.size());
         if size != (width, height) {
             let reason = format!("is {width} x {height} and those before it are {} x {}", size.0, size.1);

@@ -230,12 +230,6 @@ const WRONG: &[Row] = &[
     ),
     ("cv", "[ 0.998908116030631", "[ 0.798908116030631", "R: expected a rotation"),
     ("cv", "[ -0.16356857928250576,", "[ .Nan,", "T: expected 3 numbers"),
-    (
-        "cv",
-        "[ -0.16356857928250576,",
-        "[ 0.16356857928250576,",
-        "right camera on the left of the left one & exchange",
-    ),
     ("cv", "[ -0.16356857928250576,", "[ 0.001, 0.001,", "T: expected 3 numbers"),
     (
         "cv",
@@ -245,7 +239,7 @@ const WRONG: &[Row] = &[
     ),
     ("cv", "[ 240, 180 ]", "[ 240 ]", "imageSize: expected width and height & found 1 number"),
     ("cv", "[ 240, 180 ]", "[ 240, 180.5 ]", "imageSize: expected width and height"),
-    ("cv", "[ 240, 180 ]", "[ 320, 240 ]", "is for images of 320 x 240 & 240 x 180"),
+    ("cv", "[ 240, 180 ]", "[ 320, 200 ]", "is for images of 320 x 200 & 240 x 180 & --calib-crop"),
     ("cv", "unit: m", "unit: feet", "unit: expected mm, cm, m or unknown, found `feet`"),
     ("cv", "unit: m", "fisheye: perhaps", "fisheye: expected 0 or 1 & `perhaps`"),
     ("cv", "unit: m", "fisheye: 1", "D1: expected the 4 coefficients of a fisheye & 5 numbers"),
@@ -269,7 +263,7 @@ const WRONG: &[Row] = &[
     ),
     ("chain", "T_cn_cnm1", "T_other", "cam1.T_cn_cnm1 is missing & 4 x 4"),
     ("chain", "[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 0.0, 2.0]", "cam1.T_cn_cnm1: expected a rotation"),
-    ("chain", "[240, 180]", "[320, 240]", "cam1.resolution: expected 320 x 240 & 240 x 180"),
+    ("chain", "[240, 180]", "[320, 200]", "is for images of 320 x 200, 240 x 180 and these are 240 x 180"),
     ("chain", "intrinsics: [214.0, ", "intrinsics: [", "cam0.intrinsics: expected 4 numbers & 3 numbers"),
     ("chain", "intrinsics: [214.0, ", "intrinsics: [0, ", "cam0.intrinsics: expected 4 numbers & above 0"),
     ("ros", "plumb_bob", "thin_prism", "distortion_model: expected plumb_bob & `thin_prism`"),
@@ -278,7 +272,7 @@ const WRONG: &[Row] = &[
         "ros",
         "image_width: 240",
         "image_width: 200",
-        "image_width, image_height: expected 240 x 180 & 200 x 180",
+        "is for images of 240 x 180, 200 x 180 and these are 240 x 180",
     ),
     ("ros", "-34.48", "0", "projection_matrix: expected focal length times baseline"),
     ("ros", "215.5, 0, 118.5, -34", "100.5, 0, 118.5, -34", "projection_matrix: expected the focal length"),
@@ -304,6 +298,111 @@ fn what_is_wrong_in_a_calibration_is_told() {
         told.failed(1, &format!("a-file & {words}"));
         assert_eq!(listing(&folder).len(), 2, "{what}: nothing is left");
     }
+}
+
+/// The share of pixels by which two pictures differ by more than a level.
+fn differing(folder: &Folder, a: &str, b: &str) -> f64 {
+    let [a, b] = [a, b].map(|name| image::open(folder.join(name)).unwrap().to_rgb8());
+    assert_eq!(a.dimensions(), b.dimensions());
+    let far = a.pixels().zip(b.pixels()).filter(|(a, b)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1));
+    far.count() as f64 / (a.width() * a.height()) as f64
+}
+
+#[test]
+fn cameras_that_are_exchanged_are_taken_for_each_other() {
+    let folder = Folder::new();
+    let rig = forms::Rig::new();
+    let back = mrfgs::calibration::matrix::transposed(&rig.r);
+    let t = mrfgs::calibration::matrix::rotated(&back, rig.t).map(|v| -v);
+    let exchanged = forms::Rig { k: [rig.k[1], rig.k[0]], d: [rig.d[1], rig.d[0]], r: back, t };
+    fs::write(folder.join("rig.yml"), rig.opencv("")).unwrap();
+    fs::write(folder.join("exchanged.yml"), exchanged.opencv("")).unwrap();
+    run(&folder, "rectify @raw/left.png @raw/right.png expected --calib rig.yml --quiet").succeeded();
+    // The images are in the order of their places, and in that of the file.
+    let told =
+        "exchanged.yml: has the right camera on the left of the left one, so each was taken for the other";
+    for (images, out, words) in [
+        ("@raw/left.png @raw/right.png", "a", told.to_owned()),
+        (
+            "@raw/right.png @raw/left.png",
+            "b",
+            format!("{told}, and by their matches the right image for the left one"),
+        ),
+    ] {
+        run(&folder, &format!("rectify {images} {out} --calib exchanged.yml")).succeeded().says(&words);
+        for name in ["im0.png", "im1.png"] {
+            let share = differing(&folder, &format!("expected/{name}"), &format!("{out}/{name}"));
+            assert!(share < 0.01, "{out}/{name}: {share}");
+        }
+    }
+    // Control: the views themselves differ.
+    assert!(differing(&folder, "expected/im0.png", "expected/im1.png") > 0.5);
+}
+
+#[test]
+fn images_of_another_size_are_told() {
+    let folder = Folder::new();
+    let text = opencv();
+    for (name, size) in
+        [("half.yml", "[ 120, 90 ]"), ("odd.yml", "[ 240, 200 ]"), ("fits.yml", "[ 240, 180 ]")]
+    {
+        fs::write(folder.join(name), text.replacen("[ 240, 180 ]", size, 1)).unwrap();
+    }
+    let images = "rectify @raw/left.png @raw/right.png";
+    let words = "half.yml: is for images of 120 x 90: those of 240 x 180 count as the same, scaled; if they show another part, say \
+                 which by --calib-crop";
+    run(&folder, &format!("{images} half --calib half.yml")).succeeded().says(words);
+    run(&folder, &format!("{images} fits --calib fits.yml")).succeeded().is_silent_on("is for images of");
+    run(&folder, &format!("{images} odd --calib odd.yml"))
+        .failed(1, "odd.yml & 240 x 200 & 240 x 180 & --calib-crop");
+    run(&folder, &format!("{images} part --calib odd.yml --calib-crop 0,0,240,180")).succeeded();
+    assert!(differing(&folder, "part/im0.png", "fits/im0.png") == 0.0, "the part begins at the first pixel");
+    let outside = "--calib-crop & odd.yml & 240 x 200 & not inside";
+    run(&folder, &format!("{images} out --calib odd.yml --calib-crop 0,21,240,180")).failed(2, outside);
+    run(&folder, &format!("{images} out --calib-crop 0,0,240,180")).failed(2, "--calib");
+    // Those of one camera are twice as large.
+    let right = image::open(scene("raw/right.png")).unwrap();
+    right.resize(480, 360, image::imageops::FilterType::Nearest).save(folder.join("right.png")).unwrap();
+    run(&folder, "rectify @raw/left.png right.png two --calib fits.yml")
+        .succeeded()
+        .says("480 x 360 count as the same, scaled");
+    assert!(differing(&folder, "two/im0.png", "fits/im0.png") == 0.0);
+    assert!(differing(&folder, "two/mask1.png", "fits/mask1.png") < 0.05, "the right view shows as much");
+    run(&folder, "rectify @raw/left.png right.png alone").failed(1, "right.png is 480 x 360 & one size");
+}
+
+#[test]
+fn a_unit_that_hardly_any_cameras_have_is_told() {
+    let folder = Folder::new();
+    fs::write(folder.join("left"), ros("0")).unwrap();
+    let depth = |right: &str, out: &str| {
+        fs::write(folder.join("right"), right).unwrap();
+        let line = "match @slanted/im0.png @slanted/im1.png OUT --also depth-mm --calib left --calib right --max-disparity 23";
+        run(&folder, &line.replace("OUT", out)).succeeded()
+    };
+    let remedy = "& say the right one in the file by an entry `unit`: mm, cm or m";
+    depth(&ros("-34.48"), "d.pfm").is_silent_on("apart");
+    depth(&ros("-0.03448"), "small.pfm").says(&format!("warning & 0.00016 m apart {remedy}"));
+    depth(&ros("-34480"), "large.pfm").says(&format!("warning & 160 m apart {remedy}"));
+    // The remedy.
+    depth(&(ros("-34480") + "unit: mm\n"), "again.pfm").is_silent_on("apart");
+    let bytes = |name: &str| fs::read(folder.join(name)).unwrap();
+    assert!(bytes("d.depth-mm.png") == bytes("again.depth-mm.png"));
+    // Elsewhere.
+    for line in [
+        "depth d.pfm e.pfm --calib left --calib right --also depth",
+        "rectify @slanted/im0.png @slanted/im1.png out --calib left --calib right",
+    ] {
+        fs::write(folder.join("right"), ros("-34480")).unwrap();
+        run(&folder, line).succeeded().says("160 m apart");
+    }
+    run(&folder, "depth d.pfm f.pfm --focal 215 --baseline 160m")
+        .succeeded()
+        .says("--focal & 160 m apart & 120mm, 12cm or 0.12m");
+    run(&folder, "depth d.pfm g.pfm --focal 4 --baseline 16cm")
+        .succeeded()
+        .says("4 px & 240 px wide & in pixels");
+    run(&folder, "depth d.pfm h.pfm --focal 215 --baseline 16cm").succeeded().is_silent_on("warning");
 }
 
 /// A rectification for `testdata/raw` of its own making, with the lenses and the pose that it is of.

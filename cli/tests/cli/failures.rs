@@ -107,7 +107,7 @@ const FAILURES: &[Failure] = &[
     (
         "M out.pfm --calib larger/calib.txt --also depth",
         1,
-        "larger/calib.txt is for images of 120 x 80 & left.png is 60 x 40",
+        "larger/calib.txt is for images of 120 x 90 & left.png is 60 x 40 & --calib-crop",
     ),
     ("M out.pfm --calib none.txt", 1, "none.txt & no such file & check the name"),
     ("M out.pfm --calib damaged/calib.txt", 1, "damaged/calib.txt & line 1 & ndisp"),

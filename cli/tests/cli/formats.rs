@@ -209,14 +209,14 @@ fn settings_of_rectified_pairs_give_depths() {
     let two = format!("%YAML:1.0\n{}{size}Camera.bf: 34.48\n", numbers("Camera"));
     assert!(depths(&three) == first && depths(&two) == first);
     // Its viewer writes numbers as words; 2 and 3 are sizes that the camera has not.
-    let realsense = r#"{"baseline": "-160", "intrinsic_left.x.x": "0.5", "rectified.0.width": "640", "rectified.0.height": "480",
+    let realsense = r#"{"baseline": "-160", "intrinsic_left.x.x": "0.5", "rectified.0.width": "640", "rectified.0.height": "400",
         "rectified.0.fx": "430", "rectified.0.fy": "430", "rectified.0.ppx": "320", "rectified.0.ppy": "240",
         "rectified.1.width": 240, "rectified.1.height": 180, "rectified.1.fx": 215.5, "rectified.1.fy": 215.5,
         "rectified.1.ppx": 118.5, "rectified.1.ppy": 89.5, "rectified.2.width": 0,
         "rectified.2.fx": 9, "rectified.3.width": 240, "rectified.3.height": 180, "rectified.3.fx": 0}"#;
     assert!(depths(realsense) == first);
     for (from, to, words) in [
-        ("180", "181", "is for images of 640 x 480, 240 x 181, and these are 240 x 180"),
+        ("180", "181", "is for images of 640 x 400, 240 x 181, and these are 240 x 180"),
         ("-160", "0", "baseline: expected a number of millimetres other than 0 & RealSense's"),
         ("\"rectified.1.fx\": 215.5", "\"rectified.1.fx\": -1", "rectified.1.fx: expected a number above 0"),
         ("rectified.1.ppy", "rectified.1.pp", "rectified.1.ppy is missing"),

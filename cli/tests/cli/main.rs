@@ -158,6 +158,11 @@ impl Run {
         }
     }
 
+    /// These words are not on standard error.
+    fn is_silent_on(&self, words: &str) {
+        assert!(!self.stderr.contains(words), "{}: `{words}` in: {}", self.line, self.stderr);
+    }
+
     /// The same of standard output.
     fn prints(&self, words: &str) {
         for word in words.split(" & ") {
@@ -279,7 +284,7 @@ fn workshop() -> Folder {
         ("huge", "ndisp=100000\n"),
         ("half", "cam0=[100 0 30; 0 100 20; 0 0 1]\n"),
         ("zero", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=0\n"),
-        ("larger", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=1\nwidth=120\nheight=80\n"),
+        ("larger", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=1\nwidth=120\nheight=90\n"),
         ("camera", "cam0=[100 0 30; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=1\nwidth=60\nheight=40\nndisp=17\n"),
     ] {
         fs::create_dir(at(name)).unwrap();

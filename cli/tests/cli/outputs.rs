@@ -157,7 +157,7 @@ fn depth_and_points_of_a_map_that_is_there() {
         ("d.pfm --calib @mixed/calib.txt --also validity", 2, "--also validity & a match"),
         ("d.pfm --calib @mixed/calib.txt --min-confidence 9", 2, "--min-confidence & --confidence"),
         ("d.pfm nowhere/e.pfm --calib @mixed/calib.txt", 1, "nowhere"),
-        ("d.pfm --calib @wall/calib.txt", 1, "calib.txt is for images of 240 x 180 & d.pfm is 320 x 240"),
+        ("d.pfm --calib @raw/cameras.yml", 1, "cameras.yml & not rectified"),
         (
             "d.pfm --calib @mixed/calib.txt --left @wall/im0.png --also points",
             1,

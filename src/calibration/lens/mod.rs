@@ -4,6 +4,7 @@ mod radial_tangential;
 mod wide;
 
 use crate::error::{Error, Result};
+use crate::image::calib::{Camera, Fit};
 
 pub use radial_tangential::RadialTangential;
 
@@ -158,6 +159,13 @@ impl Lens {
             )));
         }
         Ok(Self { focal_length, principal_point, distortion, reach: distortion.reach() })
+    }
+
+    /// The same lens before images of another size.
+    pub(crate) fn in_size(&self, fit: &Fit) -> Self {
+        let Camera { focal_length, principal_point } =
+            Camera { focal_length: self.focal_length, principal_point: self.principal_point }.in_size(fit);
+        Self { focal_length, principal_point, ..*self }
     }
 
     /// Focal length across and down, in pixels.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::args::{ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs};
+use crate::args::{CropArgs, ExecutionArgs, MethodArgs, ReadingArgs, RectificationArgs};
 use crate::outputs::MapArgs;
 
 use super::shard::{Shard, shard};
@@ -59,6 +59,9 @@ pub(crate) struct Args {
     // It is among the inputs.
     #[serde(skip)]
     pub(super) calib: Vec<PathBuf>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub(super) crop: CropArgs,
     /// The images are raw: rectifies each pair by its calibration first, as `mrfgs rectify` does
     #[arg(long)]
     pub(super) rectify: bool,

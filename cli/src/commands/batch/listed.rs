@@ -8,7 +8,7 @@ use mrfgs::depth::Rig;
 use mrfgs::image::read::Reader;
 use mrfgs::rectification::Options;
 
-use crate::args::{Search, Sign};
+use crate::args::{CropArgs, Search, Sign};
 use crate::failure::{Failure, Result};
 use crate::outputs::{Also, Files};
 use crate::pairs::folder::{self, CALIBRATION, Folder};
@@ -39,6 +39,8 @@ enum Source {
 pub(super) struct Given<'a> {
     /// The calibration of pairs for which the list has none.
     pub(super) calib: &'a [PathBuf],
+    /// The part of the calibrated images that the images show.
+    pub(super) crop: &'a CropArgs,
     /// How the images are rectified, where they are as the cameras took them.
     pub(super) rectify: Option<Options>,
     /// The output that takes the cameras.
@@ -152,7 +154,8 @@ impl Listed {
                     calib = calibration.iter().map(at).collect();
                 }
                 let (other, mask_file) = (right.as_ref().map(at), mask.as_ref().map(at));
-                let pair = input::views(reader, &at(left), other.as_deref(), mask_file.as_deref())?;
+                let views = if given.rectify.is_some() { input::raw_views } else { input::views };
+                let pair = views(reader, &at(left), other.as_deref(), mask_file.as_deref())?;
                 (pair, None, [left, right.as_ref().unwrap_or(left)].map(Clone::clone), mask.clone())
             }
             // Its calibration and its truth are of rectified images.
@@ -179,7 +182,7 @@ impl Listed {
             pair,
             &search,
             Sign::default(),
-            input::Calib::Files(&calib),
+            input::Calib::Files(&calib, given.crop),
             None,
             given.rectify.as_ref(),
             beside,

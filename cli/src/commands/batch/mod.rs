@@ -110,6 +110,7 @@ impl<'a> Batch<'a> {
         let List { base, pairs } = List::read(&args.list)?;
         let given = Given {
             calib: &args.calib,
+            crop: &args.crop,
             rectify: args.rectification.options_if(args.rectify)?,
             cameras: args.maps.also.take_cameras(),
             into: args.maps.also.into.as_deref(),

@@ -6,7 +6,7 @@ use mrfgs::low_level::text::quoted;
 use mrfgs_node::names::{Names, Rule};
 use mrfgs_node::topics::{GID_BYTES, LONG_GID_BYTES, MOST_DOMAIN};
 
-use crate::args::{CameraArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search, nanoseconds};
+use crate::args::{CameraArgs, CropArgs, ExecutionArgs, MethodArgs, RectificationArgs, Search, nanoseconds};
 use crate::failure::{Failure, Result};
 use crate::outputs::AlsoArgs;
 
@@ -68,6 +68,8 @@ pub(crate) struct Args {
     /// Calibration, in the place of what the cameras say: as `mrfgs match` takes it
     #[arg(long, value_name = "FILE")]
     pub(super) calib: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) crop: CropArgs,
     #[command(flatten)]
     pub(super) numbers: CameraArgs,
     #[command(flatten)]

@@ -149,7 +149,10 @@ impl<'a> Matching<'a> {
             ros::view(self.cameras.kind(side), bytes, Encoding::Cdr, Reader::default(), &name)
         };
         let (left, right) = threads::join(|| view(0, left), || view(1, right));
-        Ok(Pair::of_frames(left?, right?)?)
+        Ok(match self.args.are_rectified(&self.cameras) {
+            true => Pair::of_frames(left?, right?)?,
+            false => Pair::of_raw_frames(left?, right?)?,
+        })
     }
 
     /// What follows from the first pair of cameras that say this.
@@ -157,7 +160,7 @@ impl<'a> Matching<'a> {
         let args = self.args;
         let size = pair.size();
         let texts = self.texts(infos.as_ref())?;
-        let calib = texts.as_deref().map_or(Calib::Files(&args.calib), Calib::Texts);
+        let calib = texts.as_deref().map_or(Calib::Files(&args.calib, &args.crop), Calib::Texts);
         let rectifying = args.rectification.options_if(!args.are_rectified(&self.cameras))?;
         let (sign, numbers) = (Sign::default(), Some(&args.numbers));
         let mut input = Input::new(pair, &args.search, sign, calib, numbers, rectifying.as_ref(), None)?;

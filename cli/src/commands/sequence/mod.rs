@@ -17,8 +17,8 @@ use mrfgs::steady::Steady;
 use mrfgs::{Error, Matcher};
 
 use crate::args::{
-    CameraArgs, ExecutionArgs, MethodArgs, ReadingArgs, RecordingArgs, RectificationArgs, RegionArgs, Search,
-    Sign,
+    CameraArgs, CropArgs, ExecutionArgs, MethodArgs, ReadingArgs, RecordingArgs, RectificationArgs,
+    RegionArgs, Search, Sign,
 };
 use crate::failure::{Failure, Result};
 use crate::outputs::messages::Messages;
@@ -106,6 +106,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     calib: Vec<PathBuf>,
     #[command(flatten)]
+    crop: CropArgs,
+    #[command(flatten)]
     numbers: CameraArgs,
     /// Image of the size of a left frame: where it is not black, LEFT is ignored in all frames
     #[arg(long, value_name = "FILE")]
@@ -187,6 +189,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         Some(recorded) => masked(Frames::of_recording(recorded), args)?,
         None => open(args)?,
     };
+    if rectify {
+        frames = frames.as_raw();
+    }
     let first_image = frames.first_image().map(Path::to_owned);
     check_outputs(args, &frames, first_image.as_deref())?;
     let rate = frames.rate();
@@ -200,7 +205,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         .as_deref()
         .filter(|_| takes_cameras(args) || kind.takes_messages() || args.search.takes_calibration());
     let numbers = Some(&args.numbers);
-    let calib = texts.as_deref().map_or(Calib::Files(&args.calib), Calib::Texts);
+    let calib = texts.as_deref().map_or(Calib::Files(&args.calib, &args.crop), Calib::Texts);
     let mut input = Input::new(pair, &args.search, sign, calib, numbers, rectifying.as_ref(), beside)?;
     if let Some(by) = &mut input.rectification {
         by.keep_places()?;

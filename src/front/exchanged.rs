@@ -1,0 +1,31 @@
+//! Which of two images is the left one, where a calibration has the right camera on the left.
+
+use super::matches;
+use crate::calibration::cameras::StereoCalibration;
+use crate::error::Result;
+use crate::image::Pair;
+use crate::maps::FRACTION;
+use crate::rectification::{Options, Rectification};
+
+impl Rectification {
+    /// The rectification of the raw images of `pair` by a calibration, as [`Rectification::of_sizes`] makes it. Where that has the right
+    /// camera on the left of the left one, the matches of the pair say whether its images are exchanged as well: nothing is behind the
+    /// cameras. Without matches they stay as they are.
+    ///
+    /// # Errors
+    /// Those of [`Rectification::new`]; [`Error::Memory`](crate::Error::Memory) when the machine has not enough for the rectified pair.
+    pub fn for_pair(calibration: &StereoCalibration, pair: &Pair, options: &Options) -> Result<Self> {
+        let by = Self::of_sizes(calibration, pair.own_sizes(), options)?;
+        if !by.has_exchanged_cameras() {
+            return Ok(by);
+        }
+        let rectified = by.apply(pair)?;
+        if matches::check_memory(&rectified).is_err() {
+            return Ok(by);
+        }
+        let infinite = -by.calibration()?.doffs.unwrap_or(0.0) * f64::from(FRACTION);
+        let found = matches::find(&rectified, None, None);
+        let behind = found.iter().filter(|m| f64::from(m.disparity) < infinite).count();
+        Ok(if 2 * behind > found.len() { by.with_images_exchanged() } else { by })
+    }
+}

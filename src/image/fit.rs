@@ -1,0 +1,137 @@
+//! Images of one camera in another size.
+
+use std::fmt;
+
+use super::Rect;
+
+/// How images of a camera come out of those that its calibration is of: all of them or a part, which may be scaled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Width and height of the images that the calibration is of.
+    pub calibrated: (usize, usize),
+    /// Width and height of the images that it is taken for.
+    pub size: (usize, usize),
+    /// Where these begin in the others, in pixels from the outer corner of those.
+    origin: [f64; 2],
+    /// Pixels of these to one of the others, across and down.
+    scale: [f64; 2],
+}
+
+impl Fit {
+    /// The whole images, scaled; `None` where the sizes have not one aspect.
+    #[must_use]
+    pub fn scaled(calibrated: (usize, usize), size: (usize, usize)) -> Option<Self> {
+        /// An image that lacks a row is no smaller one whose rows were rounded.
+        const LEAST: f64 = 0.1;
+        let scale = ratios(calibrated, size);
+        let [width, height] = [calibrated.0, calibrated.1].map(|side| side as f64);
+        let exact = calibrated.0 * size.1 == calibrated.1 * size.0;
+        let rounded =
+            (width * scale[1] - size.0 as f64).abs() < 1.0 || (height * scale[0] - size.1 as f64).abs() < 1.0;
+        let fits = exact || rounded && (scale[0] - 1.0).abs() > LEAST;
+        (fits && scale.iter().all(|scale| *scale > 0.0)).then_some(Self {
+            calibrated,
+            size,
+            origin: [0.0; 2],
+            scale,
+        })
+    }
+
+    /// The middle of the images, scaled until it fills these.
+    pub(crate) fn middle(calibrated: (usize, usize), size: (usize, usize)) -> Self {
+        let [across, down] = ratios(calibrated, size);
+        Self::around_middle(calibrated, size, across.max(down))
+    }
+
+    /// The images with their middle in the middle of these, scaled to the same width.
+    pub(crate) fn centred(calibrated: (usize, usize), size: (usize, usize)) -> Self {
+        Self::around_middle(calibrated, size, ratios(calibrated, size)[0])
+    }
+
+    fn around_middle(calibrated: (usize, usize), size: (usize, usize), scale: f64) -> Self {
+        let sides = [(calibrated.0, size.0), (calibrated.1, size.1)];
+        let origin = sides.map(|(known, side)| (known as f64 - side as f64 / scale) / 2.0);
+        Self { calibrated, size, origin, scale: [scale; 2] }
+    }
+
+    /// A part of the images, as it is.
+    pub(crate) fn part(part: &Rect) -> Self {
+        let (size, origin) = (part.size(), [part.x.start, part.y.start].map(|v| v as f64));
+        Self { calibrated: size, size, origin, scale: [1.0; 2] }
+    }
+
+    /// Where a place of the calibrated images is in these. Both count from the centre of the top left pixel.
+    pub(crate) fn place(&self, at: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| (at[i] + 0.5 - self.origin[i]) * self.scale[i] - 0.5)
+    }
+
+    /// Pixels of these to one of the calibrated images, across and down.
+    pub(crate) fn scale(&self) -> [f64; 2] {
+        self.scale
+    }
+}
+
+fn ratios(calibrated: (usize, usize), size: (usize, usize)) -> [f64; 2] {
+    [size.0 as f64 / calibrated.0 as f64, size.1 as f64 / calibrated.1 as f64]
+}
+
+impl fmt::Display for Fit {
+    /// As what follows the name of a calibration.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { calibrated: (width, height), size: (w, h), origin, scale } = *self;
+        write!(f, "is for images of {width} x {height}: those of {w} x {h} count as ")?;
+        match (origin == [0.0; 2], scale == [1.0; 2]) {
+            (true, _) => f.write_str("the same, scaled"),
+            (false, true) => f.write_str("the middle of them"),
+            (false, false) => {
+                let [w, h] = [w as f64 / scale[0], h as f64 / scale[1]].map(f64::round);
+                write!(f, "their middle {w} x {h}, scaled")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_of_one_aspect_are_scaled() {
+        for (calibrated, size, fits) in [
+            ((1280, 960), (640, 480), true),
+            ((640, 480), (1280, 960), true),
+            ((1242, 375), (621, 187), true),
+            ((1242, 375), (621, 188), true),
+            ((240, 180), (241, 180), false),
+            ((240, 180), (240, 179), false),
+            ((1280, 800), (1280, 720), false),
+            ((640, 480), (480, 640), false),
+            ((0, 0), (640, 480), false),
+            ((640, 480), (0, 0), false),
+        ] {
+            assert_eq!(Fit::scaled(calibrated, size).is_some(), fits, "{calibrated:?} {size:?}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_scaled_about_the_outer_corner() {
+        let half = Fit::scaled((1280, 960), (640, 480)).unwrap();
+        // The middle of both, and the centre of the first two pixels in each direction.
+        assert_eq!(half.place([639.5, 479.5]), [319.5, 239.5]);
+        assert_eq!(half.place([0.5, 0.5]), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn the_middle_fills_an_image() {
+        let of = |size| Fit::middle((1280, 800), size);
+        assert_eq!(of((1280, 720)).place([640.0, 400.0]), [640.0, 360.0]);
+        assert_eq!(
+            of((1280, 720)).to_string(),
+            "is for images of 1280 x 800: those of 1280 x 720 count as the middle of them"
+        );
+        // 0.6 of it are 768 x 480.
+        let narrow = of((640, 480));
+        assert!(narrow.place([639.5, 399.5]).iter().zip([319.5, 239.5]).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert!(narrow.to_string().ends_with("count as their middle 1067 x 800, scaled"), "{narrow}");
+    }
+}
