@@ -100,10 +100,11 @@ impl Rectification {
         let lens = found.lens()?;
         let views = views::choose(&[lens; 2], &found.pose(agreeing), size, options);
         views
-            .and_then(|views| match views.is_exchanged() {
-                true => Err(RectificationError::Forward.into()),
-                false => Ok(views),
-            })
+            .and_then(
+                |views| {
+                    if views.is_exchanged() { Err(RectificationError::Forward.into()) } else { Ok(views) }
+                },
+            )
             .and_then(|views| Self::of_views(&[lens; 2], views, [size; 2], Unit::default(), Vec::new()))
             .map_err(|_| RectificationError::Forward.into())
     }

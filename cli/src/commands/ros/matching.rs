@@ -149,10 +149,8 @@ impl<'a> Matching<'a> {
             ros::view(self.cameras.kind(side), bytes, Encoding::Cdr, Reader::default(), &name)
         };
         let (left, right) = threads::join(|| view(0, left), || view(1, right));
-        Ok(match self.args.are_rectified(&self.cameras) {
-            true => Pair::of_frames(left?, right?)?,
-            false => Pair::of_raw_frames(left?, right?)?,
-        })
+        let rectified = self.args.are_rectified(&self.cameras);
+        Ok(if rectified { Pair::of_frames(left?, right?)? } else { Pair::of_raw_frames(left?, right?)? })
     }
 
     /// What follows from the first pair of cameras that say this.
